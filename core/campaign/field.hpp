@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <string_view>
+
+namespace proofmass {
+
+/// Interval of admissible values of a field; an infinite end is no bound.
+struct Range {
+  double minimum = -std::numeric_limits<double>::infinity();
+  double maximum = std::numeric_limits<double>::infinity();
+  bool minimum_open = false;  ///< True if `minimum` itself is not admissible.
+  bool maximum_open = false;
+
+  [[nodiscard]] bool contains(double value) const;
+  /// For people: `must be in (0, 1]`, `must be > 0`, `must be finite`.
+  [[nodiscard]] std::string rule() const;
+};
+
+namespace range {
+inline constexpr Range any{};
+inline constexpr Range positive{.minimum = 0.0, .minimum_open = true};
+inline constexpr Range not_negative{.minimum = 0.0};
+[[nodiscard]] constexpr Range between(double minimum, double maximum) {
+  return {.minimum = minimum, .maximum = maximum};
+}
+}  // namespace range
+
+/// Name, meaning and rule of one number or choice of a scenario.
+struct FieldInfo {
+  std::string_view path;     ///< `estimation.transient_s`: table and key in a campaign file.
+  std::string_view comment;  ///< One line: meaning, and where the default comes from.
+  Range range = range::any;  ///< For numbers.
+};
+
+/// @throws ConfigError if the value is not finite or outside the field's range.
+void check_field(const FieldInfo& field, double value);
+
+}  // namespace proofmass

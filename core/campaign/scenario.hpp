@@ -1,0 +1,154 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/campaign/field.hpp"
+#include "core/campaign/parameter.hpp"
+#include "core/session/session.hpp"
+
+namespace proofmass {
+
+enum class EnvironmentKind : std::uint8_t { harmonic = 1, file = 2 };
+enum class NoisePreset : std::uint8_t { design_2013 = 1, flight_suref = 2 };
+enum class EstimationMethod : std::uint8_t { hardy2013 = 1 };
+enum class Correction : std::uint8_t { first_order = 1, second_order = 2 };
+
+/// Spelling of an enumerator in campaign files; the list of all of them, in value order from 1.
+[[nodiscard]] std::span<const std::string_view> names_of(EnvironmentKind);
+[[nodiscard]] std::span<const std::string_view> names_of(NoisePreset);
+[[nodiscard]] std::span<const std::string_view> names_of(EstimationMethod);
+[[nodiscard]] std::span<const std::string_view> names_of(Correction);
+
+struct OrbitConfig {
+  double period_s = 5950.0;
+  double eccentricity = 5e-3;
+};
+
+struct SimulationConfig {
+  double sample_period_s = 0.25;
+  double settling_s = 4000.0;  ///< Time that the loops run before a session's record begins.
+};
+
+/// mean + a₁ cos(n t + φ₁) + a₂ cos(2 n t + φ₂), t from perigee, n the mean motion.
+struct HarmonicAxis {
+  double mean = 0.0;
+  double orbital = 0.0;
+  double orbital_phase_rad = 0.0;
+  double twice_orbital = 0.0;
+  double twice_orbital_phase_rad = 0.0;
+};
+
+/// External acceleration of the satellite, in S: linear m/s², angular rad/s².
+struct EnvironmentConfig {
+  EnvironmentKind kind = EnvironmentKind::harmonic;
+  double scale = 1.0;  ///< Multiplies every external acceleration; 0 switches them off.
+  HarmonicAxis linear_x, linear_y, linear_z;
+  HarmonicAxis angular_x, angular_y, angular_z;
+
+  EnvironmentConfig();  ///< The nominal harmonic environment.
+};
+
+/// One-sided PSD white²·(1 + f_p/f) + rise²·(f/f_r)⁴ / (1 + (f/f_l)⁴); no limit if f_l = 0.
+struct SensorNoise {
+  double white_asd = 0.0;  ///< unit/√Hz.
+  double pink_corner_hz = 0.0;
+  double rise_asd = 0.0;  ///< unit/√Hz; 0 for no rise.
+  double rise_corner_hz = 0.03;
+  double rise_limit_hz = 0.0;
+};
+
+struct NoiseConfig {
+  NoisePreset preset = NoisePreset::design_2013;
+  double scale = 1.0;     ///< Multiplies every noise of the simulation; 0 switches them off.
+  SensorNoise linear_x;   ///< Each sensor, sensitive axis, m/s².
+  SensorNoise linear_yz;  ///< Each sensor, Y and Z, m/s².
+  SensorNoise angular;    ///< Measured angular acceleration, each axis, rad/s².
+  double star_tracker_across_asd_rad = 7e-6;       ///< One head, across its boresight, rad/√Hz.
+  double star_tracker_boresight_asd_rad = 3.5e-5;  ///< One head, about its boresight, rad/√Hz.
+  double thrust_asd_m_s2 = 4.7e-10;                ///< Each axis, (m/s²)/√Hz.
+  double torque_asd_rad_s2 = 1e-9;                 ///< Each axis, (rad/s²)/√Hz.
+
+  NoiseConfig();  ///< The preset `design_2013`.
+};
+
+/// All of a preset's noise, with scale 1.
+[[nodiscard]] NoiseConfig noise_preset(NoisePreset preset);
+
+/// Linear loop L(s) = (ω_c/s)(1 + ω_i/s), one sample of delay.
+struct DragFreeConfig {
+  double bandwidth_hz = 0.05;  ///< f_c.
+  double integral_hz = 0.005;  ///< f_i.
+  /// Error of the read-out bias that the loop subtracts, on each axis of S, m/s².
+  double bias_compensation_error_x_m_s2 = 0.0;
+  double bias_compensation_error_y_m_s2 = 0.0;
+  double bias_compensation_error_z_m_s2 = 0.0;
+};
+
+/// Proportional-derivative loop of natural frequency f and damping ζ, with a slow integral.
+struct AttitudeConfig {
+  double bandwidth_hz = 0.02;
+  double damping = 0.8;
+  double integral_hz = 1e-3;  ///< Corner below which the integral acts.
+  double blending_hz = 3e-3;  ///< Crossover from star tracker to angular accelerometer.
+};
+
+struct EstimationConfig {
+  EstimationMethod method = EstimationMethod::hardy2013;
+  Correction correction = Correction::second_order;
+  double transient_s = 1000.0;  ///< Filtered record dropped at a session's start.
+  double band_ratio = 3.0;      ///< Band-pass from f/ratio to f·ratio.
+  double convergence = 0.01;    ///< Stop when no estimate moves by this part of its objective.
+  std::int64_t num_rounds_max = 10;
+};
+
+/// A draw outside these bounds is drawn again.
+struct AcceptanceConfig {
+  double a_d11_max = 1e-2;
+  double a_d1j_max_rad = 1.6e-3;  ///< |a_d12| and |a_d13|.
+  double a_c1j_max_rad = 2.6e-3;  ///< |a_c12| and |a_c13|.
+};
+
+/// Levels and bounds behind the budget tables ([Hardy2013] tab:Budget, tab:Budget_cali).
+struct BudgetConfig {
+  double t_xy_s2 = 3.0e-11;            ///< T_xy at f_EP, from 1.4 mrad of tilt.
+  double residual_m_s2 = 1e-12;        ///< Drag-free residue at f_EP.
+  double differential_m_s2 = 1.43e-8;  ///< Γ_app,d at DC.
+  double offcentring_max_m = 20e-6;
+  double scale_factor_error_max = 1e-2;
+  double quadratic_factor_max_s2_m = 14000.0;
+};
+
+/// Everything that defines the runs of a campaign apart from seed, number and dispersions.
+struct Scenario {
+  OrbitConfig orbit;
+  SimulationConfig simulation;
+  EnvironmentConfig environment;
+  NoiseConfig noise;
+  DragFreeConfig drag_free;
+  AttitudeConfig attitude;
+  EstimationConfig estimation;
+  AcceptanceConfig acceptance;
+  BudgetConfig budget;
+  ParameterArray objectives;  ///< SI; [Hardy2013] tab:perfo-numerical by default.
+  std::vector<Session> sessions;
+
+  Scenario();  ///< The nominal scenario.
+
+  /// @throws ConfigError naming the field, its value and the rule.
+  void validate() const;
+};
+
+/// Calls visit(FieldInfo, value) for every number and choice of the scenario except its sessions,
+/// in file order. `Config` is Scenario or const Scenario; the value is a (const) reference to
+/// double, std::int64_t or one of the enumerations above.
+template <typename Config, typename Visitor>
+void for_each_field(Config& scenario, Visitor&& visit);
+
+}  // namespace proofmass
+
+#include "core/campaign/scenario_fields.hpp"

@@ -1,0 +1,129 @@
+#include "core/random/normal.hpp"
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <span>
+
+#include "core/error.hpp"
+#include "core/math/elementary.hpp"
+
+namespace proofmass {
+namespace {
+
+/// ln u for 2⁻³² ≤ u ≤ 1, error below 2 units in the last place: 2 artanh(s) of the mantissa.
+float log_unit(float u) {
+  const auto bits = std::bit_cast<std::int32_t>(u);
+  // Moves the split between exponents to √½, so that the mantissa lies in [√½, √2).
+  const std::int32_t shifted = bits - 0x3f3504f3;
+  const auto exponent = static_cast<float>(shifted >> 23);
+  const auto m = std::bit_cast<float>((shifted & 0x007fffff) + 0x3f3504f3);
+  const float s = (m - 1.0F) / (m + 1.0F);
+  const float z = s * s;
+  const float tail = z * (2.0F / 3 + z * (2.0F / 5 + z * (2.0F / 7 + z * (2.0F / 9))));
+  return exponent * 0.693147180559945F + s * (2.0F + tail);
+}
+
+struct SineCosineFloat {
+  float sine, cosine;
+};
+
+/// sin and cos of word/2³² turns, error below 1.2e-7.
+SineCosineFloat sincos_word(std::uint32_t word) {
+  const std::uint32_t quarter = (word + 0x20000000U) >> 30;
+  const auto rest = static_cast<std::int32_t>(word - (quarter << 30));  // Within ±⅛ turn.
+  const float x = static_cast<float>(rest) * 1.46291807926715968e-9F;   // 2π/2³²
+  const float z = x * x;
+  const float sine =
+      x * (1.0F - z * (1.0F / 6 - z * (1.0F / 120 - z * (1.0F / 5040 - z * (1.0F / 362880)))));
+  const float cosine =
+      1.0F -
+      z * (0.5F - z * (1.0F / 24 - z * (1.0F / 720 - z * (1.0F / 40320 - z * (1.0F / 3628800)))));
+  const bool swapped = (quarter & 1U) != 0;
+  const float first = swapped ? cosine : sine;
+  const float second = swapped ? sine : cosine;
+  const bool sine_negative = (quarter & 2U) != 0;
+  const bool cosine_negative = ((quarter + 1U) & 2U) != 0;
+  return {sine_negative ? -first : first, cosine_negative ? -second : second};
+}
+
+struct Pair {
+  float first, second;
+};
+
+Pair box_muller(std::uint32_t radius_word, std::uint32_t angle_word) {
+  // Centres of cells of width 2⁻³¹ where a float resolves them: u in [2⁻³², 1].
+  const float u =
+      (static_cast<float>(static_cast<std::int32_t>(radius_word >> 1)) + 0.5F) * 0x1p-31F;
+  const float radius = std::sqrt(-2.0F * log_unit(u));
+  const auto [sine, cosine] = sincos_word(angle_word);
+  return {radius * cosine, radius * sine};
+}
+
+double ratio(std::span<const double, 8> numerator, std::span<const double, 8> denominator,
+             double r) {
+  double p = numerator[7];
+  double q = denominator[7];
+  for (std::size_t i = 7; i-- > 0;) {
+    p = p * r + numerator[i];
+    q = q * r + denominator[i];
+  }
+  return p / q;
+}
+
+// [Wichura1988] PPND16: centre, |p − ½| ≤ 0.425; middle, √(−ln p) ≤ 5; tail beyond.
+constexpr std::array<double, 8> centre_p{3.3871328727963666080e0, 1.3314166789178437745e2,
+                                         1.9715909503065514427e3, 1.3731693765509461125e4,
+                                         4.5921953931549871457e4, 6.7265770927008700853e4,
+                                         3.3430575583588128105e4, 2.5090809287301226727e3};
+constexpr std::array<double, 8> centre_q{1.0,
+                                         4.2313330701600911252e1,
+                                         6.8718700749205790830e2,
+                                         5.3941960214247511077e3,
+                                         2.1213794301586595867e4,
+                                         3.9307895800092710610e4,
+                                         2.8729085735721942674e4,
+                                         5.2264952788528545610e3};
+constexpr std::array<double, 8> middle_p{1.42343711074968357734e0,  4.63033784615654529590e0,
+                                         5.76949722146069140550e0,  3.64784832476320460504e0,
+                                         1.27045825245236838258e0,  2.41780725177450611770e-1,
+                                         2.27238449892691845833e-2, 7.74545014278341407640e-4};
+constexpr std::array<double, 8> middle_q{1.0,
+                                         2.05319162663775882187e0,
+                                         1.67638483018380384940e0,
+                                         6.89767334985100004550e-1,
+                                         1.48103976427480074590e-1,
+                                         1.51986665636164571966e-2,
+                                         5.47593808499534494600e-4,
+                                         1.05075007164441684324e-9};
+constexpr std::array<double, 8> tail_p{6.65790464350110377720e0,  5.46378491116411436990e0,
+                                       1.78482653991729133580e0,  2.96560571828504891230e-1,
+                                       2.65321895265761230930e-2, 1.24266094738807843860e-3,
+                                       2.71155556874348757815e-5, 2.01033439929228813265e-7};
+constexpr std::array<double, 8> tail_q{1.0,
+                                       5.99832206555887937690e-1,
+                                       1.36929880922735805310e-1,
+                                       1.48753612908506148525e-2,
+                                       7.86869131145613259100e-4,
+                                       1.84631831751005468180e-5,
+                                       1.42151175831644588870e-7,
+                                       2.04426310338993978564e-15};
+
+}  // namespace
+
+std::array<float, 4> normal_deviates(const RandomBlock& block) {
+  const Pair a = box_muller(block[0], block[1]);
+  const Pair b = box_muller(block[2], block[3]);
+  return {a.first, a.second, b.first, b.second};
+}
+
+double inverse_normal(double probability) {
+  PROOFMASS_EXPECT(probability > 0.0 && probability < 1.0);
+  const double q = probability - 0.5;
+  if (std::abs(q) <= 0.425) return q * ratio(centre_p, centre_q, 0.180625 - q * q);
+  const double r = std::sqrt(-logarithm(q < 0.0 ? probability : 1.0 - probability));
+  const double x = r <= 5.0 ? ratio(middle_p, middle_q, r - 1.6) : ratio(tail_p, tail_q, r - 5.0);
+  return q < 0.0 ? -x : x;
+}
+
+}  // namespace proofmass

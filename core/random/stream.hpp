@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "core/campaign/identifiers.hpp"
+
+namespace proofmass {
+
+/// 128 random bits.
+using RandomBlock = std::array<std::uint32_t, 4>;
+
+/// Philox4x32-10 [Salmon2011]: a bijection of the counter for every key, used as a random function.
+[[nodiscard]] RandomBlock philox(const RandomBlock& counter, std::uint64_t key);
+
+/// Number of a stream, from its name (32-bit FNV-1a). Adding a stream changes no other one.
+[[nodiscard]] std::uint32_t stream_id(std::string_view name);
+
+/// The random numbers of one name in one run: block i is a pure function of (seed, run, name, i),
+/// so any part of any run can be computed alone.
+class RandomStream {
+ public:
+  RandomStream(std::uint64_t seed, RunIndex run, std::uint32_t id)
+      : key_(seed),
+        id_(id),
+        run_low_(static_cast<std::uint32_t>(run.value)),
+        run_high_(static_cast<std::uint32_t>(run.value >> 32)) {}
+
+  [[nodiscard]] RandomBlock block(std::uint32_t index) const {
+    return philox({index, id_, run_low_, run_high_}, key_);
+  }
+
+ private:
+  std::uint64_t key_;
+  std::uint32_t id_, run_low_, run_high_;
+};
+
+/// Uniform on (0, 1), never an end: the centres of 2⁵² equal cells, from the first 64 bits.
+[[nodiscard]] double uniform(const RandomBlock& block);
+
+}  // namespace proofmass

@@ -1,0 +1,75 @@
+#include "core/session/session_signals.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "core/math/elementary.hpp"
+
+namespace proofmass {
+
+std::int64_t num_record_samples(const Scenario& scenario, const Session& session) {
+  const double samples =
+      session.num_orbits * scenario.orbit.period_s / scenario.simulation.sample_period_s;
+  return static_cast<std::int64_t>(std::floor(samples + 1e-6));
+}
+
+SessionSignals::SessionSignals(const Scenario& scenario, const Session& session,
+                               const KeplerOrbit& orbit, const Environment& environment)
+    : orbit_(&orbit),
+      environment_(environment),
+      gains_(attitude_gains(scenario.attitude, scenario.simulation.sample_period_s)),
+      sample_period_s_(scenario.simulation.sample_period_s),
+      spin_rate_rad_s_(session.spin_rate_rad_s),
+      num_settling_(static_cast<std::int64_t>(
+          std::floor(scenario.simulation.settling_s / scenario.simulation.sample_period_s))),
+      num_record_(num_record_samples(scenario, session)),
+      next_(-num_settling_) {
+  environment_.begin_session(static_cast<double>(num_record_) * sample_period_s_);
+  if (!session.excitations.empty()) {
+    has_excitation_ = true;
+    excitation_ = session.excitations.front();
+  }
+}
+
+SharedSample SessionSignals::next() {
+  const double time_s = static_cast<double>(next_) * sample_period_s_;
+  const OrbitPoint point = orbit_->at(time_s);
+  SharedSample sample;
+  sample.gradient_s2 = point.gradient_s2;
+  sample.earth_direction_I = {point.direction_x, 0.0, point.direction_z};
+  sample.earth_direction_R = sample.earth_direction_I;
+  sample.external = environment_.at(time_s, point);
+  if (spin_rate_rad_s_ != 0.0) {
+    const double turns = spin_rate_rad_s_ * time_s / (2.0 * std::numbers::pi);
+    const auto [sine, cosine] = sincos_turns(0.5 * turns);
+    sample.reference_IR = {cosine, {0.0, sine, 0.0}};
+    sample.reference_rate = {0.0, spin_rate_rad_s_, 0.0};
+    sample.earth_direction_R = to_target(sample.reference_IR, sample.earth_direction_I);
+  }
+  if (has_excitation_) excite(time_s, sample);
+  commanded_.correct(gains_, sample.attitude_command_rad);
+  sample.commanded = commanded_;
+  commanded_.predict(gains_, {}, sample.reference_rate);
+  ++next_;
+  return sample;
+}
+
+void SessionSignals::excite(double time_s, SharedSample& sample) const {
+  const auto [sine, cosine] = sincos_turns(excitation_.frequency_hz * time_s);
+  const double value = excitation_.amplitude * sine;
+  switch (excitation_.kind) {
+    case ExcitationKind::attitude:
+      sample.attitude_command_rad[index(excitation_.axis)] = value;
+      break;
+    case ExcitationKind::drag_free:
+      sample.drag_free_command_m_s2[index(excitation_.axis)] = value;
+      break;
+    case ExcitationKind::test_mass: {
+      const double omega = 2.0 * std::numbers::pi * excitation_.frequency_hz;
+      sample.mass_motion = {value, omega * excitation_.amplitude * cosine, -omega * omega * value};
+      break;
+    }
+  }
+}
+
+}  // namespace proofmass

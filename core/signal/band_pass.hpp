@@ -1,0 +1,47 @@
+#pragma once
+
+namespace proofmass {
+
+/// Second-order recursive filter y = (b0 + b1 z⁻¹ + b2 z⁻²)/(1 + a1 z⁻¹ + a2 z⁻²) x.
+struct Biquad {
+  double b0, b1, b2, a1, a2;
+};
+
+/// Butterworth sections of second order, bilinear transform with the corner kept in place.
+/// 0 < corner_hz < ½/sample_period_s.
+[[nodiscard]] Biquad butterworth_low_pass(double corner_hz, double sample_period_s);
+[[nodiscard]] Biquad butterworth_high_pass(double corner_hz, double sample_period_s);
+
+/// The pass-band filter of [Hardy2013] section 5.2: a high-pass and a low-pass Butterworth section.
+struct BandPass {
+  Biquad high_pass;
+  Biquad low_pass;
+};
+
+[[nodiscard]] BandPass band_pass(double low_corner_hz, double high_corner_hz,
+                                 double sample_period_s);
+
+/// Memory of a Biquad (transposed direct form II).
+struct BiquadState {
+  double s1 = 0.0;
+  double s2 = 0.0;
+
+  double advance(const Biquad& filter, double x) {
+    const double y = filter.b0 * x + s1;
+    s1 = filter.b1 * x - filter.a1 * y + s2;
+    s2 = filter.b2 * x - filter.a2 * y;
+    return y;
+  }
+};
+
+/// Memory of a BandPass.
+struct BandPassState {
+  BiquadState high_pass;
+  BiquadState low_pass;
+
+  double advance(const BandPass& filter, double x) {
+    return low_pass.advance(filter.low_pass, high_pass.advance(filter.high_pass, x));
+  }
+};
+
+}  // namespace proofmass

@@ -1,0 +1,142 @@
+#include "core/signal/line_weights.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.hpp"
+#include "core/math/elementary.hpp"
+
+namespace proofmass {
+namespace {
+
+/// Σ over k in [first, last) of e^{2πi·turns·k}, from the geometric series.
+std::complex<double> phasor_sum(double turns, std::size_t first, std::size_t last) {
+  const auto count = static_cast<double>(last - first);
+  const double middle = 0.5 * (static_cast<double>(first) + static_cast<double>(last) - 1.0);
+  const double step = sincos_turns(0.5 * turns).sine;
+  // Equal lines: the limit of the quotient.
+  const double length =
+      std::abs(step) < 1e-15 ? count : sincos_turns(0.5 * turns * count).sine / step;
+  const auto [sine, cosine] = sincos_turns(turns * middle);
+  return {length * cosine, length * sine};
+}
+
+/// ΦᵀΦ of cosine and sine of all lines over the kept samples, in closed form.
+Eigen::MatrixXd gram_matrix(const LineFit& fit, const std::vector<double>& lines_hz) {
+  const auto n = static_cast<Eigen::Index>(lines_hz.size());
+  Eigen::MatrixXd gram(2 * n, 2 * n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const double a = lines_hz[static_cast<std::size_t>(i)] * fit.sample_period_s;
+      const double b = lines_hz[static_cast<std::size_t>(j)] * fit.sample_period_s;
+      const auto difference = phasor_sum(a - b, fit.num_dropped, fit.num_samples);
+      const auto sum = phasor_sum(a + b, fit.num_dropped, fit.num_samples);
+      gram(2 * i, 2 * j) = 0.5 * (difference.real() + sum.real());
+      gram(2 * i, 2 * j + 1) = 0.5 * (sum.imag() - difference.imag());
+      gram(2 * i + 1, 2 * j) = 0.5 * (sum.imag() + difference.imag());
+      gram(2 * i + 1, 2 * j + 1) = 0.5 * (difference.real() - sum.real());
+    }
+  }
+  return gram;
+}
+
+}  // namespace
+
+LineWeights::LineWeights(const LineFit& fit) : fit_(fit), lines_hz_(fit.fit_hz) {
+  lines_hz_.insert(lines_hz_.end(), fit.known_hz.begin(), fit.known_hz.end());
+  if (fit.num_samples < fit.num_dropped + 2 * lines_hz_.size()) {
+    throw InvalidArgument(fmt::format("line fit: {} samples kept of {} are fewer than {} unknowns",
+                                      fit.num_samples - std::min(fit.num_dropped, fit.num_samples),
+                                      fit.num_samples, 2 * lines_hz_.size()));
+  }
+  solve_design();
+
+  const std::size_t num_outputs = 2 * num_fit_lines();
+  means_.assign(num_outputs, 0.0);
+  block_ends_.resize((fit_.num_samples + block_size - 1) / block_size);
+  States states(num_outputs);
+  std::vector<double> weights(block_size * num_outputs);
+  std::vector<double> sums(num_outputs, 0.0);
+  for (std::size_t block = num_blocks(); block-- > 0;) {
+    block_ends_[block] = states;
+    run_backwards(block, states, weights);
+    for (std::size_t i = 0; i < samples_in(block) * num_outputs; ++i) {
+      sums[i % num_outputs] += weights[i];
+    }
+  }
+  for (std::size_t i = 0; i < num_outputs; ++i) {
+    means_[i] = sums[i] / static_cast<double>(fit_.num_samples);
+  }
+}
+
+void LineWeights::solve_design() {
+  const Eigen::MatrixXd gram = gram_matrix(fit_, lines_hz_);
+  const Eigen::LDLT<Eigen::MatrixXd> factors(gram);
+  const Eigen::VectorXd pivots = factors.vectorD();
+  if (factors.info() != Eigen::Success || pivots.minCoeff() < 1e-10 * pivots.maxCoeff()) {
+    throw InvalidArgument("line fit: two lines are too close to be told apart in the record");
+  }
+  const auto num_outputs = static_cast<Eigen::Index>(2 * num_fit_lines());
+  const Eigen::MatrixXd columns =
+      factors.solve(Eigen::MatrixXd::Identity(gram.rows(), num_outputs));
+  coefficients_.resize(static_cast<std::size_t>(columns.size()));
+  for (Eigen::Index row = 0; row < columns.rows(); ++row) {
+    for (Eigen::Index output = 0; output < num_outputs; ++output) {
+      coefficients_[static_cast<std::size_t>(row * num_outputs + output)] = columns(row, output);
+    }
+  }
+}
+
+std::size_t LineWeights::samples_in(std::size_t block) const {
+  return std::min(block_size, fit_.num_samples - block * block_size);
+}
+
+void LineWeights::run_backwards(std::size_t block, States& states,
+                                std::span<double> weights) const {
+  // A rotation steps each line back by one sample; it is set anew in every block, so that its
+  // rounding cannot grow past block_size steps.
+  struct Rotation {
+    SineCosine now, step;
+  };
+  const std::size_t first = block * block_size;
+  const std::size_t last = first + samples_in(block) - 1;
+  std::vector<Rotation> lines;
+  lines.reserve(lines_hz_.size());
+  for (const double line_hz : lines_hz_) {
+    const double turns = line_hz * fit_.sample_period_s;
+    lines.push_back({sincos_turns(turns * static_cast<double>(last)), sincos_turns(turns)});
+  }
+  const std::size_t num_outputs = states.size();
+  for (std::size_t k = last + 1; k-- > first;) {
+    double* row = &weights[(k - first) * num_outputs];
+    std::fill_n(row, num_outputs, 0.0);
+    const double* coefficient = coefficients_.data();
+    for (auto& [now, step] : lines) {
+      for (std::size_t i = 0; i < num_outputs; ++i) row[i] += now.cosine * coefficient[i];
+      coefficient += num_outputs;
+      for (std::size_t i = 0; i < num_outputs; ++i) row[i] += now.sine * coefficient[i];
+      coefficient += num_outputs;
+      now = {now.sine * step.cosine - now.cosine * step.sine,
+             now.cosine * step.cosine + now.sine * step.sine};
+    }
+    const double kept = k >= fit_.num_dropped ? 1.0 : 0.0;
+    for (std::size_t i = 0; i < num_outputs; ++i) {
+      row[i] = states[i].advance(fit_.filter, kept * row[i]);
+    }
+  }
+}
+
+void LineWeights::fill_block(std::size_t block, std::span<double> weights) const {
+  const std::size_t num_outputs = means_.size();
+  PROOFMASS_EXPECT(weights.size() >= samples_in(block) * num_outputs);
+  States states = block_ends_[block];
+  run_backwards(block, states, weights);
+  for (std::size_t k = 0; k < samples_in(block); ++k) {
+    for (std::size_t i = 0; i < num_outputs; ++i) weights[k * num_outputs + i] -= means_[i];
+  }
+}
+
+}  // namespace proofmass

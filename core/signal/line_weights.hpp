@@ -1,0 +1,66 @@
+#pragma once
+
+#include <complex>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "core/signal/band_pass.hpp"
+
+namespace proofmass {
+
+/// How the phasors of a record's lines are estimated ([Hardy2013] section 5.2): remove the mean,
+/// band-pass, drop the filter's transient, then least squares on cosine and sine of all lines.
+struct LineFit {
+  std::size_t num_samples = 0;  ///< Of the record; its first sample is at t = 0.
+  std::size_t num_dropped = 0;  ///< Filtered samples dropped at the start, < num_samples.
+  double sample_period_s = 0.25;
+  BandPass filter{};
+  std::vector<double> fit_hz;    ///< Lines whose phasors are wanted.
+  std::vector<double> known_hz;  ///< Further lines, fitted with them.
+};
+
+/// The same estimate as one weighted sum over the raw record.
+///
+/// Every step of the estimate is linear, so the amplitudes of a line's cosine and sine are Σ wₖ xₖ
+/// with weights that depend on the record's length and the lines alone, not on the signal. They are
+///
+///     w = (I − 11ᵀ/N) Fᵀ D Φ (ΦᵀΦ)⁻¹
+///
+/// with Φ the lines on the samples kept, D the dropping and F the filter; Fᵀ is the same filter run
+/// backwards in time. So no signal is ever filtered and none is stored: a signal costs two
+/// multiplications a sample and line. The weights are made block by block, forwards, from the
+/// filter's state kept at each block's end.
+class LineWeights {
+ public:
+  static constexpr std::size_t block_size = 2048;
+
+  /// @throws InvalidArgument if fewer samples are kept than the fit has unknowns, or if two lines
+  ///         cannot be told apart.
+  explicit LineWeights(const LineFit& fit);
+
+  [[nodiscard]] std::size_t num_samples() const { return fit_.num_samples; }
+  [[nodiscard]] std::size_t num_blocks() const { return block_ends_.size(); }
+  [[nodiscard]] std::size_t num_fit_lines() const { return fit_.fit_hz.size(); }
+  /// Samples of block `block`: block_size, fewer in the last one.
+  [[nodiscard]] std::size_t samples_in(std::size_t block) const;
+
+  /// Writes the weights of samples [block·block_size, …), sample after sample, for each line of
+  /// fit_hz first the cosine's then the sine's: shape [samples_in(block)][2·num_fit_lines()].
+  void fill_block(std::size_t block, std::span<double> weights) const;
+
+ private:
+  /// Filter memory of each output (cosine and sine of each fit line), running backwards.
+  using States = std::vector<BandPassState>;
+
+  void solve_design();
+  void run_backwards(std::size_t block, States& states, std::span<double> weights) const;
+
+  LineFit fit_;
+  std::vector<double> lines_hz_;      ///< fit_hz, then known_hz.
+  std::vector<double> coefficients_;  ///< Of (ΦᵀΦ)⁻¹: [line][cosine, sine][output].
+  std::vector<double> means_;         ///< Mean raw weight of each output.
+  std::vector<States> block_ends_;    ///< States on entering each block from its end.
+};
+
+}  // namespace proofmass

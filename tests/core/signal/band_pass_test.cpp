@@ -1,0 +1,152 @@
+#include "core/signal/band_pass.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <vector>
+
+namespace proofmass {
+namespace {
+
+using Complex = std::complex<long double>;
+
+constexpr long double pi = std::numbers::pi_v<long double>;
+constexpr double period_s = 0.25;
+
+/// s/ω_c of the bilinear transform that keeps the corner: i tan(πfT)/tan(πf_cT).
+Complex warped(double frequency_hz, double corner_hz) {
+  return {0.0L, std::tan(pi * frequency_hz * period_s) / std::tan(pi * corner_hz * period_s)};
+}
+
+Complex low_pass_response(double frequency_hz, double corner_hz) {
+  const Complex s = warped(frequency_hz, corner_hz);
+  return 1.0L / (s * s + std::numbers::sqrt2_v<long double> * s + 1.0L);
+}
+
+Complex high_pass_response(double frequency_hz, double corner_hz) {
+  const Complex s = warped(frequency_hz, corner_hz);
+  return s * s / (s * s + std::numbers::sqrt2_v<long double> * s + 1.0L);
+}
+
+Complex band_pass_response(double frequency_hz, double low_hz, double high_hz) {
+  return high_pass_response(frequency_hz, low_hz) * low_pass_response(frequency_hz, high_hz);
+}
+
+/// Σ hₖ e^{−2πifkT} of the recursion's answer to a unit impulse.
+template <typename State, typename Filter>
+Complex measured_response(const Filter& filter, double frequency_hz, std::size_t num_samples) {
+  const long double angle = -2.0L * pi * frequency_hz * period_s;
+  const Complex step(std::cos(angle), std::sin(angle));
+  State state;
+  Complex sum = 0.0L;
+  Complex phasor = 1.0L;
+  for (std::size_t k = 0; k < num_samples; ++k) {
+    sum += static_cast<long double>(state.advance(filter, k == 0 ? 1.0 : 0.0)) * phasor;
+    phasor *= step;
+  }
+  return sum;
+}
+
+/// Samples after which the slowest pole, decaying as e^(−√½ω_c t), is below 1e-17.
+std::size_t samples_to_rest(double lowest_corner_hz) {
+  return static_cast<std::size_t>(10.0 / (lowest_corner_hz * period_s));
+}
+
+// A coefficient's rounding, 2e-16, moves a pole whose distance from 1 is k = πf_cT·√2 by 2e-16/k,
+// and the response by 2e-16/k²: 1e-7 at the lowest corner, 1e-13 at the highest.
+double response_tolerance(double lowest_corner_hz) {
+  const double k = std::tan(std::numbers::pi * lowest_corner_hz * period_s);
+  return 1e-14 + 4e-16 / (k * k);
+}
+
+/// Corners of the sessions' bands: 2 f_orb, f_cal, 2 f_TM, each a third and three times.
+const std::vector<double>& corners() {
+  static const std::vector<double> values{1.12e-4, 4.1e-4, 1.0e-3, 3.7e-3, 6.6e-3, 5.9e-2, 0.5};
+  return values;
+}
+
+TEST(Butterworth, LowPassHasTheTransformedResponse) {
+  for (const double corner : corners()) {
+    const Biquad filter = butterworth_low_pass(corner, period_s);
+    for (const double ratio : {0.1, 0.5, 1.0, 2.0, 3.7}) {
+      const double frequency = ratio * corner;
+      const Complex expected = low_pass_response(frequency, corner);
+      const Complex actual =
+          measured_response<BiquadState>(filter, frequency, samples_to_rest(corner));
+      EXPECT_LT(std::abs(actual - expected), response_tolerance(corner)) << corner << ", " << ratio;
+    }
+  }
+}
+
+TEST(Butterworth, HighPassHasTheTransformedResponse) {
+  for (const double corner : corners()) {
+    const Biquad filter = butterworth_high_pass(corner, period_s);
+    for (const double ratio : {0.1, 0.5, 1.0, 2.0, 3.7}) {
+      const double frequency = ratio * corner;
+      const Complex expected = high_pass_response(frequency, corner);
+      const Complex actual =
+          measured_response<BiquadState>(filter, frequency, samples_to_rest(corner));
+      EXPECT_LT(std::abs(actual - expected), response_tolerance(corner)) << corner << ", " << ratio;
+    }
+  }
+}
+
+// |H|² = ½ and a phase of ∓90° whatever the corner.
+TEST(Butterworth, LosesThreeDecibelsAtItsCorner) {
+  for (const double corner : corners()) {
+    const Complex low = measured_response<BiquadState>(butterworth_low_pass(corner, period_s),
+                                                       corner, samples_to_rest(corner));
+    const Complex high = measured_response<BiquadState>(butterworth_high_pass(corner, period_s),
+                                                        corner, samples_to_rest(corner));
+    const auto half_root = static_cast<double>(1.0L / std::numbers::sqrt2_v<long double>);
+    const double tolerance = response_tolerance(corner);
+    EXPECT_NEAR(static_cast<double>(low.imag()), -half_root, tolerance);
+    EXPECT_NEAR(static_cast<double>(low.real()), 0.0, tolerance);
+    EXPECT_NEAR(static_cast<double>(high.imag()), half_root, tolerance);
+    EXPECT_NEAR(static_cast<double>(high.real()), 0.0, tolerance);
+  }
+}
+
+TEST(BandPass, IsTheProductOfItsSections) {
+  const double line = 2.0 / 5950.0;
+  const BandPass filter = band_pass(line / 3.0, line * 3.0, period_s);
+  for (const double ratio : {0.1, 1.0 / 3.0, 0.5, 1.0, 2.0, 3.0, 20.0}) {
+    const double frequency = ratio * line;
+    const Complex expected = band_pass_response(frequency, line / 3.0, line * 3.0);
+    const Complex actual =
+        measured_response<BandPassState>(filter, frequency, samples_to_rest(line / 3.0));
+    EXPECT_LT(std::abs(actual - expected), response_tolerance(line / 3.0)) << ratio;
+  }
+}
+
+// Driven with a sine, the settled output is |H| sin(ωt + arg H).
+TEST(BandPass, AnswersASineWithItsGainAndPhase) {
+  constexpr double low = 3.3e-3;
+  constexpr double high = 3.0e-2;
+  constexpr double frequency = 9.88e-3;
+  const BandPass filter = band_pass(low, high, period_s);
+  const Complex expected = band_pass_response(frequency, low, high);
+  BandPassState state;
+  const auto num_settling = static_cast<int>(samples_to_rest(low));
+  for (int k = 0; k < num_settling + 1000; ++k) {
+    const double angle = 2.0 * std::numbers::pi * frequency * period_s * k;
+    const double y = state.advance(filter, std::sin(angle));
+    if (k < num_settling) continue;
+    const auto wanted = static_cast<double>(std::abs(expected)) *
+                        std::sin(angle + static_cast<double>(std::arg(expected)));
+    ASSERT_NEAR(y, wanted, response_tolerance(low)) << "sample " << k;
+  }
+}
+
+TEST(BandPass, StopsAConstant) {
+  const BandPass filter = band_pass(3.3e-3, 3.0e-2, period_s);
+  BandPassState state;
+  double y = 1.0;
+  for (std::size_t k = 0; k < samples_to_rest(3.3e-3); ++k) y = state.advance(filter, 1.0);
+  EXPECT_NEAR(y, 0.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace proofmass

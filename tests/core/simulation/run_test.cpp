@@ -1,0 +1,107 @@
+#include "core/simulation/run.hpp"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cstdint>
+
+namespace proofmass {
+namespace {
+
+/// The paper's sessions cut to `num_orbits` each: the same code path in a fraction of the time.
+Campaign short_campaign(int num_orbits) {
+  Campaign campaign;
+  campaign.seed = 7;
+  for (Session& session : campaign.scenario.sessions) session.num_orbits = num_orbits;
+  campaign.validate();
+  return campaign;
+}
+
+void expect_same_bits(const RunResult& a, const RunResult& b) {
+  EXPECT_EQ(a.run, b.run);
+  EXPECT_EQ(a.status, b.status);
+  EXPECT_EQ(a.num_draws, b.num_draws);
+  EXPECT_EQ(a.num_rounds, b.num_rounds);
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(a.truth[i]), std::bit_cast<std::uint64_t>(b.truth[i]));
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(a.estimate[i]),
+              std::bit_cast<std::uint64_t>(b.estimate[i]));
+  }
+}
+
+TEST(RunPlan, RepeatsARunBitForBitAfterOthersAndInAnotherPlan) {
+  const Campaign campaign = short_campaign(2);
+  const RunPlan plan(campaign);
+  const RunResult alone = plan.simulate(RunIndex{5}, {});
+  (void)plan.simulate(RunIndex{0}, {});
+  expect_same_bits(plan.simulate(RunIndex{5}, {}), alone);
+  expect_same_bits(RunPlan(campaign).simulate(RunIndex{5}, {}), alone);
+}
+
+TEST(RunPlan, GivesEveryRunAndSeedItsOwnNumbers) {
+  Campaign campaign = short_campaign(1);
+  const RunResult first = RunPlan(campaign).simulate(RunIndex{0}, {});
+  const RunResult second = RunPlan(campaign).simulate(RunIndex{1}, {});
+  campaign.seed = 8;
+  const RunResult other_seed = RunPlan(campaign).simulate(RunIndex{0}, {});
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    EXPECT_NE(first.truth[i], second.truth[i]);
+    EXPECT_NE(first.truth[i], other_seed.truth[i]);
+    EXPECT_NE(first.estimate[i], second.estimate[i]);
+  }
+}
+
+// Sessions draw from streams of their own names, so the estimate that one session alone determines
+// in the first round does not move when the sessions are put in another order.
+TEST(RunPlan, DoesNotDependOnTheOrderOfSessions) {
+  Campaign campaign = short_campaign(1);
+  const RunResult before = RunPlan(campaign).simulate(RunIndex{3}, {});
+  std::swap(campaign.scenario.sessions.front(), campaign.scenario.sessions.back());
+  expect_same_bits(RunPlan(campaign).simulate(RunIndex{3}, {}), before);
+}
+
+TEST(RunPlan, ReportsItsOrbitsInOrder) {
+  const Campaign campaign = short_campaign(1);
+  const RunPlan plan(campaign);
+  EXPECT_EQ(plan.num_orbits(), 11);
+  int last = 0;
+  (void)plan.simulate(RunIndex{0}, {}, [&last](int orbits) {
+    EXPECT_GE(orbits, last);
+    last = orbits;
+  });
+  EXPECT_EQ(last, 11);
+}
+
+TEST(RunPlan, SaysWhenNoDrawIsAccepted) {
+  Campaign campaign = short_campaign(1);
+  campaign.scenario.acceptance.a_d11_max = 1e-300;
+  const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::no_draw);
+  EXPECT_EQ(result.num_draws, 1000U);
+}
+
+// A drag-free loop beyond its stability limit grows without bound.
+TEST(RunPlan, SaysWhenTheSimulationDiverges) {
+  Campaign campaign = short_campaign(1);
+  for (std::size_t i = 0; i < num_drawn; ++i) {
+    if (drawn_names()[i] != "thruster_scale_error.x") continue;
+    campaign.dispersions[i].law = Law::fixed;
+    campaign.dispersions[i].value = 50.0;  // Loop gain fifty times too high.
+  }
+  const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::not_finite);
+  EXPECT_FALSE(result.has_estimate());
+  EXPECT_TRUE(result.has_truth());
+}
+
+TEST(RunPlan, SaysWhenEstimatesStillMoveInTheLastRound) {
+  Campaign campaign = short_campaign(1);
+  campaign.scenario.estimation.num_rounds_max = 1;
+  const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::not_converged);
+  EXPECT_EQ(result.num_rounds, 1U);
+  EXPECT_TRUE(result.has_estimate());
+}
+
+}  // namespace
+}  // namespace proofmass
