@@ -1,0 +1,130 @@
+// Speed of a run and of its parts. Machines are noisy: compare numbers of one execution only.
+//
+// `steps/s` counts simulated samples of one run; the parts are what one step is made of.
+
+#include <benchmark/benchmark.h>
+
+#include "core/random/normal.hpp"
+#include "core/simulation/run.hpp"
+#include "core/simulation/session_record.hpp"
+
+namespace proofmass {
+namespace {
+
+double num_steps(const Campaign& campaign) {
+  const double period_s = campaign.scenario.simulation.sample_period_s;
+  double steps = 0.0;
+  for (const Session& session : campaign.scenario.sessions) {
+    steps += session.num_orbits * campaign.scenario.orbit.period_s / period_s;
+    steps += campaign.scenario.simulation.settling_s / period_s;
+  }
+  return steps;
+}
+
+void count_steps(benchmark::State& state, double steps_per_iteration) {
+  state.counters["steps/s"] =
+      benchmark::Counter(steps_per_iteration, benchmark::Counter::kIsIterationInvariantRate);
+}
+
+void whole_run(benchmark::State& state) {
+  const Campaign campaign;
+  const RunPlan plan(campaign);
+  std::uint64_t run = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(plan.simulate(RunIndex{run++}, {}));
+  count_steps(state, num_steps(campaign));
+}
+BENCHMARK(whole_run)->Unit(benchmark::kMillisecond);
+
+void plan_of_a_campaign(benchmark::State& state) {
+  const Campaign campaign;
+  for (auto _ : state) benchmark::DoNotOptimize(RunPlan(campaign).num_orbits());
+}
+BENCHMARK(plan_of_a_campaign)->Unit(benchmark::kMillisecond);
+
+void normal_deviate(benchmark::State& state) {
+  std::uint32_t counter = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(normal_deviates(philox({counter++, 1, 2, 3}, 4)));
+  state.counters["deviates/s"] =
+      benchmark::Counter(4.0, benchmark::Counter::kIsIterationInvariantRate);
+}
+BENCHMARK(normal_deviate);
+
+void noise_of_a_step(benchmark::State& state) {
+  const Scenario scenario;
+  const NoiseModel model = make_noise_model(scenario.noise, scenario.simulation.sample_period_s);
+  SessionNoise noise(model, 1, RunIndex{0}, "benchmark");
+  for (auto _ : state) benchmark::DoNotOptimize(noise.next());
+  count_steps(state, 1.0);
+}
+BENCHMARK(noise_of_a_step);
+
+/// A session, its shared signals and a drawn satellite.
+struct Bench {
+  Campaign campaign;
+  const Session& session = campaign.scenario.sessions[index(SessionTarget::a_c13)];
+  KeplerOrbit orbit{campaign.scenario.orbit};
+  Environment environment{campaign.scenario.environment, campaign.environment_table,
+                          campaign.scenario.orbit.period_s};
+  SessionSignals signals{campaign.scenario, session, orbit, environment};
+  LoopConstants<double> constants =
+      make_loop_constants(make_instrument(draw_values(campaign.dispersions, 1, RunIndex{0}, 0, {})),
+                          campaign.scenario, session);
+  DragFreeGains drag_free = drag_free_gains(campaign.scenario.drag_free, 0.25);
+  AttitudeGains attitude = attitude_gains(campaign.scenario.attitude, 0.25);
+};
+
+void shared_signals_of_a_step(benchmark::State& state) {
+  Bench bench;
+  for (auto _ : state) benchmark::DoNotOptimize(bench.signals.next());
+  count_steps(state, 1.0);
+}
+BENCHMARK(shared_signals_of_a_step);
+
+void dynamics_of_a_step(benchmark::State& state) {
+  Bench bench;
+  const SharedSample shared = bench.signals.next();
+  const SampleNoise<double> no_noise{};
+  Loop<double> loop;
+  loop.begin(shared);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        loop.advance(bench.constants, bench.drag_free, bench.attitude, shared, no_noise));
+  }
+  count_steps(state, 1.0);
+}
+BENCHMARK(dynamics_of_a_step);
+
+void ground_signals_of_a_step(benchmark::State& state) {
+  Bench bench;
+  const SharedSample shared = bench.signals.next();
+  Loop<double> loop;
+  loop.begin(shared);
+  Observation<double> observation =
+      loop.advance(bench.constants, bench.drag_free, bench.attitude, shared, {});
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(observation);
+    benchmark::DoNotOptimize(ground_signals(observation, shared, RegressorKind::modulated_zz));
+  }
+  count_steps(state, 1.0);
+}
+BENCHMARK(ground_signals_of_a_step);
+
+void line_weights_of_a_step(benchmark::State& state) {
+  LineFit fit;
+  fit.num_samples = 238000;
+  fit.num_dropped = 4000;
+  fit.filter = band_pass(9.88e-3 / 3, 9.88e-3 * 3, 0.25);
+  fit.fit_hz = {9.88e-3 + 2.0 / 5950, 9.88e-3 - 2.0 / 5950};
+  fit.known_hz = {9.88e-3, 1.0 / 5950, 2.0 / 5950, 9.88e-3 + 1.0 / 5950, 9.88e-3 - 1.0 / 5950};
+  const LineWeights weights(fit);
+  std::vector<double> block(LineWeights::block_size * 4);
+  for (auto _ : state) {
+    weights.fill_block(7, block);
+    benchmark::DoNotOptimize(block.data());
+  }
+  count_steps(state, static_cast<double>(LineWeights::block_size));
+}
+BENCHMARK(line_weights_of_a_step);
+
+}  // namespace
+}  // namespace proofmass
