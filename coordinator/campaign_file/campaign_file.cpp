@@ -1,0 +1,134 @@
+#include "coordinator/campaign_file/campaign_file.hpp"
+
+#include <fmt/format.h>
+
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "coordinator/campaign_file/data_file.hpp"
+#include "coordinator/campaign_file/document.hpp"
+#include "coordinator/campaign_file/readers.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using detail::Assignment;
+using detail::Document;
+
+Assignment count_assignment(std::string_view option, std::string_view path, std::uint64_t count) {
+  const std::string origin = fmt::format("{} {}", option, count);
+  if (count > std::numeric_limits<std::int64_t>::max()) {
+    throw CampaignFileError(
+        fmt::format("{}: must be in [0, {}]", origin, std::numeric_limits<std::int64_t>::max()));
+  }
+  return {origin, std::string(path), toml::table{{"value", static_cast<std::int64_t>(count)}}};
+}
+
+std::vector<Assignment> assignments_of(const Overrides& overrides) {
+  std::vector<Assignment> assignments;
+  for (const std::string& text : overrides.assignments) {
+    assignments.push_back(detail::parse_assignment(text));
+  }
+  if (overrides.num_runs) {
+    assignments.push_back(count_assignment("--runs", "campaign.runs", *overrides.num_runs));
+  }
+  if (overrides.seed) {
+    assignments.push_back(count_assignment("--seed", "campaign.seed", *overrides.seed));
+  }
+  return assignments;
+}
+
+/// Reads the data files that a definition names, each once.
+class DataFiles {
+ public:
+  DataFiles(const Document& document, std::filesystem::path folder)
+      : document_(document), folder_(std::move(folder)) {}
+
+  void read_environment(Campaign& campaign) {
+    if (campaign.scenario.environment.kind != EnvironmentKind::file) return;
+    if (campaign.environment_file.empty()) return;  // Campaign::validate() says what is missing.
+    const std::string& text = text_of(campaign.environment_file, "environment.file");
+    campaign.environment_table = detail::parse_environment(text, name_of(campaign.environment_file),
+                                                           campaign.scenario.orbit.period_s);
+  }
+
+  void read_columns(Campaign& campaign) {
+    for (const std::size_t element : table_elements(campaign.dispersions)) {
+      const Dispersion& dispersion = campaign.dispersions[element];
+      const std::string path = fmt::format("dispersion.{}.file", drawn_names()[element]);
+      campaign.table_columns.push_back(detail::parse_column(
+          text_of(dispersion.file, path), name_of(dispersion.file), dispersion.column));
+    }
+  }
+
+ private:
+  [[nodiscard]] std::string name_of(const std::string& file) const {
+    return (folder_ / file).string();
+  }
+
+  const std::string& text_of(const std::string& file, const std::string& path) {
+    const auto known = texts_.find(file);
+    if (known != texts_.end()) return known->second;
+    try {
+      return texts_[file] = detail::read_text_file(folder_ / file, data_file_size_max);
+    } catch (const detail::UnreadableFile& error) {
+      throw document_.located(ConfigError(path, fmt::format("\"{}\"", file), error.what()));
+    }
+  }
+
+  const Document& document_;
+  std::filesystem::path folder_;
+  std::map<std::string, std::string> texts_;
+};
+
+void validate(const Campaign& campaign, const Document& document) {
+  try {
+    campaign.validate();
+  } catch (const ConfigError& error) {
+    throw document.located(error);
+  }
+}
+
+std::string read_campaign_text(const std::filesystem::path& file) {
+  try {
+    return detail::read_text_file(file, campaign_file_size_max);
+  } catch (const detail::UnreadableFile& error) {
+    throw CampaignFileError(fmt::format("{}: {}", file.string(), error.what()));
+  }
+}
+
+}  // namespace
+
+Campaign read_campaign(const std::filesystem::path& file, const Overrides& overrides) {
+  Document document(file.string(), read_campaign_text(file), assignments_of(overrides));
+  Campaign campaign = detail::read_definition(document);
+  document.check();
+  DataFiles data(document, file.parent_path());
+  data.read_environment(campaign);
+  data.read_columns(campaign);
+  validate(campaign, document);
+  return campaign;
+}
+
+Campaign parse_stored_campaign(std::string_view definition, EnvironmentTable environment_table,
+                               std::vector<std::vector<double>> table_columns) {
+  Document document("stored definition", definition, {});
+  Campaign campaign = detail::read_definition(document);
+  document.check();
+  campaign.environment_table = std::move(environment_table);
+  campaign.table_columns = std::move(table_columns);
+  validate(campaign, document);
+  return campaign;
+}
+
+Campaign hardy2013_campaign() {
+  Campaign campaign;
+  campaign.name = "hardy2013";
+  campaign.seed = 1;
+  campaign.num_runs = 100;
+  campaign.scenario.estimation.correction = Correction::first_order;
+  return campaign;
+}
+
+}  // namespace proofmass::coordinator

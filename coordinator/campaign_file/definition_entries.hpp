@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/campaign/campaign.hpp"
+
+namespace proofmass::coordinator::detail {
+
+/// A key of a campaign file, with its value as TOML.
+struct Entry {
+  std::string path;     ///< `estimation.transient_s`; for a session or a law the key alone.
+  std::string text;     ///< `1000`.
+  std::string comment;  ///< Meaning and rule; may be empty.
+};
+
+/// Everything outside sessions and dispersions, in file order.
+[[nodiscard]] std::vector<Entry> scenario_entries(const Campaign& campaign);
+
+/// All keys of one session but its excitations.
+[[nodiscard]] std::vector<Entry> session_entries(const Session& session);
+
+/// `{ kind = "drag_free", axis = "x", ... }`.
+[[nodiscard]] std::string excitation_text(const Excitation& excitation);
+
+/// The law and its own keys.
+[[nodiscard]] std::vector<Entry> dispersion_entries(const Dispersion& dispersion);
+
+/// `{ law = "uniform", minimum = -0.01, maximum = 0.01 }`.
+[[nodiscard]] std::string dispersion_text(const Dispersion& dispersion);
+
+}  // namespace proofmass::coordinator::detail

@@ -1,0 +1,269 @@
+#include "coordinator/campaign_file/document.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "coordinator/campaign_file/definition_text.hpp"
+#include "coordinator/campaign_file/nearest_name.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+constexpr std::size_t shown_text_length_max = 60;
+
+bool is_bare_key(std::string_view key) {
+  return !key.empty() && std::ranges::all_of(key, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-';
+  });
+}
+
+// A key with a dot inside must not pass for a path.
+std::string path_of(const std::string& parent, std::string_view key) {
+  const std::string spelled = is_bare_key(key) ? std::string(key) : quoted_text(key);
+  return parent.empty() ? spelled : parent + "." + spelled;
+}
+
+// A value as people wrote it, for messages.
+std::string text_of(const toml::node& content) {
+  if (const auto* const text = content.as_string()) {
+    if (text->get().size() <= shown_text_length_max) return quoted_text(text->get());
+    return fmt::format("a text of {} bytes", text->get().size());
+  }
+  if (const auto* const number = content.as_floating_point()) return number_text(number->get());
+  if (const auto* const number = content.as_integer()) return fmt::format("{}", number->get());
+  if (const auto* const flag = content.as_boolean()) return flag->get() ? "true" : "false";
+  if (const auto* const array = content.as_array()) {
+    std::string text = "[";
+    for (const toml::node& element : *array) {
+      if (text.size() > 1) text += ", ";
+      text += element.is_array() || element.is_table() ? "..." : text_of(element);
+      if (text.size() > shown_text_length_max) return "a list";
+    }
+    return text + "]";
+  }
+  return content.is_table() ? "a table" : "a date or time";
+}
+
+// Parent of `a.b[0].c`: `a.b[0]`, then `a.b`, `a` and nothing.
+std::string parent_of(const std::string& path) {
+  const std::size_t end = path.find_last_of(".[");
+  return end == std::string::npos ? std::string() : path.substr(0, end);
+}
+
+toml::table parse_text(std::string_view text, const std::string& name) {
+  try {
+    return toml::parse(text);
+  } catch (const toml::parse_error& error) {
+    throw CampaignFileError(
+        fmt::format("{}:{}: {}", name, error.source().begin.line, error.description()));
+  }
+}
+
+}  // namespace
+
+Assignment parse_assignment(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw CampaignFileError(fmt::format("--set {}: must be key=value", text));
+  }
+  Assignment assignment{"--set " + text, text.substr(0, equals), {}};
+  const std::string value = text.substr(equals + 1);
+  try {
+    assignment.holder = toml::parse("value = " + value);
+  } catch (const toml::parse_error&) {
+    assignment.holder.clear();
+  }
+  // A text needs no quotes on a command line, where the shell takes them off.
+  if (assignment.holder.size() != 1) assignment.holder = toml::table{{"value", value}};
+  return assignment;
+}
+
+Document::Document(std::string name, std::string_view text, std::vector<Assignment> assignments)
+    : name_(std::move(name)),
+      root_(parse_text(text, name_)),
+      assignments_(std::move(assignments)) {}
+
+const toml::node* Document::value_at(const std::string& path) const {
+  for (auto it = assignments_.rbegin(); it != assignments_.rend(); ++it) {
+    if (it->path == path) return it->holder.get("value");
+  }
+  return toml::at_path(root_, path).node();
+}
+
+const toml::node* Document::find(const std::string& path) {
+  keys_.insert(path);
+  return value_at(path);
+}
+
+std::optional<std::size_t> Document::num_tables(const std::string& path) {
+  const toml::node* const found = value_at(path);
+  const toml::array* const list = found == nullptr ? nullptr : found->as_array();
+  const auto is_table = [](const toml::node& entry) { return entry.is_table(); };
+  const bool are_tables = list != nullptr && std::ranges::all_of(*list, is_table);
+  // The keys are those of the tables; where there is none, the list itself is one.
+  if (are_tables && !list->empty()) return list->size();
+  keys_.insert(path);
+  if (are_tables) return 0;
+  if (found != nullptr) refuse(path, "must be a list of tables");
+  return std::nullopt;
+}
+
+bool Document::read(const std::string& path, double& value, const Range& range) {
+  const toml::node* const found = find(path);
+  if (found == nullptr) return false;
+  if (!found->is_number()) {
+    refuse(path, "must be a number");
+    return false;
+  }
+  const double number = found->is_integer() ? static_cast<double>(found->as_integer()->get())
+                                            : found->as_floating_point()->get();
+  if (!range.contains(number)) {
+    refuse(path, range.rule());
+    return false;
+  }
+  value = number;
+  return true;
+}
+
+bool Document::read(const std::string& path, std::int64_t& value, const Range& range) {
+  const toml::node* const found = find(path);
+  if (found == nullptr) return false;
+  const auto* const integer = found->as_integer();
+  if (integer == nullptr) {
+    refuse(path, "must be a whole number");
+    return false;
+  }
+  if (!range.contains(static_cast<double>(integer->get()))) {
+    refuse(path, range.rule());
+    return false;
+  }
+  value = integer->get();
+  return true;
+}
+
+bool Document::read(const std::string& path, int& value) {
+  std::int64_t wide = 0;
+  using limits = std::numeric_limits<int>;
+  if (!read(path, wide, range::between(limits::min(), limits::max()))) return false;
+  value = static_cast<int>(wide);
+  return true;
+}
+
+bool Document::read(const std::string& path, std::string& value) {
+  const toml::node* const found = find(path);
+  if (found == nullptr) return false;
+  if (!found->is_string()) {
+    refuse(path, "must be a text");
+    return false;
+  }
+  value = found->as_string()->get();
+  return true;
+}
+
+std::optional<std::size_t> Document::read_choice(const std::string& path,
+                                                 std::span<const std::string_view> names) {
+  const toml::node* const found = find(path);
+  if (found == nullptr) return std::nullopt;
+  if (const auto* const text = found->as_string()) {
+    const auto match = std::ranges::find(names, std::string_view(text->get()));
+    if (match != names.end()) return static_cast<std::size_t>(match - names.begin());
+  }
+  refuse(path, "must be " + alternatives(names));
+  return std::nullopt;
+}
+
+Document::Place Document::place_of(std::string path) const {
+  for (; !path.empty(); path = parent_of(path)) {
+    for (std::size_t i = assignments_.size(); i > 0; --i) {
+      if (assignments_[i - 1].path == path) return {.assignment = i};
+    }
+    if (const toml::node* const found = toml::at_path(root_, path).node()) {
+      const toml::source_position& begin = found->source().begin;
+      return {.assignment = 0, .line = begin.line, .column = begin.column};
+    }
+  }
+  return {};
+}
+
+std::string Document::prefix(const Place& place) const {
+  if (place.assignment != 0) return assignments_[place.assignment - 1].origin + ": ";
+  return place.line == 0 ? name_ + ": " : fmt::format("{}:{}: ", name_, place.line);
+}
+
+void Document::refuse(const std::string& path, std::string_view rule) {
+  const toml::node* const found = value_at(path);
+  PROOFMASS_EXPECT(found != nullptr);
+  refusals_.push_back(
+      {place_of(path), fmt::format("{} = {}", path, text_of(*found)), path, std::string(rule)});
+}
+
+void Document::refuse_absence(const std::string& path, std::string_view rule) {
+  refusals_.push_back({place_of(path), path + " is missing", path, std::string(rule)});
+}
+
+bool Document::leads_to_keys(const std::string& path) const {
+  const auto has_prefix = [this](const std::string& prefix) {
+    const auto next = keys_.lower_bound(prefix);
+    return next != keys_.end() && next->starts_with(prefix);
+  };
+  return path.empty() || has_prefix(path + ".") || has_prefix(path + "[");
+}
+
+void Document::find_unknown_keys(const toml::node& content, const std::string& path,
+                                 std::vector<Refusal>& unknown) const {
+  if (keys_.contains(path)) return;
+  const toml::table* const table = content.as_table();
+  if (table != nullptr && (!table->empty() || leads_to_keys(path))) {
+    for (const auto& [key, child] : *table) {
+      find_unknown_keys(child, path_of(path, key.str()), unknown);
+    }
+    return;
+  }
+  const toml::array* const list = content.as_array();
+  if (list != nullptr && leads_to_keys(path)) {
+    for (std::size_t i = 0; i < list->size(); ++i) {
+      find_unknown_keys((*list)[i], fmt::format("{}[{}]", path, i), unknown);
+    }
+    return;
+  }
+  const toml::source_position& begin = content.source().begin;
+  unknown.push_back({{.assignment = 0, .line = begin.line, .column = begin.column},
+                     fmt::format("{} = {}", path, text_of(content)),
+                     path,
+                     leads_to_keys(path) ? "must be a table" : ""});
+}
+
+CampaignFileError Document::error_of(const Refusal& refusal) const {
+  std::string rule = refusal.rule;
+  if (rule.empty()) {
+    const std::optional<std::string> nearest = nearest_name(refusal.path, keys_);
+    rule = nearest ? "unknown key; nearest is " + *nearest : "unknown key";
+  }
+  // An assignment shows key and value already.
+  const bool is_assigned = refusal.place.assignment != 0 &&
+                           assignments_[refusal.place.assignment - 1].path == refusal.path;
+  const std::string text = is_assigned ? rule : fmt::format("{} ({})", refusal.subject, rule);
+  return CampaignFileError(prefix(refusal.place) + text);
+}
+
+void Document::check() const {
+  std::vector<Refusal> refusals = refusals_;
+  find_unknown_keys(root_, "", refusals);
+  for (std::size_t i = 0; i < assignments_.size(); ++i) {
+    if (keys_.contains(assignments_[i].path)) continue;
+    refusals.push_back({{.assignment = i + 1}, assignments_[i].path, assignments_[i].path, ""});
+  }
+  const auto first = std::ranges::min_element(refusals, {}, &Refusal::place);
+  if (first != refusals.end()) throw error_of(*first);
+}
+
+CampaignFileError Document::located(const ConfigError& error) const {
+  return CampaignFileError(prefix(place_of(error.field())) + error.what());
+}
+
+}  // namespace proofmass::coordinator::detail

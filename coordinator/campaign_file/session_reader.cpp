@@ -1,0 +1,116 @@
+#include <fmt/format.h>
+
+#include <limits>
+#include <optional>
+
+#include "coordinator/campaign_file/readers.hpp"
+#include "core/session/session_names.hpp"
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+constexpr ExcitationKind excitation_kinds[] = {ExcitationKind::attitude, ExcitationKind::drag_free,
+                                               ExcitationKind::test_mass};
+
+template <typename Value>
+bool read_needed(Document& document, const std::string& path, Value& value) {
+  const bool is_absent = document.find(path) == nullptr;
+  if (is_absent) document.refuse_absence(path, "every one needs it");
+  return !is_absent && document.read(path, value);
+}
+
+std::optional<int> multiple_of(const toml::node& entry) {
+  const auto* const integer = entry.as_integer();
+  if (integer == nullptr) return std::nullopt;
+  using limits = std::numeric_limits<int>;
+  if (integer->get() < limits::min() || integer->get() > limits::max()) return std::nullopt;
+  return static_cast<int>(integer->get());
+}
+
+std::optional<LineMultiple> line_of(const toml::node& entry) {
+  const toml::array* const pair = entry.as_array();
+  if (pair == nullptr || pair->size() != 2) return std::nullopt;
+  const std::optional<int> orbital = multiple_of((*pair)[0]);
+  const std::optional<int> excitation = multiple_of((*pair)[1]);
+  if (!orbital || !excitation) return std::nullopt;
+  return LineMultiple{*orbital, *excitation};
+}
+
+void read_lines(Document& document, const std::string& path, std::vector<LineMultiple>& lines) {
+  const toml::node* const found = document.find(path);
+  if (found == nullptr) return;
+  const toml::array* const list = found->as_array();
+  if (list == nullptr) return document.refuse(path, "must be a list such as [[2, 0], [0, 1]]");
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const std::optional<LineMultiple> line = line_of((*list)[i]);
+    if (!line) {
+      document.refuse(fmt::format("{}[{}]", path, i),
+                      "must be two whole numbers, the multiples of f_orb and of the excitation");
+      return;
+    }
+    lines.push_back(*line);
+  }
+}
+
+void read_amplitude(Document& document, const std::string& path, Excitation& excitation) {
+  const std::string key(amplitude_key(excitation.kind));
+  read_needed(document, path + "." + key, excitation.amplitude);
+  const std::string kind(names_of(excitation.kind)[static_cast<std::size_t>(excitation.kind) - 1]);
+  for (const ExcitationKind other : excitation_kinds) {
+    if (other == excitation.kind) continue;
+    const std::string other_path = fmt::format("{}.{}", path, amplitude_key(other));
+    if (document.find(other_path) == nullptr) continue;
+    document.refuse(other_path, fmt::format("not a key of kind {}, which has {}", kind, key));
+  }
+}
+
+Excitation read_excitation(Document& document, const std::string& path) {
+  Excitation excitation;
+  const bool has_kind = read_needed(document, path + ".kind", excitation.kind);
+  read_needed(document, path + ".axis", excitation.axis);
+  read_needed(document, path + ".frequency_hz", excitation.frequency_hz);
+  if (has_kind) {
+    read_amplitude(document, path, excitation);
+  } else {
+    // Which amplitude belongs here is not known: none is an unknown key.
+    for (const ExcitationKind kind : excitation_kinds) {
+      (void)document.find(fmt::format("{}.{}", path, amplitude_key(kind)));
+    }
+  }
+  const bool has_motion = document.read(path + ".moves", excitation.motion);
+  if (has_motion && excitation.kind != ExcitationKind::test_mass) {
+    document.refuse(path + ".moves", "only with kind = \"test_mass\"");
+  }
+  return excitation;
+}
+
+Session read_session(Document& document, const std::string& path) {
+  Session session;
+  read_needed(document, path + ".name", session.name);
+  read_needed(document, path + ".target", session.target);
+  document.read(path + ".orbits", session.num_orbits);
+  document.read(path + ".spin_rate_rad_s", session.spin_rate_rad_s);
+  document.read(path + ".drag_free", session.drag_free);
+  const std::size_t num_excitations = document.num_tables(path + ".excitations").value_or(0);
+  for (std::size_t i = 0; i < num_excitations; ++i) {
+    session.excitations.push_back(
+        read_excitation(document, fmt::format("{}.excitations[{}]", path, i)));
+  }
+  read_lines(document, path + ".fit_lines", session.fit_lines);
+  read_lines(document, path + ".known_lines", session.known_lines);
+  return session;
+}
+
+}  // namespace
+
+std::vector<Session> read_sessions(Document& document) {
+  const std::optional<std::size_t> num_sessions = document.num_tables("session");
+  if (!num_sessions) return hardy2013_sessions();
+  std::vector<Session> sessions;
+  for (std::size_t i = 0; i < *num_sessions; ++i) {
+    sessions.push_back(read_session(document, fmt::format("session[{}]", i)));
+  }
+  return sessions;
+}
+
+}  // namespace proofmass::coordinator::detail

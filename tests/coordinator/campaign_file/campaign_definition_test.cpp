@@ -1,0 +1,194 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <string>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "tests/coordinator/campaign_file/scratch_folder.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+// A campaign whose every part differs from the nominal one.
+Campaign unusual_campaign() {
+  Campaign campaign = hardy2013_campaign();
+  campaign.name = "un-usual.2";
+  campaign.seed = 9223372036854775807u;
+  campaign.num_runs = 3;
+  campaign.scenario.noise = noise_preset(NoisePreset::flight_suref);
+  campaign.scenario.noise.linear_x.white_asd = 1.0 / 3e12;
+  campaign.scenario.environment.kind = EnvironmentKind::file;
+  campaign.scenario.estimation.num_rounds_max = 7;
+  campaign.scenario.sessions[1].spin_rate_rad_s = 1e-3;
+  campaign.scenario.sessions[1].num_orbits = 12;
+  campaign.scenario.sessions[5].excitations[0].amplitude = 1.0 / 3e7;
+  std::swap(campaign.scenario.sessions[0], campaign.scenario.sessions[10]);
+  campaign.environment_file = "air \"thin\".csv";
+  campaign.environment_table = {{0.0, {1, 2, 3}, {4, 5, 6}}, {6000.0, {1, 2, 3}, {4, 5, 6}}};
+  const auto law = [](Law kind) {
+    Dispersion dispersion;
+    dispersion.law = kind;
+    return dispersion;
+  };
+  campaign.dispersions[0] = law(Law::normal);
+  campaign.dispersions[0].standard_deviation = 0.1;
+  campaign.dispersions[1] = law(Law::truncated_normal);
+  campaign.dispersions[1].minimum = -1.0;
+  campaign.dispersions[1].maximum = 2.0;
+  campaign.dispersions[1].mean = 0.5;
+  campaign.dispersions[1].standard_deviation = 0.1;
+  campaign.dispersions[7] = law(Law::fixed);
+  campaign.dispersions[7].value = -0.0;
+  campaign.dispersions[59] = law(Law::table);
+  campaign.dispersions[59].file = "heads.csv";
+  campaign.dispersions[59].column = "z2";
+  campaign.table_columns = {{1.0, 2.0, 3.0, 4.0}};
+  return campaign;
+}
+
+void expect_same(const Campaign& read, const Campaign& written) {
+  EXPECT_EQ(read.name, written.name);
+  EXPECT_EQ(read.seed, written.seed);
+  EXPECT_EQ(read.num_runs, written.num_runs);
+  EXPECT_EQ(read.environment_file, written.environment_file);
+  EXPECT_EQ(read.environment_table, written.environment_table);
+  EXPECT_EQ(read.table_columns, written.table_columns);
+  EXPECT_EQ(read.scenario.sessions, written.scenario.sessions);
+  EXPECT_EQ(read.dispersions, written.dispersions);
+  EXPECT_EQ(read.scenario.noise.linear_x.white_asd, written.scenario.noise.linear_x.white_asd);
+  EXPECT_EQ(read.scenario.estimation.correction, written.scenario.estimation.correction);
+  EXPECT_THAT(definition_differences(read, written), IsEmpty());
+}
+
+TEST(CanonicalDefinition, ReadsBackToTheSameCampaign) {
+  for (const Campaign& campaign : {Campaign{}, hardy2013_campaign(), unusual_campaign()}) {
+    const std::string definition = canonical_definition(campaign);
+    const Campaign read =
+        parse_stored_campaign(definition, campaign.environment_table, campaign.table_columns);
+    expect_same(read, campaign);
+    EXPECT_EQ(canonical_definition(read), definition);
+  }
+}
+
+TEST(CanonicalDefinition, StatesEveryField) {
+  const Campaign campaign;
+  const std::string definition = canonical_definition(campaign);
+  for_each_field(campaign.scenario, [&](const FieldInfo& field, const auto&) {
+    const std::string path(field.path);
+    EXPECT_THAT(definition, HasSubstr("[" + path.substr(0, path.rfind('.')) + "]\n"));
+    EXPECT_THAT(definition, HasSubstr("\n" + path.substr(path.rfind('.') + 1) + " = "));
+  });
+}
+
+TEST(CommentedCampaign, ReadsBackToTheSameCampaign) {
+  for (const Campaign& campaign : {Campaign{}, hardy2013_campaign()}) {
+    const test::ScratchFolder folder;
+    expect_same(read_campaign(folder.write("c.toml", commented_campaign(campaign))), campaign);
+  }
+  const Campaign unusual = unusual_campaign();
+  expect_same(parse_stored_campaign(commented_campaign(unusual), unusual.environment_table,
+                                    unusual.table_columns),
+              unusual);
+}
+
+TEST(CommentedCampaign, LeavesThePresetInCharge) {
+  const test::ScratchFolder folder;
+  const auto file = folder.write("c.toml", commented_campaign(Campaign{}));
+  const Campaign campaign = read_campaign(file, {.assignments = {"noise.preset=flight_suref"}});
+  EXPECT_EQ(campaign.scenario.noise.linear_x.white_asd, 4.49e-12);
+}
+
+TEST(Hardy2013File, IsWhatTheGeneratorWrites) {
+  std::ifstream stream(PROOFMASS_HARDY2013_FILE);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  EXPECT_EQ(text, commented_campaign(hardy2013_campaign()));
+}
+
+TEST(Hardy2013File, IsThePapersCampaign) {
+  const Campaign campaign = read_campaign(PROOFMASS_HARDY2013_FILE);
+  EXPECT_EQ(campaign.name, "hardy2013");
+  EXPECT_EQ(campaign.num_runs, 100u);
+  EXPECT_EQ(campaign.scenario.estimation.correction, Correction::first_order);
+  EXPECT_EQ(campaign.scenario.estimation.transient_s, 1000.0);
+}
+
+TEST(ParseStoredCampaign, RefusesWhatIsNoValidCampaign) {
+  const auto refusal = [](std::string_view definition, std::vector<std::vector<double>> columns) {
+    try {
+      (void)parse_stored_campaign(definition, {}, std::move(columns));
+    } catch (const CampaignFileError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal("[noise]\nscale = -1", {}),
+            "stored definition:2: noise.scale = -1 (must be >= 0)");
+  EXPECT_EQ(refusal("", {{1.0}}),
+            "stored definition: dispersion = 1 columns "
+            "(laws of kind table are 0)");
+}
+
+std::vector<std::string> differences_after(const std::function<void(Campaign&)>& change) {
+  Campaign wanted = unusual_campaign();
+  change(wanted);
+  return definition_differences(unusual_campaign(), wanted);
+}
+
+TEST(DefinitionDifferences, NameFieldAndBothValues) {
+  EXPECT_THAT(differences_after([](Campaign& c) {
+                c.seed = 2;
+                c.name = "other";
+              }),
+              ElementsAre("name: \"un-usual.2\" in the database, \"other\" asked for",
+                          "seed: 9223372036854775807 in the database, 2 asked for"));
+  EXPECT_THAT(differences_after([](Campaign& c) { c.scenario.noise.scale = 0.0; }),
+              ElementsAre("noise.scale: 1 in the database, 0 asked for"));
+  EXPECT_THAT(differences_after([](Campaign& c) { c.scenario.sessions[3].num_orbits = 2; }),
+              ElementsAre("session[3].orbits: 40 in the database, 2 asked for"));
+  EXPECT_THAT(differences_after([](Campaign& c) { c.scenario.sessions.pop_back(); }),
+              ElementsAre("session: 11 in the database, 10 asked for"));
+  EXPECT_THAT(
+      differences_after(
+          [](Campaign& c) { c.scenario.sessions[8].excitations[0].amplitude = 1e-8; }),
+      ElementsAre(
+          "session[8].excitations: [{ kind = \"drag_free\", axis = \"x\", amplitude_m_s2 = "
+          "2e-8, frequency_hz = 0.00122847554 }] in the database, [{ kind = \"drag_free\", "
+          "axis = \"x\", amplitude_m_s2 = 1e-8, frequency_hz = 0.00122847554 }] asked for"));
+  EXPECT_THAT(
+      differences_after([](Campaign& c) { c.dispersions[7].value = 0.5; }),
+      ElementsAre(
+          "dispersion.misalignment_rad.sensor_1_y: { law = \"fixed\", value = -0.0 } in the "
+          "database, { law = \"fixed\", value = 0.5 } asked for"));
+}
+
+TEST(DefinitionDifferences, IncludeTheValuesOfDataFiles) {
+  EXPECT_THAT(differences_after([](Campaign& c) { c.table_columns[0][1] = 2.5; }),
+              ElementsAre("dispersion.star_tracker_bias_rad.head_2_z of run 1: 2 in the database, "
+                          "2.5 asked for"));
+  EXPECT_THAT(differences_after([](Campaign& c) { c.environment_table[1].linear_m_s2[2] = 0.0; }),
+              ElementsAre("environment.file: other values in row 2 in the database, those of air "
+                          "\"thin\".csv asked for"));
+  EXPECT_THAT(differences_after([](Campaign& c) { c.environment_table.pop_back(); }),
+              ElementsAre("environment.file: 2 rows in the database, 1 rows asked for"));
+}
+
+TEST(DefinitionDifferences, LetACampaignGrowAndItsFilesMove) {
+  EXPECT_THAT(differences_after([](Campaign& c) {
+                c.num_runs = 4;
+                c.table_columns[0] = {1.0, 2.0, 3.0, 40.0, 50.0};
+                c.environment_file = "elsewhere/air.csv";
+                c.dispersions[59].file = "elsewhere/heads.csv";
+              }),
+              IsEmpty());
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

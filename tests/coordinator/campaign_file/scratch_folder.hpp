@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::test {
+
+/// A folder of its own for a test's files, removed with everything in it.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "proofmass-XXXXXX").string();
+    PROOFMASS_EXPECT(mkdtemp(pattern.data()) != nullptr);
+    path_ = pattern;
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  std::filesystem::path write(const std::string& name, std::string_view text) const {
+    std::ofstream(path_ / name, std::ios::binary) << text;
+    return path_ / name;
+  }
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// What read_campaign() says against a file `campaign.toml` with this text, the folder taken off;
+/// empty if it says nothing.
+inline std::string refusal_of(std::string_view text, const ScratchFolder& folder,
+                              const coordinator::Overrides& overrides = {}) {
+  try {
+    (void)coordinator::read_campaign(folder.write("campaign.toml", text), overrides);
+    return "";
+  } catch (const coordinator::CampaignFileError& error) {
+    std::string message = error.what();
+    const std::string prefix = folder.path().string() + "/";
+    if (message.starts_with(prefix)) message.erase(0, prefix.size());
+    return message;
+  }
+}
+
+inline std::string refusal_of(std::string_view text, const coordinator::Overrides& overrides = {}) {
+  return refusal_of(text, ScratchFolder(), overrides);
+}
+
+}  // namespace proofmass::test
