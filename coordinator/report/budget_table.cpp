@@ -1,0 +1,68 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <optional>
+
+#include "coordinator/report/report.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "core/campaign/budget.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t term_width = 23;
+constexpr std::size_t figure_width = 9;
+constexpr std::size_t side_width = 3 * figure_width + 1;  // A space before the line between.
+
+// Contributions before calibration and after it, with the worst and the mean errors.
+using Figures = std::array<std::optional<double>, 3>;
+
+std::string cells(const Figures& figures) {
+  std::string text;
+  for (const std::optional<double>& figure : figures) {
+    text += right_aligned(figure ? fmt::format("{:.1e}", *figure) : "-", figure_width);
+  }
+  return text;
+}
+
+std::string row(const BudgetEntryInfo& info, const Figures& figures) {
+  const Figures paper{info.paper_before, info.paper_after_worst, info.paper_after_mean};
+  return left_aligned(info.label, term_width) + cells(figures) + " │" + cells(paper) + "\n";
+}
+
+std::string rule() {
+  return horizontal_rule(term_width + side_width) + "┼" + horizontal_rule(side_width - 1) + "\n";
+}
+
+std::string heading() {
+  std::string titles;
+  for (const char* title : {"before", "worst", "mean"}) {
+    titles += right_aligned(title, figure_width);
+  }
+  return std::string(term_width, ' ') +
+         left_aligned(centred("this campaign", side_width), side_width) + "│" +
+         centred("the paper", side_width) + "\n" + left_aligned("term", term_width) + titles +
+         " │" + titles + "\n" + rule();
+}
+
+}  // namespace
+
+std::string budget_table(const Scenario& scenario, const CampaignStatistics& statistics) {
+  const Budget before = budget_before_calibration(scenario);
+  const Budget after_worst = budget_after_calibration(scenario, statistics.worst_errors());
+  const Budget after_mean = budget_after_calibration(scenario, statistics.mean_errors());
+  const auto figures = [&](const auto& value_of) -> Figures {
+    if (statistics.num_estimated == 0) return {value_of(before), std::nullopt, std::nullopt};
+    return {value_of(before), value_of(after_worst), value_of(after_mean)};
+  };
+  std::string text = "Budget of the test of the equivalence principle, m/s²\n\n" + heading();
+  for (std::size_t i = 0; i < num_budget_entries; ++i) {
+    text += row(budget_entry_infos()[i],
+                figures([&](const Budget& budget) { return budget.entries[i]; }));
+  }
+  text +=
+      rule() + row(budget_total_info, figures([](const Budget& budget) { return budget.total; }));
+  return text + "before: bounds of construction; worst, mean: left by the errors of calibration\n";
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "coordinator/store/store.hpp"
+#include "core/campaign/scenario.hpp"
+#include "core/campaign/statistics.hpp"
+
+namespace proofmass::coordinator {
+
+/// Everything that `proofmass report` prints: summary and both tables, computed from the results in
+/// the file. Lines have at most 80 characters.
+[[nodiscard]] std::string report_text(const Store& store, const Scenario& scenario);
+
+/// Name, seed, and how many runs ended how.
+/// @param num_runs  Runs wanted.
+[[nodiscard]] std::string summary_text(std::string_view name, std::uint64_t seed,
+                                       std::uint64_t num_runs,
+                                       const CampaignStatistics& statistics);
+
+/// Accuracy of each parameter beside [Hardy2013] tab:perfo-numerical.
+[[nodiscard]] std::string accuracy_table(const Scenario& scenario,
+                                         const CampaignStatistics& statistics);
+
+/// Budget before and after calibration beside [Hardy2013] tab:Budget and tab:Budget_cali.
+[[nodiscard]] std::string budget_table(const Scenario& scenario,
+                                       const CampaignStatistics& statistics);
+
+/// Statistics of the results in a campaign file.
+[[nodiscard]] CampaignStatistics read_statistics(const Store& store, const Scenario& scenario);
+
+/// Brings the statistics and budgets that are stored in the file up to its results.
+void update_statistics(Store& store, const Scenario& scenario);
+
+}  // namespace proofmass::coordinator

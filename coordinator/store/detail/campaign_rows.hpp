@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "coordinator/store/detail/database.hpp"
+#include "core/campaign/campaign.hpp"
+
+namespace proofmass::coordinator::detail {
+
+/// Fills the tables `campaign`, `parameter`, `environment_row` and `dispersion_value`.
+void insert_campaign(Database& database, const Campaign& campaign, std::string_view definition);
+
+[[nodiscard]] EnvironmentTable read_environment_table(const Database& database);
+
+/// Values of one drawn quantity, run by run; empty if the file has none.
+[[nodiscard]] std::vector<double> read_dispersion_values(const Database& database,
+                                                         std::string_view drawn_name);
+
+/// Checks that a campaign can replace the stored one: the same but for more runs.
+/// @throws StoreError naming what differs.
+void check_extension(const Database& database, const Campaign& campaign);
+
+/// Stores number of runs, definition and the table values of the new runs. @pre check_extension().
+void extend_campaign(Database& database, const Campaign& campaign, std::string_view definition);
+
+}  // namespace proofmass::coordinator::detail

@@ -1,0 +1,188 @@
+#include "coordinator/store/detail/database.hpp"
+
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "coordinator/store/store_error.hpp"
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+constexpr int busy_timeout_ms = 5000;
+
+int open_flags(Access access) {
+  switch (access) {
+    case Access::create:
+      return SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+    case Access::read_write:
+      return SQLITE_OPEN_READWRITE;
+    case Access::read_only:
+      return SQLITE_OPEN_READONLY;
+  }
+  return SQLITE_OPEN_READONLY;
+}
+
+std::string explanation(int code, sqlite3* connection) {
+  switch (code & 0xff) {
+    case SQLITE_NOTADB:
+      return "is not an SQLite database";
+    case SQLITE_CORRUPT:
+      return fmt::format("is damaged: {}; restore it from a copy", sqlite3_errmsg(connection));
+    case SQLITE_FULL:
+      return "the disk is full; what was committed before is safe, free space and try again";
+    case SQLITE_BUSY:
+      return fmt::format("is locked by another program for more than {} s", busy_timeout_ms / 1000);
+    case SQLITE_IOERR:
+      return fmt::format("{}; what was committed before is safe", sqlite3_errmsg(connection));
+    case SQLITE_CANTOPEN:
+      return fmt::format("{}: {}", sqlite3_errmsg(connection),
+                         std::strerror(sqlite3_system_errno(connection)));
+    default:
+      return sqlite3_errmsg(connection);
+  }
+}
+
+}  // namespace
+
+void Statement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+
+Statement::Statement(const Database& database, sqlite3_stmt* statement)
+    : database_(&database), statement_(statement) {}
+
+void Statement::check(int code) const {
+  if (code != SQLITE_OK) database_->fail(code);
+}
+
+void Statement::bind(int position, std::int64_t value) {
+  check(sqlite3_bind_int64(statement_.get(), position, value));
+}
+
+void Statement::bind(int position, std::uint64_t value) {
+  PROOFMASS_EXPECT(value <= static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()));
+  bind(position, static_cast<std::int64_t>(value));
+}
+
+void Statement::bind(int position, std::uint32_t value) {
+  bind(position, static_cast<std::int64_t>(value));
+}
+
+void Statement::bind(int position, const std::optional<double>& value) {
+  if (value) {
+    bind(position, *value);
+  } else {
+    check(sqlite3_bind_null(statement_.get(), position));
+  }
+}
+
+void Statement::bind(int position, double value) {
+  PROOFMASS_EXPECT(std::isfinite(value));
+  check(sqlite3_bind_double(statement_.get(), position, value));
+}
+
+void Statement::bind(int position, std::string_view value) {
+  check(sqlite3_bind_text64(statement_.get(), position, value.data(), value.size(),
+                            SQLITE_TRANSIENT, SQLITE_UTF8));
+}
+
+bool Statement::step() {
+  const int code = sqlite3_step(statement_.get());
+  if (code == SQLITE_ROW) return true;
+  sqlite3_reset(statement_.get());
+  if (code != SQLITE_DONE) database_->fail(code);
+  return false;
+}
+
+void Statement::finish() {
+  while (step()) {
+  }
+}
+
+double Statement::real(int column) const { return sqlite3_column_double(statement_.get(), column); }
+
+std::int64_t Statement::integer(int column) const {
+  return sqlite3_column_int64(statement_.get(), column);
+}
+
+std::uint64_t Statement::count(int column) const {
+  const std::int64_t value = integer(column);
+  PROOFMASS_EXPECT(value >= 0);
+  return static_cast<std::uint64_t>(value);
+}
+
+std::string Statement::text(int column) const {
+  const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
+  const int size = sqlite3_column_bytes(statement_.get(), column);
+  return text == nullptr ? std::string() : std::string(text, static_cast<std::size_t>(size));
+}
+
+void Database::Close::operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }
+
+Database::Database(const std::filesystem::path& path, Access access) : path_(path) {
+  // An absolute path is never mistaken for `:memory:` or a URI.
+  const std::string name = std::filesystem::absolute(path).string();
+  sqlite3* connection = nullptr;
+  const int code = sqlite3_open_v2(name.c_str(), &connection, open_flags(access), nullptr);
+  connection_.reset(connection);
+  if (code != SQLITE_OK) fail(code);
+  sqlite3_extended_result_codes(connection, 1);
+  sqlite3_busy_timeout(connection, busy_timeout_ms);
+  if (access != Access::read_only && sqlite3_db_readonly(connection, "main") != 0) {
+    throw StoreError(fmt::format("campaign file = {} (is not writable)", path_.string()));
+  }
+}
+
+void Database::execute(const std::string& sql) {
+  const int code = sqlite3_exec(connection_.get(), sql.c_str(), nullptr, nullptr, nullptr);
+  if (code != SQLITE_OK) fail(code);
+}
+
+Statement Database::prepare(std::string_view sql) const {
+  sqlite3_stmt* statement = nullptr;
+  const int code = sqlite3_prepare_v2(connection_.get(), sql.data(), static_cast<int>(sql.size()),
+                                      &statement, nullptr);
+  if (code != SQLITE_OK) fail(code);
+  return {*this, statement};
+}
+
+std::int64_t Database::integer(std::string_view sql) const {
+  Statement statement = prepare(sql);
+  PROOFMASS_EXPECT(statement.step());
+  return statement.integer(0);
+}
+
+std::string Database::text(std::string_view sql) const {
+  Statement statement = prepare(sql);
+  PROOFMASS_EXPECT(statement.step());
+  return statement.text(0);
+}
+
+std::int64_t Database::num_changes() const { return sqlite3_changes64(connection_.get()); }
+
+bool Database::in_transaction() const { return sqlite3_get_autocommit(connection_.get()) == 0; }
+
+void Database::fail(int code) const {
+  throw StoreError(
+      fmt::format("campaign file = {} ({})", path_.string(), explanation(code, connection_.get())));
+}
+
+Transaction::Transaction(Database& database) : database_(database) {
+  database_.execute("BEGIN IMMEDIATE");
+}
+
+// SQLite ends a transaction by itself on a full disk, so that there may be none to roll back.
+Transaction::~Transaction() {
+  if (!database_.in_transaction()) return;
+  try {
+    database_.execute("ROLLBACK");
+  } catch (const StoreError&) {
+    // The next BEGIN reports what is wrong with the connection.
+  }
+}
+
+void Transaction::commit() { database_.execute("COMMIT"); }
+
+}  // namespace proofmass::coordinator::detail

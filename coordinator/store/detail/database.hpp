@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace proofmass::coordinator::detail {
+
+/// How a database file is opened.
+enum class Access { create, read_write, read_only };
+
+class Database;
+
+/// A prepared statement of a Database, which outlives it. Parameters count from 1, columns from 0.
+class Statement {
+ public:
+  /// Binds all parameters, runs to the end and resets.
+  template <typename... Values>
+  void run(const Values&... values) {
+    bind_all(values...);
+    finish();
+  }
+
+  /// Binds all parameters in order.
+  template <typename... Values>
+  void bind_all(const Values&... values) {
+    int position = 0;
+    (bind(++position, values), ...);
+  }
+
+  void bind(int position, std::int64_t value);
+  void bind(int position, std::uint64_t value);  ///< @pre value < 2⁶³.
+  void bind(int position, std::uint32_t value);
+  /// Binds the value, or NULL. A zero loses its sign: SQLite keeps none in a column of type REAL.
+  /// @pre The value is finite; SQLite would turn NaN into NULL.
+  void bind(int position, const std::optional<double>& value);
+  void bind(int position, double value);
+  void bind(int position, std::string_view value);
+
+  /// Goes to the next row; false, and reset, after the last.
+  [[nodiscard]] bool step();
+  /// Goes on to the end and resets.
+  void finish();
+
+  [[nodiscard]] double real(int column) const;
+  [[nodiscard]] std::int64_t integer(int column) const;
+  [[nodiscard]] std::uint64_t count(int column) const;  ///< @pre The integer is not negative.
+  [[nodiscard]] std::string text(int column) const;
+
+ private:
+  friend class Database;
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const;
+  };
+
+  Statement(const Database& database, sqlite3_stmt* statement);
+  void check(int code) const;
+
+  const Database* database_;
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+};
+
+/// One connection to one database file, for one thread.
+class Database {
+ public:
+  /// Opens the file and waits up to 5 s, then and later, for locks of others.
+  /// @throws StoreError if the file cannot be opened as asked.
+  Database(const std::filesystem::path& path, Access access);
+  Database(const Database&) = delete;
+  Database& operator=(const Database&) = delete;
+
+  /// Runs statements that yield nothing of interest.
+  void execute(const std::string& sql);
+  [[nodiscard]] Statement prepare(std::string_view sql) const;
+
+  /// First column of the first row of a query that has one.
+  [[nodiscard]] std::int64_t integer(std::string_view sql) const;
+  [[nodiscard]] std::string text(std::string_view sql) const;
+
+  /// Rows changed by the last INSERT, UPDATE or DELETE.
+  [[nodiscard]] std::int64_t num_changes() const;
+  [[nodiscard]] bool in_transaction() const;
+
+  /// @throws StoreError `campaign file = path (what went wrong, with a remedy)`.
+  [[noreturn]] void fail(int code) const;
+
+ private:
+  struct Close {
+    void operator()(sqlite3* connection) const;
+  };
+
+  std::filesystem::path path_;
+  std::unique_ptr<sqlite3, Close> connection_;
+};
+
+/// Changes that are stored together by commit(), or not at all.
+class Transaction {
+ public:
+  explicit Transaction(Database& database);
+  ~Transaction();
+  Transaction(const Transaction&) = delete;
+  Transaction& operator=(const Transaction&) = delete;
+
+  /// Durable when it returns.
+  void commit();
+
+ private:
+  Database& database_;
+};
+
+}  // namespace proofmass::coordinator::detail

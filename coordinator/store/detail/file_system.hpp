@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+
+namespace proofmass::coordinator::detail {
+
+/// Name of the network file system with this statfs(2) type, or empty if the type is none of those.
+/// A write-ahead log needs memory shared by all readers and writers, so one host.
+[[nodiscard]] std::string_view network_file_system_name(std::uint64_t type);
+
+/// @throws StoreError if new files cannot stand beside `path`: no such directory, or a network file
+///         system below it.
+void check_directory_of(const std::filesystem::path& path);
+
+/// Makes the directory entry of `path` durable.
+void synchronise_directory_of(const std::filesystem::path& path);
+
+}  // namespace proofmass::coordinator::detail

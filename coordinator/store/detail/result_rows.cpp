@@ -1,0 +1,124 @@
+#include "coordinator/store/detail/result_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <string>
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+// Columns before the parameters': run_index, status, num_draws, num_rounds.
+constexpr int num_leading_columns = 4;
+constexpr int num_columns = num_leading_columns + 2 * static_cast<int>(num_parameters);
+
+// Position of a parameter's truth among the columns, from 0; its estimate stands num_parameters on.
+int truth_column(const ParameterInfo& info) {
+  return num_leading_columns + static_cast<int>(index(info.parameter));
+}
+int estimate_column(const ParameterInfo& info) {
+  return truth_column(info) + static_cast<int>(num_parameters);
+}
+
+std::string column_list() {
+  std::string truths, estimates;
+  for (const ParameterInfo& info : parameter_infos()) {
+    truths += fmt::format(", truth_{}{}", info.name, info.unit_suffix);
+    estimates += fmt::format(", estimate_{}{}", info.name, info.unit_suffix);
+  }
+  return "run_index, status, num_draws, num_rounds" + truths + estimates;
+}
+
+std::string insert_sql() {
+  std::string values = "?";
+  for (int column = 1; column < num_columns; ++column) values += ", ?";
+  return fmt::format("INSERT INTO run_result ({}) VALUES ({}) ON CONFLICT DO NOTHING",
+                     column_list(), values);
+}
+
+std::string select_sql(std::string_view clause) {
+  return fmt::format("SELECT {} FROM run_result {}", column_list(), clause);
+}
+
+void check_finite(const RunResult& result, std::string_view kind, const ParameterInfo& info,
+                  double value) {
+  if (std::isfinite(value)) return;
+  throw StoreError(fmt::format("run_result.{}_{}{} = {} (must be finite; run {})", kind, info.name,
+                               info.unit_suffix, value, result.run.value));
+}
+
+}  // namespace
+
+ResultRows::ResultRows(const Database& database)
+    : database_(database),
+      insert_(database.prepare(insert_sql())),
+      select_(database.prepare(select_sql("WHERE run_index = ?"))) {}
+
+bool ResultRows::insert(const RunResult& result) {
+  insert_.bind(1, result.run.value);
+  insert_.bind(2, static_cast<std::int64_t>(result.status));
+  insert_.bind(3, result.num_draws);
+  insert_.bind(4, result.num_rounds);
+  for (const ParameterInfo& info : parameter_infos()) {
+    const std::size_t i = index(info.parameter);
+    const auto truth = result.has_truth() ? std::optional(result.truth[i]) : std::nullopt;
+    const auto estimate = result.has_estimate() ? std::optional(result.estimate[i]) : std::nullopt;
+    insert_.bind(truth_column(info) + 1, truth);
+    insert_.bind(estimate_column(info) + 1, estimate);
+  }
+  insert_.finish();
+  return database_.num_changes() == 1;
+}
+
+RunResult ResultRows::read(RunIndex run) {
+  select_.bind_all(run.value);
+  PROOFMASS_EXPECT(select_.step());
+  const RunResult result = read_result(select_);
+  select_.finish();
+  return result;
+}
+
+Statement select_results(const Database& database) {
+  return database.prepare(select_sql("ORDER BY run_index"));
+}
+
+RunResult read_result(const Statement& row) {
+  RunResult result{.run = RunIndex{row.count(0)},
+                   .status = static_cast<RunStatus>(row.integer(1)),
+                   .num_draws = static_cast<std::uint32_t>(row.integer(2)),
+                   .num_rounds = static_cast<std::uint32_t>(row.integer(3))};
+  for (const ParameterInfo& info : parameter_infos()) {
+    result.truth[index(info.parameter)] = row.real(truth_column(info));
+    result.estimate[index(info.parameter)] = row.real(estimate_column(info));
+  }
+  return result;
+}
+
+// Meaningful values are finite, so that equal ones differ in the sign of a zero at most.
+bool are_equal(const RunResult& left, const RunResult& right) {
+  return left.run == right.run && left.status == right.status &&
+         left.num_draws == right.num_draws && left.num_rounds == right.num_rounds &&
+         (!left.has_truth() || left.truth == right.truth) &&
+         (!left.has_estimate() || left.estimate == right.estimate);
+}
+
+void check_delivery(const Delivery& delivery, std::uint64_t num_runs) {
+  const RunResult& result = delivery.result;
+  if (result.run.value >= num_runs) {
+    throw StoreError(fmt::format("run_result.run_index = {} (must be below num_runs = {})",
+                                 result.run.value, num_runs));
+  }
+  for (const ParameterInfo& info : parameter_infos()) {
+    const std::size_t i = index(info.parameter);
+    if (result.has_truth()) check_finite(result, "truth", info, result.truth[i]);
+    if (result.has_estimate()) check_finite(result, "estimate", info, result.estimate[i]);
+  }
+  if (!std::isfinite(delivery.compute_s)) {
+    throw StoreError(fmt::format("delivery.compute_s = {} (must be finite; run {})",
+                                 delivery.compute_s, result.run.value));
+  }
+}
+
+}  // namespace proofmass::coordinator::detail

@@ -1,0 +1,37 @@
+#pragma once
+
+#include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/store.hpp"
+#include "core/campaign/run_result.hpp"
+
+namespace proofmass::coordinator::detail {
+
+/// Results as rows of `run_result`; the columns follow from parameter_infos().
+class ResultRows {
+ public:
+  explicit ResultRows(const Database& database);
+
+  /// Stores a result unless the run has one; returns whether it did.
+  [[nodiscard]] bool insert(const RunResult& result);
+
+  /// The stored result. @pre There is one.
+  [[nodiscard]] RunResult read(RunIndex run);
+
+ private:
+  const Database& database_;
+  Statement insert_;
+  Statement select_;
+};
+
+/// All results in run order; read_result() takes one from its current row.
+[[nodiscard]] Statement select_results(const Database& database);
+[[nodiscard]] RunResult read_result(const Statement& row);
+
+/// Whether two results of one run agree in everything that means something.
+[[nodiscard]] bool are_equal(const RunResult& left, const RunResult& right);
+
+/// Checks a delivery before it is stored.
+/// @throws StoreError naming the field.
+void check_delivery(const Delivery& delivery, std::uint64_t num_runs);
+
+}  // namespace proofmass::coordinator::detail

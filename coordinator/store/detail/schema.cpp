@@ -1,0 +1,52 @@
+#include "coordinator/store/detail/schema.hpp"
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "coordinator/store/store_error.hpp"
+
+namespace proofmass::coordinator::detail {
+
+std::int64_t schema_version() { return static_cast<std::int64_t>(migrations().size()); }
+
+void check_campaign_file(const Database& database, const std::filesystem::path& path) {
+  const std::int64_t id = database.integer("PRAGMA application_id");
+  if (id != application_id) {
+    throw StoreError(fmt::format(
+        "campaign file = {} (is not a Proofmass campaign: its application_id is {}, not {})",
+        path.string(), id, application_id));
+  }
+  const std::int64_t version = database.integer("PRAGMA user_version");
+  if (version > schema_version()) {
+    throw StoreError(
+        fmt::format("campaign file = {} (is newer than this program: its user_version "
+                    "is {}, the newest known one {})",
+                    path.string(), version, schema_version()));
+  }
+  const std::string finding = database.text("PRAGMA quick_check(1)");
+  if (finding != "ok") {
+    throw StoreError(fmt::format("campaign file = {} (is damaged: {}; restore it from a copy)",
+                                 path.string(), finding));
+  }
+}
+
+void check_up_to_date(const Database& database, const std::filesystem::path& path) {
+  const std::int64_t version = database.integer("PRAGMA user_version");
+  if (version == schema_version()) return;
+  throw StoreError(
+      fmt::format("campaign file = {} (is older than this program: its user_version is "
+                  "{}, not {}; resuming the campaign brings it up to date)",
+                  path.string(), version, schema_version()));
+}
+
+void migrate(Database& database) {
+  PROOFMASS_EXPECT(database.in_transaction());
+  for (std::int64_t version = database.integer("PRAGMA user_version"); version < schema_version();
+       ++version) {
+    database.execute(std::string(migrations()[static_cast<std::size_t>(version)]));
+    PROOFMASS_EXPECT(database.integer("PRAGMA user_version") == version + 1);
+  }
+}
+
+}  // namespace proofmass::coordinator::detail

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+#include "coordinator/store/detail/database.hpp"
+
+namespace proofmass::coordinator::detail {
+
+/// `PrMs`: marks an SQLite database as a campaign file.
+inline constexpr std::int64_t application_id = 0x50724D73;
+
+/// The files of schema/ in order; the n-th, from 1, leads from version n − 1 to version n. They are
+/// compiled in.
+[[nodiscard]] std::span<const std::string_view> migrations();
+
+/// The version that this program reads and writes.
+[[nodiscard]] std::int64_t schema_version();
+
+/// Checks that a database is a campaign file, not newer than this program, and undamaged.
+/// @param path  For the message.
+/// @throws StoreError otherwise.
+void check_campaign_file(const Database& database, const std::filesystem::path& path);
+
+/// Checks that a campaign file has the version of this program: a reader cannot migrate it.
+/// @param path  For the message.
+/// @throws StoreError otherwise.
+void check_up_to_date(const Database& database, const std::filesystem::path& path);
+
+/// Brings the schema up to date, step by step. @pre Inside a transaction.
+void migrate(Database& database);
+
+}  // namespace proofmass::coordinator::detail

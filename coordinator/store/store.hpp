@@ -1,0 +1,116 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "coordinator/store/store_error.hpp"
+#include "core/campaign/budget.hpp"
+#include "core/campaign/campaign.hpp"
+#include "core/campaign/identifiers.hpp"
+#include "core/campaign/run_result.hpp"
+#include "core/campaign/statistics.hpp"
+#include "core/environment/environment_table.hpp"
+
+namespace proofmass::coordinator {
+
+/// A result and where it comes from.
+struct Delivery {
+  RunResult result;
+  std::string worker;         ///< Name of the worker, for people.
+  std::uint32_t attempt = 0;  ///< Of the lease under which the run was computed.
+  double compute_s = 0.0;     ///< Time that the worker spent on the run.
+};
+
+/// What became of the deliveries of one commit.
+struct CommitSummary {
+  std::uint64_t num_new = 0;
+  std::uint64_t num_duplicate = 0;  ///< Runs that were there already; nothing was changed.
+  /// Duplicates whose result is not the stored one: some worker computes wrongly.
+  std::uint64_t num_contradicting = 0;
+};
+
+/// A campaign file: one SQLite database with everything about one campaign (see README.md).
+///
+/// What a function has stored when it returns survives a crash of the process and of the machine;
+/// what a function has not stored when it throws is not in the file in part either. For one thread.
+/// All functions throw StoreError if the file cannot be read or written.
+class Store {
+ public:
+  /// Makes a new campaign file, complete or not at all, and opens it like open().
+  ///
+  /// @param campaign    Validated.
+  /// @param definition  The campaign as canonical TOML, for whoever opens the file.
+  /// @throws StoreError if the file exists.
+  static Store create(const std::filesystem::path& path, const Campaign& campaign,
+                      std::string_view definition);
+
+  /// Opens a campaign file for its coordinator: takes the lock, brings an older file up to date.
+  /// @throws StoreError if the file is missing, foreign, newer than this program or damaged, or if
+  ///         another coordinator has it; on a network file system.
+  static Store open(const std::filesystem::path& path);
+
+  /// Opens a campaign file for reading, also while a coordinator writes to it.
+  /// @throws StoreError as open() does, but for lock and file system; if the file is older than
+  /// this
+  ///         program.
+  static Store open_read_only(const std::filesystem::path& path);
+
+  /// Closes the file. Of a coordinator's, no other file (log, lock) remains unless somebody reads.
+  ~Store();
+  Store(Store&&) noexcept;
+  Store& operator=(Store&&) noexcept;
+
+  [[nodiscard]] std::string name() const;
+  [[nodiscard]] std::uint64_t seed() const;
+  [[nodiscard]] std::uint64_t num_runs() const;  ///< Runs wanted, finished or not.
+  [[nodiscard]] std::string definition() const;
+  [[nodiscard]] std::string model_version() const;  ///< That of the program that made the file.
+  [[nodiscard]] EnvironmentTable environment_table() const;
+
+  /// Values of `table` quantities for each run, shape [elements][num_runs].
+  /// @param elements  Indices into drawn_names(), as from table_elements().
+  [[nodiscard]] std::vector<std::vector<double>> table_columns(
+      std::span<const std::size_t> elements) const;
+
+  /// Raises the number of runs; takes the table values of the new ones.
+  /// @throws StoreError if that number is less than before, or if name, seed, environment or the
+  ///         table values of the old runs are not those of the file. The caller compares the rest.
+  void extend(const Campaign& campaign, std::string_view definition);
+
+  /// Ascending; neighbours are one range.
+  [[nodiscard]] std::vector<RunRange> finished_runs() const;
+
+  /// Stores the results of runs that have none yet, all of them or, if it throws, none.
+  /// @throws StoreError if a run is not one of the campaign's or a number that matters is not
+  /// finite.
+  CommitSummary commit(std::span<const Delivery> deliveries);
+
+  /// Calls visit(result) for each finished run, in run order. Zeros have no sign.
+  void for_each_result(const std::function<void(const RunResult&)>& visit) const;
+
+  /// Replaces the stored statistics and budgets.
+  /// @param after_worst  With each parameter's worst error; ignored while no run has an estimate.
+  /// @param after_mean   The same with the mean errors.
+  void write_statistics(const CampaignStatistics& statistics, const Budget& before,
+                        const Budget& after_worst, const Budget& after_mean);
+
+  /// Appends to the campaign's log, of which the newest 10,000 entries are kept.
+  /// @param kind  What happened, in one word: `coordinator_started`.
+  /// @param text  Details; what is beyond 2,000 characters is cut.
+  void record_event(std::string_view kind, std::string_view text);
+
+ private:
+  struct Parts;
+  explicit Store(std::unique_ptr<Parts> parts);
+
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace proofmass::coordinator

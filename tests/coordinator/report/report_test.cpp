@@ -1,0 +1,181 @@
+#include "coordinator/report/report.hpp"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "coordinator/report/text_cells.hpp"
+#include "coordinator/store/detail/database.hpp"
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::Contains;
+using ::testing::Each;
+using ::testing::HasSubstr;
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+MATCHER(FitsATerminal, "has at most 80 characters") { return text_width(arg) <= 80; }
+
+/// Statistics with the paper's own errors and `num_runs` runs, all of them estimated.
+CampaignStatistics paper_statistics(std::uint64_t num_runs) {
+  CampaignStatistics statistics;
+  statistics.num_runs = num_runs;
+  statistics.num_estimated = num_runs;
+  for (const ParameterInfo& info : parameter_infos()) {
+    AccuracyStatistic& accuracy = statistics.accuracy[index(info.parameter)];
+    accuracy.worst = info.paper.worst;
+    accuracy.mean = info.paper.mean;
+    accuracy.standard_deviation = info.paper.standard_deviation;
+  }
+  return statistics;
+}
+
+TEST(AccuracyTable, ShowsEachParameterBesideThePaper) {
+  CampaignStatistics statistics = paper_statistics(100);
+  statistics.accuracy[index(Parameter::a_c13)].num_beyond_objective = 3;
+  const std::vector<std::string> lines = lines_of(accuracy_table(Scenario{}, statistics));
+  // Figures of [Hardy2013] tab:perfo-numerical in the units of the table, left and right.
+  EXPECT_THAT(lines, Contains("a_c11·Δx   nm             100    40.0    10.0    7.30      0 │"
+                              "    40    10   7.3"));
+  EXPECT_THAT(lines, Contains("a_c11·Δy   nm            2000     200    50.0    40.0      0 │"
+                              "   200    50    40"));
+  EXPECT_THAT(lines, Contains("a_c13      1e-4 rad         9    11.0    3.10    2.60      3 │"
+                              "    11   3.1   2.6"));
+  EXPECT_THAT(lines, Contains("a_d11'     1e-6           150    5.00    1.60    1.20      0 │"
+                              "     5   1.6   1.2"));
+  EXPECT_THAT(lines, Contains("K2d/K1c²   s²/m           250     124    25.0    23.0      0 │"
+                              "   124    25    23"));
+}
+
+TEST(AccuracyTable, CountsTheRunsThatItIsAbout) {
+  EXPECT_THAT(accuracy_table(Scenario{}, paper_statistics(100)), HasSubstr(" of 100 runs\n"));
+  EXPECT_THAT(accuracy_table(Scenario{}, paper_statistics(1)), HasSubstr(" of 1 run\n"));
+}
+
+TEST(AccuracyTable, HasDashesWhileNoRunHasAnEstimate) {
+  const std::vector<std::string> lines = lines_of(accuracy_table(Scenario{}, CampaignStatistics{}));
+  EXPECT_THAT(lines, Contains("a_c12      1e-4 rad         9       -       -       -      - │"
+                              "    10   2.6   2.3"));
+}
+
+TEST(BudgetTable, ShowsEachTermBesideThePaper) {
+  const std::vector<std::string> lines = lines_of(budget_table(Scenario{}, paper_statistics(100)));
+  EXPECT_THAT(lines, Contains("a_c11·T_xx·Δx            8.4e-14  1.7e-16  4.2e-17 │"
+                              "  8.4e-14  1.7e-16  4.2e-17"));
+  EXPECT_THAT(lines, Contains("2·K2d·(Γ_d²+Γ_res,x²)    8.0e-16  7.1e-18  1.4e-18 │"
+                              "  8.0e-16  7.1e-18  1.4e-18"));
+  // The mean total differs by the rounding of the paper's inputs, most of it that of Δz.
+  EXPECT_THAT(lines, Contains("Total                    2.0e-13  1.1e-15  3.5e-16 │"
+                              "  2.0e-13  1.1e-15  3.6e-16"));
+}
+
+TEST(BudgetTable, HasDashesAfterCalibrationWhileNoRunHasAnEstimate) {
+  const std::vector<std::string> lines = lines_of(budget_table(Scenario{}, CampaignStatistics{}));
+  EXPECT_THAT(lines, Contains("Total                    2.0e-13        -        - │"
+                              "  2.0e-13  1.1e-15  3.6e-16"));
+}
+
+TEST(Summary, TellsHowTheRunsEnded) {
+  CampaignStatistics statistics = paper_statistics(90);
+  EXPECT_EQ(summary_text("hardy2013", 1, 100, statistics),
+            "Campaign  hardy2013\n"
+            "Seed      1\n"
+            "Runs      90 finished of 100, 90 completed\n");
+  statistics.num_not_converged = 3;
+  statistics.num_not_finite = 2;
+  statistics.num_no_draw = 1;
+  EXPECT_EQ(summary_text("hardy2013", 1, 100, statistics),
+            "Campaign  hardy2013\n"
+            "Seed      1\n"
+            "Runs      90 finished of 100, 84 completed\n"
+            "          3 not converged, 2 not finite, 1 without draw\n");
+}
+
+// The largest counts, the longest name and errors of any size.
+TEST(Report, FitsATerminal) {
+  constexpr std::uint64_t most = 1'000'000'000;
+  CampaignStatistics statistics = paper_statistics(most);
+  statistics.num_not_converged = statistics.num_not_finite = statistics.num_no_draw = most / 4;
+  for (const double factor : {1e-90, 1e-6, 1.0, 1e6, 1e90}) {
+    for (AccuracyStatistic& accuracy : statistics.accuracy) {
+      accuracy.worst = accuracy.mean = accuracy.standard_deviation = 1.2345e-6 * factor;
+      accuracy.num_beyond_objective = most;
+    }
+    Scenario scenario;
+    for (double& objective : scenario.objectives) objective *= factor;
+    EXPECT_THAT(lines_of(accuracy_table(scenario, statistics)), Each(FitsATerminal()));
+    EXPECT_THAT(lines_of(budget_table(scenario, statistics)), Each(FitsATerminal()));
+  }
+  EXPECT_THAT(lines_of(summary_text(std::string(64, 'n'), std::numeric_limits<std::uint64_t>::max(),
+                                    most, statistics)),
+              Each(FitsATerminal()));
+}
+
+// All rows of a table have the width of its rule, so that nothing is shifted.
+TEST(Report, AlignsEveryRow) {
+  const CampaignStatistics statistics = paper_statistics(100);
+  for (const std::string& table :
+       {accuracy_table(Scenario{}, statistics), budget_table(Scenario{}, statistics)}) {
+    const std::vector<std::string> lines = lines_of(table);
+    for (std::size_t i = 3; i + 1 < lines.size(); ++i) {
+      EXPECT_EQ(text_width(lines[i]), text_width(lines[4])) << lines[i];
+    }
+  }
+}
+
+using StoredReport = test::StoreTest;
+
+TEST_F(StoredReport, IsThatOfTheResultsInTheFile) {
+  Store store = Store::create(file(), test::campaign_of(12), "");
+  std::vector<Delivery> deliveries = test::deliveries_of(0, 10);
+  deliveries[4].result.status = RunStatus::no_draw;
+  store.commit(deliveries);
+  const Scenario scenario;
+
+  const CampaignStatistics statistics = read_statistics(store, scenario);
+
+  EXPECT_EQ(statistics.num_runs, 10u);
+  EXPECT_EQ(statistics.num_estimated, 9u);
+  // Errors grow with the run: the last is the worst.
+  EXPECT_EQ(statistics.accuracy[0].worst_run, RunIndex{9});
+  EXPECT_EQ(statistics.accuracy[0].worst, test::result_of(9).error(Parameter::a_c11_delta_x));
+  EXPECT_EQ(report_text(store, scenario), summary_text("hardy2013", 1, 12, statistics) + "\n" +
+                                              accuracy_table(scenario, statistics) + "\n" +
+                                              budget_table(scenario, statistics));
+}
+
+TEST_F(StoredReport, IsStoredForSql) {
+  Store store = Store::create(file(), test::campaign_of(10), "");
+  store.commit(test::deliveries_of(0, 10));
+  const Scenario scenario;
+  update_statistics(store, scenario);
+
+  const CampaignStatistics statistics = read_statistics(store, scenario);
+  const detail::Database database(file(), detail::Access::read_only);
+  detail::Statement row = database.prepare("SELECT worst, mean FROM parameter_accuracy");
+  for (const AccuracyStatistic& accuracy : statistics.accuracy) {
+    ASSERT_TRUE(row.step());
+    EXPECT_EQ(row.real(0), accuracy.worst);
+    EXPECT_EQ(row.real(1), accuracy.mean);
+  }
+  detail::Statement total = database.prepare(
+      "SELECT before_m_s2, after_worst_m_s2, after_mean_m_s2 FROM budget WHERE term = 'Total'");
+  ASSERT_TRUE(total.step());
+  EXPECT_EQ(total.real(0), budget_before_calibration(scenario).total);
+  EXPECT_EQ(total.real(1), budget_after_calibration(scenario, statistics.worst_errors()).total);
+  EXPECT_EQ(total.real(2), budget_after_calibration(scenario, statistics.mean_errors()).total);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,65 @@
+#include "coordinator/report/text_cells.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace proofmass::coordinator {
+namespace {
+
+TEST(TextWidth, CountsCharactersNotBytes) {
+  EXPECT_EQ(text_width(""), 0u);
+  EXPECT_EQ(text_width("a_c11·Δx"), 8u);
+  EXPECT_EQ(text_width("s²/m"), 4u);
+  EXPECT_EQ(text_width("│─−µ"), 4u);
+}
+
+TEST(Alignment, FillsUpWithSpaces) {
+  EXPECT_EQ(left_aligned("Δx", 4), "Δx  ");
+  EXPECT_EQ(right_aligned("Δx", 4), "  Δx");
+  EXPECT_EQ(centred("Δx", 6), "  Δx");
+  EXPECT_EQ(horizontal_rule(3), "───");
+}
+
+TEST(Alignment, CutsNothing) {
+  EXPECT_EQ(left_aligned("Δxyz", 2), "Δxyz");
+  EXPECT_EQ(right_aligned("Δxyz", 2), "Δxyz");
+  EXPECT_EQ(centred("Δxyz", 2), "Δxyz");
+}
+
+TEST(MeasuredFigure, HasThreeSignificantDigits) {
+  EXPECT_EQ(measured_figure(0.0), "0");
+  EXPECT_EQ(measured_figure(0.0012345), "0.00123");
+  EXPECT_EQ(measured_figure(0.36), "0.360");
+  EXPECT_EQ(measured_figure(7.526), "7.53");
+  EXPECT_EQ(measured_figure(49.24), "49.2");
+  EXPECT_EQ(measured_figure(124.4), "124");
+  EXPECT_EQ(measured_figure(1239.6), "1240");
+}
+
+TEST(MeasuredFigure, CarriesIntoTheNextDecade) {
+  EXPECT_EQ(measured_figure(9.996), "10.0");
+  EXPECT_EQ(measured_figure(99.96), "100");
+  EXPECT_EQ(measured_figure(999'999.6), "1.0e+06");
+}
+
+TEST(MeasuredFigure, HasAtMostSevenCharactersBelow1e99) {
+  for (int exponent = -99; exponent < 99; ++exponent) {
+    for (const double mantissa : {1.0, 1.2345, 9.9949, 9.9996}) {
+      const std::string figure = measured_figure(mantissa * std::pow(10.0, exponent));
+      EXPECT_LE(figure.size(), 7u) << figure;
+    }
+  }
+}
+
+TEST(GivenFigure, HasNoZerosThatSayNothing) {
+  EXPECT_EQ(given_figure(2000.0), "2000");
+  EXPECT_EQ(given_figure(7.3), "7.3");
+  EXPECT_EQ(given_figure(5.0), "5");
+  EXPECT_EQ(given_figure(0.83), "0.83");
+  EXPECT_EQ(given_figure(0.04e-6 / 1e-9), "40");
+  EXPECT_EQ(given_figure(1e7), "1.0e+07");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

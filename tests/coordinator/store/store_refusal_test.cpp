@@ -1,0 +1,155 @@
+// Files and places that a store refuses, each with what the user reads.
+
+#include <gmock/gmock.h>
+
+#include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/store.hpp"
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using detail::Access;
+using detail::Database;
+using test::campaign_of;
+using test::deliveries_of;
+using test::store_error_of;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
+
+class StoreRefusal : public test::StoreTest {
+ protected:
+  /// `campaign file = <file()> (<reason>)`
+  [[nodiscard]] std::string message(const std::string& reason) const {
+    return "campaign file = " + file().string() + " (" + reason + ")";
+  }
+  [[nodiscard]] std::string error_of_open() const {
+    return store_error_of([&] { Store::open(file()); });
+  }
+  [[nodiscard]] std::string error_of_open_read_only() const {
+    return store_error_of([&] { Store::open_read_only(file()); });
+  }
+  void create(std::uint64_t num_runs = 1) const {
+    Store::create(file(), campaign_of(num_runs), "");
+  }
+};
+
+TEST_F(StoreRefusal, OfAMissingFile) {
+  EXPECT_EQ(error_of_open(), message("does not exist"));
+  EXPECT_EQ(error_of_open_read_only(), message("does not exist"));
+  EXPECT_TRUE(file_names().empty());
+}
+
+TEST_F(StoreRefusal, ToCreateAFileThatExists) {
+  test::write_file(file(), "precious");
+  EXPECT_EQ(store_error_of([&] { create(); }), message("exists already"));
+  EXPECT_EQ(std::filesystem::file_size(file()), 8u);
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+}
+
+TEST_F(StoreRefusal, OfAFileThatIsNotADatabase) {
+  test::write_file(file(), "name = \"hardy2013\"\n" + std::string(1000, '#'));
+  EXPECT_EQ(error_of_open(), message("is not an SQLite database"));
+  EXPECT_EQ(error_of_open_read_only(), message("is not an SQLite database"));
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+}
+
+TEST_F(StoreRefusal, OfAnEmptyFile) {
+  test::write_file(file(), "");
+  EXPECT_EQ(error_of_open(),
+            message("is not a Proofmass campaign: its application_id is 0, not 1349668211"));
+}
+
+TEST_F(StoreRefusal, OfADatabaseOfAnotherApplication) {
+  Database(file(), Access::create).execute("CREATE TABLE t (x); PRAGMA application_id = 77");
+  const std::string expected =
+      message("is not a Proofmass campaign: its application_id is 77, not 1349668211");
+  EXPECT_EQ(error_of_open(), expected);
+  EXPECT_EQ(error_of_open_read_only(), expected);
+}
+
+TEST_F(StoreRefusal, OfANewerFile) {
+  create();
+  Database(file(), Access::read_write).execute("PRAGMA user_version = 99");
+  const std::string expected =
+      message("is newer than this program: its user_version is 99, the newest known one 3");
+  EXPECT_EQ(error_of_open(), expected);
+  EXPECT_EQ(error_of_open_read_only(), expected);
+}
+
+TEST_F(StoreRefusal, ToReadAnOlderFile) {
+  create();
+  Database(file(), Access::read_write).execute("PRAGMA user_version = 2");
+  EXPECT_EQ(
+      error_of_open_read_only(),
+      message("is older than this program: its user_version is 2, not 3; resuming the campaign "
+              "brings it up to date"));
+}
+
+// Zeros in the middle of the pages of results: the header and the schema are still good.
+TEST_F(StoreRefusal, OfADamagedFile) {
+  Store::create(file(), campaign_of(1000), "").commit(deliveries_of(0, 1000));
+  const auto size = std::filesystem::file_size(file());
+  ASSERT_GT(size, 100'000u);
+  std::fstream stream(file(), std::ios::binary | std::ios::in | std::ios::out);
+  stream.seekp(static_cast<std::streamoff>(size / 2));
+  stream << std::string(20'000, '\0');
+  stream.close();
+  EXPECT_THAT(error_of_open(), HasSubstr("(is damaged: "));
+  EXPECT_THAT(error_of_open(), HasSubstr("; restore it from a copy)"));
+  EXPECT_THAT(error_of_open_read_only(), HasSubstr("(is damaged: "));
+}
+
+TEST_F(StoreRefusal, OfATruncatedFile) {
+  Store::create(file(), campaign_of(1000), "").commit(deliveries_of(0, 1000));
+  std::filesystem::resize_file(file(), std::filesystem::file_size(file()) / 2);
+  EXPECT_THAT(error_of_open(), HasSubstr("(is damaged: "));
+}
+
+TEST_F(StoreRefusal, OfASecondCoordinator) {
+  const Store store = Store::create(file(), campaign_of(1), "");
+  EXPECT_THAT(error_of_open(), MatchesRegex("lock = .*/campaign.db.lock \\(held by process " +
+                                            std::to_string(::getpid()) +
+                                            " on .+; a campaign has one coordinator at a time\\)"));
+  EXPECT_THAT(store_error_of([&] { create(); }), HasSubstr("(held by process "));
+}
+
+TEST_F(StoreRefusal, OfADirectoryThatDoesNotExist) {
+  const std::filesystem::path missing = directory() / "missing";
+  EXPECT_EQ(store_error_of([&] { Store::create(missing / "campaign.db", campaign_of(1), ""); }),
+            "directory = " + missing.string() + " (No such file or directory)");
+}
+
+TEST_F(StoreRefusal, OfADirectoryThatIsNotWritable) {
+  create();
+  std::filesystem::permissions(directory(), std::filesystem::perms(0555));
+  std::string error;
+  {
+    const test::OrdinaryUser user;
+    error = error_of_open();
+  }
+  std::filesystem::permissions(directory(), std::filesystem::perms(0755));
+  EXPECT_EQ(error,
+            "lock = " + file().string() +
+                ".lock (cannot be created: Permission denied; the directory of a campaign file "
+                "must be writable)");
+}
+
+TEST_F(StoreRefusal, OfAFileThatIsNotWritable) {
+  create();
+  std::filesystem::permissions(file(), std::filesystem::perms(0444));
+  std::filesystem::permissions(directory(), std::filesystem::perms(0777));
+  const test::OrdinaryUser user;
+  EXPECT_EQ(error_of_open(), message("is not writable"));
+}
+
+TEST_F(StoreRefusal, ToWriteThroughAReader) {
+  create();
+  Store reader = Store::open_read_only(file());
+  EXPECT_EQ(store_error_of([&] { reader.record_event("note", ""); }),
+            message("attempt to write a readonly database"));
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

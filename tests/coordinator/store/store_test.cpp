@@ -1,0 +1,336 @@
+#include "coordinator/store/store.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <limits>
+
+#include "coordinator/store/detail/database.hpp"
+#include "core/campaign/dispersion.hpp"
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using detail::Access;
+using detail::Database;
+using detail::Statement;
+using test::campaign_of;
+using test::deliveries_of;
+using test::delivery_of;
+using test::result_of;
+using test::results_in;
+using test::store_error_of;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+using StoreTest = test::StoreTest;
+
+/// Asserts that two results are the same bits, of which they have no spare ones.
+void expect_same_bits(const RunResult& left, const RunResult& right) {
+  EXPECT_EQ(left.run, right.run);
+  EXPECT_EQ(left.status, right.status);
+  EXPECT_EQ(left.num_draws, right.num_draws);
+  EXPECT_EQ(left.num_rounds, right.num_rounds);
+  using Bits = std::array<std::uint64_t, num_parameters>;
+  EXPECT_EQ(std::bit_cast<Bits>(left.truth), std::bit_cast<Bits>(right.truth));
+  EXPECT_EQ(std::bit_cast<Bits>(left.estimate), std::bit_cast<Bits>(right.estimate));
+}
+
+/// A campaign with two rows of environment and two drawn quantities from tables.
+Campaign campaign_with_data(std::uint64_t num_runs) {
+  Campaign campaign = campaign_of(num_runs);
+  campaign.environment_table = {
+      {.time_s = -0.1, .linear_m_s2 = {1e-7, 1.0 / 3.0, 0.0}, .angular_rad_s2 = {1, -2, 3e-300}},
+      {.time_s = 6000.0, .linear_m_s2 = {0.1, 0.2, 0.3}, .angular_rad_s2 = {0, 0, 1e-9}}};
+  for (const std::size_t element : {std::size_t{3}, std::size_t{17}}) {
+    campaign.dispersions[element].law = Law::table;
+    std::vector<double> column(num_runs + 1);  // Files may hold more values than there are runs.
+    for (std::size_t run = 0; run < column.size(); ++run) {
+      column[run] = static_cast<double>(element) + static_cast<double>(run) / 7.0;
+    }
+    campaign.table_columns.push_back(column);
+  }
+  return campaign;
+}
+
+TEST_F(StoreTest, HoldsTheCampaignThatItWasCreatedWith) {
+  Campaign campaign = campaign_with_data(3);
+  campaign.name = "naïve";
+  campaign.seed = std::numeric_limits<std::uint64_t>::max();
+  Store::create(file(), campaign, "name = \"naïve\"\n");
+
+  const Store store = Store::open(file());
+  EXPECT_EQ(store.name(), "naïve");
+  EXPECT_EQ(store.seed(), 18446744073709551615u);
+  EXPECT_EQ(store.num_runs(), 3u);
+  EXPECT_EQ(store.definition(), "name = \"naïve\"\n");
+  EXPECT_EQ(store.environment_table(), campaign.environment_table);
+  const std::vector<std::size_t> elements = table_elements(campaign.dispersions);
+  const std::vector<std::vector<double>> columns = store.table_columns(elements);
+  ASSERT_EQ(columns.size(), 2u);
+  EXPECT_THAT(columns[0], ElementsAre(3.0, 3.0 + 1.0 / 7.0, 3.0 + 2.0 / 7.0));
+  EXPECT_THAT(columns[1], ElementsAre(17.0, 17.0 + 1.0 / 7.0, 17.0 + 2.0 / 7.0));
+}
+
+TEST_F(StoreTest, OfANewCampaignHasNoResults) {
+  const Store store = Store::create(file(), campaign_of(5), "");
+  EXPECT_THAT(store.finished_runs(), IsEmpty());
+  EXPECT_THAT(results_in(store), IsEmpty());
+  EXPECT_THAT(store.environment_table(), IsEmpty());
+}
+
+TEST_F(StoreTest, ReturnsResultsBitForBit) {
+  RunResult extremes = result_of(0);
+  extremes.truth = {0.1,
+                    -1.0 / 3.0,
+                    std::numeric_limits<double>::denorm_min(),
+                    std::numeric_limits<double>::max(),
+                    1e-300,
+                    3.0,
+                    1e15,
+                    9007199254740993.0,
+                    -5e-324,
+                    std::numeric_limits<double>::epsilon()};
+  extremes.num_draws = std::numeric_limits<std::uint32_t>::max();
+  const std::vector<Delivery> deliveries{{extremes, "w", 0, 1.0}, {result_of(1), "w", 0, 1.0}};
+  Store::create(file(), campaign_of(2), "").commit(deliveries);
+
+  const std::vector<RunResult> results = results_in(Store::open(file()));
+  ASSERT_EQ(results.size(), 2u);
+  expect_same_bits(results[0], extremes);
+  expect_same_bits(results[1], result_of(1));
+}
+
+TEST_F(StoreTest, KeepsNoSignOfAZero) {
+  Delivery delivery = delivery_of(0);
+  delivery.result.truth[0] = -0.0;
+  Store store = Store::create(file(), campaign_of(1), "");
+  store.commit({&delivery, 1});
+  EXPECT_EQ(std::bit_cast<std::uint64_t>(results_in(store)[0].truth[0]), 0u);
+  EXPECT_EQ(store.commit({&delivery, 1}).num_contradicting, 0u);
+}
+
+TEST_F(StoreTest, HasNullWhereAResultHasNoMeaning) {
+  std::vector<Delivery> deliveries;
+  for (const auto status : {RunStatus::completed, RunStatus::not_converged, RunStatus::not_finite,
+                            RunStatus::no_draw}) {
+    RunResult result = result_of(deliveries.size(), status);
+    if (!result.has_estimate()) result.estimate.fill(std::numeric_limits<double>::quiet_NaN());
+    if (!result.has_truth()) result.truth.fill(std::numeric_limits<double>::infinity());
+    deliveries.push_back({result, "w", 0, 1.0});
+  }
+  EXPECT_EQ(Store::create(file(), campaign_of(4), "").commit(deliveries).num_new, 4u);
+
+  const Database database(file(), Access::read_only);
+  const auto count = [&](const std::string& column) {
+    return database.integer("SELECT count(" + column + ") FROM run_result");
+  };
+  for (const ParameterInfo& info : parameter_infos()) {
+    const std::string name = std::string(info.name) + std::string(info.unit_suffix);
+    EXPECT_EQ(count("truth_" + name), 3);
+    EXPECT_EQ(count("estimate_" + name), 2);
+    EXPECT_EQ(count("error_" + name), 2);
+  }
+}
+
+TEST_F(StoreTest, ShowsEachErrorAsEstimateMinusTruth) {
+  Store::create(file(), campaign_of(1), "").commit(deliveries_of(0, 1));
+  const Database database(file(), Access::read_only);
+  for (const ParameterInfo& info : parameter_infos()) {
+    Statement select = database.prepare("SELECT error_" + std::string(info.name) +
+                                        std::string(info.unit_suffix) + " FROM run_result");
+    ASSERT_TRUE(select.step());
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(select.real(0)),
+              std::bit_cast<std::uint64_t>(result_of(0).error(info.parameter)));
+  }
+}
+
+TEST_F(StoreTest, YieldsResultsInRunOrderWhateverTheOrderOfArrival) {
+  Store store = Store::create(file(), campaign_of(300), "");
+  for (const std::uint64_t run : {299u, 0u, 256u, 2u, 1u}) {
+    const Delivery delivery = delivery_of(run);
+    store.commit({&delivery, 1});
+  }
+  std::vector<std::uint64_t> runs;
+  store.for_each_result([&](const RunResult& result) { runs.push_back(result.run.value); });
+  EXPECT_THAT(runs, ElementsAre(0, 1, 2, 256, 299));
+  EXPECT_THAT(store.finished_runs(),
+              ElementsAre(RunRange{RunIndex{0}, 3}, RunRange{RunIndex{256}, 1},
+                          RunRange{RunIndex{299}, 1}));
+}
+
+TEST_F(StoreTest, CommitsARunOnce) {
+  Store store = Store::create(file(), campaign_of(4), "");
+  EXPECT_EQ(store.commit(deliveries_of(0, 2)).num_new, 2u);
+  std::vector<Delivery> again = deliveries_of(1, 4);
+  again[0].worker = "late";
+  again.push_back(again.back());  // The same run twice in one commit.
+
+  const CommitSummary summary = store.commit(again);
+
+  EXPECT_EQ(summary.num_new, 2u);
+  EXPECT_EQ(summary.num_duplicate, 2u);
+  EXPECT_EQ(summary.num_contradicting, 0u);
+  EXPECT_EQ(results_in(store).size(), 4u);
+  const Database database(file(), Access::read_only);
+  EXPECT_EQ(database.text("SELECT worker FROM delivery WHERE run_index = 1"), "worker-1");
+  EXPECT_EQ(database.integer("SELECT count(*) FROM delivery"), 4);
+}
+
+TEST_F(StoreTest, CountsAndLogsAResultThatContradictsTheStoredOne) {
+  Store store = Store::create(file(), campaign_of(1), "");
+  store.commit(deliveries_of(0, 1));
+  std::vector<Delivery> other = deliveries_of(0, 1);
+  double& estimate = other[0].result.estimate[9];
+  estimate = std::nextafter(estimate, 1e300);
+
+  EXPECT_EQ(store.commit(other).num_contradicting, 1u);
+
+  expect_same_bits(results_in(store)[0], result_of(0));
+  const Database database(file(), Access::read_only);
+  EXPECT_EQ(database.text("SELECT kind || ' ' || text FROM event"),
+            "contradicting_result run=0 worker=worker-1 attempt=0");
+}
+
+TEST_F(StoreTest, KeepsWhoDeliveredARun) {
+  const Delivery delivery{.result = result_of(0), .worker = "näh", .attempt = 7, .compute_s = 2.25};
+  Store::create(file(), campaign_of(1), "").commit({&delivery, 1});
+  const Database database(file(), Access::read_only);
+  EXPECT_EQ(database.text("SELECT worker || ' ' || attempt || ' ' || compute_s FROM delivery"),
+            "näh 7 2.25");
+  EXPECT_EQ(
+      database.integer("SELECT abs(strftime('%s', received_utc) - strftime('%s', 'now')) < 60 "
+                       "FROM delivery"),
+      1);
+}
+
+TEST_F(StoreTest, RefusesARunBeyondTheCampaign) {
+  Store store = Store::create(file(), campaign_of(2), "");
+  EXPECT_EQ(store_error_of([&] { store.commit(deliveries_of(0, 3)); }),
+            "run_result.run_index = 2 (must be below num_runs = 2)");
+  EXPECT_THAT(store.finished_runs(), IsEmpty());
+}
+
+TEST_F(StoreTest, RefusesANumberThatIsNotFinite) {
+  Store store = Store::create(file(), campaign_of(2), "");
+  std::vector<Delivery> deliveries = deliveries_of(0, 2);
+  deliveries[1].result.truth[0] = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(store_error_of([&] { store.commit(deliveries); }),
+            "run_result.truth_a_c11_delta_x_m = inf (must be finite; run 1)");
+  deliveries[1] = delivery_of(1);
+  deliveries[1].result.estimate[8] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(store_error_of([&] { store.commit(deliveries); }),
+            "run_result.estimate_k2d_s2_m = nan (must be finite; run 1)");
+  deliveries[1] = delivery_of(1);
+  deliveries[1].compute_s = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(store_error_of([&] { store.commit(deliveries); }),
+            "delivery.compute_s = inf (must be finite; run 1)");
+  EXPECT_THAT(store.finished_runs(), IsEmpty());
+}
+
+TEST_F(StoreTest, ExtendsToMoreRunsAndTheirTableValues) {
+  Store store = Store::create(file(), campaign_with_data(2), "num_runs = 2\n");
+  store.commit(deliveries_of(0, 2));
+  const Campaign larger = campaign_with_data(4);
+
+  store.extend(larger, "num_runs = 4\n");
+
+  EXPECT_EQ(store.num_runs(), 4u);
+  EXPECT_EQ(store.definition(), "num_runs = 4\n");
+  const std::vector<std::size_t> elements = table_elements(larger.dispersions);
+  const std::vector<double> first_column = store.table_columns(elements)[0];
+  EXPECT_THAT(first_column, ElementsAre(3.0, 3.0 + 1.0 / 7.0, 3.0 + 2.0 / 7.0, 3.0 + 3.0 / 7.0));
+  EXPECT_EQ(store.commit(deliveries_of(0, 4)).num_new, 2u);
+}
+
+TEST_F(StoreTest, RefusesToExtendToAnotherCampaign) {
+  Store store = Store::create(file(), campaign_with_data(3), "");
+  const auto error_after = [&](const std::function<void(Campaign&)>& change) {
+    Campaign campaign = campaign_with_data(3);
+    change(campaign);
+    return store_error_of([&] { store.extend(campaign, ""); });
+  };
+  EXPECT_EQ(error_after([](Campaign& campaign) { campaign.name = "other"; }),
+            "campaign.name = other (the campaign file has hardy2013)");
+  EXPECT_EQ(error_after([](Campaign& campaign) { campaign.seed = 2; }),
+            "campaign.seed = 2 (the campaign file has 1)");
+  EXPECT_EQ(error_after([](Campaign& campaign) { campaign.num_runs = 2; }),
+            "campaign.runs = 2 (must be at least 3, as in the campaign file)");
+  EXPECT_EQ(error_after([](Campaign& campaign) {
+              campaign.environment_file = "e.csv";
+              campaign.environment_table[0].linear_m_s2[0] *= 2.0;
+            }),
+            "environment.file = e.csv (its rows are not those of the campaign file)");
+  EXPECT_EQ(error_after([](Campaign& campaign) { campaign.table_columns[1][2] = 0.5; }),
+            "dispersion." + drawn_names()[17] +
+                " = 0.5 (for run 2 the campaign file has 17.285714285714285)");
+  EXPECT_EQ(
+      error_after([](Campaign& campaign) {
+        campaign.dispersions[18] = campaign.dispersions[17];
+        campaign.table_columns.push_back(campaign.table_columns[1]);
+      }),
+      "dispersion." + drawn_names()[18] + " = table (the campaign file holds no values for it)");
+  EXPECT_EQ(error_after([](Campaign&) {}), "");
+}
+
+TEST_F(StoreTest, IsReadableWhileItsCoordinatorWrites) {
+  Store writer = Store::create(file(), campaign_of(10), "");
+  const Store reader = Store::open_read_only(file());
+  EXPECT_EQ(results_in(reader).size(), 0u);
+  writer.commit(deliveries_of(0, 7));
+  EXPECT_EQ(results_in(reader).size(), 7u);
+  EXPECT_EQ(Store::open_read_only(file()).num_runs(), 10u);
+}
+
+TEST_F(StoreTest, LeavesOneFileWhenClosed) {
+  {
+    Store store = Store::create(file(), campaign_of(10), "");
+    store.commit(deliveries_of(0, 10));
+  }
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+  Store::open(file());
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+}
+
+TEST_F(StoreTest, LosesNothingWhenClosedWhileSomebodyReads) {
+  std::optional<Store> writer = Store::create(file(), campaign_of(300), "");
+  writer->commit(deliveries_of(0, 300));
+  const Store reader = Store::open_read_only(file());
+  std::uint64_t num_read = 0;
+  reader.for_each_result([&](const RunResult&) {
+    if (num_read++ == 10) writer.reset();
+  });
+  EXPECT_EQ(num_read, 300u);
+  EXPECT_EQ(results_in(Store::open(file())).size(), 300u);
+}
+
+TEST_F(StoreTest, IsReadableInADirectoryThatIsNotWritable) {
+  Store::create(file(), campaign_of(3), "").commit(deliveries_of(0, 3));
+  std::filesystem::permissions(file(), std::filesystem::perms(0444));
+  std::filesystem::permissions(directory(), std::filesystem::perms(0555));
+  std::size_t num_results = 0;
+  {
+    const test::OrdinaryUser user;
+    num_results = results_in(Store::open_read_only(file())).size();
+  }
+  std::filesystem::permissions(directory(), std::filesystem::perms(0755));
+  EXPECT_EQ(num_results, 3u);
+}
+
+TEST_F(StoreTest, KeepsTheNewestEventsAndCutsLongOnes) {
+  Store store = Store::create(file(), campaign_of(1), "");
+  store.record_event("long", std::string(3000, 'x'));
+  const Database database(file(), Access::read_only);
+  EXPECT_EQ(database.text("SELECT text FROM event"), std::string(2000, 'x'));
+
+  Database(file(), Access::read_write)
+      .execute("INSERT INTO event (event_id, kind, text) VALUES (10000, 'old', '')");
+  store.record_event("new", "");
+  EXPECT_EQ(database.text("SELECT group_concat(kind) FROM event"), "old,new");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
