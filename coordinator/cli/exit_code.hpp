@@ -1,0 +1,21 @@
+#pragma once
+
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+
+/// How the programs end; documented in their --help.
+enum ExitCode : int {
+  exit_done = 0,
+  exit_cannot_be_done = 1,  ///< Disk, database, address, workers that crash.
+  exit_wrong_usage = 2,     ///< Arguments or campaign file.
+  exit_interrupted = 130,   ///< SIGINT or SIGTERM; what is stored stands.
+};
+
+/// The user asked for something that makes no sense.
+class UsageError : public Error {
+ public:
+  using Error::Error;
+};
+
+}  // namespace proofmass::coordinator

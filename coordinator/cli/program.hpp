@@ -1,0 +1,48 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <string_view>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+
+inline constexpr const char* exit_codes_text =
+    "Exit codes:\n"
+    "  0    done\n"
+    "  1    cannot be done: disk, database, address, workers that crash\n"
+    "  2    wrong usage or campaign file\n"
+    "  130  interrupted by SIGINT or SIGTERM; what is stored stands";
+
+/// Parses the arguments, does the work and turns what goes wrong into a message and an exit code.
+inline int run_program(CLI::App& app, int argc, char** argv, const std::function<int()>& work) {
+  const auto fail = [](std::string_view what, int exit_code) {
+    fmt::print(stderr, "proofmass: error: {}\n", what);
+    return exit_code;
+  };
+  try {
+    app.parse(argc, argv);
+    return work();
+  } catch (const CLI::Success& wish) {
+    return app.exit(wish);  // --help or --version.
+  } catch (const CLI::ParseError& error) {
+    return fail(error.what(), exit_wrong_usage);
+  } catch (const CampaignFileError& error) {
+    return fail(error.what(), exit_wrong_usage);
+  } catch (const UsageError& error) {
+    return fail(error.what(), exit_wrong_usage);
+  } catch (const InvalidArgument& error) {
+    return fail(error.what(), exit_wrong_usage);
+  } catch (const std::exception& error) {
+    return fail(error.what(), exit_cannot_be_done);
+  }
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,103 @@
+#include "coordinator/cli/progress_display.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t columns_max = 79;
+
+std::uint64_t percent(const CampaignProgress& progress) {
+  return progress.num_done * 100 / std::max<std::uint64_t>(1, progress.num_runs);
+}
+
+std::string rate_text(double rate_hz) {
+  if (rate_hz <= 0.0) return "";
+  if (rate_hz >= 10.0) return fmt::format("  {:.0f} runs/s", rate_hz);
+  if (rate_hz >= 0.1) return fmt::format("  {:.2f} runs/s", rate_hz);
+  return fmt::format("  {:.2f} runs/min", 60.0 * rate_hz);
+}
+
+std::string left_text(const CampaignProgress& progress) {
+  if (progress.rate_hz <= 0.0 || progress.num_done >= progress.num_runs) return "";
+  const auto num_left = static_cast<double>(progress.num_runs - progress.num_done);
+  return fmt::format("  {} left", duration_text(num_left / progress.rate_hz));
+}
+
+std::string figures(const CampaignProgress& progress) {
+  return fmt::format("{:3} %{}{}", percent(progress), rate_text(progress.rate_hz),
+                     left_text(progress));
+}
+
+}  // namespace
+
+std::string duration_text(double seconds) {
+  constexpr double longest_s = 9999.0 * 86400.0;
+  const auto total = static_cast<std::uint64_t>(std::ceil(std::clamp(seconds, 0.0, longest_s)));
+  if (total < 60) return fmt::format("{} s", total);
+  if (total < 3600) return fmt::format("{} min {} s", total / 60, total % 60);
+  if (total < 86400) return fmt::format("{} h {} min", total / 3600, total % 3600 / 60);
+  return fmt::format("{} d {} h", total / 86400, total % 86400 / 3600);
+}
+
+std::string progress_bar(const CampaignProgress& progress) {
+  const std::string left = fmt::format("{}/{} runs [", progress.num_done, progress.num_runs);
+  const std::string right = fmt::format("] {}", figures(progress));
+  const std::size_t used = left.size() + right.size();
+  constexpr std::size_t width_max = 30;
+  constexpr std::size_t width_min = 1;
+  const std::size_t room = columns_max > used ? columns_max - used : 0;
+  const std::size_t width = std::clamp(room, width_min, width_max);
+  const std::size_t filled = width * percent(progress) / 100;
+  const std::string line =
+      left + std::string(filled, '#') + std::string(width - filled, '.') + right;
+  return line.substr(0, columns_max);
+}
+
+std::string progress_line(const CampaignProgress& progress) {
+  return fmt::format("{}/{} runs  {}", progress.num_done, progress.num_runs, figures(progress));
+}
+
+DisplayMode display_mode_for(std::FILE* stream) {
+  return isatty(fileno(stream)) != 0 ? DisplayMode::bar : DisplayMode::lines;
+}
+
+ProgressDisplay::ProgressDisplay(DisplayMode mode, std::FILE* stream)
+    : mode_(mode), stream_(stream) {}
+
+ProgressDisplay::~ProgressDisplay() {
+  if (has_bar_) fmt::print(stream_, "\n");
+}
+
+void ProgressDisplay::update(const CampaignProgress& progress) {
+  if (mode_ == DisplayMode::bar) return show_bar(progress);
+  if (mode_ == DisplayMode::quiet) return;
+  const std::uint64_t tenths = percent(progress) / 10;
+  if (!is_first_ && tenths <= tenths_shown_) return;
+  is_first_ = false;
+  tenths_shown_ = tenths;
+  fmt::print(stream_, "{}\n", progress_line(progress));
+}
+
+void ProgressDisplay::show_bar(const CampaignProgress& progress) {
+  std::string line = progress_bar(progress);
+  if (has_bar_ && line == shown_) return;
+  // The longer line before it is wiped by the erasure to the end of the line.
+  fmt::print(stream_, "\r{}\033[K", line);
+  std::fflush(stream_);
+  has_bar_ = true;
+  shown_ = std::move(line);
+}
+
+void ProgressDisplay::note(std::string_view text) {
+  if (has_bar_) fmt::print(stream_, "\r\033[K");
+  fmt::print(stream_, "{}\n", text);
+  has_bar_ = false;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <string>
+#include <string_view>
+
+#include "coordinator/net/campaign_service.hpp"
+
+namespace proofmass::coordinator {
+
+enum class DisplayMode : std::uint8_t {
+  bar,    ///< One line, written again and again: for a terminal.
+  lines,  ///< A line every ten percent.
+  quiet,  ///< Notes only.
+};
+
+/// A line of at most 79 columns: runs done, percent, rate, time left.
+[[nodiscard]] std::string progress_bar(const CampaignProgress& progress);
+
+/// The same without a bar.
+[[nodiscard]] std::string progress_line(const CampaignProgress& progress);
+
+/// For people: `42 s`, `3 min 20 s`, `5 h 10 min`, `12 d 4 h`.
+[[nodiscard]] std::string duration_text(double seconds);
+
+/// Shows a campaign's progress and notes beside it.
+class ProgressDisplay {
+ public:
+  /// @param stream  Must outlive this object; standard error.
+  ProgressDisplay(DisplayMode mode, std::FILE* stream);
+  ~ProgressDisplay();  ///< Ends the bar's line.
+  ProgressDisplay(const ProgressDisplay&) = delete;
+  ProgressDisplay& operator=(const ProgressDisplay&) = delete;
+
+  /// May be called as often as one likes.
+  void update(const CampaignProgress& progress);
+  /// A line of its own that stays.
+  void note(std::string_view text);
+
+ private:
+  void show_bar(const CampaignProgress& progress);
+
+  DisplayMode mode_;
+  std::FILE* stream_;
+  bool has_bar_ = false;
+  std::string shown_;
+  std::uint64_t tenths_shown_ = 0;
+  bool is_first_ = true;
+};
+
+/// `bar` if the stream is a terminal, `lines` otherwise.
+[[nodiscard]] DisplayMode display_mode_for(std::FILE* stream);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+
+namespace proofmass::coordinator {
+
+/// Arguments of `proofmass run`.
+struct RunOptions {
+  std::filesystem::path campaign_file;
+  std::optional<std::filesystem::path> database;  ///< By default STEM.db in the current directory.
+  Overrides overrides;
+  std::optional<unsigned> num_workers;  ///< By default one for each processor.
+  bool is_quiet = false;
+};
+
+/// Runs what is missing of a campaign with local workers and prints its tables.
+/// @return An ExitCode.
+/// @throws CampaignFileError, UsageError, StoreError, Error.
+[[nodiscard]] int run_campaign(const RunOptions& options);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,35 @@
+#include "coordinator/cli/small_commands.hpp"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/campaign_start.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/report/report.hpp"
+#include "coordinator/store/store.hpp"
+
+namespace proofmass::coordinator {
+
+int print_report(const std::filesystem::path& database) {
+  const Store store = Store::open_read_only(database);
+  fmt::print("{}", report_text(store, stored_campaign(store).scenario));
+  return exit_done;
+}
+
+int write_campaign(const std::filesystem::path& file, IfFileExists if_exists) {
+  if (if_exists == IfFileExists::refuse && std::filesystem::exists(file)) {
+    throw UsageError(fmt::format("{} exists (replace it with --force)", file.string()));
+  }
+  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
+  stream << commented_campaign(hardy2013_campaign());
+  stream.close();
+  if (!stream) throw Error(fmt::format("{}: {}", file.string(), std::strerror(errno)));
+  fmt::print("wrote {}\n", file.string());
+  return exit_done;
+}
+
+}  // namespace proofmass::coordinator

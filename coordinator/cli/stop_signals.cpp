@@ -1,0 +1,28 @@
+#include "coordinator/cli/stop_signals.hpp"
+
+#include <csignal>
+
+namespace proofmass::coordinator {
+namespace {
+
+// A signal handler can reach nothing but globals.
+std::atomic<StopRequest> request = StopRequest::none;
+std::atomic<StopRequest> request_of_first_terminate = StopRequest::now;
+static_assert(std::atomic<StopRequest>::is_always_lock_free);
+
+void on_signal(int signal) {
+  const bool is_first_terminate = signal == SIGTERM && request == StopRequest::none;
+  request = is_first_terminate ? request_of_first_terminate.load() : StopRequest::now;
+}
+
+}  // namespace
+
+const std::atomic<StopRequest>& catch_stop_signals(OnTerminate on_terminate) {
+  const bool drains = on_terminate == OnTerminate::drain;
+  request_of_first_terminate = drains ? StopRequest::drain : StopRequest::now;
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  return request;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,94 @@
+#include "coordinator/cli/worker_processes.hpp"
+
+#include <fmt/format.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "core/error.hpp"
+
+extern char** environ;
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr int grace_ms = 3000;  // A worker looks at signals between two orbits, some 20 ms apart.
+
+std::string reason_of(int status) {
+  if (!WIFSIGNALED(status)) return fmt::format("exit code {}", WEXITSTATUS(status));
+  const int signal = WTERMSIG(status);
+  return fmt::format("killed by signal {} ({})", signal, strsignal(signal));
+}
+
+}  // namespace
+
+std::filesystem::path worker_executable() {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path worker = self.parent_path() / "proofmass-worker";
+  if (error || access(worker.c_str(), X_OK) != 0) {
+    throw Error(fmt::format("worker program = {} (must be beside proofmass)", worker.string()));
+  }
+  return worker;
+}
+
+WorkerProcesses::WorkerProcesses(std::filesystem::path executable, std::string endpoint)
+    : executable_(std::move(executable)), endpoint_(std::move(endpoint)) {}
+
+WorkerProcesses::~WorkerProcesses() {
+  wait_until_ended(0);
+  for (const Process& process : processes_) kill(process.process_id, SIGTERM);
+  wait_until_ended(grace_ms);
+  for (const Process& process : processes_) {
+    kill(process.process_id, SIGKILL);
+    waitpid(process.process_id, nullptr, 0);
+  }
+}
+
+void WorkerProcesses::start(const std::string& name) {
+  std::vector<std::string> arguments{
+      executable_.string(),    "--connect", endpoint_, "--name", name, "--parent",
+      std::to_string(getpid())};
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  pid_t process_id = 0;
+  const int error =
+      posix_spawn(&process_id, executable_.c_str(), nullptr, nullptr, argv.data(), environ);
+  if (error != 0) {
+    throw Error(fmt::format("worker program = {} ({})", executable_.string(), strerror(error)));
+  }
+  processes_.push_back({.name = name, .process_id = process_id});
+}
+
+std::vector<WorkerProcesses::Exit> WorkerProcesses::take_exits() {
+  std::vector<Exit> exits;
+  std::erase_if(processes_, [&](const Process& process) {
+    int status = 0;
+    if (waitpid(process.process_id, &status, WNOHANG) != process.process_id) return false;
+    exits.push_back(
+        {.name = process.name, .process_id = process.process_id, .reason = reason_of(status)});
+    return true;
+  });
+  return exits;
+}
+
+void WorkerProcesses::wait_until_ended(int milliseconds_max) {
+  const auto deadline =
+      std::chrono::steady_clock::now() + std::chrono::milliseconds(milliseconds_max);
+  while (true) {
+    (void)take_exits();
+    if (processes_.empty() || std::chrono::steady_clock::now() >= deadline) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+}  // namespace proofmass::coordinator

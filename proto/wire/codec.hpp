@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "proto/wire/messages.hpp"
+
+namespace proofmass::wire {
+
+/// Size limits of an encoded message, bytes. Only a Welcome may be as large as the first.
+inline constexpr std::size_t welcome_size_max = std::size_t{64} << 20;
+inline constexpr std::size_t message_size_max = std::size_t{4} << 20;
+
+enum class DecodeFault : std::uint8_t {
+  too_large,      ///< More bytes than its kind may have.
+  unparsable,     ///< Not an envelope.
+  wrong_version,  ///< Another protocol version.
+  empty,          ///< An envelope without a message of a known kind.
+  invalid,        ///< A message with a value that the rules forbid.
+};
+
+/// Why bytes are not a message.
+struct DecodeError {
+  DecodeFault fault = DecodeFault::unparsable;
+  std::string text;  ///< `field = value (rule)`, for logs and for the peer.
+};
+
+/// The bytes of a message.
+/// @throws InvalidArgument if they are more than the message may have.
+[[nodiscard]] std::string encode(const Message& message);
+
+/// Checks everything: sizes, counts, enumerators, that numbers are finite, that a campaign is
+/// complete and valid. What it returns can be used without further checks of form.
+///
+/// @param bytes  Anything at all, from anybody.
+[[nodiscard]] std::variant<Message, DecodeError> decode(std::string_view bytes);
+
+}  // namespace proofmass::wire

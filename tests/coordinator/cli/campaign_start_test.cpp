@@ -1,0 +1,107 @@
+#include "coordinator/cli/campaign_start.hpp"
+
+#include <gtest/gtest.h>
+
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/store/detail/database.hpp"
+#include "core/simulation/run.hpp"
+#include "tests/coordinator/cli/temporary_directory.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+Campaign campaign_of(std::uint64_t num_runs) {
+  Campaign campaign;
+  campaign.num_runs = num_runs;
+  return campaign;
+}
+
+std::string refusal(const Campaign& wanted, const std::filesystem::path& database) {
+  try {
+    (void)open_or_create(wanted, database);
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(CampaignStart, MakesTheDatabaseAndOpensItAgain) {
+  const test::TemporaryDirectory directory;
+  const auto database = directory / "a.db";
+  EXPECT_EQ(open_or_create(campaign_of(10), database).num_runs(), 10U);
+  EXPECT_EQ(open_or_create(campaign_of(10), database).num_runs(), 10U);
+}
+
+TEST(CampaignStart, RefusesAnotherCampaignAndSaysWhatDiffers) {
+  const test::TemporaryDirectory directory;
+  const auto database = directory / "a.db";
+  (void)open_or_create(campaign_of(10), database);
+  Campaign other = campaign_of(10);
+  other.seed = 2;
+  EXPECT_EQ(refusal(other, database), database.string() +
+                                          " holds another campaign:\n"
+                                          "  seed: 1 in the database, 2 asked for\n"
+                                          "name another database with --db");
+}
+
+// Half of a campaign from one model and half from another would be neither's.
+TEST(CampaignStart, RefusesACampaignThatAnotherModelBegan) {
+  const test::TemporaryDirectory directory;
+  const auto database = directory / "a.db";
+  (void)open_or_create(campaign_of(10), database);
+  detail::Database(database, detail::Access::read_write)
+      .execute("UPDATE campaign SET model_version = 'older'");
+  EXPECT_EQ(refusal(campaign_of(10), database),
+            database.string() + " holds another campaign:\n  model: older in the database, " +
+                std::string(model_version) + " in this program\nname another database with --db");
+}
+
+TEST(CampaignStart, ExtendsToMoreRuns) {
+  const test::TemporaryDirectory directory;
+  const auto database = directory / "a.db";
+  (void)open_or_create(campaign_of(10), database);
+  EXPECT_EQ(open_or_create(campaign_of(12), database).num_runs(), 12U);
+}
+
+TEST(CampaignStart, RefusesFewerRunsThanBefore) {
+  const test::TemporaryDirectory directory;
+  const auto database = directory / "a.db";
+  (void)open_or_create(campaign_of(10), database);
+  EXPECT_EQ(refusal(campaign_of(9), database), "runs = 9 (must be at least 10, the number that " +
+                                                   database.string() + " was asked for)");
+}
+
+TEST(CampaignStart, ReadsACampaignWithTablesBack) {
+  const test::TemporaryDirectory directory;
+  Campaign campaign = campaign_of(3);
+  campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
+  campaign.dispersions[9] = {.law = Law::table, .file = "f.csv", .column = "b"};
+  campaign.table_columns = {{1e-4, 2e-4, 3e-4}, {1e-3, -2e-3, 0.1}};
+  const Store store = open_or_create(campaign, directory / "a.db");
+  const Campaign stored = stored_campaign(store);
+  EXPECT_EQ(stored.table_columns, campaign.table_columns);
+  EXPECT_EQ(stored.dispersions, campaign.dispersions);
+  EXPECT_TRUE(definition_differences(stored, campaign).empty());
+}
+
+TEST(CampaignStart, LogsResultsThatContradictTheStoredOnes) {
+  const test::TemporaryDirectory directory;
+  Store store = open_or_create(campaign_of(3), directory / "a.db");
+  std::vector<std::string> events;
+  const Commit commit = commit_to(store, [&](const Event& event) {
+    events.push_back(std::string(event.kind) + ' ' + event.text);
+  });
+  Delivery delivery;
+  delivery.attempt = 1;
+  delivery.worker = "w";
+  commit(std::vector{delivery});
+  commit(std::vector{delivery});
+  EXPECT_TRUE(events.empty());
+  delivery.result.estimate[0] = 1.0;
+  commit(std::vector{delivery});
+  EXPECT_EQ(events, std::vector<std::string>{"results_contradict runs=1 (the stored results "
+                                             "stand)"});
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

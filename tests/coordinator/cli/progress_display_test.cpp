@@ -1,0 +1,103 @@
+#include "coordinator/cli/progress_display.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+namespace proofmass::coordinator {
+namespace {
+
+CampaignProgress progress(std::uint64_t num_done, std::uint64_t num_runs, double rate_hz) {
+  return {.num_done = num_done, .num_runs = num_runs, .num_workers = 2, .rate_hz = rate_hz};
+}
+
+/// What a display writes.
+template <typename Use>
+std::string output_of(DisplayMode mode, Use use) {
+  std::FILE* const file = std::tmpfile();
+  {
+    ProgressDisplay display(mode, file);
+    use(display);
+  }
+  std::rewind(file);
+  std::string text;
+  for (int c = std::fgetc(file); c != EOF; c = std::fgetc(file)) text += static_cast<char>(c);
+  std::fclose(file);
+  return text;
+}
+
+TEST(Duration, IsWrittenInItsTwoLargestUnits) {
+  EXPECT_EQ(duration_text(0.2), "1 s");
+  EXPECT_EQ(duration_text(59.0), "59 s");
+  EXPECT_EQ(duration_text(200.0), "3 min 20 s");
+  EXPECT_EQ(duration_text(18600.0), "5 h 10 min");
+  EXPECT_EQ(duration_text(1051200.0), "12 d 4 h");
+  EXPECT_EQ(duration_text(1e300), "9999 d 0 h");
+}
+
+TEST(ProgressBar, ShowsRunsPercentRateAndTimeLeft) {
+  EXPECT_EQ(progress_bar(progress(42, 100, 0.5)),
+            "42/100 runs [############.................]  42 %  0.50 runs/s  1 min 56 s left");
+  EXPECT_EQ(progress_bar(progress(100, 100, 25.0)),
+            "100/100 runs [##############################] 100 %  25 runs/s");
+}
+
+TEST(ProgressBar, ShowsNoRateBeforeThereIsOne) {
+  EXPECT_EQ(progress_bar(progress(0, 100, 0.0)),
+            "0/100 runs [..............................]   0 %");
+}
+
+TEST(ProgressBar, NeverFillsALineOf80Columns) {
+  for (std::uint64_t num_runs = 1; num_runs <= num_runs_max; num_runs *= 10) {
+    for (const double rate_hz : {0.0, 1e-9, 0.05, 0.5, 20.0, 1e6}) {
+      EXPECT_LE(progress_bar(progress(num_runs - 1, num_runs, rate_hz)).size(), 79U);
+    }
+  }
+}
+
+TEST(ProgressDisplay, WritesALineEveryTenPercent) {
+  const std::string text = output_of(DisplayMode::lines, [](ProgressDisplay& display) {
+    for (std::uint64_t i = 0; i <= 30; ++i) display.update(progress(i, 30, 0.0));
+  });
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 11);
+  EXPECT_EQ(text.substr(0, text.find('\n')), "0/30 runs    0 %");
+  EXPECT_NE(text.find("\n30/30 runs  100 %\n"), std::string::npos);
+}
+
+TEST(ProgressDisplay, WritesTheBarOverItself) {
+  const std::string text = output_of(DisplayMode::bar, [](ProgressDisplay& display) {
+    display.update(progress(1, 2, 0.0));
+    display.update(progress(1, 2, 0.0));  // Nothing new: not written again.
+    display.update(progress(2, 2, 0.0));
+  });
+  EXPECT_EQ(text,
+            "\r1/2 runs [###############...............]  50 %\033[K"
+            "\r2/2 runs [##############################] 100 %\033[K\n");
+}
+
+TEST(ProgressDisplay, DoesNotTearTheBarWithANote) {
+  const std::string text = output_of(DisplayMode::bar, [](ProgressDisplay& display) {
+    display.update(progress(2, 2, 0.0));
+    display.note("a note");
+    display.update(progress(2, 2, 0.0));
+  });
+  const std::string bar = "\r2/2 runs [##############################] 100 %\033[K";
+  EXPECT_EQ(text, bar + "\r\033[Ka note\n" + bar + "\n");
+}
+
+TEST(ProgressDisplay, ShowsOnlyNotesIfQuiet) {
+  const std::string text = output_of(DisplayMode::quiet, [](ProgressDisplay& display) {
+    display.update(progress(1, 2, 0.0));
+    display.note("a note");
+  });
+  EXPECT_EQ(text, "a note\n");
+}
+
+TEST(ProgressDisplay, IsOfLinesIfTheStreamIsNoTerminal) {
+  std::FILE* const file = std::tmpfile();
+  EXPECT_EQ(display_mode_for(file), DisplayMode::lines);
+  std::fclose(file);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,256 @@
+#include "proto/wire/codec.hpp"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <limits>
+#include <memory>
+#include <random>
+#include <variant>
+
+#include "core/error.hpp"
+
+namespace proofmass::wire {
+namespace {
+
+std::uint64_t bits(double value) { return std::bit_cast<std::uint64_t>(value); }
+
+template <typename Content>
+Content round_trip(const Content& content) {
+  const auto decoded = decode(encode(content));
+  if (const auto* const error = std::get_if<DecodeError>(&decoded)) {
+    throw Error("not decoded: " + error->text);
+  }
+  return std::get<Content>(std::get<Message>(decoded));
+}
+
+/// Numbers of which text or single precision would lose bits.
+constexpr std::array<double, 5> hard_numbers{0.1, 1e-300, -2.0 / 3.0,
+                                             std::numeric_limits<double>::denorm_min(), -0.0};
+
+RunResult some_result(RunIndex run, RunStatus status) {
+  RunResult result;
+  result.run = run;
+  result.status = status;
+  result.num_draws = 3;
+  result.num_rounds = 7;
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    if (result.has_truth()) result.truth[i] = hard_numbers[i % hard_numbers.size()];
+    if (result.has_estimate()) result.estimate[i] = 1.0 / (3.0 + static_cast<double>(i));
+  }
+  return result;
+}
+
+/// Every number of the scenario's fields, in order, as bits.
+std::vector<std::uint64_t> field_bits(const Scenario& scenario) {
+  std::vector<std::uint64_t> all;
+  for_each_field(scenario, [&](const FieldInfo&, const auto& value) {
+    using Value = std::decay_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, double>) {
+      all.push_back(bits(value));
+    } else {
+      all.push_back(static_cast<std::uint64_t>(value));
+    }
+  });
+  return all;
+}
+
+Campaign unusual_campaign() {
+  Campaign campaign;
+  campaign.name = "unusual";
+  campaign.seed = 0xffff'ffff'ffff'fffe;
+  campaign.num_runs = 12345;
+  campaign.scenario.noise.scale = 0.1;
+  campaign.scenario.estimation.correction = Correction::first_order;
+  campaign.scenario.estimation.num_rounds_max = 9;
+  campaign.scenario.environment.kind = EnvironmentKind::file;
+  campaign.environment_file = "drag.csv";
+  for (int i = 0; i <= 12; ++i) {
+    campaign.environment_table.push_back({.time_s = 500.0 * i,
+                                          .linear_m_s2 = {1e-8 / (i + 1), -0.0, 3e-9},
+                                          .angular_rad_s2 = {1e-11, 2e-11, 1e-300}});
+  }
+  campaign.dispersions[0] = {
+      .law = Law::normal, .mean = 1e-3, .standard_deviation = 1e-4, .file = {}, .column = {}};
+  campaign.dispersions[7] = {.law = Law::table, .file = "values.csv", .column = "a"};
+  return campaign;
+}
+
+TEST(Codec, KeepsAHello) {
+  const Hello hello = round_trip(Hello{.worker_name = "w-1",
+                                       .host = "h",
+                                       .process_id = 1ULL << 40,
+                                       .num_slots = 2,
+                                       .model_version = "m-1"});
+  EXPECT_EQ(hello.worker_name, "w-1");
+  EXPECT_EQ(hello.host, "h");
+  EXPECT_EQ(hello.process_id, 1ULL << 40);
+  EXPECT_EQ(hello.num_slots, 2U);
+  EXPECT_EQ(hello.model_version, "m-1");
+}
+
+TEST(Codec, KeepsEveryBitOfACampaign) {
+  const auto sent = std::make_shared<const Campaign>(unusual_campaign());
+  const Welcome welcome =
+      round_trip(Welcome{.worker = {5}, .heartbeat_interval_s = 0.1, .campaign = sent});
+
+  EXPECT_EQ(welcome.worker, WorkerId{5});
+  EXPECT_EQ(bits(welcome.heartbeat_interval_s), bits(0.1));
+  const Campaign& got = *welcome.campaign;
+  EXPECT_EQ(got.name, sent->name);
+  EXPECT_EQ(got.seed, sent->seed);
+  EXPECT_EQ(got.num_runs, sent->num_runs);
+  EXPECT_EQ(field_bits(got.scenario), field_bits(sent->scenario));
+  EXPECT_EQ(got.scenario.sessions, sent->scenario.sessions);
+  EXPECT_EQ(got.dispersions, sent->dispersions);
+  EXPECT_EQ(got.environment_file, sent->environment_file);
+  EXPECT_EQ(got.environment_table, sent->environment_table);
+  EXPECT_TRUE(std::signbit(got.environment_table[0].linear_m_s2[1]));
+}
+
+TEST(Codec, LeavesTableColumnsOut) {
+  Campaign campaign = unusual_campaign();
+  campaign.table_columns = {std::vector<double>(12345, 1e-3)};
+  const Welcome welcome =
+      round_trip(Welcome{.worker = {5},
+                         .heartbeat_interval_s = 1.0,
+                         .campaign = std::make_shared<const Campaign>(campaign)});
+  EXPECT_TRUE(welcome.campaign->table_columns.empty());
+}
+
+TEST(Codec, KeepsARejectWithItsReason) {
+  const Reject reject = round_trip(Reject{.reason = RejectReason::full, .text = "full"});
+  EXPECT_EQ(reject.reason, RejectReason::full);
+  EXPECT_EQ(reject.text, "full");
+}
+
+TEST(Codec, KeepsACredit) {
+  EXPECT_EQ(round_trip(Credit{.num_runs_max = 4096}).num_runs_max, 4096U);
+}
+
+TEST(Codec, KeepsALeaseWithItsTableValues) {
+  const RunLease lease =
+      round_trip(RunLease{.lease = {9},
+                          .runs = {.first = {100}, .count = 5},
+                          .attempt = {2},
+                          .table_values = {hard_numbers.begin(), hard_numbers.end()}});
+  EXPECT_EQ(lease.lease, LeaseId{9});
+  EXPECT_EQ(lease.runs, (RunRange{.first = {100}, .count = 5}));
+  EXPECT_EQ(lease.attempt, Attempt{2});
+  ASSERT_EQ(lease.table_values.size(), hard_numbers.size());
+  for (std::size_t i = 0; i < hard_numbers.size(); ++i) {
+    EXPECT_EQ(bits(lease.table_values[i]), bits(hard_numbers[i]));
+  }
+}
+
+TEST(Codec, KeepsEveryBitOfResultsOfEachStatus) {
+  ResultBatch sent{.lease = {3}, .attempt = {1}, .results = {}};
+  for (const RunStatus status : {RunStatus::completed, RunStatus::not_converged,
+                                 RunStatus::not_finite, RunStatus::no_draw}) {
+    sent.results.push_back(
+        {.result = some_result({sent.results.size()}, status), .compute_s = 2.5});
+  }
+  const ResultBatch got = round_trip(sent);
+  EXPECT_EQ(got.lease, sent.lease);
+  EXPECT_EQ(got.attempt, sent.attempt);
+  ASSERT_EQ(got.results.size(), 4U);
+  for (std::size_t run = 0; run < 4; ++run) {
+    const RunResult& a = got.results[run].result;
+    const RunResult& b = sent.results[run].result;
+    EXPECT_EQ(a.run, b.run);
+    EXPECT_EQ(a.status, b.status);
+    EXPECT_EQ(a.num_draws, 3U);
+    EXPECT_EQ(a.num_rounds, 7U);
+    EXPECT_EQ(got.results[run].compute_s, 2.5);
+    for (std::size_t i = 0; i < num_parameters; ++i) {
+      EXPECT_EQ(bits(a.truth[i]), bits(b.truth[i]));
+      EXPECT_EQ(bits(a.estimate[i]), bits(b.estimate[i]));
+    }
+  }
+}
+
+TEST(Codec, KeepsAnAcknowledgement) {
+  EXPECT_EQ(round_trip(ResultAck{.runs = {{0}, {7}}}).runs, (std::vector<RunIndex>{{0}, {7}}));
+}
+
+TEST(Codec, KeepsAHeartbeat) {
+  const Heartbeat heartbeat =
+      round_trip(Heartbeat{.num_orbits_done = 1ULL << 33, .leases = {{4}, {2}}});
+  EXPECT_EQ(heartbeat.num_orbits_done, 1ULL << 33);
+  EXPECT_EQ(heartbeat.leases, (std::vector<LeaseId>{{4}, {2}}));
+}
+
+TEST(Codec, KeepsTheKindOfAMessageWithoutContent) {
+  EXPECT_NO_THROW((void)round_trip(HeartbeatAck{}));
+  EXPECT_NO_THROW((void)round_trip(Bye{}));
+  EXPECT_NO_THROW((void)round_trip(Drain{}));
+  EXPECT_NO_THROW((void)round_trip(Stop{}));
+}
+
+// Around the text are 14 bytes: version 2, reason 2, and tag and length of text and message 5 each.
+TEST(Codec, DoesNotEncodeMoreThanMayBeSent) {
+  Reject reject{.reason = RejectReason::full, .text = std::string(message_size_max, 'x')};
+  try {
+    (void)encode(reject);
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_EQ(std::string(error.what()), "message size = 4194318 bytes (must be at most 4194304)");
+  }
+}
+
+// The largest lease and the largest batch of results must fit, or a campaign could stand still.
+TEST(Codec, HasRoomForTheLargestLeaseAndBatch) {
+  const RunLease lease{.lease = {1},
+                       .runs = {.first = {0}, .count = runs_per_lease_max},
+                       .attempt = {1},
+                       .table_values = std::vector<double>(runs_per_lease_max * num_drawn, 0.1)};
+  EXPECT_EQ(round_trip(lease).table_values.size(), lease.table_values.size());
+
+  ResultBatch batch{.lease = {~0ULL}, .attempt = {~0U}, .results = {}};
+  for (std::uint64_t i = 0; i < runs_per_lease_max; ++i) {
+    batch.results.push_back(
+        {.result = some_result({num_runs_max - 1 - i}, RunStatus::completed), .compute_s = 0.1});
+  }
+  EXPECT_EQ(round_trip(batch).results.size(), batch.results.size());
+}
+
+TEST(Codec, SurvivesAnyTruncation) {
+  const std::string bytes =
+      encode(Welcome{.worker = {5},
+                     .heartbeat_interval_s = 1.0,
+                     .campaign = std::make_shared<const Campaign>(unusual_campaign())});
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    const auto decoded = decode(std::string_view(bytes).substr(0, size));
+    ASSERT_TRUE(std::holds_alternative<DecodeError>(decoded)) << size;
+  }
+}
+
+// Not a proof of safety, but it runs under the sanitizers too. The seed is fixed.
+TEST(Codec, SurvivesRandomBytesAndRandomDamage) {
+  std::mt19937_64 random(20130104);
+  const ResultBatch batch{
+      .lease = {3},
+      .attempt = {1},
+      .results = {{.result = some_result({1}, RunStatus::completed), .compute_s = 1.0}}};
+  const std::array<std::string, 3> good{
+      encode(batch), encode(Heartbeat{.num_orbits_done = 5, .leases = {{1}, {2}}}),
+      encode(Welcome{.worker = {5},
+                     .heartbeat_interval_s = 1.0,
+                     .campaign = std::make_shared<const Campaign>(unusual_campaign())})};
+  std::size_t num_refused = 0;
+  for (int i = 0; i < 20000; ++i) {
+    std::string bytes = good[random() % good.size()];
+    if (i % 4 == 0) {
+      bytes.resize(random() % 200);
+      for (char& byte : bytes) byte = static_cast<char>(random());
+    }
+    for (std::uint64_t hits = random() % 4; hits > 0 && !bytes.empty(); --hits) {
+      bytes[random() % bytes.size()] = static_cast<char>(random());
+    }
+    if (std::holds_alternative<DecodeError>(decode(bytes))) ++num_refused;
+  }
+  EXPECT_GT(num_refused, 5000U);
+}
+
+}  // namespace
+}  // namespace proofmass::wire
