@@ -1,0 +1,268 @@
+#include "tests/tidy/rules.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <filesystem>
+#include <map>
+#include <regex>
+#include <set>
+
+namespace proofmass::test {
+namespace {
+
+constexpr std::size_t num_columns_max = 100;
+constexpr std::size_t num_lines_max = 500;
+constexpr std::size_t num_function_lines_max = 70;
+
+std::string finding(const SourceFile& file, std::size_t line, std::string_view what) {
+  return fmt::format("{}:{}: {}", file.path, line, what);
+}
+
+bool matches(const std::string& text, const char* pattern) {
+  return std::regex_search(text, std::regex(pattern));
+}
+
+// What a file must not include, by layer; empty if the include is admissible.
+std::string broken_layer(const SourceFile& file, const std::string& include) {
+  const bool is_source = file.path.ends_with(".cpp");
+  if (matches(include, "^sqlite3?\\.h") && !(file.is_in("coordinator/store") && is_source)) {
+    return "SQLite stays in coordinator/store/*.cpp";
+  }
+  if (matches(include, "^zmq") &&
+      !(matches(file.path, "^(coordinator|worker)/net/") && is_source)) {
+    return "ZeroMQ stays in */net/*.cpp";
+  }
+  if (matches(include, "\\.pb\\.h$|^google/protobuf") && !(file.is_in("proto/wire") && is_source)) {
+    return "Protobuf types stay in proto/wire/*.cpp";
+  }
+  if (file.is_in("core") && matches(include, "^(proto|coordinator|worker|tests)/")) {
+    return "core depends on nothing above it";
+  }
+  if (file.is_in("core") &&
+      matches(include,
+              "^(spdlog/|chrono$|thread$|mutex$|future$|fstream$|iostream$|filesystem$|"
+              "random$|ctime$|unistd\\.h|sys/)")) {
+    return "core has no clock, thread, file, logger or random device";
+  }
+  if (file.is_in("proto") && matches(include, "^(coordinator|worker|tests)/")) {
+    return "proto depends on core alone";
+  }
+  if (file.is_in("coordinator") && matches(include, "^(worker|tests)/")) {
+    return "coordinator never sees worker";
+  }
+  if (file.is_in("worker") && matches(include, "^(coordinator|tests)/")) {
+    return "worker never sees coordinator";
+  }
+  return "";
+}
+
+std::size_t line_at(std::string_view text, std::size_t position) {
+  return static_cast<std::size_t>(std::ranges::count(text.substr(0, position), '\n')) + 1;
+}
+
+bool is_name_part(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
+
+// Text without what stands in parentheses, blanks joined: `int f() const` for `int f(int a) const`.
+std::string outline_of(std::string_view text) {
+  std::string outline;
+  int depth = 0;
+  for (const char c : text) {
+    if (c == ')') --depth;
+    const bool is_blank = std::isspace(static_cast<unsigned char>(c)) != 0;
+    const bool follows_blank = !outline.empty() && outline.back() == ' ';
+    if (depth == 0 && !(is_blank && follows_blank)) outline += is_blank ? ' ' : c;
+    if (c == '(') ++depth;
+  }
+  return outline;
+}
+
+// True if the text in front of an opening brace is the head of a function.
+bool is_function_head(std::string_view head) {
+  static const std::regex scope("^ ?(namespace|class|struct|union|enum|extern)\\b");
+  static const std::regex function("\\)( (const|noexcept|override|final|->[^=]*|:.*))* ?$");
+  const std::string outline = outline_of(head);
+  const bool is_value = outline.find(" = ") != std::string::npos;
+  return !is_value && !std::regex_search(outline, scope) && std::regex_search(outline, function);
+}
+
+// Position of the brace that closes the one at `open`.
+std::size_t closing_brace(std::string_view code, std::size_t open) {
+  std::size_t depth = 0;
+  for (std::size_t i = open; i < code.size(); ++i) {
+    if (code[i] == '{') ++depth;
+    if (code[i] == '}' && --depth == 0) return i;
+  }
+  return code.size();
+}
+
+// Words of an identifier, small letters: `numTaskSlots` and `num_task_slots` have num, task, slots.
+std::vector<std::string> words_of(const std::string& identifier) {
+  std::vector<std::string> words(1);
+  for (const char c : identifier) {
+    const bool starts_word = c == '_' || std::isupper(static_cast<unsigned char>(c)) != 0;
+    if (starts_word && !words.back().empty()) words.emplace_back();
+    if (c != '_') words.back() += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  return words;
+}
+
+bool is_banned(std::string word) {
+  static const std::set<std::string> banned{"job",   "task",   "node",    "master", "slave",
+                                            "trial", "helper", "manager", "utils",  "misc"};
+  if (banned.contains(word)) return true;
+  if (word.ends_with('s')) word.pop_back();
+  return banned.contains(word);
+}
+
+}  // namespace
+
+Findings check_layers(const SourceFile& file) {
+  Findings findings;
+  if (!file.is_cpp() || file.is_in("tests")) return findings;
+  static const std::regex pattern("^\\s*#\\s*include\\s*[<\"]([^>\"]+)[>\"]");
+  const std::vector<std::string> lines = lines_of(file.text);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    std::smatch match;
+    if (!std::regex_search(lines[i], match, pattern)) continue;
+    const std::string what = broken_layer(file, match[1]);
+    if (!what.empty()) findings.push_back(finding(file, i + 1, match[1].str() + ": " + what));
+  }
+  return findings;
+}
+
+Findings check_header_guard(const SourceFile& file) {
+  if (!file.is_header() || file.text.starts_with("#pragma once\n")) return {};
+  return {finding(file, 1, "must begin with #pragma once")};
+}
+
+Findings check_size(const SourceFile& file) {
+  Findings findings;
+  if (file.path.ends_with("CMakeLists.txt")) return findings;
+  const std::vector<std::string> lines = lines_of(file.text);
+  if (lines.size() > num_lines_max) {
+    findings.push_back(
+        finding(file, lines.size(), fmt::format("more than {} lines", num_lines_max)));
+  }
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    // Bytes that continue a UTF-8 character take no column.
+    const auto num_columns = std::ranges::count_if(
+        lines[i], [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; });
+    if (static_cast<std::size_t>(num_columns) <= num_columns_max) continue;
+    findings.push_back(finding(file, i + 1, fmt::format("{} columns", num_columns)));
+  }
+  return findings;
+}
+
+Findings check_function_length(const SourceFile& file) {
+  Findings findings;
+  if (!file.is_cpp()) return findings;
+  // Preprocessor lines have no braces that count, and would glue themselves to a head.
+  const std::string code =
+      std::regex_replace(code_of(file.text), std::regex("(^|\n)[ \t]*#[^\n]*"), "$1");
+  std::size_t head = 0;
+  for (std::size_t i = 0; i < code.size(); ++i) {
+    if (code[i] == ';' || code[i] == '}') head = i + 1;
+    if (code[i] != '{') continue;
+    // A brace right behind a name holds the value of a member.
+    if (i > 0 && is_name_part(code[i - 1])) {
+      i = std::min(closing_brace(code, i), code.size() - 1);
+      continue;
+    }
+    if (is_function_head(std::string_view(code).substr(head, i - head))) {
+      const std::size_t close = closing_brace(code, i);
+      const std::size_t num_lines = line_at(code, close) - line_at(code, i) + 1;
+      if (num_lines > num_function_lines_max) {
+        findings.push_back(
+            finding(file, line_at(code, i), fmt::format("function of {} lines", num_lines)));
+      }
+      i = std::min(close, code.size() - 1);
+    }
+    head = i + 1;
+  }
+  return findings;
+}
+
+Findings check_open_work(const SourceFile& file) {
+  Findings findings;
+  // Spelled apart, so that this file keeps its own rule.
+  static const std::regex marks(
+      "\\b(TO"
+      "DO|FIX"
+      "ME|X"
+      "XX)\\b");
+  static const std::regex with_issue(
+      "\\bTO"
+      "DO\\(#[0-9]+\\):");
+  const std::vector<std::string> lines = lines_of(file.text);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (!std::regex_search(lines[i], marks) || std::regex_search(lines[i], with_issue)) continue;
+    findings.push_back(finding(file, i + 1, "open work without an issue"));
+  }
+  return findings;
+}
+
+Findings check_elementary_functions(const SourceFile& file) {
+  Findings findings;
+  if (!file.is_cpp() || !file.is_in("core")) return findings;
+  static const std::regex call(
+      "(^|[^\\w.>:]|std::|(^|[^\\w])::)((sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|exp|exp2|"
+      "expm1|log|log2|log10|log1p|pow|cbrt|hypot|erf|erfc|tgamma|lgamma|polar)f?)\\s*\\(");
+  const std::vector<std::string> lines = lines_of(code_of(file.text));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    std::smatch match;
+    if (!std::regex_search(lines[i], match, call)) continue;
+    findings.push_back(finding(file, i + 1, match[3].str() + " (use core/math/elementary.hpp)"));
+  }
+  return findings;
+}
+
+Findings check_words(const SourceFile& file) {
+  Findings findings;
+  if (!file.is_cpp() && !file.path.ends_with(".proto")) return findings;
+  // Names that libraries chose.
+  static const std::regex foreign("toml::node\\b|\\)\\.node\\(\\)");
+  static const std::regex identifier("[A-Za-z_]\\w*");
+  const std::vector<std::string> lines = lines_of(code_of(file.text));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const std::string line = std::regex_replace(lines[i], foreign, "");
+    for (std::sregex_iterator it(line.begin(), line.end(), identifier), end; it != end; ++it) {
+      const std::string name = it->str();
+      if (!std::ranges::any_of(words_of(name), is_banned)) continue;
+      findings.push_back(finding(file, i + 1, name + " is not one of our words"));
+    }
+  }
+  return findings;
+}
+
+Findings check_all_built(const std::vector<SourceFile>& files) {
+  namespace fs = std::filesystem;
+  std::map<std::string, std::set<std::string>> listed;  // Words of each folder's CMakeLists.txt.
+  for (const SourceFile& file : files) {
+    if (fs::path(file.path).filename() != "CMakeLists.txt") continue;
+    static const std::regex word("[\\w./-]+");
+    auto& words = listed[fs::path(file.path).parent_path().generic_string()];
+    for (std::sregex_iterator it(file.text.begin(), file.text.end(), word), end; it != end; ++it) {
+      words.insert(it->str());
+    }
+  }
+  const auto is_listed = [&](const fs::path& path) {
+    for (fs::path folder = path.parent_path();; folder = folder.parent_path()) {
+      const auto words = listed.find(folder.generic_string());
+      const std::string name =
+          path.lexically_relative(folder.empty() ? "." : folder).generic_string();
+      if (words != listed.end() && words->second.contains(name)) return true;
+      if (folder.empty()) return false;
+    }
+  };
+  Findings findings;
+  for (const SourceFile& file : files) {
+    if (!file.path.ends_with(".cpp") || is_listed(file.path)) continue;
+    findings.push_back(finding(file, 1, "in no CMakeLists.txt"));
+  }
+  return findings;
+}
+
+}  // namespace proofmass::test

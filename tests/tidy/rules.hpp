@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tests/tidy/source_file.hpp"
+
+namespace proofmass::test {
+
+// Each rule yields a line for every violation, `path:line: what`; none if all is well.
+using Findings = std::vector<std::string>;
+
+/// core includes only numerics; coordinator and worker never see each other; SQLite, ZeroMQ and
+/// generated Protobuf types stay in the few sources that may know them.
+[[nodiscard]] Findings check_layers(const SourceFile& file);
+
+/// A header begins with `#pragma once`.
+[[nodiscard]] Findings check_header_guard(const SourceFile& file);
+
+/// At most 100 columns and 500 lines, lists of files apart.
+[[nodiscard]] Findings check_size(const SourceFile& file);
+
+/// Functions of at most 70 lines, from the line of the opening brace to that of the closing one.
+[[nodiscard]] Findings check_function_length(const SourceFile& file);
+
+/// Work left open names its issue: `TODO(#12):`.
+[[nodiscard]] Findings check_open_work(const SourceFile& file);
+
+/// core calls no function of the C library whose last bit depends on the processor.
+[[nodiscard]] Findings check_elementary_functions(const SourceFile& file);
+
+/// Identifiers use the project's words.
+[[nodiscard]] Findings check_words(const SourceFile& file);
+
+/// Every .cpp file is named by the CMakeLists.txt of its folder or of one above.
+[[nodiscard]] Findings check_all_built(const std::vector<SourceFile>& files);
+
+}  // namespace proofmass::test
