@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/campaign/scenario.hpp"
+#include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
 
 namespace proofmass {
@@ -34,7 +35,7 @@ struct AttitudeEstimator {
   Vector3<T> bias;   ///< Of the angular accelerometer, rad/s².
 
   /// Takes up the star tracker's angles of this sample.
-  void correct(const AttitudeGains& gains, const Vector3<T>& star_tracker) {
+  PROOFMASS_INLINE void correct(const AttitudeGains& gains, const Vector3<T>& star_tracker) {
     const Vector3<T> innovation = star_tracker - angle;
     angle += T(gains.blend_angle) * innovation;
     rate += T(gains.blend_rate_per_s) * innovation;
@@ -44,8 +45,8 @@ struct AttitudeEstimator {
   /// Carries the estimate to the next sample with the measured acceleration of this one, which acts
   /// until then.
   /// @param reference_rate  Ω of the rotating reference, in S.
-  void predict(const AttitudeGains& gains, const Vector3<T>& acceleration,
-               const Vector3<T>& reference_rate) {
+  PROOFMASS_INLINE void predict(const AttitudeGains& gains, const Vector3<T>& acceleration,
+                                const Vector3<T>& reference_rate) {
     const T period = T(gains.sample_period_s);
     const Vector3<T> corrected = acceleration - bias;
     const Vector3<T> rotation = rate - cross(reference_rate, angle) + (T(0.5) * period) * corrected;
@@ -60,7 +61,8 @@ struct AttitudeController {
   Vector3<T> integral;  ///< ∫θ̂ dt, rad·s.
 
   /// @returns Angular acceleration to be applied from the next sample on, rad/s².
-  Vector3<T> advance(const AttitudeGains& gains, const AttitudeEstimator<T>& estimate) {
+  PROOFMASS_INLINE Vector3<T> advance(const AttitudeGains& gains,
+                                      const AttitudeEstimator<T>& estimate) {
     integral += T(gains.sample_period_s) * estimate.angle;
     return -(T(gains.stiffness_per_s2) * estimate.angle + T(gains.damping_per_s) * estimate.rate +
              T(gains.integral_per_s3) * integral);

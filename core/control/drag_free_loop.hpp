@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/campaign/scenario.hpp"
+#include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
 
 namespace proofmass {
@@ -27,7 +28,7 @@ struct DragFreeController {
 
   /// @param input  Γ_mes less the known bias, plus C_cal, m/s².
   /// @returns Γ_DF, the acceleration to be cancelled from the next sample on.
-  Vector3<T> advance(const DragFreeGains& gains, const Vector3<T>& input) {
+  PROOFMASS_INLINE Vector3<T> advance(const DragFreeGains& gains, const Vector3<T>& input) {
     first += T(gains.proportional) * input;
     second += T(gains.integral) * first;
     return first + second;

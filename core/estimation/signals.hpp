@@ -16,16 +16,17 @@ enum class Signal : std::size_t {
   gradient_xx,  ///< s⁻².
   gradient_xy,
   gradient_xz,
-  gradient_yx,
+  regressor,    ///< The session's own: a squared measurement or a modulated gradient.
+  gradient_yx,  ///< From here on for the off-centring sessions only: 0 in the others.
   gradient_yy,
   gradient_yz,
   gradient_zx,
   gradient_zy,
   gradient_zz,
-  regressor,  ///< The session's own: a squared measurement or a modulated gradient.
 };
 
 inline constexpr std::size_t num_signals = 14;
+inline constexpr std::size_t num_common_signals = 8;  ///< Those that every session uses.
 inline constexpr std::size_t num_fit_lines_max = 2;
 
 [[nodiscard]] constexpr std::size_t index(Signal signal) {

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "core/instrument/instrument.hpp"
+#include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
 #include "core/orbit/gradient.hpp"
 
@@ -39,9 +40,9 @@ struct SensorModel {
 /// Γ_App,k + p_k, the applied acceleration without the parasitic one ([Hardy2013]
 /// eq:instrument-dynamics with O_kO_sat = −r_k): Γ_sat − ([T] − [In]) r + [Cor] ṙ + r̈.
 template <typename T>
-inline Vector3<T> kinematic_acceleration(const SensorModel<T>& sensor,
-                                         const SatelliteMotion<T>& satellite,
-                                         const MassMotionPhase& motion) {
+PROOFMASS_INLINE Vector3<T> kinematic_acceleration(const SensorModel<T>& sensor,
+                                                   const SatelliteMotion<T>& satellite,
+                                                   const MassMotionPhase& motion) {
   const Vector3<T> r = sensor.rest_position_m + T(motion.position_m) * sensor.motion_direction;
   const Vector3<T> velocity = T(motion.velocity_m_s) * sensor.motion_direction;
   const Vector3<T> acceleration = T(motion.acceleration_m_s2) * sensor.motion_direction;
@@ -54,7 +55,8 @@ inline Vector3<T> kinematic_acceleration(const SensorModel<T>& sensor,
 /// Γ_mes,k without noise ([Hardy2013] eq:measurement):
 /// b0 + [M](Γ_App + p) − ([K1] + [η]) p + [K2] Γ_App².
 template <typename T>
-inline Vector3<T> measured_acceleration(const SensorModel<T>& sensor, const Vector3<T>& kinematic) {
+PROOFMASS_INLINE Vector3<T> measured_acceleration(const SensorModel<T>& sensor,
+                                                  const Vector3<T>& kinematic) {
   const Vector3<T> applied = kinematic - sensor.parasitic_m_s2;
   return sensor.offset_m_s2 + sensor.sensitivity * kinematic +
          scaled(sensor.quadratic_s2_m, scaled(applied, applied));

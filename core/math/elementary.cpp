@@ -39,7 +39,8 @@ SineCosine sincos_turns(double turns) {
   // Taylor series on |x| ≤ π/4: the first dropped terms are below 2e-17.
   static constexpr auto sine_terms = alternating_factorials<9>(1);
   static constexpr auto cosine_terms = alternating_factorials<10>(0);
-  const double quarter = std::floor(4.0 * turns + 0.5);
+  // Adding and taking away 1.5·2⁵² rounds to an integer.
+  const double quarter = (4.0 * turns + 0x1.8p52) - 0x1.8p52;
   const double x = two_pi * (turns - 0.25 * quarter);  // The difference is exact.
   const double square = x * x;
   const double sine = x * polynomial(sine_terms, square);

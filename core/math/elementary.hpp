@@ -11,7 +11,7 @@ struct SineCosine {
   double cosine;
 };
 
-/// sin and cos of 2π·turns, |turns| < 2⁵⁰; absolute error below 3e-16 for the given `turns`.
+/// sin and cos of 2π·turns, |turns| < 2⁴⁸; absolute error below 3e-16 for the given `turns`.
 [[nodiscard]] SineCosine sincos_turns(double turns);
 
 /// sin and cos of an angle in radians; absolute error below 3e-16 + 1.5e-16·|angle|.

@@ -3,6 +3,8 @@
 #include <array>
 #include <cstddef>
 
+#include "core/math/inline.hpp"
+
 namespace proofmass {
 
 /// A vector over the number type of a kernel: `double` for one run, a batch of lanes for many.
@@ -13,47 +15,49 @@ struct Vector3 {
   T y{};
   T z{};
 
-  T& operator[](std::size_t i) { return i == 0 ? x : (i == 1 ? y : z); }
-  const T& operator[](std::size_t i) const { return i == 0 ? x : (i == 1 ? y : z); }
+  PROOFMASS_INLINE T& operator[](std::size_t i) { return i == 0 ? x : (i == 1 ? y : z); }
+  PROOFMASS_INLINE const T& operator[](std::size_t i) const {
+    return i == 0 ? x : (i == 1 ? y : z);
+  }
 };
 
 template <typename T>
-inline Vector3<T> operator+(const Vector3<T>& a, const Vector3<T>& b) {
+PROOFMASS_INLINE Vector3<T> operator+(const Vector3<T>& a, const Vector3<T>& b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
 template <typename T>
-inline Vector3<T> operator-(const Vector3<T>& a, const Vector3<T>& b) {
+PROOFMASS_INLINE Vector3<T> operator-(const Vector3<T>& a, const Vector3<T>& b) {
   return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
 template <typename T>
-inline Vector3<T> operator-(const Vector3<T>& a) {
+PROOFMASS_INLINE Vector3<T> operator-(const Vector3<T>& a) {
   return {-a.x, -a.y, -a.z};
 }
 template <typename T, typename S>
-inline Vector3<T> operator*(const S& s, const Vector3<T>& a) {
+PROOFMASS_INLINE Vector3<T> operator*(const S& s, const Vector3<T>& a) {
   return {s * a.x, s * a.y, s * a.z};
 }
 template <typename T>
-inline Vector3<T>& operator+=(Vector3<T>& a, const Vector3<T>& b) {
+PROOFMASS_INLINE Vector3<T>& operator+=(Vector3<T>& a, const Vector3<T>& b) {
   return a = a + b;
 }
 
 template <typename T>
-inline T dot(const Vector3<T>& a, const Vector3<T>& b) {
+PROOFMASS_INLINE T dot(const Vector3<T>& a, const Vector3<T>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <typename T>
-inline Vector3<T> cross(const Vector3<T>& a, const Vector3<T>& b) {
+PROOFMASS_INLINE Vector3<T> cross(const Vector3<T>& a, const Vector3<T>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 /// Componentwise product.
 template <typename T>
-inline Vector3<T> scaled(const Vector3<T>& a, const Vector3<T>& b) {
+PROOFMASS_INLINE Vector3<T> scaled(const Vector3<T>& a, const Vector3<T>& b) {
   return {a.x * b.x, a.y * b.y, a.z * b.z};
 }
 /// The same number for every lane.
 template <typename T>
-inline Vector3<T> broadcast(const Vector3<double>& a) {
+PROOFMASS_INLINE Vector3<T> broadcast(const Vector3<double>& a) {
   return {T(a.x), T(a.y), T(a.z)};
 }
 
@@ -64,7 +68,7 @@ struct Matrix3 {
 };
 
 template <typename T>
-inline Vector3<T> operator*(const Matrix3<T>& m, const Vector3<T>& v) {
+PROOFMASS_INLINE Vector3<T> operator*(const Matrix3<T>& m, const Vector3<T>& v) {
   return {dot(m.row[0], v), dot(m.row[1], v), dot(m.row[2], v)};
 }
 

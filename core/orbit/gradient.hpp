@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
 
 namespace proofmass {
@@ -9,23 +10,24 @@ namespace proofmass {
 /// @param gradient_s2  μ/r³, the same for every lane.
 /// @param direction    û, in the frame of v.
 template <typename T>
-inline Vector3<T> gravity_gradient(double gradient_s2, const Vector3<T>& direction,
-                                   const Vector3<T>& v) {
+PROOFMASS_INLINE Vector3<T> gravity_gradient(double gradient_s2, const Vector3<T>& direction,
+                                             const Vector3<T>& v) {
   const T along = T(3.0) * dot(direction, v);
   return T(gradient_s2) * (along * direction - v);
 }
 
 /// [In] v = Ω∧(Ω∧v) + Ω̇∧v ([Hardy2013] section 3.1).
 template <typename T>
-inline Vector3<T> inertia_gradient(const Vector3<T>& rate, const Vector3<T>& acceleration,
-                                   const Vector3<T>& v) {
+PROOFMASS_INLINE Vector3<T> inertia_gradient(const Vector3<T>& rate, const Vector3<T>& acceleration,
+                                             const Vector3<T>& v) {
   return cross(rate, cross(rate, v)) + cross(acceleration, v);
 }
 
 /// The matrix [T] − [In] itself.
 template <typename T>
-inline Matrix3<T> gradient_matrix(double gradient_s2, const Vector3<T>& direction,
-                                  const Vector3<T>& rate, const Vector3<T>& acceleration) {
+PROOFMASS_INLINE Matrix3<T> gradient_matrix(double gradient_s2, const Vector3<T>& direction,
+                                            const Vector3<T>& rate,
+                                            const Vector3<T>& acceleration) {
   const T g = T(gradient_s2);
   const Vector3<T> u = (T(3.0) * g) * direction;
   // In = ΩΩᵀ − Ω² + [Ω̇∧]

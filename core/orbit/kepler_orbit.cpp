@@ -29,8 +29,14 @@ OrbitPoint KeplerOrbit::at(double time_s) const {
     const double residual = offset - e * eccentric.sine;
     const double move = residual / (1.0 - e * eccentric.cosine);
     offset -= move;
+    if (std::abs(move) < 1e-8) {
+      // The next error would be about e·move², and so would be that of turning by −move at first
+      // order.
+      eccentric = {eccentric.sine - move * eccentric.cosine,
+                   eccentric.cosine + move * eccentric.sine};
+      break;
+    }
     eccentric = sincos_turns(turns + offset / two_pi);
-    if (std::abs(move) < 1e-8) break;  // The next error is about e·move².
   }
   const double radius_ratio = 1.0 - e * eccentric.cosine;  // r/a
   const double inverse = 1.0 / radius_ratio;

@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::size_t name_length_max = 64;
 constexpr std::size_t num_lines_max = 16;
+constexpr std::size_t fit_lines_max = 2;
 constexpr int multiple_max = 1000;
 
 // What must be shaken, and which measurement nulled, for a session to determine its target.
@@ -147,6 +148,9 @@ void SessionCheck::check_excitation(const Excitation& excitation, const Stimulus
 
 void SessionCheck::check_lines() const {
   if (session_.fit_lines.empty()) refuse("fit_lines", "[]", "must name one line or more");
+  if (session_.fit_lines.size() > fit_lines_max) {
+    refuse("fit_lines", fmt::format("{} lines", session_.fit_lines.size()), "must be one or two");
+  }
   const std::size_t num_lines = session_.fit_lines.size() + session_.known_lines.size();
   if (num_lines > num_lines_max) {
     refuse("known_lines", fmt::format("{} lines with fit_lines", num_lines),

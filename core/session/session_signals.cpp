@@ -31,21 +31,28 @@ SessionSignals::SessionSignals(const Scenario& scenario, const Session& session,
   }
 }
 
+SessionSignals::Reference SessionSignals::reference_at_start() const {
+  return reference_at(static_cast<double>(-num_settling_) * sample_period_s_);
+}
+
+SessionSignals::Reference SessionSignals::reference_at(double time_s) const {
+  if (spin_rate_rad_s_ == 0.0) return {};
+  const auto [sine, cosine] =
+      sincos_turns(0.5 * spin_rate_rad_s_ * time_s / (2.0 * std::numbers::pi));
+  return {.attitude_IR = {cosine, {0.0, sine, 0.0}}, .rate = {0.0, spin_rate_rad_s_, 0.0}};
+}
+
 SharedSample SessionSignals::next() {
   const double time_s = static_cast<double>(next_) * sample_period_s_;
   const OrbitPoint point = orbit_->at(time_s);
+  const Reference reference = reference_at(time_s);
   SharedSample sample;
   sample.gradient_s2 = point.gradient_s2;
   sample.earth_direction_I = {point.direction_x, 0.0, point.direction_z};
-  sample.earth_direction_R = sample.earth_direction_I;
+  sample.reference_IR = reference.attitude_IR;
+  sample.reference_rate = reference.rate;
+  sample.earth_direction_R = to_target(reference.attitude_IR, sample.earth_direction_I);
   sample.external = environment_.at(time_s, point);
-  if (spin_rate_rad_s_ != 0.0) {
-    const double turns = spin_rate_rad_s_ * time_s / (2.0 * std::numbers::pi);
-    const auto [sine, cosine] = sincos_turns(0.5 * turns);
-    sample.reference_IR = {cosine, {0.0, sine, 0.0}};
-    sample.reference_rate = {0.0, spin_rate_rad_s_, 0.0};
-    sample.earth_direction_R = to_target(sample.reference_IR, sample.earth_direction_I);
-  }
   if (has_excitation_) excite(time_s, sample);
   commanded_.correct(gains_, sample.attitude_command_rad);
   sample.commanded = commanded_;

@@ -36,10 +36,18 @@ class SessionSignals {
   [[nodiscard]] std::int64_t num_settling() const { return num_settling_; }
   [[nodiscard]] std::int64_t num_record() const { return num_record_; }
 
+  /// Attitude and rate of the reference at the first sample.
+  struct Reference {
+    Quaternion<double> attitude_IR;
+    Vector3<double> rate;
+  };
+  [[nodiscard]] Reference reference_at_start() const;
+
   /// The next sample; the first call yields t = −num_settling()·T.
   [[nodiscard]] SharedSample next();
 
  private:
+  [[nodiscard]] Reference reference_at(double time_s) const;
   void excite(double time_s, SharedSample& sample) const;
 
   const KeplerOrbit* orbit_;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/error.hpp"
@@ -52,6 +53,7 @@ LineWeights::LineWeights(const LineFit& fit) : fit_(fit), lines_hz_(fit.fit_hz) 
                                       fit.num_samples - std::min(fit.num_dropped, fit.num_samples),
                                       fit.num_samples, 2 * lines_hz_.size()));
   }
+  PROOFMASS_EXPECT(fit.fit_hz.size() == 1 || fit.fit_hz.size() == 2);
   solve_design();
 
   const std::size_t num_outputs = 2 * num_fit_lines();
@@ -94,39 +96,62 @@ std::size_t LineWeights::samples_in(std::size_t block) const {
   return std::min(block_size, fit_.num_samples - block * block_size);
 }
 
-void LineWeights::run_backwards(std::size_t block, States& states,
-                                std::span<double> weights) const {
-  // A rotation steps each line back by one sample; it is set anew in every block, so that its
-  // rounding cannot grow past block_size steps.
-  struct Rotation {
-    SineCosine now, step;
-  };
-  const std::size_t first = block * block_size;
-  const std::size_t last = first + samples_in(block) - 1;
+namespace {
+
+/// A line's cosine and sine at a sample, and the rotation to the next one.
+struct Rotation {
+  SineCosine now, step;
+};
+
+/// Lines at sample `last`. They are set anew in every block, so that the rounding of their rotation
+/// cannot grow past block_size steps.
+std::vector<Rotation> rotations(const std::vector<double>& lines_hz, double sample_period_s,
+                                std::size_t last) {
   std::vector<Rotation> lines;
-  lines.reserve(lines_hz_.size());
-  for (const double line_hz : lines_hz_) {
-    const double turns = line_hz * fit_.sample_period_s;
+  lines.reserve(lines_hz.size());
+  for (const double line_hz : lines_hz) {
+    const double turns = line_hz * sample_period_s;
     lines.push_back({sincos_turns(turns * static_cast<double>(last)), sincos_turns(turns)});
   }
-  const std::size_t num_outputs = states.size();
-  for (std::size_t k = last + 1; k-- > first;) {
-    double* row = &weights[(k - first) * num_outputs];
-    std::fill_n(row, num_outputs, 0.0);
-    const double* coefficient = coefficients_.data();
+  return lines;
+}
+
+/// Filters Φ (ΦᵀΦ)⁻¹ backwards from the end of [first, first + num_samples) to its start.
+template <std::size_t num_outputs>
+void filter_backwards(const LineFit& fit, std::vector<Rotation> lines, const double* coefficients,
+                      std::size_t first, std::size_t num_samples, BandPassState* states,
+                      double* weights) {
+  const BandPass filter = fit.filter;
+  std::array<BandPassState, num_outputs> state;
+  std::copy_n(states, num_outputs, state.begin());
+  for (std::size_t k = num_samples; k-- > 0;) {
+    std::array<double, num_outputs> row{};
+    const double* coefficient = coefficients;
     for (auto& [now, step] : lines) {
-      for (std::size_t i = 0; i < num_outputs; ++i) row[i] += now.cosine * coefficient[i];
-      coefficient += num_outputs;
-      for (std::size_t i = 0; i < num_outputs; ++i) row[i] += now.sine * coefficient[i];
-      coefficient += num_outputs;
+      for (std::size_t i = 0; i < num_outputs; ++i) {
+        row[i] += now.cosine * coefficient[i] + now.sine * coefficient[num_outputs + i];
+      }
+      coefficient += 2 * num_outputs;
       now = {now.sine * step.cosine - now.cosine * step.sine,
              now.cosine * step.cosine + now.sine * step.sine};
     }
-    const double kept = k >= fit_.num_dropped ? 1.0 : 0.0;
+    const double kept = first + k >= fit.num_dropped ? 1.0 : 0.0;
     for (std::size_t i = 0; i < num_outputs; ++i) {
-      row[i] = states[i].advance(fit_.filter, kept * row[i]);
+      weights[k * num_outputs + i] = state[i].advance(filter, kept * row[i]);
     }
   }
+  std::copy_n(state.begin(), num_outputs, states);
+}
+
+}  // namespace
+
+void LineWeights::run_backwards(std::size_t block, States& states,
+                                std::span<double> weights) const {
+  const std::size_t first = block * block_size;
+  const std::size_t num_samples = samples_in(block);
+  const auto lines = rotations(lines_hz_, fit_.sample_period_s, first + num_samples - 1);
+  const auto run = states.size() == 2 ? filter_backwards<2> : filter_backwards<4>;
+  run(fit_, lines, coefficients_.data(), first, num_samples, states.data(), weights.data());
 }
 
 void LineWeights::fill_block(std::size_t block, std::span<double> weights) const {

@@ -5,6 +5,7 @@
 #include "core/control/attitude_loop.hpp"
 #include "core/control/drag_free_loop.hpp"
 #include "core/instrument/sensor_model.hpp"
+#include "core/math/inline.hpp"
 #include "core/math/quaternion.hpp"
 #include "core/math/vector3.hpp"
 #include "core/session/session_signals.hpp"
@@ -49,14 +50,15 @@ struct Loop {
   AttitudeController<T> controller;
 
   /// Puts the satellite at rest in its reference attitude.
-  void begin(const SharedSample& first) {
-    attitude_IS = {T(first.reference_IR.scalar), broadcast<T>(first.reference_IR.vector)};
-    rate = broadcast<T>(first.reference_rate);
+  void begin(const SessionSignals::Reference& reference) {
+    attitude_IS = {T(reference.attitude_IR.scalar), broadcast<T>(reference.attitude_IR.vector)};
+    rate = broadcast<T>(reference.rate);
   }
 
-  Observation<T> advance(const LoopConstants<T>& constants, const DragFreeGains& drag_free_gains,
-                         const AttitudeGains& attitude_gains, const SharedSample& shared,
-                         const SampleNoise<T>& noise) {
+  PROOFMASS_INLINE Observation<T> advance(const LoopConstants<T>& constants,
+                                          const DragFreeGains& drag_free_gains,
+                                          const AttitudeGains& attitude_gains,
+                                          const SharedSample& shared, const SampleNoise<T>& noise) {
     // Γ_sat = Γ_propu + Γ_ext, Γ_propu = −[M_DF] Γ_DF + Γ_n,DF
     const Vector3<T> thrust = noise.thrust - constants.thrust_matrix * thrust_command;
     const Vector3<T> angular_acceleration =
@@ -100,7 +102,7 @@ struct Loop {
 
   /// One sample of rotation under a constant angular acceleration in S. The last term is the first
   /// of the rotation vector's series in the non-commuting rates [Bortz1971].
-  void rotate(const Vector3<T>& angular_acceleration, double period_s) {
+  PROOFMASS_INLINE void rotate(const Vector3<T>& angular_acceleration, double period_s) {
     const Vector3<T> rotation =
         T(period_s) * rate + T(0.5 * period_s * period_s) * angular_acceleration +
         T(period_s * period_s * period_s / 12.0) * cross(rate, angular_acceleration);

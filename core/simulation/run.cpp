@@ -1,10 +1,13 @@
 #include "core/simulation/run.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "core/campaign/draw.hpp"
+#include "core/error.hpp"
 #include "core/estimation/calibration.hpp"
+#include "core/simulation/batch_kernel.hpp"
 #include "core/simulation/session_record.hpp"
 
 namespace proofmass {
@@ -40,6 +43,47 @@ SessionPhasors to_phasors(const SignalSums<double>& sums, std::size_t num_lines)
   return phasors;
 }
 
+/// What is known of a run before it is simulated.
+RunRecord drawn_record(const Scenario& scenario, RunIndex run, const AcceptedDraw& draw) {
+  RunRecord record{
+      .run = run, .num_draws = draw.num_draws, .has_draw = draw.instrument.has_value()};
+  if (draw.instrument) {
+    record.truth =
+        true_parameters(*draw.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
+  }
+  return record;
+}
+
+/// Turns the samples done in a session into the orbits done in the run.
+class SessionProgress {
+ public:
+  SessionProgress(const Scenario& scenario, const std::function<void(int)>& report)
+      : scenario_(scenario), report_(report) {}
+
+  void operator()(std::size_t num_samples) const {
+    if (!report_) return;
+    const double elapsed_s =
+        static_cast<double>(num_samples) * scenario_.simulation.sample_period_s;
+    report_(orbits_before_ + static_cast<int>(elapsed_s / scenario_.orbit.period_s));
+  }
+  static void report_to(const void* progress, std::size_t num_samples) {
+    (*static_cast<const SessionProgress*>(progress))(num_samples);
+  }
+  void end_session(std::size_t i) { orbits_before_ += scenario_.sessions[i].num_orbits; }
+
+ private:
+  const Scenario& scenario_;
+  const std::function<void(int)>& report_;
+  int orbits_before_ = 0;
+};
+
+/// A run of a batch.
+struct Lane {
+  RunIndex run;
+  Instrument instrument;
+  std::size_t index = 0;  ///< Of its record.
+};
+
 bool all_finite(const ParameterArray& values) {
   for (const double value : values) {
     if (!std::isfinite(value)) return false;
@@ -63,17 +107,55 @@ struct RunPlan::Parts {
     }
   }
 
-  template <typename Progress>
+  [[nodiscard]] SessionSetup setup(std::size_t i) const {
+    return {.weights = &weights[i],
+            .drag_free = drag_free,
+            .attitude = attitude,
+            .regressor = regressor_kind(campaign.scenario.sessions[i].target),
+            .num_signals_used = num_signals_used(campaign.scenario.sessions[i].target)};
+  }
+
   SessionPhasors simulate_session(std::size_t i, const Instrument& instrument, RunIndex run,
-                                  const Progress& progress) const {
+                                  const SessionProgress& progress) const {
     const Scenario& scenario = campaign.scenario;
     const Session& session = scenario.sessions[i];
+    SessionSignals signals(scenario, session, orbit, environment);
     SessionNoise session_noise(noise, campaign.seed, run, session.name);
-    const SignalSums<double> sums =
-        record_session<double>(SessionSignals(scenario, session, orbit, environment), weights[i],
-                               make_loop_constants(instrument, scenario, session), drag_free,
-                               attitude, regressor_kind(session.target), session_noise, progress);
+    std::vector<double> buffer(LineWeights::block_size * 2 * weights[i].num_fit_lines());
+    const SignalSums<double> sums = record_session<double>(
+        signals, setup(i), make_loop_constants(instrument, scenario, session), session_noise,
+        buffer, progress);
     return to_phasors(sums, weights[i].num_fit_lines());
+  }
+
+  void record_session_batch(std::size_t i, std::span<const Lane> lanes, BatchKernel kernel,
+                            const SessionProgress& progress,
+                            std::vector<RunRecord>& records) const {
+    const Scenario& scenario = campaign.scenario;
+    const Session& session = scenario.sessions[i];
+    SessionSignals signals(scenario, session, orbit, environment);
+    const NoiseStreams streams = noise_streams(session.name);
+    std::vector<double> buffer(LineWeights::block_size * 2 * weights[i].num_fit_lines());
+    BatchSession batch{.signals = &signals,
+                       .setup = setup(i),
+                       .noise = &noise,
+                       .streams = &streams,
+                       .seed = campaign.seed,
+                       .weights_buffer = buffer,
+                       .progress = SessionProgress::report_to,
+                       .progress_context = &progress};
+    for (std::size_t l = 0; l < batch_lanes; ++l) {
+      const Lane& lane = lanes[std::min(l, lanes.size() - 1)];
+      batch.runs[l] = lane.run;
+      batch.constants[l] = make_loop_constants(lane.instrument, scenario, session);
+      batch.noise_states[l] = stationary_states(noise, campaign.seed, lane.run, session.name);
+    }
+    std::array<SignalSums<double>, batch_lanes> sums{};
+    kernel(batch, sums);
+    for (std::size_t l = 0; l < lanes.size(); ++l) {
+      records[lanes[l].index].phasors[index(session.target)] =
+          to_phasors(sums[l], weights[i].num_fit_lines());
+    }
   }
 
   Campaign campaign;
@@ -98,27 +180,54 @@ int RunPlan::num_orbits() const {
 
 RunRecord RunPlan::record(RunIndex run, std::span<const double> table_values,
                           const std::function<void(int)>& progress) const {
-  const Campaign& campaign = parts_->campaign;
-  const Scenario& scenario = campaign.scenario;
-  const AcceptedDraw draw = draw_instrument(campaign, run, table_values);
-  RunRecord recorded{
-      .run = run, .num_draws = draw.num_draws, .has_draw = draw.instrument.has_value()};
+  const Scenario& scenario = parts_->campaign.scenario;
+  const AcceptedDraw draw = draw_instrument(parts_->campaign, run, table_values);
+  RunRecord recorded = drawn_record(scenario, run, draw);
   if (!draw.instrument) return recorded;
-  recorded.truth =
-      true_parameters(*draw.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
-
-  int orbits_before = 0;
-  const double samples_per_orbit = scenario.orbit.period_s / scenario.simulation.sample_period_s;
+  SessionProgress sessions(scenario, progress);
   for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
-    const auto report = [&](std::size_t num_samples) {
-      const int orbits = static_cast<int>(static_cast<double>(num_samples) / samples_per_orbit);
-      if (progress) progress(orbits_before + orbits);
-    };
     recorded.phasors[index(scenario.sessions[i].target)] =
-        parts_->simulate_session(i, *draw.instrument, run, report);
-    orbits_before += scenario.sessions[i].num_orbits;
+        parts_->simulate_session(i, *draw.instrument, run, sessions);
+    sessions.end_session(i);
   }
   return recorded;
+}
+
+std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> requests,
+                                               InstructionSet set,
+                                               const std::function<void(int)>& progress) const {
+  PROOFMASS_EXPECT(requests.size() <= batch_lanes);
+  std::vector<RunResult> results;
+  if (set == InstructionSet::scalar) {
+    for (const RunRequest& request : requests) {
+      results.push_back(simulate(request.run, request.table_values, progress));
+    }
+    return results;
+  }
+  for (const RunRecord& record : record_batch(requests, set, progress)) {
+    results.push_back(estimate(record));
+  }
+  return results;
+}
+
+std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> requests,
+                                             InstructionSet set,
+                                             const std::function<void(int)>& progress) const {
+  std::vector<RunRecord> records;
+  std::vector<Lane> lanes;
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    const auto& [run, table_values] = requests[i];
+    const AcceptedDraw draw = draw_instrument(parts_->campaign, run, table_values);
+    records.push_back(drawn_record(parts_->campaign.scenario, run, draw));
+    if (draw.instrument) lanes.push_back({.run = run, .instrument = *draw.instrument, .index = i});
+  }
+  if (lanes.empty()) return records;
+  SessionProgress sessions(parts_->campaign.scenario, progress);
+  for (std::size_t i = 0; i < parts_->weights.size(); ++i) {
+    parts_->record_session_batch(i, lanes, batch_kernel(set), sessions, records);
+    sessions.end_session(i);
+  }
+  return records;
 }
 
 RunResult RunPlan::estimate(const RunRecord& record) const {

@@ -5,16 +5,27 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/estimation/calibration.hpp"
+#include "core/simulation/instruction_set.hpp"
 
 namespace proofmass {
 
 /// Changes with every change of core that may change a result's bits. Coordinator and workers must
 /// agree on it, and a campaign is finished by the model that began it.
-inline constexpr std::string_view model_version = "hardy2013-1";
+inline constexpr std::string_view model_version = "hardy2013-2";
+
+/// Runs that one batch advances together at most.
+inline constexpr std::size_t batch_lanes = 16;
+
+/// A run to be simulated, with campaign.table_values(run).
+struct RunRequest {
+  RunIndex run;
+  std::vector<double> table_values;
+};
 
 /// What a run's simulation leaves for the estimation, and the truth to compare with.
 struct RunRecord {
@@ -26,7 +37,7 @@ struct RunRecord {
 };
 
 /// Everything that the runs of a campaign share: filters, weights, orbit, environment. Made once,
-/// used for any run, by one thread at a time.
+/// used for any run, by any number of threads.
 class RunPlan {
  public:
   /// @pre campaign.validate() passed.
@@ -43,6 +54,11 @@ class RunPlan {
   [[nodiscard]] RunRecord record(RunIndex run, std::span<const double> table_values,
                                  const std::function<void(int)>& progress = {}) const;
 
+  /// record() for several runs at once; arguments as for simulate_batch(), `set` not `scalar`.
+  [[nodiscard]] std::vector<RunRecord> record_batch(
+      std::span<const RunRequest> requests, InstructionSet set,
+      const std::function<void(int)>& progress = {}) const;
+
   /// Estimates the ten parameters from a record.
   [[nodiscard]] RunResult estimate(const RunRecord& record) const;
 
@@ -51,6 +67,15 @@ class RunPlan {
                                    const std::function<void(int)>& progress = {}) const {
     return estimate(record(run, table_values, progress));
   }
+
+  /// simulate() for several runs at once, bit for bit the same results, in the order of `requests`.
+  ///
+  /// @param requests  At most batch_lanes; a batch costs the same however few they are.
+  /// @param set       One of available_instruction_sets().
+  /// @param progress  As for simulate(); the runs advance together.
+  [[nodiscard]] std::vector<RunResult> simulate_batch(
+      std::span<const RunRequest> requests, InstructionSet set,
+      const std::function<void(int)>& progress = {}) const;
 
   /// Orbits of one run, all sessions together.
   [[nodiscard]] int num_orbits() const;

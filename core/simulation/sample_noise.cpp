@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/control/star_tracker.hpp"
 #include "core/random/normal.hpp"
 
 namespace proofmass {
@@ -21,10 +22,12 @@ NoiseShape scaled_shape(const SensorNoise& noise, double scale, double sample_pe
 
 NoiseModel make_noise_model(const NoiseConfig& config, double sample_period_s) {
   const double per_sample = config.scale / std::sqrt(2.0 * sample_period_s);
+  const Eigen::Matrix3d star = make_star_tracker(config, sample_period_s).noise_factor;
   return {.linear_x = scaled_shape(config.linear_x, config.scale, sample_period_s),
           .linear_yz = scaled_shape(config.linear_yz, config.scale, sample_period_s),
           .angular = scaled_shape(config.angular, config.scale, sample_period_s),
-          .star_tracker = make_star_tracker(config, sample_period_s),
+          .star_tracker_factor = {star(0, 0), star(1, 0), star(1, 1), star(2, 0), star(2, 1),
+                                  star(2, 2)},
           .thrust_deviation = config.thrust_asd_m_s2 * per_sample,
           .torque_deviation = config.torque_asd_rad_s2 * per_sample};
 }
@@ -40,79 +43,76 @@ const std::array<std::string_view, num_noise_channels>& noise_channel_names() {
   return names;
 }
 
+NoiseStreams noise_streams(std::string_view session_name) {
+  NoiseStreams streams{};
+  for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
+    streams[channel] =
+        stream_id(fmt::format("session/{}/{}", session_name, noise_channel_names()[channel]));
+  }
+  return streams;
+}
+
+namespace {
+
+const NoiseShape& shape_of(const NoiseModel& model, std::size_t channel) {
+  if (channel >= 6) return model.angular;
+  return channel % 3 == 0 ? model.linear_x : model.linear_yz;
+}
+
+NoiseState<double> stationary_state(const NoiseShape& shape, const RandomStream& stream) {
+  const std::size_t n = shape.num_states();
+  std::array<double, NoiseShape::num_poles_max> normals{};
+  for (std::size_t i = 0; i < n; ++i) {
+    const RandomBlock block = stream.block(static_cast<std::uint32_t>(i / 4));
+    normals[i] = static_cast<double>(normal_deviates(block)[i % 4]);
+  }
+  NoiseState<double> state;
+  for (std::size_t i = 0; i < n; ++i) {
+    double value = 0.0;
+    for (std::size_t j = 0; j <= i; ++j) value += shape.start_factor[i * n + j] * normals[j];
+    if (i < shape.num_real) {
+      state.real[i] = value;
+    } else {
+      (i == shape.num_real ? state.pair_real : state.pair_imaginary) = value;
+    }
+  }
+  return state;
+}
+
+}  // namespace
+
+NoiseStates<double> stationary_states(const NoiseModel& model, std::uint64_t seed, RunIndex run,
+                                      std::string_view session_name) {
+  NoiseStates<double> states;
+  for (std::size_t channel = 0; channel < num_coloured_channels; ++channel) {
+    const std::uint32_t id =
+        stream_id(fmt::format("session/{}/{}/start", session_name, noise_channel_names()[channel]));
+    states[channel] = stationary_state(shape_of(model, channel), RandomStream(seed, run, id));
+  }
+  return states;
+}
+
 SessionNoise::SessionNoise(const NoiseModel& model, std::uint64_t seed, RunIndex run,
                            std::string_view session_name)
-    : model_(&model) {
-  for (const std::string_view channel : noise_channel_names()) {
-    streams_.emplace_back(seed, run,
-                          stream_id(fmt::format("session/{}/{}", session_name, channel)));
-  }
-  start(seed, run, session_name);
-}
-
-const NoiseShape& SessionNoise::shape(std::size_t channel) const {
-  if (channel >= 6) return model_->angular;
-  return channel % 3 == 0 ? model_->linear_x : model_->linear_yz;
-}
-
-void SessionNoise::start(std::uint64_t seed, RunIndex run, std::string_view session_name) {
-  for (std::size_t channel = 0; channel < num_coloured; ++channel) {
-    const RandomStream stream(seed, run,
-                              stream_id(fmt::format("session/{}/{}/start", session_name,
-                                                    noise_channel_names()[channel])));
-    const NoiseShape& colour = shape(channel);
-    const std::size_t n = colour.num_states();
-    std::array<double, NoiseShape::num_poles_max> normals{};
-    for (std::size_t i = 0; i < n; ++i) {
-      normals[i] = static_cast<double>(
-          normal_deviates(stream.block(static_cast<std::uint32_t>(i / 4)))[i % 4]);
-    }
-    NoiseState<double>& state = states_[channel];
-    for (std::size_t i = 0; i < n; ++i) {
-      double value = 0.0;
-      for (std::size_t j = 0; j <= i; ++j) value += colour.start_factor[i * n + j] * normals[j];
-      if (i < colour.num_real) {
-        state.real[i] = value;
-      } else {
-        (i == colour.num_real ? state.pair_real : state.pair_imaginary) = value;
-      }
-    }
-  }
-}
+    : model_(&model),
+      seed_(seed),
+      run_(run),
+      streams_(noise_streams(session_name)),
+      states_(stationary_states(model, seed, run, session_name)) {}
 
 SampleNoise<double> SessionNoise::next() {
-  if (next_in_block_ == samples_per_block) {
+  if (next_in_block_ == samples_per_noise_block) {
     for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
-      deviates_[channel] = normal_deviates(streams_[channel].block(num_blocks_));
+      deviates_[channel] =
+          normal_deviates(RandomStream(seed_, run_, streams_[channel]).block(num_blocks_));
     }
     ++num_blocks_;
     next_in_block_ = 0;
   }
-  const auto white = [this](std::size_t channel) {
-    return static_cast<double>(deviates_[channel][next_in_block_]);
-  };
-  const auto coloured = [&](std::size_t channel, const NoiseShape& colour) {
-    return states_[channel].advance(colour, white(channel));
-  };
-  const auto triple = [&](std::size_t first) {
-    return Vector3<double>{white(first), white(first + 1), white(first + 2)};
-  };
-  SampleNoise<double> noise;
-  for (const std::size_t k : {0U, 1U}) {
-    noise.sensor[k] = {coloured(3 * k, model_->linear_x), coloured(3 * k + 1, model_->linear_yz),
-                       coloured(3 * k + 2, model_->linear_yz)};
-  }
-  noise.angular = {coloured(6, model_->angular), coloured(7, model_->angular),
-                   coloured(8, model_->angular)};
-  const Vector3<double> normals = triple(9);
-  const Eigen::Matrix3d& factor = model_->star_tracker.noise_factor;
-  noise.star_tracker = {
-      factor(0, 0) * normals.x, factor(1, 0) * normals.x + factor(1, 1) * normals.y,
-      factor(2, 0) * normals.x + factor(2, 1) * normals.y + factor(2, 2) * normals.z};
-  noise.thrust = model_->thrust_deviation * triple(12);
-  noise.torque = model_->torque_deviation * triple(15);
-  ++next_in_block_;
-  return noise;
+  const std::size_t i = next_in_block_++;
+  return shape_sample<double>(*model_, states_, [&](std::size_t channel) {
+    return static_cast<double>(deviates_[channel][i]);
+  });
 }
 
 }  // namespace proofmass

@@ -19,4 +19,15 @@ RegressorKind regressor_kind(SessionTarget target) {
   }
 }
 
+std::size_t num_signals_used(SessionTarget target) {
+  switch (target) {
+    case SessionTarget::a_c11_delta_x:
+    case SessionTarget::a_c11_delta_y:
+    case SessionTarget::a_c11_delta_z:
+      return num_signals;
+    default:
+      return num_common_signals;
+  }
+}
+
 }  // namespace proofmass

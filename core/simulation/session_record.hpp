@@ -2,9 +2,10 @@
 
 #include <array>
 #include <cstdint>
-#include <vector>
+#include <span>
 
 #include "core/estimation/signals.hpp"
+#include "core/math/inline.hpp"
 #include "core/session/session_signals.hpp"
 #include "core/signal/line_weights.hpp"
 #include "core/simulation/loop.hpp"
@@ -23,14 +24,18 @@ enum class RegressorKind : std::uint8_t {
 
 [[nodiscard]] RegressorKind regressor_kind(SessionTarget target);
 
+/// How many signals, in their order, the target's estimate needs.
+[[nodiscard]] std::size_t num_signals_used(SessionTarget target);
+
 /// Weighted sums over a record: [signal][2·line: cosine, 2·line + 1: sine].
 template <typename T>
 using SignalSums = std::array<std::array<T, 2 * num_fit_lines_max>, num_signals>;
 
 /// The signals of one sample, in the order of `Signal`.
 template <typename T>
-inline std::array<T, num_signals> ground_signals(const Observation<T>& observation,
-                                                 const SharedSample& shared, RegressorKind kind) {
+PROOFMASS_INLINE std::array<T, num_signals> ground_signals(const Observation<T>& observation,
+                                                           const SharedSample& shared,
+                                                           RegressorKind kind) {
   const Vector3<T>& m1 = observation.measured[0];
   const Vector3<T>& m2 = observation.measured[1];
   const T half = T(0.5);
@@ -69,43 +74,69 @@ inline std::array<T, num_signals> ground_signals(const Observation<T>& observati
       break;
   }
   return {differential_x, common.x, common.y, common.z, g[0].x, g[0].y, g[0].z,
-          g[1].x,         g[1].y,   g[1].z,   g[2].x,   g[2].y, g[2].z, regressor};
+          regressor,      g[1].x,   g[1].y,   g[1].z,   g[2].x, g[2].y, g[2].z};
+}
+
+/// What the runs of a batch share in one session.
+struct SessionSetup {
+  const LineWeights* weights = nullptr;
+  DragFreeGains drag_free;
+  AttitudeGains attitude;
+  RegressorKind regressor = RegressorKind::none;
+  std::size_t num_signals_used = num_signals;  ///< num_common_signals or all.
+};
+
+/// Adds one sample's signals to the sums of one output of the line weights.
+template <std::size_t first, std::size_t last, typename T>
+PROOFMASS_INLINE void add_weighted(const std::array<T, num_signals>& values, const T& weight,
+                                   std::size_t output, SignalSums<T>& sums) {
+  for (std::size_t s = first; s < last; ++s) {
+    sums[s][output] = sums[s][output] + weight * values[s];
+  }
+}
+
+/// Adds one sample's signals to the sums of every output.
+template <typename T>
+PROOFMASS_INLINE void add_sample(const std::array<T, num_signals>& values, const double* weights,
+                                 std::size_t num_outputs, std::size_t num_used,
+                                 SignalSums<T>& sums) {
+  for (std::size_t i = 0; i < num_outputs; ++i) {
+    const T weight = T(weights[i]);
+    add_weighted<0, num_common_signals>(values, weight, i, sums);
+    if (num_used == num_signals) {
+      add_weighted<num_common_signals, num_signals>(values, weight, i, sums);
+    }
+  }
 }
 
 /// Runs one session from settling to its last sample and sums its signals.
 ///
+/// @param signals   Not yet asked for any sample.
 /// @param noise     next() yields the SampleNoise<T> of each sample, settling included.
+/// @param buffer    Room for a block of weights.
 /// @param progress  Called with the number of record samples done after each block.
 template <typename T, typename Noise, typename Progress>
-SignalSums<T> record_session(SessionSignals signals, const LineWeights& weights,
-                             const LoopConstants<T>& constants, const DragFreeGains& drag_free,
-                             const AttitudeGains& attitude, RegressorKind kind, Noise& noise,
-                             const Progress& progress) {
-  Loop<T> loop;
-  for (std::int64_t i = 0; i < signals.num_settling(); ++i) {
-    const SharedSample shared = signals.next();
-    if (i == 0) loop.begin(shared);
-    (void)loop.advance(constants, drag_free, attitude, shared, noise.next());
-  }
-  SignalSums<T> sums{};
+inline SignalSums<T> record_session(SessionSignals& signals, const SessionSetup& setup,
+                                    const LoopConstants<T>& constants, Noise& noise,
+                                    std::span<double> buffer, const Progress& progress) {
+  const LineWeights& weights = *setup.weights;
   const std::size_t num_outputs = 2 * weights.num_fit_lines();
-  std::vector<double> block_weights(LineWeights::block_size * num_outputs);
+  SignalSums<T> sums{};
+  Loop<T> loop;
+  loop.begin(signals.reference_at_start());
+  for (std::int64_t i = 0; i < signals.num_settling(); ++i) {
+    (void)loop.advance(constants, setup.drag_free, setup.attitude, signals.next(), noise.next());
+  }
   std::size_t num_done = 0;
   for (std::size_t block = 0; block < weights.num_blocks(); ++block) {
-    weights.fill_block(block, block_weights);
+    weights.fill_block(block, buffer);
     const std::size_t num_samples = weights.samples_in(block);
     for (std::size_t k = 0; k < num_samples; ++k) {
       const SharedSample shared = signals.next();
-      if (num_done == 0 && k == 0 && signals.num_settling() == 0) loop.begin(shared);
       const Observation<T> observation =
-          loop.advance(constants, drag_free, attitude, shared, noise.next());
-      const std::array<T, num_signals> values = ground_signals(observation, shared, kind);
-      const double* row = &block_weights[k * num_outputs];
-      for (std::size_t s = 0; s < num_signals; ++s) {
-        for (std::size_t i = 0; i < num_outputs; ++i) {
-          sums[s][i] = sums[s][i] + T(row[i]) * values[s];
-        }
-      }
+          loop.advance(constants, setup.drag_free, setup.attitude, shared, noise.next());
+      add_sample(ground_signals(observation, shared, setup.regressor), &buffer[k * num_outputs],
+                 num_outputs, setup.num_signals_used, sums);
     }
     num_done += num_samples;
     progress(num_done);

@@ -105,7 +105,8 @@ struct ModelRecord {
     for (Complex& amplitude : phasors.amplitude[index(own[index(target)])]) amplitude *= 100.0;
     if (own[index(target)] != Signal::regressor) return;
     // The gradients of these sessions lie elsewhere in frequency.
-    for (std::size_t s = 1; s < index(Signal::regressor); ++s) {
+    for (std::size_t s = 1; s < num_signals; ++s) {
+      if (s == index(Signal::regressor)) continue;
       for (Complex& amplitude : phasors.amplitude[s]) amplitude *= 1e-3;
     }
   }

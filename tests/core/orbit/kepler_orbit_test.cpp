@@ -94,8 +94,8 @@ TEST(KeplerOrbit, GivesSineAndCosineOfTheMeanAnomaly) {
   }
 }
 
-// r² dν/dt = n a² √(1 − e²). The derivative comes from a step h of 10 s: its error is h²/6 times the
-// third derivative, which is below 30 n² of the first for e ≤ 0.3: 6e-4. Halving the step and
+// r² dν/dt = n a² √(1 − e²). The derivative comes from a step h of 10 s: its error is h²/6 times
+// the third derivative, which is below 30 n² of the first for e ≤ 0.3: 6e-4. Halving the step and
 // extrapolating leaves the fourth order, below 1e-6.
 TEST(KeplerOrbit, SweepsEqualAreasInEqualTimes) {
   for (const double e : {5e-3, 0.05, 0.3}) {

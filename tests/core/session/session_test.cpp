@@ -129,6 +129,10 @@ TEST(ValidateSessions, WantsAFewLinesInsideTheBand) {
   EXPECT_EQ(refusal_after([](Sessions& s) { s[0].fit_lines.clear(); }),
             "session[0].fit_lines = [] (must name one line or more)");
   EXPECT_EQ(refusal_after([](Sessions& s) {
+              s[0].fit_lines = {{2, 0}, {5, 0}, {6, 0}};
+            }),
+            "session[0].fit_lines = 3 lines (must be one or two)");
+  EXPECT_EQ(refusal_after([](Sessions& s) {
               s[0].known_lines.clear();
               for (int i = 3; i < 19; ++i) s[0].known_lines.push_back({i, 0});
             }),

@@ -171,10 +171,10 @@ TEST(Loop, SpinsAsTheClosedFormSays) {
   const DragFreeGains drag_free = drag_free_gains(scenario.drag_free, period_s);
   const AttitudeGains attitude = attitude_gains(scenario.attitude, period_s);
   Loop<double> loop;
+  loop.begin(signals.reference_at_start());
   const double n2 = orbit.mean_motion_rad_s() * orbit.mean_motion_rad_s();
   for (std::int64_t i = -signals.num_settling(); i < signals.num_record(); ++i) {
     const SharedSample shared = signals.next();
-    if (i == -signals.num_settling()) loop.begin(shared);
     const Observation<double> observation =
         loop.advance(constants, drag_free, attitude, shared, SampleNoise<double>{});
     if (i < 0) continue;
@@ -210,10 +210,10 @@ TEST(GroundSignals, SeeTheTrueAttitudeUnderACommandedSwing) {
   const DragFreeGains drag_free = drag_free_gains(scenario.drag_free, period_s);
   const AttitudeGains attitude = attitude_gains(scenario.attitude, period_s);
   Loop<double> loop;
+  loop.begin(signals.reference_at_start());
   double largest = 0.0;
   for (std::int64_t i = -signals.num_settling(); i < signals.num_record(); ++i) {
     const SharedSample shared = signals.next();
-    if (i == -signals.num_settling()) loop.begin(shared);
     const Vector3<double> u = to_target(loop.attitude_IS, shared.earth_direction_I);
     const Observation<double> observation =
         loop.advance(constants, drag_free, attitude, shared, SampleNoise<double>{});

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/simulation/instruction_set.hpp"
+#include "core/simulation/run.hpp"
+#include "core/simulation/session_record.hpp"
+
+namespace proofmass {
+
+/// What one session of a batch of runs is computed from. Lanes that no run fills repeat another's.
+struct BatchSession {
+  SessionSignals* signals = nullptr;
+  SessionSetup setup;
+  const NoiseModel* noise = nullptr;
+  const NoiseStreams* streams = nullptr;
+  std::uint64_t seed = 0;
+  std::array<RunIndex, batch_lanes> runs{};
+  std::array<LoopConstants<double>, batch_lanes> constants{};
+  std::array<NoiseStates<double>, batch_lanes> noise_states{};
+  std::span<double> weights_buffer;  ///< Room for a block of weights.
+  void (*progress)(const void* context, std::size_t num_samples) = nullptr;
+  const void* progress_context = nullptr;
+};
+
+/// record_session() for batch_lanes runs at once, into one SignalSums a lane, the same bits as for
+/// each alone.
+using BatchKernel = void (*)(const BatchSession& session,
+                             std::span<SignalSums<double>, batch_lanes> sums);
+
+// One for each instruction set that has more than one lane; compiled with that set's flags, to be
+// called only where available_instruction_sets() holds it.
+void record_batch_sse4(const BatchSession& session,
+                       std::span<SignalSums<double>, batch_lanes> sums);
+void record_batch_avx2(const BatchSession& session,
+                       std::span<SignalSums<double>, batch_lanes> sums);
+void record_batch_avx512(const BatchSession& session,
+                         std::span<SignalSums<double>, batch_lanes> sums);
+
+/// @pre set is not `scalar`.
+[[nodiscard]] BatchKernel batch_kernel(InstructionSet set);
+
+}  // namespace proofmass
