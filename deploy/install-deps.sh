@@ -5,12 +5,12 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build pkg-config git
-  libeigen3-dev librandom123-dev
+  libeigen3-dev libhwy-dev librandom123-dev
   libzmq3-dev cppzmq-dev libprotobuf-dev protobuf-compiler
   libsqlite3-dev sqlite3
-  libspdlog-dev libfmt-dev libcli11-dev libtomlplusplus-dev
+  libspdlog-dev libfmt-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev
   libgtest-dev libgmock-dev libbenchmark-dev
-  clang-format
+  qemu-user clang-format
 )
 
 is_installed() {

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <cstdio>
@@ -12,6 +13,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include "core/error.hpp"
 #include "core/simulation/run.hpp"
@@ -25,10 +27,12 @@ using namespace proofmass;
 
 constexpr int exit_failed = 1;
 constexpr int exit_usage = 2;
+constexpr unsigned threads_max = wire::slots_max / batch_lanes;
 
 struct Options {
   std::string endpoint;
   std::string name;
+  unsigned num_threads = std::clamp(std::thread::hardware_concurrency(), 1U, threads_max);
   std::optional<pid_t> parent;
 };
 
@@ -48,9 +52,9 @@ void die_with(pid_t parent) {
 worker::Simulate prepare(const Campaign& campaign) {
   // Shared by the copies that std::function makes.
   const auto plan = std::make_shared<const RunPlan>(campaign);
-  return [plan](RunIndex run, std::span<const double> table_values,
-                const std::function<void(int)>& progress) {
-    return plan->simulate(run, table_values, progress);
+  return [plan, set = best_instruction_set()](std::span<const RunRequest> requests,
+                                              const std::function<void(int)>& progress) {
+    return plan->simulate_batch(requests, set, progress);
   };
 }
 
@@ -62,13 +66,15 @@ int run(const Options& options) {
     spdlog::set_level(spdlog::level::warn);
   }
   wire::check_endpoint("connect", options.endpoint);
+  const worker::ExecutorConfig config{.num_threads = options.num_threads,
+                                      .batch_size_max = batch_lanes};
   const std::string host = host_name();
   const wire::Hello hello{.worker_name = options.name.empty()
                                              ? wire::name_from(fmt::format("{}-{}", host, getpid()))
                                              : options.name,
                           .host = host,
                           .process_id = static_cast<std::uint64_t>(getpid()),
-                          .num_slots = 1,
+                          .num_slots = static_cast<std::uint32_t>(config.num_threads * batch_lanes),
                           .model_version = std::string(model_version)};
   if (!wire::is_name(hello.worker_name)) {
     throw InvalidArgument(
@@ -76,7 +82,7 @@ int run(const Options& options) {
   }
   const auto signals =
       options.parent ? worker::Signals::terminate : worker::Signals::terminate_and_interrupt;
-  const worker::Ending ending = worker::serve(options.endpoint, hello, prepare, signals);
+  const worker::Ending ending = worker::serve(options.endpoint, hello, prepare, config, signals);
   if (ending.kind == worker::Ending::Kind::failed) throw Error(ending.reason);
   spdlog::info("worker_ended reason=\"{}\"", ending.reason);
   return 0;
@@ -93,6 +99,9 @@ int main(int argc, char** argv) {
                  "Where the coordinator listens: ipc://PATH or tcp://127.0.0.1:PORT")
       ->required();
   app.add_option("--name", options.name, "Name in logs and database; HOST-PID by default");
+  app.add_option("--threads", options.num_threads,
+                 "Threads that simulate, one a processor by default")
+      ->check(CLI::Range(1U, threads_max));
   app.add_option("--parent", options.parent, "Process to die with; used by `proofmass run`");
   app.set_version_flag("--version", "proofmass-worker " PROOFMASS_VERSION);
   try {

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "coordinator/cli/bench_command.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/run_command.hpp"
 #include "coordinator/cli/small_commands.hpp"
@@ -12,6 +13,7 @@ namespace {
 using namespace proofmass::coordinator;
 
 constexpr unsigned workers_max = 1024;
+constexpr std::uint64_t bench_runs_max = 1'000'000;
 
 CLI::App* add_run(CLI::App& app, RunOptions& options) {
   CLI::App* const run = app.add_subcommand("run", "Run a campaign, or what is missing of it");
@@ -50,7 +52,19 @@ int main(int argc, char** argv) {
   init->add_option("FILE", file, "File to write")->capture_default_str();
   init->add_flag("--force", is_forced, "Replace an existing file");
 
+  BenchOptions bench_options;
+  bool is_json = false;
+  CLI::App* const bench = app.add_subcommand("bench", "Measure the speed of this machine");
+  bench->add_option("--runs", bench_options.num_runs, "Runs of each instruction set")
+      ->check(CLI::Range(std::uint64_t{1}, bench_runs_max))
+      ->capture_default_str();
+  bench->add_flag("--json", is_json, "Print JSON");
+
   return run_program(app, argc, argv, [&] {
+    if (bench->parsed()) {
+      bench_options.format = is_json ? BenchFormat::json : BenchFormat::table;
+      return run_bench(bench_options);
+    }
     if (run->parsed()) return run_campaign(run_options);
     if (report->parsed()) return print_report(database);
     return write_campaign(file, is_forced ? IfFileExists::replace : IfFileExists::refuse);

@@ -16,6 +16,7 @@
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/private_endpoint.hpp"
 #include "coordinator/report/report.hpp"
+#include "core/simulation/run.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -76,6 +77,13 @@ std::uint64_t num_missing(const Store& store) {
   return store.num_runs() - num_finished;
 }
 
+/// No more than there are batches: runs of one batch take no longer than one of them.
+std::uint64_t num_workers(const RunOptions& options, std::uint64_t num_runs_missing) {
+  const unsigned num_processors = std::max(1U, std::thread::hardware_concurrency());
+  const std::uint64_t num_batches = (num_runs_missing + batch_lanes - 1) / batch_lanes;
+  return std::min<std::uint64_t>(options.num_workers.value_or(num_processors), num_batches);
+}
+
 /// What nobody needs to see while all goes well goes into the database only.
 Log log_to(Store& store, ProgressDisplay& display) {
   return [&store, &display](const Event& event) {
@@ -97,9 +105,7 @@ bool compute(const Campaign& campaign, Store& store, const RunOptions& options) 
   CampaignService service(std::make_shared<const Campaign>(campaign), store.finished_runs(),
                           endpoint.address(), commit_to(store, log), log);
   Crew crew(service, display);
-  const unsigned num_processors = std::max(1U, std::thread::hardware_concurrency());
-  crew.start(
-      std::min<std::uint64_t>(options.num_workers.value_or(num_processors), num_runs_missing));
+  crew.start(num_workers(options, num_runs_missing));
   const bool is_finished = service.run(stop, [&] {
     const CampaignProgress progress = service.progress();
     const bool needs_workers = stop == StopRequest::none && progress.num_done < progress.num_runs;

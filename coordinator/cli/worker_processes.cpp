@@ -55,7 +55,7 @@ WorkerProcesses::~WorkerProcesses() {
 
 void WorkerProcesses::start(const std::string& name) {
   std::vector<std::string> arguments{
-      executable_.string(),    "--connect", endpoint_, "--name", name, "--parent",
+      executable_.string(),    "--connect", endpoint_, "--name", name, "--threads", "1", "--parent",
       std::to_string(getpid())};
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());

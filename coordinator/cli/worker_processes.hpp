@@ -13,7 +13,8 @@ namespace proofmass::coordinator {
 /// @throws Error if it is not there.
 [[nodiscard]] std::filesystem::path worker_executable();
 
-/// Worker processes of this machine. They end with this process, however it ends.
+/// Worker processes of this machine, of one thread each: what kills one costs the runs of that
+/// thread only. They end with this process, however it ends.
 class WorkerProcesses {
  public:
   /// A worker that ended by itself.

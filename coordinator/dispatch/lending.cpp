@@ -24,17 +24,25 @@ std::uint64_t num_slots(const State& state) {
   return count;
 }
 
-/// Runs that a worker should hold: some seconds of work a slot, but never more than half of a fair
-/// share of what is left, so that all workers finish together. One a slot at least.
-std::uint64_t runs_wanted(const State& state, const Worker& worker) {
+/// Rounds of work that a worker's slots should hold: one that is computed and one that waits, so
+/// that a batch never starts with less than it has room for; more if runs are short. But never more
+/// than half of a fair share of what is left, so that all workers finish together. Before the first
+/// result one, as it may be that most workers have not registered yet.
+std::uint64_t rounds_wanted(const State& state, const Worker& worker) {
   const double run_time_s = worker.run_time_s > 0.0 ? worker.run_time_s : state.run_time_s;
-  if (run_time_s <= 0.0) return worker.num_slots;
+  if (run_time_s <= 0.0) return 1;
   const double by_time = std::ceil(state.config.lease_work_s / run_time_s);
-  const auto runs = static_cast<std::uint64_t>(
-      std::clamp(by_time, 1.0, static_cast<double>(wire::runs_per_lease_max)));
+  const auto rounds = static_cast<std::uint64_t>(
+      std::clamp(by_time, 2.0, static_cast<double>(wire::runs_per_lease_max)));
   const std::uint64_t slots = 2 * num_slots(state);
   const std::uint64_t by_share = (num_pending(state) + slots - 1) / slots;
-  return worker.num_slots * std::max<std::uint64_t>(1, std::min(runs, by_share));
+  return std::max<std::uint64_t>(1, std::min(rounds, by_share));
+}
+
+/// True if the worker needs nothing yet: it would not run low before the next of its results.
+bool has_enough(const Worker& worker, std::uint64_t wanted) {
+  const std::uint64_t two_rounds = 2 * static_cast<std::uint64_t>(worker.num_slots);
+  return worker.num_lent >= std::min(wanted, two_rounds) && 2 * worker.num_lent > wanted;
 }
 
 std::vector<double> table_values(const Campaign& campaign, RunRange runs) {
@@ -71,9 +79,8 @@ void lend(State& state, WorkerId id, TimePoint now, Outbox& outbox) {
   if (!state.is_lending) return;
   Worker& worker = state.workers.at(id);
   const std::uint64_t wanted =
-      std::min<std::uint64_t>(runs_wanted(state, worker), worker.num_runs_max);
-  const bool has_enough = worker.num_lent >= worker.num_slots && 2 * worker.num_lent > wanted;
-  if (has_enough) return;
+      std::min<std::uint64_t>(worker.num_slots * rounds_wanted(state, worker), worker.num_runs_max);
+  if (has_enough(worker, wanted)) return;
   while (worker.num_lent < wanted && !state.pending.empty()) {
     const std::uint64_t count_max =
         std::min<std::uint64_t>(wanted - worker.num_lent, wire::runs_per_lease_max);

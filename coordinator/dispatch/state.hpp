@@ -44,7 +44,7 @@ struct Worker {
   std::uint32_t num_runs_max = 0;  ///< Its credit: most unfinished runs that it wants to hold.
   std::uint64_t num_lent = 0;      ///< Runs on its leases, as far as the coordinator knows.
   std::uint64_t num_orbits_done = 0;
-  double run_time_s = 0.0;  ///< Running mean of what a run takes; 0 if not known yet.
+  double run_time_s = 0.0;  ///< Running mean of what a run takes in its slot; 0: not known yet.
 };
 
 /// Runs lent to a worker. It exists while one of them has not been delivered.

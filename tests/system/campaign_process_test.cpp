@@ -21,14 +21,14 @@ using Arguments = std::vector<std::string>;
 using testing::Test;
 
 const std::string programs = PROOFMASS_PROGRAMS;
-constexpr std::size_t num_runs = 20;
+constexpr std::size_t num_runs = 320;  // 20 batches, so that there is an end to be killed before.
 
 bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// A directory with a campaign whose runs take a fraction of a second: the paper's, with sessions
-/// of two orbits.
+/// A directory with a campaign whose batches take a tenth of a second or two: the paper's, with
+/// sessions of two orbits.
 class CampaignProcess : public Test {
  protected:
   void SetUp() override {
@@ -203,6 +203,9 @@ TEST_F(CampaignProcess, ShowsNothingIfQuiet) {
 TEST_F(CampaignProcess, RefusesWrongUsageBeforeAnythingStarts) {
   EXPECT_EQ(start("usage", {"--worker", "1"}).wait(), 2);
   EXPECT_EQ(start("usage", {"--workers", "0"}).wait(), 2);
+  EXPECT_EQ(
+      Process(directory / "", "bench", programs + "/proofmass", {"bench", "--runs", "0"}).wait(),
+      2);
   EXPECT_EQ(start("usage", {"--set", "noise.scal=0"}).wait(), 2);
   EXPECT_EQ(errors_of("usage"),
             "proofmass: error: --set noise.scal=0: unknown key; nearest is noise.scale\n");
@@ -231,9 +234,10 @@ class CoordinatorProcess : public CampaignProcess {
     return Process(directory / "", "coordinator", programs + "/proofmass-coordinator",
                    {"short.toml", "--db", "served.db", "--bind", endpoint()});
   }
-  [[nodiscard]] Process start_worker(const std::string& name) const {
+  [[nodiscard]] Process start_worker(const std::string& name,
+                                     const std::string& num_threads = "1") const {
     return Process(directory / "", name, programs + "/proofmass-worker",
-                   {"--connect", endpoint(), "--name", name});
+                   {"--connect", endpoint(), "--name", name, "--threads", num_threads});
   }
 };
 
@@ -248,6 +252,24 @@ TEST_F(CoordinatorProcess, ServesWorkersThatConnectAndLeave) {
   EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
   EXPECT_EQ(late.wait(), 0) << errors_of("late");
   EXPECT_EQ(stored_runs(path("served.db")), reference());
+}
+
+TEST_F(CoordinatorProcess, ThreeThreadsOfAWorkerGiveTheBitsOfOne) {
+  Process worker = start_worker("threads", "3");
+  Process coordinator = start_coordinator();
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+  EXPECT_EQ(worker.wait(), 0) << errors_of("threads");
+  EXPECT_TRUE(contains(errors_of("coordinator"), "name=threads ")) << errors_of("coordinator");
+  EXPECT_TRUE(contains(errors_of("coordinator"), " slots=48")) << errors_of("coordinator");
+  EXPECT_EQ(stored_runs(path("served.db")), reference());
+}
+
+TEST_F(CoordinatorProcess, RefusesMoreThreadsThanAWorkerMayHave) {
+  for (const std::string num_threads : {"0", "65"}) {
+    Process worker = start_worker("many", num_threads);
+    EXPECT_EQ(worker.wait(), 2) << num_threads;
+    EXPECT_TRUE(contains(errors_of("many"), "--threads")) << errors_of("many");
+  }
 }
 
 TEST_F(CoordinatorProcess, DrainsOnSigtermAndResumes) {

@@ -28,12 +28,12 @@ class Execution {
   virtual void start(std::shared_ptr<const Campaign> campaign) = 0;
   /// Queues the runs of a lease. @pre start() has been called.
   virtual void submit(wire::RunLease lease) = 0;
-  /// Drops all runs that are not finished, also the one that is being computed.
+  /// Drops all runs that are not finished, also those that are being computed.
   virtual void abandon() = 0;
 
   /// Finished runs, each handed out once, in the order in which they finished.
   [[nodiscard]] virtual std::vector<FinishedRun> take_finished() = 0;
-  /// Leases with an unfinished run.
+  /// Leases with a run that take_finished() has not handed out, each once, in order.
   [[nodiscard]] virtual std::vector<wire::LeaseId> open_leases() const = 0;
   [[nodiscard]] virtual std::uint64_t num_orbits_done() const = 0;
   /// Why no run can be computed any more, if so.

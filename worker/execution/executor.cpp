@@ -1,5 +1,6 @@
 #include "worker/execution/executor.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <utility>
@@ -16,12 +17,21 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+std::vector<RunRequest> requests_of(const std::vector<Assignment>& assignments) {
+  std::vector<RunRequest> requests;
+  for (const Assignment& assignment : assignments) requests.push_back(assignment.request);
+  return requests;
+}
+
 }  // namespace
 
-Executor::Executor(Prepare prepare, std::function<void()> on_change)
-    : prepare_(std::move(prepare)),
-      on_change_(std::move(on_change)),
-      thread_([this] { serve(); }) {}
+Executor::Executor(Prepare prepare, std::function<void()> on_change, const ExecutorConfig& config)
+    : prepare_(std::move(prepare)), on_change_(std::move(on_change)), config_(config) {
+  PROOFMASS_EXPECT(config.num_threads >= 1 && config.batch_size_max >= 1);
+  for (std::size_t i = 0; i < config.num_threads; ++i) {
+    threads_.emplace_back([this] { serve(); });
+  }
+}
 
 Executor::~Executor() {
   {
@@ -30,15 +40,15 @@ Executor::~Executor() {
     ++generation_;
   }
   changed_.notify_all();
-  thread_.join();
+  for (std::thread& thread : threads_) thread.join();
 }
 
 void Executor::start(std::shared_ptr<const Campaign> campaign) {
   {
     const std::lock_guard lock(mutex_);
     campaign_ = std::move(campaign);
+    simulate_.reset();
     queue_.clear();
-    num_taken_ = 0;
     finished_.clear();
     ++generation_;
   }
@@ -49,7 +59,7 @@ void Executor::submit(wire::RunLease lease) {
   {
     const std::lock_guard lock(mutex_);
     PROOFMASS_EXPECT(campaign_ != nullptr);
-    queue_.push_back(std::move(lease));
+    queue_.add(std::move(lease));
   }
   changed_.notify_all();
 }
@@ -57,7 +67,6 @@ void Executor::submit(wire::RunLease lease) {
 void Executor::abandon() {
   const std::lock_guard lock(mutex_);
   queue_.clear();
-  num_taken_ = 0;
   ++generation_;
 }
 
@@ -68,10 +77,11 @@ std::vector<FinishedRun> Executor::take_finished() {
 
 std::vector<wire::LeaseId> Executor::open_leases() const {
   const std::lock_guard lock(mutex_);
-  std::vector<wire::LeaseId> leases;
-  if (computing_) leases.push_back(*computing_);
-  for (const wire::RunLease& lease : queue_) leases.push_back(lease.lease);
-  return leases;
+  const std::vector<wire::LeaseId> queued = queue_.leases();
+  std::set<wire::LeaseId> leases(queued.begin(), queued.end());
+  leases.insert(computing_.begin(), computing_.end());
+  for (const FinishedRun& run : finished_) leases.insert(run.lease);
+  return {leases.begin(), leases.end()};
 }
 
 std::optional<std::string> Executor::failure() const {
@@ -81,83 +91,90 @@ std::optional<std::string> Executor::failure() const {
 
 void Executor::serve() {
   try {
-    serve_campaigns();
+    while (const auto batch = next_batch()) compute(*batch);
   } catch (const std::exception& error) {
     {
       const std::lock_guard lock(mutex_);
-      failure_ = error.what();
+      if (!failure_) failure_ = error.what();
     }
+    changed_.notify_all();
     on_change_();
   }
 }
 
-void Executor::serve_campaigns() {
-  Simulate simulate;
-  std::shared_ptr<const Campaign> prepared;
-  while (true) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return is_ending_ || campaign_ != prepared; });
-    if (is_ending_) return;
-    prepared = campaign_;
-    prepared_ = prepared;
-    lock.unlock();
-    simulate = prepare_(*prepared);
-    while (const auto assignment = next_assignment()) compute(simulate, *assignment);
-  }
-}
-
-std::optional<Executor::Assignment> Executor::next_assignment() {
+std::optional<Executor::Batch> Executor::next_batch() {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return is_ending_ || campaign_ != prepared_ || !queue_.empty(); });
-  if (is_ending_ || campaign_ != prepared_) return std::nullopt;
-
-  const wire::RunLease& lease = queue_.front();
-  const std::size_t width = lease.table_values.size() / lease.runs.count;
-  const auto values = lease.table_values.begin() + static_cast<std::ptrdiff_t>(num_taken_ * width);
-  Assignment assignment{.lease = lease.lease,
-                        .attempt = lease.attempt,
-                        .run = {lease.runs.first.value + num_taken_},
-                        .table_values = {values, values + static_cast<std::ptrdiff_t>(width)},
-                        .generation = generation_};
-  computing_ = lease.lease;
-  if (++num_taken_ == lease.runs.count) {
-    queue_.pop_front();
-    num_taken_ = 0;
+  while (true) {
+    changed_.wait(lock, [&] {
+      const bool can_prepare = campaign_ && !simulate_ && !is_preparing_;
+      return is_ending_ || failure_ || can_prepare || (simulate_ && !queue_.empty());
+    });
+    if (is_ending_ || failure_) return std::nullopt;
+    if (simulate_) break;
+    prepare(lock);
   }
-  return assignment;
+  Batch batch{.simulate = simulate_,
+              .assignments = queue_.take(config_.batch_size_max),
+              .generation = generation_};
+  for (const Assignment& assignment : batch.assignments) computing_.insert(assignment.lease);
+  return batch;
 }
 
-bool Executor::is_current(const Assignment& assignment) const {
-  return assignment.generation == generation_;
+void Executor::prepare(std::unique_lock<std::mutex>& lock) {
+  const std::shared_ptr<const Campaign> campaign = campaign_;
+  is_preparing_ = true;
+  lock.unlock();
+  auto prepared = std::make_shared<const Simulate>(prepare_(*campaign));
+  lock.lock();
+  is_preparing_ = false;
+  if (campaign_ == campaign) simulate_ = std::move(prepared);
+  changed_.notify_all();
 }
 
-void Executor::compute(const Simulate& simulate, const Assignment& assignment) {
-  const auto on_orbit = [&](int) {
-    ++num_orbits_done_;
-    if (!is_current(assignment)) throw Abandoned{};
-  };
+void Executor::compute(const Batch& batch) {
   const auto start = std::chrono::steady_clock::now();
   try {
-    wire::ComputedRun computed;
-    computed.result = simulate(assignment.run, assignment.table_values, on_orbit);
-    computed.compute_s = seconds_since(start);
-    finish(assignment, std::move(computed));
+    std::vector<RunResult> results = simulate(batch);
+    finish(batch, std::move(results), seconds_since(start));
   } catch (const Abandoned&) {
     const std::lock_guard lock(mutex_);
-    computing_.reset();
+    close(batch);
   }
 }
 
-void Executor::finish(const Assignment& assignment, wire::ComputedRun computed) {
+std::vector<RunResult> Executor::simulate(const Batch& batch) {
+  const std::vector<RunRequest> requests = requests_of(batch.assignments);
+  int num_orbits = 0;
+  const auto on_progress = [&](int num_orbits_now) {
+    const int num_new = std::max(0, num_orbits_now - num_orbits);
+    num_orbits += num_new;
+    num_orbits_done_ += static_cast<std::uint64_t>(num_new) * requests.size();
+    if (batch.generation != generation_) throw Abandoned{};
+  };
+  std::vector<RunResult> results = (*batch.simulate)(requests, on_progress);
+  PROOFMASS_EXPECT(results.size() == requests.size());
+  return results;
+}
+
+void Executor::finish(const Batch& batch, std::vector<RunResult> results, double compute_s) {
   {
     const std::lock_guard lock(mutex_);
-    computing_.reset();
-    if (!is_current(assignment)) return;
-    finished_.push_back({.lease = assignment.lease,
-                         .attempt = assignment.attempt,
-                         .computed = std::move(computed)});
+    close(batch);
+    if (batch.generation != generation_) return;
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      const Assignment& assignment = batch.assignments[i];
+      finished_.push_back({.lease = assignment.lease,
+                           .attempt = assignment.attempt,
+                           .computed = {.result = results[i], .compute_s = compute_s}});
+    }
   }
   on_change_();
+}
+
+void Executor::close(const Batch& batch) {
+  for (const Assignment& assignment : batch.assignments) {
+    computing_.erase(computing_.find(assignment.lease));
+  }
 }
 
 }  // namespace proofmass::worker

@@ -35,6 +35,10 @@ void Conversation::on_message(const wire::Message& message, TimePoint now) {
   std::visit([&](const auto& content) { handle(content, now); }, message);
 }
 
+void Conversation::on_connected(TimePoint now) {
+  if (!ending_ && !is_registered_) say_hello(now);
+}
+
 void Conversation::handle(const wire::Welcome& welcome, TimePoint now) {
   if (is_registered_) return;  // The answer to a repeated Hello.
   std::string bytes = bytes_of(welcome.campaign);

@@ -47,6 +47,8 @@ class Conversation {
                const ConversationConfig& config = {});
 
   void on_message(const wire::Message& message, TimePoint now);
+  /// Messages sent before had nowhere to go: repeats the Hello at once.
+  void on_connected(TimePoint now);
   /// The execution has something new to take.
   void on_progress(TimePoint now);
   /// To be called some times a second.

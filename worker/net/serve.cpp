@@ -80,21 +80,28 @@ zmq::socket_t connect(zmq::context_t& context, const std::string& endpoint) {
 
 class Service {
  public:
-  Service(const std::string& endpoint, const wire::Hello& hello, Prepare prepare, Signals signals)
+  Service(const std::string& endpoint, const wire::Hello& hello, Prepare prepare,
+          const ExecutorConfig& config, Signals signals)
       : signals_(open_signals(signals), "signalfd"),
         progress_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd"),
         socket_(connect(context_, endpoint)),
-        executor_(std::move(prepare), [this] { progress_.notify(); }),
+        executor_(
+            std::move(prepare), [this] { progress_.notify(); }, config),
         conversation_(
             hello, executor_, [this](const wire::Message& message) { send(message); }, now()) {}
 
   Ending run() {
     while (!conversation_.ending()) {
-      std::array<zmq::pollitem_t, 3> items{zmq::pollitem_t{socket_.handle(), 0, ZMQ_POLLIN, 0},
+      const short wanted = is_connected_ ? ZMQ_POLLIN : ZMQ_POLLIN | ZMQ_POLLOUT;
+      std::array<zmq::pollitem_t, 3> items{zmq::pollitem_t{socket_.handle(), 0, wanted, 0},
                                            zmq::pollitem_t{nullptr, progress_.fd(), ZMQ_POLLIN, 0},
                                            zmq::pollitem_t{nullptr, signals_.fd(), ZMQ_POLLIN, 0}};
       poll(items);
-      if (items[0].revents != 0) receive();
+      if ((items[0].revents & ZMQ_POLLOUT) != 0) {
+        is_connected_ = true;
+        conversation_.on_connected(now());
+      }
+      if ((items[0].revents & ZMQ_POLLIN) != 0) receive();
       if (items[1].revents != 0) {
         progress_.clear();
         conversation_.on_progress(now());
@@ -140,6 +147,7 @@ class Service {
   Descriptor progress_;
   zmq::context_t context_;
   zmq::socket_t socket_;
+  bool is_connected_ = false;  ///< The socket found its coordinator once.
   Executor executor_;
   Conversation conversation_;
 };
@@ -147,9 +155,9 @@ class Service {
 }  // namespace
 
 Ending serve(const std::string& endpoint, const wire::Hello& hello, Prepare prepare,
-             Signals signals) {
+             const ExecutorConfig& config, Signals signals) {
   try {
-    return Service(endpoint, hello, std::move(prepare), signals).run();
+    return Service(endpoint, hello, std::move(prepare), config, signals).run();
   } catch (const zmq::error_t& error) {
     throw Error(fmt::format("connect = {} ({})", endpoint, error.what()));
   }

@@ -21,6 +21,6 @@ enum class Signals : std::uint8_t {
 /// @param endpoint  check_endpoint() holds.
 /// @throws Error if the socket cannot be made.
 [[nodiscard]] Ending serve(const std::string& endpoint, const wire::Hello& hello, Prepare prepare,
-                           Signals signals);
+                           const ExecutorConfig& config, Signals signals);
 
 }  // namespace proofmass::worker

@@ -27,7 +27,7 @@ wire::ComputedRun computed(std::uint64_t run, RunStatus status = RunStatus::comp
   wire::ComputedRun result;
   result.result.run = {run};
   result.result.status = status;
-  result.compute_s = 1000.0;  // So long that one run is lent at a time.
+  result.compute_s = 1000.0;  // So long that no more than two rounds are lent.
   return result;
 }
 
@@ -165,7 +165,7 @@ TEST_F(DispatchTest, AcknowledgesAfterTheCommitAndNotBefore) {
   ASSERT_EQ(outbox.stored().size(), 1U);
   EXPECT_EQ(outbox.stored()[0].worker, first);
   EXPECT_EQ(outbox.stored()[0].attempt, Attempt{1});
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{1}, 1}));
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{1}, 2}));
 
   on_committed(state, outbox.take_stored(), outbox);
   EXPECT_EQ(outbox.take_sent<wire::ResultAck>(first).runs, Runs{{0}});

@@ -42,8 +42,8 @@ TEST(Lending, GivesASecondAndAHalfOfWork) {
   EXPECT_EQ(lent_after_first_run(1'000'000, 1.0), (std::vector<RunRange>{{{1}, 2}}));
 }
 
-TEST(Lending, GivesOneRunIfRunsAreLong) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 60.0), (std::vector<RunRange>{{{1}, 1}}));
+TEST(Lending, GivesOneRunToComputeAndOneToWaitIfRunsAreLong) {
+  EXPECT_EQ(lent_after_first_run(1'000'000, 60.0), (std::vector<RunRange>{{{1}, 2}}));
 }
 
 TEST(Lending, GivesNoMoreThanALeaseMayHave) {

@@ -110,6 +110,20 @@ TEST_F(ConversationTest, SaysHelloUntilItIsWelcome) {
   EXPECT_EQ(execution.num_starts, 1);
 }
 
+// The first Hello is lost if the connection was not there yet.
+TEST_F(ConversationTest, SaysHelloAgainOnceItIsConnected) {
+  (void)take_sent<wire::Hello>();
+  conversation.on_connected(now += 10ms);
+  (void)take_sent<wire::Hello>();
+  conversation.on_tick(now += 990ms);
+  EXPECT_TRUE(sent.empty());
+  conversation.on_message(welcome, now);
+  (void)take_sent<wire::Heartbeat>();
+  (void)take_sent<wire::Credit>();
+  conversation.on_connected(now);
+  EXPECT_TRUE(sent.empty()) << "it is registered";
+}
+
 TEST_F(ConversationTest, HandsALeaseToTheExecutionOnce) {
   register_here();
   conversation.on_message(lease(4, 10, 2), now);

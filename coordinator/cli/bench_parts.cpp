@@ -1,0 +1,126 @@
+#include "coordinator/cli/bench_parts.hpp"
+
+#include <chrono>
+#include <cstddef>
+#include <vector>
+
+#include "core/campaign/draw.hpp"
+#include "core/random/normal.hpp"
+#include "core/simulation/session_record.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+/// Makes the compiler believe that somebody reads the value.
+template <typename T>
+void keep(const T& value) {
+  asm volatile("" : : "g"(&value) : "memory");
+}
+
+/// Nanoseconds of one call, over some tenths of a second.
+template <typename Work>
+double ns_per_call(const Work& work) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::size_t calls_at_a_time = 1000;
+  const auto start = Clock::now();
+  std::chrono::duration<double> elapsed{};
+  std::size_t num_calls = 0;
+  while (elapsed < std::chrono::milliseconds(300)) {
+    for (std::size_t i = 0; i < calls_at_a_time; ++i) work();
+    num_calls += calls_at_a_time;
+    elapsed = Clock::now() - start;
+  }
+  return 1e9 * elapsed.count() / static_cast<double>(num_calls);
+}
+
+double scalar_deviate_ns() {
+  std::uint32_t counter = 0;
+  return ns_per_call([&] { keep(normal_deviates(philox({counter++, 1, 2, 3}, 4))); }) / 4.0;
+}
+
+/// A session, its shared signals and a drawn satellite.
+struct Bench {
+  explicit Bench(const Campaign& of)
+      : campaign(of),
+        session(of.scenario.sessions.front()),
+        orbit(of.scenario.orbit),
+        environment(of.scenario.environment, of.environment_table, of.scenario.orbit.period_s),
+        signals(of.scenario, session, orbit, environment),
+        constants(make_loop_constants(
+            make_instrument(draw_values(of.dispersions, of.seed, RunIndex{0}, 0, {})), of.scenario,
+            session)),
+        drag_free(drag_free_gains(of.scenario.drag_free, of.scenario.simulation.sample_period_s)),
+        attitude(attitude_gains(of.scenario.attitude, of.scenario.simulation.sample_period_s)) {
+    loop.begin(signals.reference_at_start());
+  }
+
+  Observation<double> advance(const SharedSample& shared) {
+    return loop.advance(constants, drag_free, attitude, shared, SampleNoise<double>{});
+  }
+
+  const Campaign& campaign;
+  const Session& session;
+  KeplerOrbit orbit;
+  Environment environment;
+  SessionSignals signals;
+  LoopConstants<double> constants;
+  DragFreeGains drag_free;
+  AttitudeGains attitude;
+  Loop<double> loop;
+};
+
+/// Ground signals and their sums, with weights at hand.
+double sums_ns(Bench& bench) {
+  const SharedSample shared = bench.signals.next();
+  const Observation<double> observation = bench.advance(shared);
+  const RegressorKind kind = regressor_kind(bench.session.target);
+  const std::array<double, 2> weights{0.5, -0.5};
+  SignalSums<double> sums{};
+  return ns_per_call([&] {
+    keep(observation);
+    add_sample(ground_signals(observation, shared, kind), weights.data(), weights.size(),
+               num_signals_used(bench.session.target), sums);
+    keep(sums);
+  });
+}
+
+/// Weights of a record with one fitted line and one known line.
+double weights_ns(const Bench& bench) {
+  const double period_s = bench.campaign.scenario.simulation.sample_period_s;
+  constexpr double line_hz = 1e-2;
+  const LineWeights weights({.num_samples = 10 * LineWeights::block_size,
+                             .num_dropped = LineWeights::block_size,
+                             .sample_period_s = period_s,
+                             .filter = band_pass(line_hz / 3.0, line_hz * 3.0, period_s),
+                             .fit_hz = {line_hz},
+                             .known_hz = {1.5 * line_hz}});
+  std::vector<double> block(2 * LineWeights::block_size);
+  const double block_ns = ns_per_call([&] {
+    weights.fill_block(1, block);
+    keep(block);
+  });
+  return block_ns / static_cast<double>(LineWeights::block_size);
+}
+
+}  // namespace
+
+std::optional<NoiseCost> measure_noise(const Campaign& campaign, InstructionSet set) {
+  if (set != InstructionSet::scalar) return std::nullopt;
+  const Scenario& scenario = campaign.scenario;
+  const NoiseModel model = make_noise_model(scenario.noise, scenario.simulation.sample_period_s);
+  SessionNoise noise(model, campaign.seed, RunIndex{0}, scenario.sessions.front().name);
+  return NoiseCost{.deviate_ns = scalar_deviate_ns(),
+                   .step_ns = ns_per_call([&] { keep(noise.next()); })};
+}
+
+StepCost measure_step_parts(const Campaign& campaign) {
+  Bench bench(campaign);
+  StepCost step;
+  step.shared_signals_ns = ns_per_call([&] { keep(bench.signals.next()); });
+  const SharedSample shared = bench.signals.next();
+  step.dynamics_ns = ns_per_call([&] { keep(bench.advance(shared)); });
+  step.estimation_ns = sums_ns(bench) + weights_ns(bench);
+  return step;
+}
+
+}  // namespace proofmass::coordinator

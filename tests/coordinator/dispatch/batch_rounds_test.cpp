@@ -1,0 +1,144 @@
+// Whether batches are full: workers that compute batches, in a time that counts rounds.
+
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <map>
+#include <vector>
+
+#include "coordinator/dispatch/dispatch.hpp"
+#include "core/simulation/run.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+/// A run that a worker holds.
+struct HeldRun {
+  wire::LeaseId lease;
+  wire::Attempt attempt;
+  RunIndex run;
+};
+
+/// A worker: each of its threads takes what is there, up to a batch, and needs one round for it.
+struct PlayedWorker {
+  std::deque<HeldRun> queue;
+  std::vector<std::vector<HeldRun>> batches;  ///< Of each thread; empty if it is idle.
+
+  void take_batches() {
+    for (std::vector<HeldRun>& batch : batches) {
+      if (!batch.empty()) continue;
+      const std::size_t count = std::min(queue.size(), batch_lanes);
+      const auto end = queue.begin() + static_cast<std::ptrdiff_t>(count);
+      batch.assign(queue.begin(), end);
+      queue.erase(queue.begin(), end);
+    }
+  }
+};
+
+/// A campaign whose store commits at once and whose messages arrive at once.
+class Rounds final : public Outbox {
+ public:
+  Rounds(std::uint64_t num_runs, std::size_t num_workers, std::size_t num_threads,
+         std::vector<RunRange> finished = {}) {
+    Campaign campaign;
+    campaign.num_runs = num_runs;
+    state_ = initial_state(std::make_shared<const Campaign>(campaign), finished, {});
+    const wire::Hello hello{.worker_name = "w",
+                            .host = "h",
+                            .process_id = 1,
+                            .num_slots = static_cast<std::uint32_t>(num_threads * batch_lanes),
+                            .model_version = std::string(model_version)};
+    for (std::uint64_t i = 1; i <= num_workers; ++i) {
+      workers_[WorkerId{i}].batches.resize(num_threads);
+      on_hello(state_, WorkerId{i}, hello, {}, *this);
+      on_credit(state_, WorkerId{i}, {.num_runs_max = wire::runs_per_lease_max}, {}, *this);
+    }
+  }
+
+  /// Rounds until the campaign is finished.
+  int play(double batch_time_s) {
+    int num_rounds = 0;
+    while (!is_finished(state_)) {
+      for (auto& [id, worker] : workers_) worker.take_batches();
+      for (auto& [id, worker] : workers_) {
+        for (std::size_t i = 0; i < worker.batches.size(); ++i) deliver(id, i, batch_time_s);
+      }
+      check_invariants(state_);
+      ++num_rounds;
+    }
+    return num_rounds;
+  }
+
+  [[nodiscard]] int num_partial_batches() const { return num_partial_batches_; }
+
+  void send(WorkerId id, wire::Message message) override {
+    const auto* const lease = std::get_if<wire::RunLease>(&message);
+    if (lease == nullptr) return;
+    PlayedWorker& worker = workers_.at(id);
+    for (std::uint64_t run = lease->runs.first.value; run < lease->runs.end(); ++run) {
+      worker.queue.push_back({.lease = lease->lease, .attempt = lease->attempt, .run = {run}});
+    }
+  }
+  void store(Arrival arrival) override { stored_.push_back(arrival.computed.result.run); }
+  void log(Event) override {}
+
+ private:
+  /// One message a lease, as workers send them. The thread is free before its results arrive: it
+  /// finds what was lent before, but begins nothing before the round is over.
+  void deliver(WorkerId id, std::size_t thread, double batch_time_s) {
+    const std::vector<HeldRun> batch = std::exchange(workers_.at(id).batches[thread], {});
+    if (batch.empty()) return;
+    if (batch.size() < batch_lanes) ++num_partial_batches_;
+    std::map<wire::LeaseId, wire::ResultBatch> messages;
+    for (const HeldRun& held : batch) {
+      wire::ComputedRun computed;
+      computed.result.run = held.run;
+      computed.compute_s = batch_time_s;
+      messages[held.lease].lease = held.lease;
+      messages[held.lease].attempt = held.attempt;
+      messages[held.lease].results.push_back(computed);
+    }
+    workers_.at(id).take_batches();
+    for (const auto& [lease, message] : messages) {
+      on_results(state_, id, message, {}, *this);
+      on_committed(state_, std::exchange(stored_, {}), *this);
+    }
+  }
+
+  State state_;
+  std::map<WorkerId, PlayedWorker> workers_;
+  std::vector<RunIndex> stored_;
+  int num_partial_batches_ = 0;
+};
+
+TEST(BatchRounds, AreAsFewAsTheyCanBe) {
+  for (const std::uint64_t num_runs : {1U, 16U, 17U, 100U, 300U, 1000U, 5000U}) {
+    for (const std::size_t num_workers : {1U, 2U, 3U, 8U}) {
+      for (const std::size_t num_threads : {1U, 2U, 7U}) {
+        for (const double batch_time_s : {0.1, 2.4, 60.0}) {
+          const std::uint64_t num_batches = (num_runs + batch_lanes - 1) / batch_lanes;
+          const std::size_t num_at_a_time = num_workers * num_threads;
+          const auto fewest = static_cast<int>((num_batches + num_at_a_time - 1) / num_at_a_time);
+          Rounds rounds(num_runs, num_workers, num_threads);
+          EXPECT_EQ(rounds.play(batch_time_s), fewest)
+              << num_runs << " runs, " << num_workers << " workers of " << num_threads
+              << " threads, " << batch_time_s << " s a batch";
+          EXPECT_LE(rounds.num_partial_batches(), 1);
+        }
+      }
+    }
+  }
+}
+
+// Every tenth run is there already, so that no lease holds more than nine. Batches are full until
+// nothing waits any more, two rounds before the end.
+TEST(BatchRounds, AreAsFewAndOneIfLeasesAreSmallerThanBatches) {
+  std::vector<RunRange> finished;
+  for (std::uint64_t run = 0; run < 1000; run += 10) finished.push_back({{run}, 1});
+  Rounds rounds(1000, 2, 2, finished);
+  EXPECT_LE(rounds.play(2.4), 15 + 1);  // 900 runs are 56.25 batches, four at a time.
+  EXPECT_LE(rounds.num_partial_batches(), 2 * 4);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
