@@ -80,7 +80,7 @@ BenchFigures measure(const Campaign& campaign, std::uint64_t num_runs) {
     figures.sets.push_back(measure_set(campaign, plan, count, set, known));
   }
   const SetCost& scalar = figures.sets.front();
-  figures.scalar_step.noise_ns = scalar.noise ? scalar.noise->step_ns : 0.0;
+  figures.scalar_step.noise_ns = scalar.noise.step_ns;
   figures.scalar_step.whole_ns = 1e9 * scalar.run_s / static_cast<double>(figures.num_steps);
   return figures;
 }

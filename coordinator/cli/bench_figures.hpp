@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,8 +17,8 @@ struct NoiseCost {
 /// What a run costs with one instruction set, on one core.
 struct SetCost {
   InstructionSet set = InstructionSet::scalar;
-  double run_s = 0.0;              ///< In batches, a run's share of its batch; > 0.
-  std::optional<NoiseCost> noise;  ///< Absent where noise cannot be made alone.
+  double run_s = 0.0;  ///< In batches, a run's share of its batch; > 0.
+  NoiseCost noise;
   bool has_reference_bits = true;  ///< Its results are those of the sets before.
 };
 

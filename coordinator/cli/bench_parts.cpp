@@ -2,10 +2,12 @@
 
 #include <chrono>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "core/campaign/draw.hpp"
 #include "core/random/normal.hpp"
+#include "core/simulation/batch_kernel.hpp"
 #include "core/simulation/session_record.hpp"
 
 namespace proofmass::coordinator {
@@ -104,13 +106,43 @@ double weights_ns(const Bench& bench) {
 
 }  // namespace
 
-std::optional<NoiseCost> measure_noise(const Campaign& campaign, InstructionSet set) {
-  if (set != InstructionSet::scalar) return std::nullopt;
+namespace {
+
+NoiseCost scalar_noise(const Campaign& campaign, const NoiseModel& model) {
+  SessionNoise noise(model, campaign.seed, RunIndex{0}, campaign.scenario.sessions.front().name);
+  return {.deviate_ns = scalar_deviate_ns(), .step_ns = ns_per_call([&] { keep(noise.next()); })};
+}
+
+/// Of one run of a full batch.
+NoiseCost batch_noise(const Campaign& campaign, const NoiseModel& model, InstructionSet set) {
+  const std::string& session_name = campaign.scenario.sessions.front().name;
+  const NoiseStreams streams = noise_streams(session_name);
+  BatchSession batch;
+  batch.noise = &model;
+  batch.streams = &streams;
+  batch.seed = campaign.seed;
+  for (std::size_t lane = 0; lane < batch_lanes; ++lane) {
+    batch.runs[lane] = RunIndex{lane};
+    batch.noise_states[lane] =
+        stationary_states(model, campaign.seed, batch.runs[lane], session_name);
+  }
+  constexpr std::size_t num_samples = 64;
+  const auto lane_sample_ns = [&](NoiseWork work) {
+    const BatchNoiseKernel kernel = batch_noise_kernel(set);
+    const double ns = ns_per_call([&] { keep(kernel(batch, num_samples, work)); });
+    return ns / static_cast<double>(num_samples * batch_lanes);
+  };
+  return {.deviate_ns = lane_sample_ns(NoiseWork::deviates) / num_noise_channels,
+          .step_ns = lane_sample_ns(NoiseWork::shaped)};
+}
+
+}  // namespace
+
+NoiseCost measure_noise(const Campaign& campaign, InstructionSet set) {
   const Scenario& scenario = campaign.scenario;
   const NoiseModel model = make_noise_model(scenario.noise, scenario.simulation.sample_period_s);
-  SessionNoise noise(model, campaign.seed, RunIndex{0}, scenario.sessions.front().name);
-  return NoiseCost{.deviate_ns = scalar_deviate_ns(),
-                   .step_ns = ns_per_call([&] { keep(noise.next()); })};
+  if (set == InstructionSet::scalar) return scalar_noise(campaign, model);
+  return batch_noise(campaign, model, set);
 }
 
 StepCost measure_step_parts(const Campaign& campaign) {

@@ -23,27 +23,22 @@ double ratio_to_scalar(const BenchFigures& figures, const SetCost& cost) {
 }
 
 /// Time of the noise alone over that of the run: how near the run is to the least that it can cost.
-std::optional<double> noise_fraction(const BenchFigures& figures, const SetCost& cost) {
-  if (!cost.noise) return std::nullopt;
-  return cost.noise->step_ns * steps_per_s(figures, cost) / 1e9;
+double noise_fraction(const BenchFigures& figures, const SetCost& cost) {
+  return cost.noise.step_ns * steps_per_s(figures, cost) / 1e9;
 }
 
 std::string set_row(const BenchFigures& figures, const SetCost& cost) {
-  const auto figure = [](std::optional<double> value) {
-    return value ? measured_figure(*value) : std::string("–");
-  };
   const bool is_reference = &cost == &figures.sets.front();
   const std::string_view bits = is_reference              ? "reference"
                                 : cost.has_reference_bits ? "same"
                                                           : "different";
-  const auto deviate_ns = cost.noise ? std::optional(cost.noise->deviate_ns) : std::nullopt;
   return fmt::format("{}{}{}{}{} │{}{} │ {}\n", left_aligned(name_of(cost.set), 8),
                      right_aligned(measured_figure(cost.run_s), 9),
                      right_aligned(measured_figure(1.0 / cost.run_s), 9),
                      right_aligned(measured_figure(steps_per_s(figures, cost)), 10),
                      right_aligned(measured_figure(ratio_to_scalar(figures, cost)), 10),
-                     right_aligned(figure(deviate_ns), 11),
-                     right_aligned(figure(noise_fraction(figures, cost)), 9), bits);
+                     right_aligned(measured_figure(cost.noise.deviate_ns), 11),
+                     right_aligned(measured_figure(noise_fraction(figures, cost)), 9), bits);
 }
 
 std::string sets_table(const BenchFigures& figures) {
@@ -84,20 +79,15 @@ std::string key_of(std::string_view name) {
 
 using Json = nlohmann::ordered_json;
 
-Json or_null(std::optional<double> value) { return value ? Json(*value) : Json(nullptr); }
-
 Json json_of(const BenchFigures& figures, const SetCost& cost) {
-  const auto noise = [&](double NoiseCost::*figure) {
-    return cost.noise ? std::optional((*cost.noise).*figure) : std::nullopt;
-  };
   return {{"set", name_of(cost.set)},
           {"run_s", cost.run_s},
           {"runs_per_s", 1.0 / cost.run_s},
           {"steps_per_s", steps_per_s(figures, cost)},
           {"ratio_to_scalar", ratio_to_scalar(figures, cost)},
-          {"deviate_ns", or_null(noise(&NoiseCost::deviate_ns))},
-          {"noise_step_ns", or_null(noise(&NoiseCost::step_ns))},
-          {"fraction_of_bound", or_null(noise_fraction(figures, cost))},
+          {"deviate_ns", cost.noise.deviate_ns},
+          {"noise_step_ns", cost.noise.step_ns},
+          {"fraction_of_bound", noise_fraction(figures, cost)},
           {"has_reference_bits", cost.has_reference_bits}};
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 
 // The kernel of one instruction set. Included once by each batch_kernel_<set>.cpp, which is
-// compiled with that set's flags and defines PROOFMASS_RECORD_BATCH, the name of the function to be
-// made.
+// compiled with that set's flags and defines PROOFMASS_KERNEL_SET, the ending of the names of the
+// functions to be made.
 //
 // Everything over `Batch` has internal linkage, because `Batch` has: no symbol of this file can be
 // taken for another translation unit's, so no code of a faster processor reaches a slower one.
@@ -209,17 +209,26 @@ class BatchNoise {
   HWY_INLINE SampleNoise<Batch> next() {
     if (next_in_block_ == samples_per_noise_block) refill();
     const std::size_t i = next_in_block_++;
-    return shape_sample<Batch>(model_, states_, [&](std::size_t channel) HWY_ATTR {
-      Batch white;
-      for (std::size_t part = 0; part < num_vectors; ++part) {
-        white.part[part] =
-            hn::PromoteTo(Doubles(), hn::Load(HalfFloats(), deviates_[channel][i] + part * width));
-      }
-      return white;
-    });
+    return shape_sample<Batch>(model_, states_,
+                               [&](std::size_t channel) HWY_ATTR { return deviate(channel, i); });
+  }
+
+  /// Makes a sample's deviates for all channels and returns that of the first.
+  HWY_INLINE Batch next_deviate() {
+    if (next_in_block_ == samples_per_noise_block) refill();
+    return deviate(0, next_in_block_++);
   }
 
  private:
+  HWY_INLINE Batch deviate(std::size_t channel, std::size_t i) const {
+    Batch white;
+    for (std::size_t part = 0; part < num_vectors; ++part) {
+      white.part[part] =
+          hn::PromoteTo(Doubles(), hn::Load(HalfFloats(), deviates_[channel][i] + part * width));
+    }
+    return white;
+  }
+
   HWY_NOINLINE void refill() {
     for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
       WordBatch word[4];
@@ -322,8 +331,12 @@ HWY_INLINE void scatter(const SignalSums<Batch>& sums,
 
 }  // namespace
 
-void PROOFMASS_RECORD_BATCH(const BatchSession& session,
-                            std::span<SignalSums<double>, batch_lanes> sums) {
+#define PROOFMASS_JOIN(a, b) a##b
+#define PROOFMASS_NAME(stem, set) PROOFMASS_JOIN(stem, set)
+
+void PROOFMASS_NAME(record_batch_,
+                    PROOFMASS_KERNEL_SET)(const BatchSession& session,
+                                          std::span<SignalSums<double>, batch_lanes> sums) {
   BatchNoise noise(session);
   gather_states(session, noise.states());
   const LoopConstants<Batch> constants = gather_constants(session);
@@ -334,5 +347,32 @@ void PROOFMASS_RECORD_BATCH(const BatchSession& session,
                                 session.weights_buffer, progress),
           sums);
 }
+
+double PROOFMASS_NAME(make_noise_, PROOFMASS_KERNEL_SET)(const BatchSession& session,
+                                                         std::size_t num_samples, NoiseWork work) {
+  BatchNoise noise(session);
+  gather_states(session, noise.states());
+  Batch sum;
+  for (std::size_t k = 0; k < num_samples; ++k) {
+    if (work == NoiseWork::deviates) {
+      sum = sum + noise.next_deviate();
+      continue;
+    }
+    const SampleNoise<Batch> sample = noise.next();
+    const Vector3<Batch> total = sample.sensor[0] + sample.sensor[1] + sample.angular +
+                                 sample.star_tracker + sample.thrust + sample.torque;
+    sum = sum + total.x + total.y + total.z;
+  }
+  alignas(64) double values[batch_lanes];
+  double result = 0.0;
+  for (std::size_t i = 0; i < num_vectors; ++i) {
+    hn::Store(sum.part[i], Doubles(), values + i * width);
+  }
+  for (const double value : values) result += value;
+  return result;
+}
+
+#undef PROOFMASS_NAME
+#undef PROOFMASS_JOIN
 
 }  // namespace proofmass

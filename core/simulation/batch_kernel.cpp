@@ -11,4 +11,11 @@ BatchKernel batch_kernel(InstructionSet set) {
   return record_batch_avx512;
 }
 
+BatchNoiseKernel batch_noise_kernel(InstructionSet set) {
+  PROOFMASS_EXPECT(set != InstructionSet::scalar);
+  if (set == InstructionSet::sse4) return make_noise_sse4;
+  if (set == InstructionSet::avx2) return make_noise_avx2;
+  return make_noise_avx512;
+}
+
 }  // namespace proofmass

@@ -1,2 +1,2 @@
-#define PROOFMASS_RECORD_BATCH record_batch_avx512
+#define PROOFMASS_KERNEL_SET avx512
 #include "core/simulation/batch_kernel-inl.hpp"

@@ -1,2 +1,2 @@
-#define PROOFMASS_RECORD_BATCH record_batch_sse4
+#define PROOFMASS_KERNEL_SET sse4
 #include "core/simulation/batch_kernel-inl.hpp"
