@@ -11,8 +11,9 @@
 namespace proofmass {
 namespace {
 
-/// Blocks that one draw of a truncated normal may use; its law keeps at least a hundredth of the
-/// normal's mass, so none is left with probability 0.99¹⁰²⁴ = 3e-5 of a percent.
+/// Trials that one draw of a truncated normal may take. Validation keeps the mean inside the
+/// interval and the standard deviation below 100 widths, so one trial succeeds with 0.4 % at least,
+/// and all of them fail with less than 1e-7.
 constexpr std::uint32_t blocks_per_draw = 4096;
 
 double draw_truncated(const Dispersion& law, const RandomStream& stream,
@@ -22,7 +23,7 @@ double draw_truncated(const Dispersion& law, const RandomStream& stream,
         law.mean + law.standard_deviation * inverse_normal(uniform(stream.block(first_block + i)));
     if (value >= law.minimum && value <= law.maximum) return value;
   }
-  // So unlikely that only a law that validation should have refused comes here.
+  // All trials failed: the bound on the probability stands above.
   return std::fmin(std::fmax(law.mean, law.minimum), law.maximum);
 }
 
