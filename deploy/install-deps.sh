@@ -1,17 +1,30 @@
 #!/bin/bash
-# Installs the Debian 12 packages that Proofmass is built, run and tested with; does nothing if all
-# are there. Uses sudo unless run as root.
+# Installs the Debian 12 packages that Proofmass is built, run and tested with; with --all, also
+# those for fuzzing and for benchmarks beside other systems. Does nothing if all are there. Uses sudo
+# unless run as root.
 set -euo pipefail
 
 packages=(
   g++ cmake ninja-build pkg-config git
   libeigen3-dev libhwy-dev librandom123-dev
-  libzmq3-dev cppzmq-dev libprotobuf-dev protobuf-compiler
+  libzmq3-dev cppzmq-dev libsodium-dev libprotobuf-dev protobuf-compiler
   libsqlite3-dev sqlite3
   libspdlog-dev libfmt-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev
-  libgtest-dev libgmock-dev libbenchmark-dev
-  qemu-user clang-format
+  # Tests only.
+  libgtest-dev libgmock-dev libbenchmark-dev qemu-user clang-format
+  iproute2 iptables faketime python3-scipy python3-mpmath
 )
+# The fuzzer, and the systems that the dispatch is measured beside.
+more_packages=(clang libclang-rt-14-dev parallel python3-distributed python3-ipyparallel)
+
+case "${1:-}" in
+  '') ;;
+  --all) packages+=("${more_packages[@]}") ;;
+  *)
+    echo "install-deps: error: argument = $1 (must be --all or none)" >&2
+    exit 2
+    ;;
+esac
 
 is_installed() {
   [[ $(dpkg-query --show --showformat='${db:Status-Status}' "$1" 2>/dev/null) == installed ]]

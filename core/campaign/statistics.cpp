@@ -3,34 +3,46 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
 
 #include "core/error.hpp"
+#include "core/statistics/bootstrap.hpp"
+#include "core/statistics/moments.hpp"
+#include "core/statistics/order.hpp"
 
 namespace proofmass {
 namespace {
 
-double mean_of(const std::vector<double>& values) {
-  CompensatedSum sum;
-  for (const double value : values) sum.add(value);
-  return sum.value() / static_cast<double>(values.size());
+std::vector<double> magnitudes_of(std::span<const double> errors) {
+  std::vector<double> magnitudes(errors.size());
+  std::ranges::transform(errors, magnitudes.begin(), [](double error) { return std::abs(error); });
+  return magnitudes;
 }
 
-// The difference to the mean is taken before squaring: a spread far below the mean survives.
-double standard_deviation_of(const std::vector<double>& values, double mean) {
-  if (values.size() < 2) return 0.0;
-  CompensatedSum squares;
-  for (const double value : values) squares.add((value - mean) * (value - mean));
-  return std::sqrt(squares.value() / static_cast<double>(values.size() - 1));
+ErrorStatistic error_statistic(std::span<const double> errors) {
+  const Moments about = moments(errors);
+  return {.bias = about.mean,
+          .bias_interval = mean_interval(about, default_confidence),
+          .rms = about.rms,
+          .standard_deviation = about.standard_deviation,
+          .deviation_interval = normal_deviation_interval(about, default_confidence),
+          .skewness = about.skewness};
+}
+
+std::array<PercentileStatistic, percentile_levels.size()> percentiles_of(
+    std::span<const double> magnitudes) {
+  const std::vector<double> ascending = sorted(magnitudes);
+  std::array<PercentileStatistic, percentile_levels.size()> percentiles;
+  for (std::size_t i = 0; i < percentile_levels.size(); ++i) {
+    const double level = percentile_levels[i];
+    percentiles[i] = {.level = level,
+                      .value = percentile(ascending, level),
+                      .interval = percentile_interval(ascending, level, default_confidence)};
+  }
+  return percentiles;
 }
 
 }  // namespace
-
-void CompensatedSum::add(double term) {
-  const double sum = sum_ + term;
-  const bool term_is_small = std::abs(sum_) >= std::abs(term);
-  lost_ += term_is_small ? (sum_ - sum) + term : (term - sum) + sum_;
-  sum_ = sum;
-}
 
 ParameterArray CampaignStatistics::worst_errors() const {
   ParameterArray errors{};
@@ -56,7 +68,7 @@ void StatisticsAccumulator::add(const RunResult& result) {
   ++counts_.num_estimated;
   estimated_runs_.push_back(result.run);
   for (const ParameterInfo& info : parameter_infos()) {
-    errors_[index(info.parameter)].push_back(std::abs(result.error(info.parameter)));
+    errors_[index(info.parameter)].push_back(result.error(info.parameter));
   }
 }
 
@@ -70,17 +82,21 @@ CampaignStatistics StatisticsAccumulator::statistics() const {
 }
 
 AccuracyStatistic StatisticsAccumulator::accuracy(Parameter parameter) const {
-  const std::vector<double>& errors = errors_[index(parameter)];
-  const auto worst = std::max_element(errors.begin(), errors.end());
+  const std::vector<double> magnitudes = magnitudes_of(errors_[index(parameter)]);
+  const Extreme worst = extremes(magnitudes).largest;
   const double objective = objectives_[index(parameter)];
   const auto num_beyond =
-      std::count_if(errors.begin(), errors.end(), [&](double error) { return error > objective; });
-  const double mean = mean_of(errors);
-  return {.worst = *worst,
-          .worst_run = estimated_runs_[static_cast<std::size_t>(worst - errors.begin())],
-          .mean = mean,
-          .standard_deviation = standard_deviation_of(errors, mean),
-          .num_beyond_objective = static_cast<std::uint64_t>(num_beyond)};
+      std::ranges::count_if(magnitudes, [&](double error) { return error > objective; });
+  const Moments about = moments(magnitudes);
+  return {.worst = worst.value,
+          .worst_run = estimated_runs_[worst.index],
+          .mean = about.mean,
+          .standard_deviation = about.standard_deviation,
+          .num_beyond_objective = static_cast<std::uint64_t>(num_beyond),
+          .mean_interval = mean_interval(about, default_confidence),
+          .deviation_interval = bootstrap_deviation_interval(magnitudes, default_confidence),
+          .percentiles = percentiles_of(magnitudes),
+          .error = error_statistic(errors_[index(parameter)])};
 }
 
 }  // namespace proofmass

@@ -8,16 +8,42 @@
 #include "core/campaign/identifiers.hpp"
 #include "core/campaign/parameter.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/statistics/interval.hpp"
+#include "core/statistics/sum.hpp"
 
 namespace proofmass {
 
-/// |estimate − truth| of one parameter over the runs that have an estimate.
+/// Percentiles of |error| that are reported: 0.99 for the 99th.
+inline constexpr std::array percentile_levels{0.5, 0.9, 0.95, 0.99};
+
+/// A percentile of |error|, SI.
+struct PercentileStatistic {
+  double level = 0.0;  ///< One of percentile_levels.
+  double value = 0.0;
+  std::optional<Interval> interval;  ///< Empty if runs are too few, 368 for the 99th.
+};
+
+/// estimate − truth of one parameter, signed, over the runs that have an estimate. SI.
+struct ErrorStatistic {
+  double bias = 0.0;                      ///< Mean.
+  std::optional<Interval> bias_interval;  ///< Empty for a single run; so is the other.
+  double rms = 0.0;
+  double standard_deviation = 0.0;             ///< With n − 1; 0 for a single run.
+  std::optional<Interval> deviation_interval;  ///< By the chi-square law: for normal errors.
+  double skewness = 0.0;                       ///< Adjusted, see Moments.
+};
+
+/// |estimate − truth| of one parameter over the runs that have an estimate. Intervals are of 95 %.
 struct AccuracyStatistic {
-  double worst = 0.0;                      ///< SI.
-  RunIndex worst_run;                      ///< The first run that reaches `worst`.
-  double mean = 0.0;                       ///< SI.
-  double standard_deviation = 0.0;         ///< SI, with n − 1; 0 for a single run.
-  std::uint64_t num_beyond_objective = 0;  ///< Runs whose |error| is above the objective.
+  double worst = 0.0;                          ///< SI.
+  RunIndex worst_run;                          ///< The first run that reaches `worst`.
+  double mean = 0.0;                           ///< SI.
+  double standard_deviation = 0.0;             ///< SI, with n − 1; 0 for a single run.
+  std::uint64_t num_beyond_objective = 0;      ///< Runs whose |error| is above the objective.
+  std::optional<Interval> mean_interval;       ///< Empty for a single run.
+  std::optional<Interval> deviation_interval;  ///< By the bootstrap; empty below three runs.
+  std::array<PercentileStatistic, percentile_levels.size()> percentiles{};
+  ErrorStatistic error;  ///< With its sign.
 };
 
 /// Statistics of a campaign's finished runs.
@@ -36,20 +62,8 @@ struct CampaignStatistics {
   [[nodiscard]] ParameterArray mean_errors() const;
 };
 
-/// Sum whose rounding error does not grow with the number of terms [Neumaier1974]: what each
-/// addition loses is added up apart.
-class CompensatedSum {
- public:
-  void add(double term);
-  [[nodiscard]] double value() const { return sum_ + lost_; }
-
- private:
-  double sum_ = 0.0;
-  double lost_ = 0.0;
-};
-
 /// Accumulates results in run order, so that the statistics do not depend on the order in which
-/// runs arrived at the store. Keeps 80 bytes a run: the standard deviation takes a second pass.
+/// runs arrived at the store. Keeps 88 bytes a run: order statistics and second passes need all.
 class StatisticsAccumulator {
  public:
   /// @param objectives  Largest acceptable |error| of each parameter, SI.
@@ -57,7 +71,13 @@ class StatisticsAccumulator {
 
   /// @pre Runs are added in strictly ascending order.
   void add(const RunResult& result);
+  /// Takes some 1 s for a million runs.
   [[nodiscard]] CampaignStatistics statistics() const;
+
+  /// estimate − truth of the runs that have an estimate, in run order, SI.
+  [[nodiscard]] const std::vector<double>& errors(Parameter parameter) const {
+    return errors_[index(parameter)];
+  }
 
  private:
   [[nodiscard]] AccuracyStatistic accuracy(Parameter parameter) const;
@@ -66,7 +86,7 @@ class StatisticsAccumulator {
   CampaignStatistics counts_;
   std::optional<RunIndex> last_run_;
   std::vector<RunIndex> estimated_runs_;
-  std::array<std::vector<double>, num_parameters> errors_;  ///< |error| of estimated_runs_.
+  std::array<std::vector<double>, num_parameters> errors_;  ///< Of estimated_runs_.
 };
 
 }  // namespace proofmass

@@ -38,8 +38,8 @@ bool Environment::is_periodic(double end_s) const {
 
 ExternalAcceleration Environment::at(double time_s, const OrbitPoint& point) const {
   if (kind_ == EnvironmentKind::file) return interpolate(time_s);
-  const double c = point.mean_anomaly_cosine;
-  const double s = point.mean_anomaly_sine;
+  const double c = point.mean_anomaly.cosine;
+  const double s = point.mean_anomaly.sine;
   const double c2 = c * c - s * s;
   const double s2 = 2.0 * s * c;
   const auto value = [&](std::size_t i) {

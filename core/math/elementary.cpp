@@ -1,50 +1,22 @@
 #include "core/math/elementary.hpp"
 
-#include <array>
-#include <bit>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <numbers>
+
+#include "core/math/sincos_series.hpp"
 
 namespace proofmass {
 namespace {
 
 constexpr double two_pi = 2.0 * std::numbers::pi;
 
-/// Coefficients 1/first!, −1/(first+2)!, 1/(first+4)!, ... of sine (first = 1) and cosine (first =
-/// 0).
-template <std::size_t N>
-constexpr std::array<double, N> alternating_factorials(int first) {
-  std::array<double, N> terms{};
-  double term = 1.0;
-  for (std::size_t i = 0; i < N; ++i) {
-    terms[i] = term;
-    const double order = first + 2.0 * static_cast<double>(i);
-    term = -term / ((order + 1.0) * (order + 2.0));
-  }
-  return terms;
-}
-
-template <std::size_t N>
-double polynomial(const std::array<double, N>& coefficients, double x) {
-  double sum = coefficients[N - 1];
-  for (std::size_t i = N - 1; i-- > 0;) sum = sum * x + coefficients[i];
-  return sum;
-}
-
 }  // namespace
 
 SineCosine sincos_turns(double turns) {
-  // Taylor series on |x| ≤ π/4: the first dropped terms are below 2e-17.
-  static constexpr auto sine_terms = alternating_factorials<9>(1);
-  static constexpr auto cosine_terms = alternating_factorials<10>(0);
   // Adding and taking away 1.5·2⁵² rounds to an integer.
   const double quarter = (4.0 * turns + 0x1.8p52) - 0x1.8p52;
-  const double x = two_pi * (turns - 0.25 * quarter);  // The difference is exact.
-  const double square = x * x;
-  const double sine = x * polynomial(sine_terms, square);
-  const double cosine = polynomial(cosine_terms, square);
+  const auto [sine, cosine] = sincos_series(turns, quarter);
   switch (static_cast<std::int64_t>(quarter) & 3) {
     case 0:
       return {sine, cosine};

@@ -6,10 +6,12 @@ namespace proofmass {
 /// an implementation by processor, and their last bits differ; these give the same bits everywhere.
 /// Errors are bounded in tests/core/math/elementary_test.cpp.
 
-struct SineCosine {
-  double sine;
-  double cosine;
+template <typename T>
+struct SineCosineOf {
+  T sine;
+  T cosine;
 };
+using SineCosine = SineCosineOf<double>;
 
 /// sin and cos of 2π·turns, |turns| < 2⁴⁸; absolute error below 3e-16 for the given `turns`.
 [[nodiscard]] SineCosine sincos_turns(double turns);

@@ -11,12 +11,13 @@
 #include "core/error.hpp"
 #include "core/session/session.hpp"
 #include "core/session/session_names.hpp"
+#include "core/signal/line_weights.hpp"
 
 namespace proofmass {
 namespace {
 
 constexpr std::size_t name_length_max = 64;
-constexpr std::size_t num_lines_max = 16;
+constexpr std::size_t num_lines_max = LineWeights::num_lines_max;
 constexpr std::size_t fit_lines_max = 2;
 constexpr int multiple_max = 1000;
 

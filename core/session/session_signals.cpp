@@ -3,8 +3,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/math/elementary.hpp"
-
 namespace proofmass {
 
 std::int64_t num_record_samples(const Scenario& scenario, const Session& session) {
@@ -32,38 +30,43 @@ SessionSignals::SessionSignals(const Scenario& scenario, const Session& session,
 }
 
 SessionSignals::Reference SessionSignals::reference_at_start() const {
-  return reference_at(static_cast<double>(-num_settling_) * sample_period_s_);
+  return reference_from(reference_phase(static_cast<double>(-num_settling_) * sample_period_s_));
 }
 
-SessionSignals::Reference SessionSignals::reference_at(double time_s) const {
-  if (spin_rate_rad_s_ == 0.0) return {};
-  const auto [sine, cosine] =
-      sincos_turns(0.5 * spin_rate_rad_s_ * time_s / (2.0 * std::numbers::pi));
-  return {.attitude_IR = {cosine, {0.0, sine, 0.0}}, .rate = {0.0, spin_rate_rad_s_, 0.0}};
+SessionSignals::Reference SessionSignals::reference_from(const SineCosine& phase) const {
+  return {.attitude_IR = {phase.cosine, {0.0, phase.sine, 0.0}},
+          .rate = {0.0, spin_rate_rad_s_, 0.0}};
 }
 
 SharedSample SessionSignals::next() {
-  const double time_s = static_cast<double>(next_) * sample_period_s_;
-  const OrbitPoint point = orbit_->at(time_s);
-  const Reference reference = reference_at(time_s);
+  const double time = time_s(0);
   SharedSample sample;
+  advance({orbit_->at(time), reference_phase(time), excitation_phase(time)}, sample);
+  return sample;
+}
+
+void SessionSignals::next(std::span<const SamplePhases> phases, std::span<SharedSample> samples) {
+  for (std::size_t i = 0; i < phases.size(); ++i) advance(phases[i], samples[i]);
+}
+
+void SessionSignals::advance(const SamplePhases& phases, SharedSample& sample) {
+  const OrbitPoint& point = phases.orbit;
+  const Reference reference = reference_from(phases.reference);
   sample.gradient_s2 = point.gradient_s2;
   sample.earth_direction_I = {point.direction_x, 0.0, point.direction_z};
   sample.reference_IR = reference.attitude_IR;
   sample.reference_rate = reference.rate;
   sample.earth_direction_R = to_target(reference.attitude_IR, sample.earth_direction_I);
-  sample.external = environment_.at(time_s, point);
-  if (has_excitation_) excite(time_s, sample);
+  sample.external = environment_.at(time_s(0), point);
+  if (has_excitation_) excite(phases.excitation, sample);
   commanded_.correct(gains_, sample.attitude_command_rad);
   sample.commanded = commanded_;
   commanded_.predict(gains_, {}, sample.reference_rate);
   ++next_;
-  return sample;
 }
 
-void SessionSignals::excite(double time_s, SharedSample& sample) const {
-  const auto [sine, cosine] = sincos_turns(excitation_.frequency_hz * time_s);
-  const double value = excitation_.amplitude * sine;
+void SessionSignals::excite(const SineCosine& phase, SharedSample& sample) const {
+  const double value = excitation_.amplitude * phase.sine;
   switch (excitation_.kind) {
     case ExcitationKind::attitude:
       sample.attitude_command_rad[index(excitation_.axis)] = value;
@@ -73,7 +76,8 @@ void SessionSignals::excite(double time_s, SharedSample& sample) const {
       break;
     case ExcitationKind::test_mass: {
       const double omega = 2.0 * std::numbers::pi * excitation_.frequency_hz;
-      sample.mass_motion = {value, omega * excitation_.amplitude * cosine, -omega * omega * value};
+      sample.mass_motion = {value, omega * excitation_.amplitude * phase.cosine,
+                            -omega * omega * value};
       break;
     }
   }

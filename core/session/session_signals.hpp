@@ -1,11 +1,17 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <numbers>
+#include <optional>
+#include <span>
 
 #include "core/campaign/scenario.hpp"
 #include "core/control/attitude_loop.hpp"
 #include "core/environment/environment.hpp"
 #include "core/instrument/sensor_model.hpp"
+#include "core/math/elementary.hpp"
+#include "core/math/inline.hpp"
 #include "core/math/quaternion.hpp"
 #include "core/math/vector3.hpp"
 #include "core/orbit/kepler_orbit.hpp"
@@ -25,6 +31,15 @@ struct SharedSample {
   AttitudeEstimator<double> commanded;     ///< What that command alone makes of the estimate.
   MassMotionPhase mass_motion;             ///< Of the moving test masses.
 };
+
+/// What a sample takes from sines and cosines: functions of its time alone.
+template <typename T>
+struct SamplePhasesOf {
+  OrbitPointOf<T> orbit;
+  SineCosineOf<T> reference;   ///< Of half the angle that the rotating frame has turned.
+  SineCosineOf<T> excitation;  ///< Of the phase of the excitation.
+};
+using SamplePhases = SamplePhasesOf<double>;
 
 /// Generates the samples of a session in order, from the start of settling on.
 class SessionSignals {
@@ -46,9 +61,39 @@ class SessionSignals {
   /// The next sample; the first call yields t = −num_settling()·T.
   [[nodiscard]] SharedSample next();
 
+  /// Writes the next samples from their phases, which phases_at() computes for many at once.
+  /// @param samples  As many as phases; what no sample of the session sets is left alone.
+  void next(std::span<const SamplePhases> phases, std::span<SharedSample> samples);
+
+  /// Time of sample `ahead` of those that come next, s.
+  [[nodiscard]] double time_s(std::size_t ahead) const {
+    return static_cast<double>(next_ + static_cast<std::int64_t>(ahead)) * sample_period_s_;
+  }
+
+  /// Phases of a batch of times, one a lane; nothing if the orbit cannot, see
+  /// KeplerOrbit::at_lanes().
+  template <typename T>
+  [[nodiscard]] PROOFMASS_INLINE std::optional<SamplePhasesOf<T>> phases_at(const T& time_s) const {
+    const std::optional<OrbitPointOf<T>> orbit = orbit_->at_lanes(time_s);
+    if (!orbit) return std::nullopt;
+    return SamplePhasesOf<T>{*orbit, reference_phase(time_s), excitation_phase(time_s)};
+  }
+
  private:
-  [[nodiscard]] Reference reference_at(double time_s) const;
-  void excite(double time_s, SharedSample& sample) const;
+  template <typename T>
+  PROOFMASS_INLINE SineCosineOf<T> reference_phase(const T& time_s) const {
+    if (spin_rate_rad_s_ == 0.0) return {T(0.0), T(1.0)};
+    return sincos_turns(T(0.5 * spin_rate_rad_s_) * time_s / T(2.0 * std::numbers::pi));
+  }
+  template <typename T>
+  PROOFMASS_INLINE SineCosineOf<T> excitation_phase(const T& time_s) const {
+    if (!has_excitation_) return {T(0.0), T(1.0)};
+    return sincos_turns(T(excitation_.frequency_hz) * time_s);
+  }
+
+  void advance(const SamplePhases& phases, SharedSample& sample);
+  [[nodiscard]] Reference reference_from(const SineCosine& phase) const;
+  void excite(const SineCosine& phase, SharedSample& sample) const;
 
   const KeplerOrbit* orbit_;
   Environment environment_;

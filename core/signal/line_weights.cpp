@@ -54,12 +54,13 @@ LineWeights::LineWeights(const LineFit& fit) : fit_(fit), lines_hz_(fit.fit_hz) 
                                       fit.num_samples, 2 * lines_hz_.size()));
   }
   PROOFMASS_EXPECT(fit.fit_hz.size() == 1 || fit.fit_hz.size() == 2);
+  PROOFMASS_EXPECT(lines_hz_.size() <= num_lines_max);
   solve_design();
 
   const std::size_t num_outputs = 2 * num_fit_lines();
   means_.assign(num_outputs, 0.0);
   block_ends_.resize((fit_.num_samples + block_size - 1) / block_size);
-  States states(num_outputs);
+  States states{};
   std::vector<double> weights(block_size * num_outputs);
   std::vector<double> sums(num_outputs, 0.0);
   for (std::size_t block = num_blocks(); block-- > 0;) {
@@ -103,22 +104,22 @@ struct Rotation {
   SineCosine now, step;
 };
 
+using Rotations = std::array<Rotation, LineWeights::num_lines_max>;
+
 /// Lines at sample `last`. They are set anew in every block, so that the rounding of their rotation
 /// cannot grow past block_size steps.
-std::vector<Rotation> rotations(const std::vector<double>& lines_hz, double sample_period_s,
-                                std::size_t last) {
-  std::vector<Rotation> lines;
-  lines.reserve(lines_hz.size());
-  for (const double line_hz : lines_hz) {
-    const double turns = line_hz * sample_period_s;
-    lines.push_back({sincos_turns(turns * static_cast<double>(last)), sincos_turns(turns)});
+Rotations rotations(const std::vector<double>& lines_hz, double sample_period_s, std::size_t last) {
+  Rotations lines{};
+  for (std::size_t i = 0; i < lines_hz.size(); ++i) {
+    const double turns = lines_hz[i] * sample_period_s;
+    lines[i] = {sincos_turns(turns * static_cast<double>(last)), sincos_turns(turns)};
   }
   return lines;
 }
 
 /// Filters Φ (ΦᵀΦ)⁻¹ backwards from the end of [first, first + num_samples) to its start.
 template <std::size_t num_outputs>
-void filter_backwards(const LineFit& fit, std::vector<Rotation> lines, const double* coefficients,
+void filter_backwards(const LineFit& fit, std::span<Rotation> lines, const double* coefficients,
                       std::size_t first, std::size_t num_samples, BandPassState* states,
                       double* weights) {
   const BandPass filter = fit.filter;
@@ -149,9 +150,10 @@ void LineWeights::run_backwards(std::size_t block, States& states,
                                 std::span<double> weights) const {
   const std::size_t first = block * block_size;
   const std::size_t num_samples = samples_in(block);
-  const auto lines = rotations(lines_hz_, fit_.sample_period_s, first + num_samples - 1);
-  const auto run = states.size() == 2 ? filter_backwards<2> : filter_backwards<4>;
-  run(fit_, lines, coefficients_.data(), first, num_samples, states.data(), weights.data());
+  Rotations lines = rotations(lines_hz_, fit_.sample_period_s, first + num_samples - 1);
+  const auto run = num_fit_lines() == 1 ? filter_backwards<2> : filter_backwards<4>;
+  run(fit_, std::span(lines).first(lines_hz_.size()), coefficients_.data(), first, num_samples,
+      states.data(), weights.data());
 }
 
 void LineWeights::fill_block(std::size_t block, std::span<double> weights) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <complex>
 #include <cstddef>
 #include <span>
@@ -17,7 +18,7 @@ struct LineFit {
   double sample_period_s = 0.25;
   BandPass filter{};
   std::vector<double> fit_hz;    ///< Lines whose phasors are wanted: one or two.
-  std::vector<double> known_hz;  ///< Further lines, fitted with them.
+  std::vector<double> known_hz;  ///< Further lines; at most LineWeights::num_lines_max in all.
 };
 
 /// The same estimate as one weighted sum over the raw record.
@@ -34,6 +35,7 @@ struct LineFit {
 class LineWeights {
  public:
   static constexpr std::size_t block_size = 2048;
+  static constexpr std::size_t num_lines_max = 16;
 
   /// @throws InvalidArgument if fewer samples are kept than the fit has unknowns, or if two lines
   ///         cannot be told apart.
@@ -50,8 +52,8 @@ class LineWeights {
   void fill_block(std::size_t block, std::span<double> weights) const;
 
  private:
-  /// Filter memory of each output (cosine and sine of each fit line), running backwards.
-  using States = std::vector<BandPassState>;
+  /// Filter memory of each output (cosine and sine of one or two fit lines), running backwards.
+  using States = std::array<BandPassState, 4>;
 
   void solve_design();
   void run_backwards(std::size_t block, States& states, std::span<double> weights) const;

@@ -18,6 +18,7 @@ struct BatchSession {
   const NoiseModel* noise = nullptr;
   const NoiseStreams* streams = nullptr;
   std::uint64_t seed = 0;
+  std::size_t num_runs = batch_lanes;  ///< At least 1; in the first lanes.
   std::array<RunIndex, batch_lanes> runs{};
   std::array<LoopConstants<double>, batch_lanes> constants{};
   std::array<NoiseStates<double>, batch_lanes> noise_states{};

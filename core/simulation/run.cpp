@@ -120,12 +120,12 @@ struct RunPlan::Parts {
     const Scenario& scenario = campaign.scenario;
     const Session& session = scenario.sessions[i];
     SessionSignals signals(scenario, session, orbit, environment);
-    SessionNoise session_noise(noise, campaign.seed, run, session.name);
+    LaneGroup<double, SessionNoise> alone{
+        .constants = make_loop_constants(instrument, scenario, session),
+        .noise = SessionNoise(noise, campaign.seed, run, session.name)};
     std::vector<double> buffer(LineWeights::block_size * 2 * weights[i].num_fit_lines());
-    const SignalSums<double> sums = record_session<double>(
-        signals, setup(i), make_loop_constants(instrument, scenario, session), session_noise,
-        buffer, progress);
-    return to_phasors(sums, weights[i].num_fit_lines());
+    record_session(signals, setup(i), std::span(&alone, 1), buffer, progress);
+    return to_phasors(alone.sums, weights[i].num_fit_lines());
   }
 
   void record_session_batch(std::size_t i, std::span<const Lane> lanes, BatchKernel kernel,
@@ -141,6 +141,7 @@ struct RunPlan::Parts {
                        .noise = &noise,
                        .streams = &streams,
                        .seed = campaign.seed,
+                       .num_runs = lanes.size(),
                        .weights_buffer = buffer,
                        .progress = SessionProgress::report_to,
                        .progress_context = &progress};

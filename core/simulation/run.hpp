@@ -70,7 +70,7 @@ class RunPlan {
 
   /// simulate() for several runs at once, bit for bit the same results, in the order of `requests`.
   ///
-  /// @param requests  At most batch_lanes; a batch costs the same however few they are.
+  /// @param requests  At most batch_lanes; a batch that is not full costs no more than a full one.
   /// @param set       One of available_instruction_sets().
   /// @param progress  As for simulate(); the runs advance together.
   [[nodiscard]] std::vector<RunResult> simulate_batch(

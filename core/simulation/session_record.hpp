@@ -109,39 +109,53 @@ PROOFMASS_INLINE void add_sample(const std::array<T, num_signals>& values, const
   }
 }
 
-/// Runs one session from settling to its last sample and sums its signals.
-///
-/// @param signals   Not yet asked for any sample.
-/// @param noise     next() yields the SampleNoise<T> of each sample, settling included.
-/// @param buffer    Room for a block of weights.
-/// @param progress  Called with the number of record samples done after each block.
-template <typename T, typename Noise, typename Progress>
-inline SignalSums<T> record_session(SessionSignals& signals, const SessionSetup& setup,
-                                    const LoopConstants<T>& constants, Noise& noise,
-                                    std::span<double> buffer, const Progress& progress) {
-  const LineWeights& weights = *setup.weights;
-  const std::size_t num_outputs = 2 * weights.num_fit_lines();
+/// The runs that one T holds, in one session.
+template <typename T, typename Noise>
+struct LaneGroup {
+  LoopConstants<T> constants;
+  Noise noise;  ///< next() yields the SampleNoise<T> of each sample, settling included.
+  Loop<T> loop{};
   SignalSums<T> sums{};
-  Loop<T> loop;
-  loop.begin(signals.reference_at_start());
-  for (std::int64_t i = 0; i < signals.num_settling(); ++i) {
-    (void)loop.advance(constants, setup.drag_free, setup.attitude, signals.next(), noise.next());
-  }
-  std::size_t num_done = 0;
-  for (std::size_t block = 0; block < weights.num_blocks(); ++block) {
-    weights.fill_block(block, buffer);
-    const std::size_t num_samples = weights.samples_in(block);
-    for (std::size_t k = 0; k < num_samples; ++k) {
-      const SharedSample shared = signals.next();
-      const Observation<T> observation =
+};
+
+/// Advances all groups by some samples.
+/// @param weights  Of these samples; null while the loops settle, when nothing is summed.
+template <typename Signals, typename Group>
+__attribute__((noinline)) void advance_groups(Signals& signals, const SessionSetup& setup,
+                                              std::span<Group> groups, std::size_t num_samples,
+                                              const double* weights) {
+  const std::size_t num_outputs = 2 * setup.weights->num_fit_lines();
+  for (std::size_t k = 0; k < num_samples; ++k) {
+    const SharedSample& shared = signals.next();
+    for (auto& [constants, noise, loop, sums] : groups) {
+      const auto observation =
           loop.advance(constants, setup.drag_free, setup.attitude, shared, noise.next());
-      add_sample(ground_signals(observation, shared, setup.regressor), &buffer[k * num_outputs],
+      if (weights == nullptr) continue;
+      add_sample(ground_signals(observation, shared, setup.regressor), weights + k * num_outputs,
                  num_outputs, setup.num_signals_used, sums);
     }
+  }
+}
+
+/// Runs one session from settling to its last sample and sums its signals.
+///
+/// @param signals   Like SessionSignals, not yet asked for any sample.
+/// @param groups    With zero sums and a loop that has not begun.
+/// @param buffer    Room for a block of weights.
+/// @param progress  Called with the number of record samples done after each block.
+template <typename Signals, typename Group, typename Progress>
+inline void record_session(Signals& signals, const SessionSetup& setup, std::span<Group> groups,
+                           std::span<double> buffer, const Progress& progress) {
+  for (Group& group : groups) group.loop.begin(signals.reference_at_start());
+  advance_groups(signals, setup, groups, static_cast<std::size_t>(signals.num_settling()), nullptr);
+  std::size_t num_done = 0;
+  for (std::size_t block = 0; block < setup.weights->num_blocks(); ++block) {
+    setup.weights->fill_block(block, buffer);
+    const std::size_t num_samples = setup.weights->samples_in(block);
+    advance_groups(signals, setup, groups, num_samples, buffer.data());
     num_done += num_samples;
     progress(num_done);
   }
-  return sums;
 }
 
 }  // namespace proofmass

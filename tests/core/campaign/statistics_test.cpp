@@ -93,18 +93,6 @@ TEST(Statistics, CountEveryStatusAndLeaveOutRunsWithoutEstimate) {
   EXPECT_EQ(statistics.accuracy[index(a_c12)].worst_run, RunIndex{20});
 }
 
-// A plain sum of these returns 0: the first 1 drowns in 1e16, and with it goes all that is left.
-TEST(Statistics, CompensatedSumKeepsWhatAPlainSumLoses) {
-  CompensatedSum sum;
-  double plain = 0.0;
-  for (const double term : {1.0, 1e16, 1.0, -1e16}) {
-    sum.add(term);
-    plain += term;
-  }
-  EXPECT_EQ(sum.value(), 2.0);
-  EXPECT_EQ(plain, 0.0);
-}
-
 // 10⁵ errors 1e8 ± 1e-4 in equal numbers. Their mean is 1e8, their deviation 1e-4·√(n/(n − 1)); the
 // one-pass formula would subtract numbers of 1e16 that agree in 24 digits. 1e8 ± 1e-4 itself is
 // stored to 2⁻²⁷ = 7.5e-9, which is 7.5e-5 of the deviation.
@@ -115,6 +103,66 @@ TEST(Statistics, ResolveASpreadFarBelowTheMean) {
   const AccuracyStatistic accuracy = statistics_of(errors).accuracy[index(a_c12)];
   EXPECT_NEAR(accuracy.mean, 1e8, 1.5e-8);  // Half a unit in the last place of 1e8, twice.
   EXPECT_NEAR(accuracy.standard_deviation / 1e-4, std::sqrt(n / (n - 1.0)), 7.5e-5);
+}
+
+// Signed errors 1, −2, 3, −4: mean −½, squares 30/4, squared deviations 30 − 1 = 29 over 3.
+TEST(Statistics, KeepTheSignOfTheErrorApart) {
+  const ErrorStatistic error = statistics_of({1.0, -2.0, 3.0, -4.0}).accuracy[index(a_c13)].error;
+  EXPECT_EQ(error.bias, -0.5);
+  EXPECT_DOUBLE_EQ(error.rms, std::sqrt(7.5));
+  EXPECT_DOUBLE_EQ(error.standard_deviation, std::sqrt(29.0 / 3.0));
+  EXPECT_LT(error.bias_interval->lower, -0.5);
+  EXPECT_LT(error.deviation_interval->lower, error.standard_deviation);
+  EXPECT_GT(error.deviation_interval->upper, error.standard_deviation);
+  // Third central moments sum to 3.375 − 3.375 + 42.875 − 42.875: symmetric about −½.
+  EXPECT_NEAR(error.skewness, 0.0, 1e-15);
+}
+
+// |error| = 0, 1 ... 1000: the percentiles are ten times their levels, and far enough inside.
+TEST(Statistics, HavePercentilesWithIntervals) {
+  std::vector<double> errors;
+  for (int i = 0; i <= 1000; ++i) errors.push_back(i % 2 == 0 ? i : -i);
+  const AccuracyStatistic accuracy = statistics_of(errors).accuracy[index(k2d)];
+  constexpr std::array expected{500.0, 900.0, 950.0, 990.0};
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const PercentileStatistic& percentile = accuracy.percentiles[i];
+    EXPECT_EQ(percentile.level, percentile_levels[i]);
+    EXPECT_NEAR(percentile.value, expected[i], 1e-9);
+    // Binomial deviation √(1001 p(1 − p)) in ranks, which are values here; 1.96 of it each side.
+    const double half_width = 1.96 * std::sqrt(1001 * percentile.level * (1 - percentile.level));
+    EXPECT_NEAR(percentile.interval->lower, expected[i] - half_width, 2.0) << percentile.level;
+    EXPECT_NEAR(percentile.interval->upper, expected[i] + half_width, 2.0) << percentile.level;
+  }
+}
+
+TEST(Statistics, HaveIntervalsOfMeanAndDeviation) {
+  std::vector<double> errors;
+  for (int i = 0; i <= 1000; ++i) errors.push_back(i);
+  const AccuracyStatistic accuracy = statistics_of(errors).accuracy[index(k2c)];
+  const double mean_error = accuracy.standard_deviation / std::sqrt(1001.0);
+  EXPECT_NEAR(accuracy.mean_interval->upper, 500.0 + 1.962 * mean_error, 0.01 * mean_error);
+  // A deviation has variance (μ₄/σ⁴ − 1)σ²/4n, with μ₄/σ⁴ = 1.8 for even spread.
+  const double deviation_error = accuracy.standard_deviation * std::sqrt(0.8 / 4.0 / 1001.0);
+  EXPECT_NEAR(accuracy.deviation_interval->upper,
+              accuracy.standard_deviation + 1.96 * deviation_error, 0.3 * deviation_error);
+}
+
+TEST(Statistics, OfASingleRunHaveNoIntervals) {
+  const AccuracyStatistic accuracy = statistics_of({-3.0}).accuracy[index(a_c12)];
+  EXPECT_FALSE(accuracy.mean_interval.has_value());
+  EXPECT_FALSE(accuracy.deviation_interval.has_value());
+  EXPECT_FALSE(accuracy.percentiles[0].interval.has_value());
+  EXPECT_EQ(accuracy.percentiles[0].value, 3.0);
+  EXPECT_EQ(accuracy.error.bias, -3.0);
+  EXPECT_FALSE(accuracy.error.bias_interval.has_value());
+}
+
+TEST(Statistics, HandOutTheSignedErrorsInRunOrder) {
+  ParameterArray objectives{};
+  StatisticsAccumulator accumulator(objectives);
+  accumulator.add(run_with_error(3, -1.0));
+  accumulator.add(run_with_error(7, 2.0));
+  EXPECT_EQ(accumulator.errors(a_d13), (std::vector<double>{-1.0, 2.0}));
 }
 
 TEST(StatisticsDeathTest, RefusesRunsOutOfOrder) {

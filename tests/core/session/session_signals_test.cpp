@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <complex>
 #include <cstdint>
+#include <cstring>
 #include <numbers>
 #include <vector>
 
@@ -231,6 +233,27 @@ TEST(SessionSignals, ReferenceThatFollowsTheOrbitSeesTheEarthAtRest) {
   for (const auto& [time_s, sample] : all_samples(fixture)) {
     ASSERT_NEAR(sample.earth_direction_R.x, 1.0, 1e-14);
     ASSERT_NEAR(sample.earth_direction_R.z, 0.0, 1e-13);
+  }
+}
+
+TEST(SessionSignals, AreTheSameBitsManyAtATime) {
+  Fixture fixture;
+  fixture.session.excitations = {{ExcitationKind::attitude, Axis::y, 3.5e-3, 1e-3}};
+  fixture.session.spin_rate_rad_s = 4.2e-3;
+  SessionSignals many = fixture.signals();
+  SessionSignals one = fixture.signals();
+  std::array<SamplePhases, 7> phases;
+  std::array<SharedSample, 7> samples;
+  for (int round = 0; round < 3000; ++round) {
+    for (std::size_t i = 0; i < phases.size(); ++i) {
+      phases[i] = many.phases_at(many.time_s(i)).value();
+    }
+    many.next(phases, samples);
+    for (const SharedSample& sample : samples) {
+      const SharedSample expected = one.next();
+      static_assert(sizeof(SharedSample) % sizeof(double) == 0);
+      ASSERT_EQ(std::memcmp(&sample, &expected, sizeof sample), 0) << round;
+    }
   }
 }
 

@@ -93,6 +93,13 @@ TEST(Batch, EqualsTheScalarReferenceInARotatingFrame) {
   expect_batch_equals_scalar(campaign, requests_from(0, 3));
 }
 
+// Here the orbit is computed time by time.
+TEST(Batch, EqualsTheScalarReferenceOnAnEccentricOrbit) {
+  Campaign campaign = short_campaign();
+  campaign.scenario.orbit.eccentricity = 0.1;
+  expect_batch_equals_scalar(campaign, requests_from(0, 3));
+}
+
 TEST(Batch, EqualsTheScalarReferenceWithAnEnvironmentTable) {
   Campaign campaign = short_campaign();
   campaign.scenario.environment.kind = EnvironmentKind::file;

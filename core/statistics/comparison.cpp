@@ -1,0 +1,202 @@
+#include "core/statistics/comparison.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+
+#include "core/statistics/detail/check.hpp"
+#include "core/statistics/distribution.hpp"
+#include "core/statistics/moments.hpp"
+#include "core/statistics/order.hpp"
+
+namespace proofmass {
+namespace {
+
+constexpr std::size_t num_exact_ranks_max = 50;  // 2⁵⁰ signs are counted exactly in a double.
+constexpr std::uint64_t num_exact_steps_max = 4'000'000;
+
+double sign_p_value(std::size_t num_larger, std::size_t num_smaller) {
+  const auto fewer = static_cast<double>(std::min(num_larger, num_smaller));
+  const auto count = static_cast<double>(num_larger + num_smaller);
+  if (count == 0.0) return 1.0;
+  return std::min(2.0 * binomial_at_most(fewer, count, 0.5), 1.0);
+}
+
+/// Sum of the ranks of the positive differences, by the ranks of their magnitudes.
+struct SignedRanks {
+  double positive_sum = 0.0;
+  double square_sum = 0.0;  ///< Σ rank².
+  bool has_equal = false;
+  std::size_t count = 0;
+};
+
+SignedRanks signed_ranks(std::span<const double> differences) {
+  std::vector<double> magnitudes;
+  std::vector<bool> is_positive;
+  for (const double difference : differences) {
+    if (difference == 0.0) continue;
+    magnitudes.push_back(std::abs(difference));
+    is_positive.push_back(difference > 0.0);
+  }
+  SignedRanks result{.count = magnitudes.size()};
+  if (magnitudes.empty()) return result;
+  const std::vector<double> ranks = average_ranks(magnitudes);
+  for (std::size_t i = 0; i < ranks.size(); ++i) {
+    if (is_positive[i]) result.positive_sum += ranks[i];
+    result.square_sum += ranks[i] * ranks[i];
+  }
+  std::sort(magnitudes.begin(), magnitudes.end());
+  result.has_equal = std::ranges::adjacent_find(magnitudes) != magnitudes.end();
+  return result;
+}
+
+/// Fraction of all choices of signs whose sum of positive ranks is at most `sum`.
+double exact_rank_probability(std::size_t count, double sum) {
+  std::vector<double> num_choices(count * (count + 1) / 2 + 1, 0.0);
+  num_choices[0] = 1.0;
+  for (std::size_t rank = 1; rank <= count; ++rank) {
+    for (std::size_t total = num_choices.size() - 1; total >= rank; --total) {
+      num_choices[total] += num_choices[total - rank];
+    }
+  }
+  double num_below = 0.0;
+  for (std::size_t total = 0; static_cast<double>(total) <= sum; ++total) {
+    num_below += num_choices[total];
+  }
+  return std::ldexp(num_below, -static_cast<int>(count));
+}
+
+double rank_p_value(const SignedRanks& ranks) {
+  if (ranks.count == 0) return 1.0;
+  const auto n = static_cast<double>(ranks.count);
+  const double all = 0.5 * n * (n + 1.0);
+  const double smaller = std::min(ranks.positive_sum, all - ranks.positive_sum);
+  if (ranks.count <= num_exact_ranks_max && !ranks.has_equal) {
+    return std::min(2.0 * exact_rank_probability(ranks.count, smaller), 1.0);
+  }
+  // Each rank counts with probability ½: variance Σ rank²/4, equal ones included.
+  const double deviation = std::sqrt(0.25 * ranks.square_sum);
+  return std::min(2.0 * normal_cumulative((smaller - 0.5 * all) / deviation), 1.0);
+}
+
+/// Largest |i/m − j/n| of the distribution functions, times m n: an exact integer.
+std::uint64_t scaled_distance(std::span<const double> first, std::span<const double> second) {
+  const auto m = static_cast<std::int64_t>(first.size());
+  const auto n = static_cast<std::int64_t>(second.size());
+  std::int64_t i = 0;
+  std::int64_t j = 0;
+  std::int64_t largest = 0;
+  while (i < m && j < n) {
+    const double next =
+        std::min(first[static_cast<std::size_t>(i)], second[static_cast<std::size_t>(j)]);
+    while (i < m && first[static_cast<std::size_t>(i)] == next) ++i;
+    while (j < n && second[static_cast<std::size_t>(j)] == next) ++j;
+    largest = std::max(largest, std::abs(i * n - j * m));
+  }
+  return static_cast<std::uint64_t>(largest);
+}
+
+// Probability that a random path of m steps right and n steps up comes so far from the diagonal.
+// The last step to (i, j) was to the right with probability i/(i + j); once out, a path stays
+// counted.
+double exact_law_p_value(std::uint64_t m, std::uint64_t n, std::uint64_t distance) {
+  std::vector<double> is_out(n + 1, 0.0);  // For the current i, at each j.
+  for (std::uint64_t i = 0; i <= m; ++i) {
+    for (std::uint64_t j = 0; j <= n; ++j) {
+      const std::uint64_t apart = i * n > j * m ? i * n - j * m : j * m - i * n;
+      if (apart >= distance) {
+        is_out[j] = 1.0;
+        continue;
+      }
+      const auto steps = static_cast<double>(i + j);
+      double probability = 0.0;
+      if (i > 0) probability += static_cast<double>(i) / steps * is_out[j];
+      if (j > 0) probability += static_cast<double>(j) / steps * is_out[j - 1];
+      is_out[j] = probability;
+    }
+  }
+  return is_out[n];
+}
+
+double law_p_value(std::uint64_t m, std::uint64_t n, std::uint64_t distance) {
+  if (distance == 0) return 1.0;
+  if (m * n <= num_exact_steps_max) return exact_law_p_value(m, n, distance);
+  const double product = static_cast<double>(m) * static_cast<double>(n);
+  const double root = std::sqrt(product / static_cast<double>(m + n));
+  return kolmogorov_upper(root * static_cast<double>(distance) / product);
+}
+
+/// Welch's t with the degrees of freedom of Satterthwaite.
+void compare_means(const Moments& first, const Moments& second, double confidence,
+                   UnpairedComparison& comparison) {
+  const auto squared_error = [](const Moments& one) {
+    return one.standard_deviation * one.standard_deviation / static_cast<double>(one.count);
+  };
+  const double a = squared_error(first);
+  const double b = squared_error(second);
+  comparison.mean_difference = second.mean - first.mean;
+  if (a + b <= 0.0) {
+    comparison.mean_p_value = comparison.mean_difference == 0.0 ? 1.0 : 0.0;
+    return;
+  }
+  const double degrees = (a + b) * (a + b) /
+                         (a * a / (static_cast<double>(first.count) - 1.0) +
+                          b * b / (static_cast<double>(second.count) - 1.0));
+  const double error = std::sqrt(a + b);
+  const double half_width = student_quantile(0.5 + 0.5 * confidence, degrees) * error;
+  comparison.mean_p_value = student_two_sided(comparison.mean_difference / error, degrees);
+  comparison.interval = Interval{comparison.mean_difference - half_width,
+                                 comparison.mean_difference + half_width, confidence};
+}
+
+}  // namespace
+
+PairedComparison compare_paired(std::span<const double> first, std::span<const double> second,
+                                double confidence) {
+  detail::check_same_size("second", second, first);
+  detail::check_values("first", first, 1);
+  detail::check_values("second", second, 1);
+  std::vector<double> differences(first.size());
+  std::ranges::transform(second, first, differences.begin(), std::minus<>());
+  const Moments about = moments(differences);
+  PairedComparison comparison;
+  comparison.num_pairs = first.size();
+  comparison.mean_difference = about.mean;
+  comparison.interval = mean_interval(about, confidence);
+  for (const double difference : differences) {
+    if (difference > 0.0) ++comparison.num_larger;
+    if (difference < 0.0) ++comparison.num_smaller;
+  }
+  comparison.sign_p_value = sign_p_value(comparison.num_larger, comparison.num_smaller);
+  comparison.rank_p_value = rank_p_value(signed_ranks(differences));
+  return comparison;
+}
+
+UnpairedComparison compare_unpaired(std::span<const double> first, std::span<const double> second,
+                                    double confidence) {
+  detail::check_fraction("confidence", confidence);
+  detail::check_values("first", first, 2);
+  detail::check_values("second", second, 2);
+  UnpairedComparison comparison;
+  compare_means(moments(first), moments(second), confidence, comparison);
+  const std::uint64_t distance = scaled_distance(sorted(first), sorted(second));
+  comparison.distance = static_cast<double>(distance) / static_cast<double>(first.size()) /
+                        static_cast<double>(second.size());
+  comparison.law_p_value = law_p_value(first.size(), second.size(), distance);
+  return comparison;
+}
+
+std::vector<double> holm_adjusted(std::span<const double> p_values) {
+  const std::vector<std::size_t> order = ascending_order(p_values);
+  std::vector<double> adjusted(p_values.size());
+  double largest = 0.0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const double scaled = static_cast<double>(order.size() - i) * p_values[order[i]];
+    largest = std::max(largest, std::min(scaled, 1.0));
+    adjusted[order[i]] = largest;
+  }
+  return adjusted;
+}
+
+}  // namespace proofmass

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/statistics/interval.hpp"
+
+namespace proofmass {
+
+/// Two campaigns whose runs are the same draws, run by run; differences are second − first.
+struct PairedComparison {
+  std::size_t num_pairs = 0;
+  double mean_difference = 0.0;
+  std::optional<Interval> interval;  ///< Of the mean difference (Student); empty for one pair.
+  std::size_t num_larger = 0;        ///< Pairs whose second value is larger.
+  std::size_t num_smaller = 0;       ///< Pairs whose second value is smaller.
+  double sign_p_value = 1.0;         ///< Two-sided, exact: larger as often as smaller?
+  /// Wilcoxon's signed-rank test, two-sided, pairs without difference left out: are differences
+  /// symmetric about 0? Exact up to 50 pairs without equal ones, else by the normal law.
+  double rank_p_value = 1.0;
+};
+
+/// @throws InvalidArgument if there is no pair, sizes differ or a value is not finite; confidence
+/// must be in (0, 1).
+[[nodiscard]] PairedComparison compare_paired(std::span<const double> first,
+                                              std::span<const double> second, double confidence);
+
+/// Two campaigns with draws of their own; differences are second − first.
+struct UnpairedComparison {
+  double mean_difference = 0.0;
+  std::optional<Interval> interval;  ///< Of the difference (Welch); empty if neither varies.
+  double mean_p_value = 1.0;         ///< Welch's t, two-sided: are the means equal?
+  double distance = 0.0;             ///< Largest difference of the distribution functions.
+  /// Kolmogorov and Smirnov's test: one law? Exact if the product of both counts is at most
+  /// 4 million, else by the limiting law, which is conservative.
+  double law_p_value = 1.0;
+};
+
+/// @throws InvalidArgument if one has below two values or a value is not finite; confidence must
+/// be in (0, 1).
+[[nodiscard]] UnpairedComparison compare_unpaired(std::span<const double> first,
+                                                  std::span<const double> second,
+                                                  double confidence);
+
+/// P-values such that comparing each with α errs in any of them with probability α at most
+/// [Holm1979]; in the given order.
+[[nodiscard]] std::vector<double> holm_adjusted(std::span<const double> p_values);
+
+}  // namespace proofmass

@@ -1,0 +1,91 @@
+#include "core/statistics/correlation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/math/elementary.hpp"
+#include "core/random/normal.hpp"
+#include "core/statistics/detail/check.hpp"
+#include "core/statistics/order.hpp"
+#include "core/statistics/sum.hpp"
+
+namespace proofmass {
+namespace {
+
+double inverse_tanh(double r) { return 0.5 * logarithm((1.0 + r) / (1.0 - r)); }
+
+double hyperbolic_tangent(double z) {
+  if (std::abs(z) > 20.0) return std::copysign(1.0, z);  // Closer to 1 than a double resolves.
+  const double power = exponential(2.0 * z);
+  return (power - 1.0) / (power + 1.0);
+}
+
+// Central sums with d = x − c, each corrected for what the rounded mean c lacks (see moments.hpp).
+std::optional<double> coefficient_of(std::span<const double> x, std::span<const double> y) {
+  const auto n = static_cast<double>(x.size());
+  const double x_centre = compensated_sum(x) / n;
+  const double y_centre = compensated_sum(y) / n;
+  CompensatedSum sum_x, sum_y, sum_xx, sum_yy, sum_xy;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double dx = x[i] - x_centre;
+    const double dy = y[i] - y_centre;
+    sum_x.add(dx);
+    sum_y.add(dy);
+    sum_xx.add(dx * dx);
+    sum_yy.add(dy * dy);
+    sum_xy.add(dx * dy);
+  }
+  const double xx = sum_xx.value() - sum_x.value() * sum_x.value() / n;
+  const double yy = sum_yy.value() - sum_y.value() * sum_y.value() / n;
+  const double xy = sum_xy.value() - sum_x.value() * sum_y.value() / n;
+  if (xx <= 0.0 || yy <= 0.0) return std::nullopt;
+  return std::clamp(xy / std::sqrt(xx) / std::sqrt(yy), -1.0, 1.0);
+}
+
+Correlation with_interval(double r, double standard_error, double confidence) {
+  if (std::abs(r) == 1.0) return {r, {r, r, confidence}};
+  const double half_width = inverse_normal(0.5 + 0.5 * confidence) * standard_error;
+  const double z = inverse_tanh(r);
+  return {.coefficient = r,
+          .interval = {hyperbolic_tangent(z - half_width), hyperbolic_tangent(z + half_width),
+                       confidence}};
+}
+
+void check_columns(std::span<const double> x, std::span<const double> y, double confidence) {
+  detail::check_fraction("confidence", confidence);
+  detail::check_same_size("y", y, x);
+  detail::check_values("x", x, 0);
+  detail::check_values("y", y, 0);
+}
+
+}  // namespace
+
+std::optional<Correlation> linear_correlation(std::span<const double> x, std::span<const double> y,
+                                              double confidence) {
+  check_columns(x, y, confidence);
+  if (x.size() < 4) return std::nullopt;
+  const std::optional<double> r = coefficient_of(x, y);
+  if (!r) return std::nullopt;
+  return with_interval(*r, 1.0 / std::sqrt(static_cast<double>(x.size()) - 3.0), confidence);
+}
+
+std::optional<Correlation> rank_correlation(std::span<const double> x, std::span<const double> y,
+                                            double confidence) {
+  check_columns(x, y, confidence);
+  if (x.size() < 4) return std::nullopt;
+  return correlation_of_ranks(average_ranks(x), average_ranks(y), confidence);
+}
+
+std::optional<Correlation> correlation_of_ranks(std::span<const double> x_ranks,
+                                                std::span<const double> y_ranks,
+                                                double confidence) {
+  check_columns(x_ranks, y_ranks, confidence);
+  if (x_ranks.size() < 4) return std::nullopt;
+  const std::optional<double> r = coefficient_of(x_ranks, y_ranks);
+  if (!r) return std::nullopt;
+  const double variance = (1.0 + 0.5 * *r * *r) / (static_cast<double>(x_ranks.size()) - 3.0);
+  return with_interval(*r, std::sqrt(variance), confidence);
+}
+
+}  // namespace proofmass

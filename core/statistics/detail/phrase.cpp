@@ -1,0 +1,88 @@
+#include "core/statistics/detail/phrase.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <string>
+
+#include "core/error.hpp"
+
+namespace proofmass::detail {
+namespace {
+
+bool is_word_part(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+}
+
+std::string_view without_blanks_in_front(std::string_view text) {
+  return text.substr(std::min(text.find_first_not_of(" \t"), text.size()));
+}
+
+std::string parameter_names() {
+  std::string names;
+  for (const ParameterInfo& info : parameter_infos()) {
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", info.name);
+  }
+  return names;
+}
+
+}  // namespace
+
+Phrase::Phrase(std::string_view field, std::string_view text, std::string_view form)
+    : field_(field), text_(text), form_(form), rest_(without_blanks_in_front(text)) {}
+
+std::string_view Phrase::word() {
+  const auto end = std::ranges::find_if_not(rest_, is_word_part);
+  const std::string_view word(rest_.begin(), end);
+  if (word.empty()) refuse_form();
+  rest_ = without_blanks_in_front(rest_.substr(word.size()));
+  return word;
+}
+
+Parameter Phrase::parameter() {
+  const std::string_view name = word();
+  for (const ParameterInfo& info : parameter_infos()) {
+    if (info.name == name) return info.parameter;
+  }
+  refuse(fmt::format("{} is no parameter; they are {}", name, parameter_names()));
+}
+
+double Phrase::positive_number() {
+  const std::string_view before = rest_;
+  const double value = number();
+  if (std::isfinite(value) && value > 0.0) return value;
+  refuse(fmt::format("{} must be finite and > 0",
+                     before.substr(0, static_cast<std::size_t>(before.find_first_of(" \t")))));
+}
+
+double Phrase::percentage() {
+  const double percent = number();
+  expect("%");
+  if (percent > 0.0 && percent < 100.0) return percent / 100.0;
+  refuse(fmt::format("{}% must be above 0% and below 100%", percent));
+}
+
+void Phrase::expect(std::string_view literal) {
+  if (!rest_.starts_with(literal)) refuse_form();
+  rest_ = without_blanks_in_front(rest_.substr(literal.size()));
+}
+
+void Phrase::expect_end() {
+  if (!rest_.empty()) refuse_form();
+}
+
+void Phrase::refuse(std::string_view rule) const { throw ConfigError(field_, text_, rule); }
+
+double Phrase::number() {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
+  if (error != std::errc()) refuse_form();
+  rest_ = without_blanks_in_front(rest_.substr(static_cast<std::size_t>(end - rest_.data())));
+  return value;
+}
+
+void Phrase::refuse_form() const { refuse(fmt::format("must read \"{}\"", form_)); }
+
+}  // namespace proofmass::detail

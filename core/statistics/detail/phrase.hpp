@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string_view>
+
+#include "core/campaign/parameter.hpp"
+
+namespace proofmass::detail {
+
+/// Reads a phrase that a user typed, such as `a_c12 < 9e-4 for 99% with 95%`, from left to right.
+/// Blanks may stand between any two parts.
+///
+/// Each reader throws ConfigError, `field = phrase (rule)`, if something else follows.
+class Phrase {
+ public:
+  /// @param form  How the whole phrase must read, for messages.
+  /// All three must outlive the object.
+  Phrase(std::string_view field, std::string_view text, std::string_view form);
+
+  /// Letters, digits and underscores.
+  [[nodiscard]] std::string_view word();
+  /// The name of a parameter.
+  [[nodiscard]] Parameter parameter();
+  /// A finite number > 0.
+  [[nodiscard]] double positive_number();
+  /// A number and `%`, as a fraction in (0, 1).
+  [[nodiscard]] double percentage();
+  /// This very text.
+  void expect(std::string_view literal);
+  void expect_end();
+
+  [[noreturn]] void refuse(std::string_view rule) const;
+
+ private:
+  [[nodiscard]] double number();
+  [[noreturn]] void refuse_form() const;
+
+  std::string_view field_, text_, form_;
+  std::string_view rest_;  ///< What is not yet read, without blanks in front.
+};
+
+}  // namespace proofmass::detail

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "core/statistics/moments.hpp"
+
+namespace proofmass {
+
+/// Contains the true value with probability `confidence`, the rest split evenly on both sides.
+struct Interval {
+  double lower = 0.0;
+  double upper = 0.0;
+  double confidence = 0.0;  ///< In (0, 1).
+};
+
+/// The confidence of every interval that a user did not choose.
+inline constexpr double default_confidence = 0.95;
+
+/// Of the mean, by Student's law: exact for normal values, close for others from some 100 on.
+/// Empty below two values.
+/// @throws InvalidArgument unless 0 < confidence < 1; so do all below.
+[[nodiscard]] std::optional<Interval> mean_interval(const Moments& moments, double confidence);
+
+/// Of the standard deviation, by the chi-square law: exact for normal values and wrong for any
+/// others, at any count; bootstrap_deviation_interval() serves those. Empty below two values.
+[[nodiscard]] std::optional<Interval> normal_deviation_interval(const Moments& moments,
+                                                                double confidence);
+
+/// Of a percentile, by order statistics, for any continuous law. Neighbouring order statistics are
+/// interpolated [Nyblom1992], so that the coverage is near `confidence` and not above it by up to
+/// the probability of one more value. Empty if no order statistic is a bound: the 99th percentile
+/// needs 368 values for 95 %.
+///
+/// @param ascending  From sorted().
+/// @param level      In (0, 1).
+[[nodiscard]] std::optional<Interval> percentile_interval(std::span<const double> ascending,
+                                                          double level, double confidence);
+
+/// Of a probability, from `num_hits` events in `num_runs` > 0: exact and conservative
+/// (Clopper-Pearson).
+[[nodiscard]] Interval probability_interval(double num_hits, double num_runs, double confidence);
+
+}  // namespace proofmass

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace proofmass {
+
+/// A value and its place among the others, from 0.
+struct Extreme {
+  double value = 0.0;
+  std::size_t index = 0;  ///< The first place that has the value.
+};
+
+struct Extremes {
+  Extreme smallest;
+  Extreme largest;
+};
+
+/// @throws InvalidArgument if there is no value or one is not finite.
+[[nodiscard]] Extremes extremes(std::span<const double> values);
+
+/// The values in ascending order.
+/// @throws InvalidArgument if there is no value or one is not finite.
+[[nodiscard]] std::vector<double> sorted(std::span<const double> values);
+
+/// Percentile by linear interpolation between x₍₁₊₍ₙ₋₁₎ₚ₎'s neighbours: definition 7 of
+/// [HyndmanFan1996], the default of numpy and R.
+///
+/// @param ascending  From sorted().
+/// @param level      In [0, 1]: 0.95 for the 95th percentile.
+/// @throws InvalidArgument if there is no value or the level is outside.
+[[nodiscard]] double percentile(std::span<const double> ascending, double level);
+
+/// Positions of the values in ascending order; equal values keep their order.
+[[nodiscard]] std::vector<std::size_t> ascending_order(std::span<const double> values);
+
+/// Rank of each value, from 1; equal values share the average of their ranks.
+[[nodiscard]] std::vector<double> average_ranks(std::span<const double> values);
+
+}  // namespace proofmass

@@ -1,0 +1,139 @@
+#include "core/statistics/requirement.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "core/error.hpp"
+#include "core/statistics/distribution.hpp"
+#include "tests/core/statistics/columns.hpp"
+
+namespace proofmass {
+namespace {
+
+const Requirement a_c12_99_95{Parameter::a_c12, 9e-4, {0.99, 0.95}};
+
+/// So many errors below the limit of 9e-4, then so many on it.
+std::vector<double> errors_with(std::size_t num_below, std::size_t num_on_limit) {
+  std::vector<double> errors(num_below, 1e-4);
+  errors.insert(errors.end(), num_on_limit, 9e-4);
+  return errors;
+}
+
+std::string refusal(std::string_view text) {
+  return test::message_of<ConfigError>([&] { (void)parse_requirement(text); });
+}
+
+TEST(ParseRequirement, ReadsEveryPart) {
+  const Requirement requirement = parse_requirement("a_c12 < 9e-4 for 99% with 95%");
+  EXPECT_EQ(requirement.parameter, Parameter::a_c12);
+  EXPECT_EQ(requirement.limit, 9e-4);
+  EXPECT_EQ(requirement.tolerance.coverage, 0.99);
+  EXPECT_EQ(requirement.tolerance.confidence, 0.95);
+}
+
+TEST(ParseRequirement, TakesBlanksAsTheyCome) {
+  const Requirement requirement = parse_requirement("  k2d<1000 for 99.9 %  with 90% ");
+  EXPECT_EQ(requirement.parameter, Parameter::k2d);
+  EXPECT_EQ(requirement.limit, 1000.0);
+  EXPECT_DOUBLE_EQ(requirement.tolerance.coverage, 0.999);
+}
+
+TEST(ParseRequirement, RefusesAnotherForm) {
+  const std::string rule = " (must read \"PARAMETER < LIMIT for COVERAGE% with CONFIDENCE%\")";
+  for (const std::string text :
+       {"", "a_c12", "a_c12 > 1 for 9% with 9%", "a_c12 < x for 9% with 9%",
+        "a_c12 < 1 for 9 with 9%", "a_c12 < 1 for 9%", "a_c12 < 1 for 9% with 9% or so"}) {
+    EXPECT_EQ(refusal(text), "requirement = " + text + rule);
+  }
+}
+
+TEST(ParseRequirement, RefusesAnUnknownParameter) {
+  EXPECT_EQ(refusal("a_c14 < 1 for 9% with 9%"),
+            "requirement = a_c14 < 1 for 9% with 9% (a_c14 is no parameter; they are "
+            "a_c11_delta_x, a_c11_delta_z, a_c11_delta_y, a_c12, a_c13, a_d11_prime, a_d12, "
+            "a_d13, k2d, k2c)");
+}
+
+TEST(ParseRequirement, RefusesNumbersOutsideTheirRange) {
+  EXPECT_EQ(refusal("k2c < -1 for 9% with 9%"),
+            "requirement = k2c < -1 for 9% with 9% (-1 must be finite and > 0)");
+  EXPECT_EQ(refusal("k2c < inf for 9% with 9%"),
+            "requirement = k2c < inf for 9% with 9% (inf must be finite and > 0)");
+  EXPECT_EQ(refusal("k2c < 1 for 100% with 9%"),
+            "requirement = k2c < 1 for 100% with 9% (100% must be above 0% and below 100%)");
+}
+
+// 0.99²⁹⁹ = 0.0495: 299 runs without an exceedance show it, 298 do not.
+TEST(CheckRequirement, IsMetWithEnoughRunsBelowTheLimit) {
+  const RequirementCheck check = check_requirement(a_c12_99_95, errors_with(299, 0), 0);
+  EXPECT_EQ(check.verdict, Verdict::met);
+  EXPECT_EQ(check.num_runs, 299u);
+  EXPECT_EQ(check.num_exceedances, 0u);
+  EXPECT_EQ(check.num_allowed, 0u);
+  EXPECT_EQ(check.bound->value, 1e-4);
+  EXPECT_FALSE(check.num_runs_at_best.has_value());
+}
+
+TEST(CheckRequirement, IsUndecidedWithOneRunLess) {
+  const RequirementCheck check = check_requirement(a_c12_99_95, errors_with(298, 0), 0);
+  EXPECT_EQ(check.verdict, Verdict::undecided);
+  EXPECT_FALSE(check.bound.has_value());
+  EXPECT_EQ(check.num_runs_at_best, 299u);
+  EXPECT_EQ(check.num_runs_at_this_rate, 299u);
+}
+
+// One exceedance allows no verdict before 473 runs (second order).
+TEST(CheckRequirement, SaysHowManyRunsItTakesAfterAnExceedance) {
+  const RequirementCheck check = check_requirement(a_c12_99_95, errors_with(299, 1), 0);
+  EXPECT_EQ(check.verdict, Verdict::undecided);
+  EXPECT_EQ(check.num_exceedances, 1u);  // On the limit exceeds it.
+  EXPECT_EQ(check.num_runs_at_best, 473u);
+  // At one of 300 the number is the first n that P(Bin(n, 0.01) ≤ n/300) ≤ 5 % holds for.
+  const auto n = static_cast<double>(*check.num_runs_at_this_rate);
+  EXPECT_LE(binomial_at_most(n / 300.0, n, 0.01), 0.05);
+  EXPECT_GT(binomial_at_most((n - 1.0) / 300.0, n - 1.0, 0.01), 0.05);
+}
+
+// P(Bin(100, 0.01) ≥ 3) = 7.9 %, ≥ 4: 1.8 %.
+TEST(CheckRequirement, IsNotMetOnceTooManyExceed) {
+  EXPECT_EQ(check_requirement(a_c12_99_95, errors_with(97, 3), 0).verdict, Verdict::undecided);
+  EXPECT_EQ(check_requirement(a_c12_99_95, errors_with(96, 4), 0).verdict, Verdict::not_met);
+}
+
+TEST(CheckRequirement, CountsRunsWithoutEstimateAsExceedances) {
+  const RequirementCheck check = check_requirement(a_c12_99_95, errors_with(96, 1), 3);
+  EXPECT_EQ(check.verdict, Verdict::not_met);
+  EXPECT_EQ(check.num_runs, 100u);
+  EXPECT_EQ(check.num_exceedances, 4u);
+}
+
+// As often as allowed: no number of runs decides.
+TEST(CheckRequirement, KnowsWhenNoNumberOfRunsDecides) {
+  const RequirementCheck check = check_requirement(a_c12_99_95, errors_with(99, 1), 0);
+  EXPECT_EQ(check.verdict, Verdict::undecided);
+  EXPECT_FALSE(check.num_runs_at_this_rate.has_value());
+  EXPECT_EQ(check.num_runs_at_best, 473u);
+}
+
+TEST(CheckRequirement, OfNoRunsSaysHowManyItTakes) {
+  const RequirementCheck check = check_requirement(a_c12_99_95, {}, 0);
+  EXPECT_EQ(check.verdict, Verdict::undecided);
+  EXPECT_FALSE(check.exceedance.has_value());
+  EXPECT_EQ(check.num_runs_at_best, 299u);
+}
+
+// The verdict and the tolerance bound are two ways to say the same.
+TEST(CheckRequirement, IsMetIfAndOnlyIfTheBoundIsBelowTheLimit) {
+  const std::vector<double> errors = test::half_normal_column(700, {.seed = 31});
+  for (double limit = 1.0; limit < 3.5; limit += 0.01) {
+    const Requirement requirement{Parameter::k2c, limit, {0.95, 0.9}};
+    const RequirementCheck check = check_requirement(requirement, errors, 5);
+    EXPECT_EQ(check.verdict == Verdict::met, check.bound->value < limit) << limit;
+    EXPECT_EQ(check.verdict == Verdict::met, check.num_exceedances <= check.num_allowed) << limit;
+  }
+}
+
+}  // namespace
+}  // namespace proofmass

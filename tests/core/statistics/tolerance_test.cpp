@@ -1,0 +1,88 @@
+#include "core/statistics/tolerance.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "core/error.hpp"
+#include "tests/core/statistics/columns.hpp"
+
+namespace proofmass {
+namespace {
+
+struct PublishedRuns {
+  double coverage, confidence;
+  std::vector<std::uint64_t> num_runs;  ///< For orders 1, 2, 3 ...
+};
+
+// Tables for one-sided limits: [Wilks1941] and its use in reactor safety (59, 93, 124 and on).
+TEST(WilksNumRuns, AreThePublishedOnes) {
+  const std::vector<PublishedRuns> table{
+      {0.95, 0.95, {59, 93, 124, 153, 181, 208, 234, 260, 286, 311}},
+      {0.95, 0.99, {90, 130, 165, 198, 229}},
+      {0.90, 0.95, {29, 46, 61, 76, 89, 103}},
+      {0.99, 0.95, {299, 473, 628, 773, 913}},
+      {0.99, 0.99, {459, 662, 838}}};
+  for (const PublishedRuns& row : table) {
+    for (std::size_t i = 0; i < row.num_runs.size(); ++i) {
+      EXPECT_EQ(wilks_num_runs({row.coverage, row.confidence}, i + 1), row.num_runs[i])
+          << row.coverage << "/" << row.confidence << " order " << i + 1;
+    }
+  }
+}
+
+TEST(WilksOrder, IsTheInverse) {
+  const Tolerance tolerance{0.95, 0.95};
+  EXPECT_EQ(wilks_order(tolerance, 0), 0u);
+  EXPECT_EQ(wilks_order(tolerance, 58), 0u);
+  EXPECT_EQ(wilks_order(tolerance, 59), 1u);
+  EXPECT_EQ(wilks_order(tolerance, 123), 2u);
+  EXPECT_EQ(wilks_order(tolerance, 124), 3u);
+}
+
+// A million runs against 99.9 %: 1000 are expected above, less 1.645 deviations of 31.6.
+TEST(WilksOrder, OfAMillionRunsIsThatOfTheNormalLaw) {
+  EXPECT_NEAR(static_cast<double>(wilks_order({0.999, 0.95}, 1'000'000)), 1000.0 - 52.0, 2.0);
+}
+
+TEST(WilksNumRuns, AreEmptyBeyondTheLargestCampaign) {
+  EXPECT_FALSE(wilks_num_runs({1.0 - 1e-9, 0.95}, 1).has_value());
+}
+
+TEST(WilksUpper, NamesTheValueItsOrderAndItsPlace) {
+  std::vector<double> values(124);
+  for (std::size_t i = 0; i < values.size(); ++i) values[(i * 7) % 124] = static_cast<double>(i);
+  const auto bound = wilks_upper(values, {0.95, 0.95});
+  EXPECT_EQ(bound->value, 121.0);  // The third of 123, 122, 121.
+  EXPECT_EQ(bound->order, 3u);
+  EXPECT_EQ(bound->index, (121 * 7) % 124u);
+}
+
+TEST(WilksUpper, CountsUnknownValuesAsTheLargest) {
+  const std::vector<double> values = test::uniform_column(122, {.seed = 4});
+  std::vector<double> with_largest = values;
+  with_largest.insert(with_largest.end(), {7.0, 7.0});
+  EXPECT_EQ(wilks_upper(values, {0.95, 0.95}, 2)->value,
+            wilks_upper(with_largest, {0.95, 0.95})->value);
+  EXPECT_FALSE(wilks_upper(values, {0.95, 0.95}, 6).has_value());
+}
+
+TEST(WilksUpper, IsEmptyWithTooFewValues) {
+  EXPECT_FALSE(wilks_upper(std::vector<double>(58, 1.0), {0.95, 0.95}).has_value());
+  EXPECT_TRUE(wilks_upper(std::vector<double>(59, 1.0), {0.95, 0.95}).has_value());
+}
+
+TEST(Tolerance, RefusesFractionsOutsideTheirRange) {
+  EXPECT_EQ(test::message_of<InvalidArgument>([] {
+              (void)wilks_order({1.0, 0.95}, 10);
+            }),
+            "coverage = 1 (must be in (0, 1))");
+  EXPECT_EQ(test::message_of<InvalidArgument>([] {
+              (void)wilks_num_runs({0.95, 0.0}, 1);
+            }),
+            "confidence = 0 (must be in (0, 1))");
+}
+
+}  // namespace
+}  // namespace proofmass

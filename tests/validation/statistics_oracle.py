@@ -1,0 +1,425 @@
+"""Confirms statistics that statistics_oracle_test.cpp computed, by numpy, scipy and mpmath.
+
+Reads columns and lines `function argument... : value...`, all numbers hexadecimal, computes every
+value anew and compares. Sums over columns are exact here (integers), so that an offset of 1e8 costs
+nothing. Needs the Debian packages python3-scipy and python3-mpmath.
+"""
+
+import math
+import sys
+
+try:
+    import mpmath
+    import numpy as np
+    import scipy.special
+    import scipy.stats
+except ImportError as error:
+    sys.exit(f"statistics_oracle: {error} (install python3-scipy and python3-mpmath)")
+
+mpmath.mp.dps = 40
+
+STATISTIC = 1e-12  # Relative tolerance of statistics of columns.
+LAW = 1e-9         # Of intervals and p-values.
+
+columns = {}
+
+
+# ---- exact sums -----------------------------------------------------------------------------------
+
+
+def integers(values):
+    """The values as integers over one common power of two."""
+    ratios = [float(v).as_integer_ratio() for v in values]
+    denominator = max(d for _, d in ratios)
+    return [n * (denominator // d) for n, d in ratios], denominator
+
+
+def rational(numerator, denominator):
+    return mpmath.mpf(numerator) / mpmath.mpf(denominator)
+
+
+def exact_moments(values):
+    x, unit = integers(values)
+    n = len(x)
+    s1, s2, s3 = sum(x), sum(v * v for v in x), sum(v * v * v for v in x)
+    mean = rational(s1, n * unit)
+    # n² Σ(x − mean)² and n³ Σ(x − mean)³ / n are integers.
+    m2 = rational(n * s2 - s1 * s1, n * n * unit**2)
+    m3 = rational(n * n * s3 - 3 * n * s1 * s2 + 2 * s1**3, n**3 * unit**3)
+    deviation = mpmath.sqrt(m2 * n / (n - 1))
+    rms = mpmath.sqrt(rational(s2, n * unit**2))
+    skewness = mpmath.sqrt(n * (n - 1)) / (n - 2) * m3 / m2**1.5
+    return mean, deviation, rms, skewness
+
+
+def exact_correlation(x, y):
+    x, _ = integers(x)
+    y, _ = integers(y)
+    n = len(x)
+    xy = n * sum(a * b for a, b in zip(x, y)) - sum(x) * sum(y)
+    xx = n * sum(a * a for a in x) - sum(x) ** 2
+    yy = n * sum(b * b for b in y) - sum(y) ** 2
+    return mpmath.mpf(xy) / mpmath.sqrt(mpmath.mpf(xx) * mpmath.mpf(yy))
+
+
+def student_quantile(probability, degrees):
+    """scipy's own is only good to 1e-8; refined by the exact density."""
+    probability, degrees = mpmath.mpf(probability), mpmath.mpf(degrees)
+    start = scipy.stats.t.ppf(float(probability), float(degrees))
+    scale = mpmath.exp(mpmath.loggamma((degrees + 1) / 2) - mpmath.loggamma(degrees / 2))
+    scale /= mpmath.sqrt(degrees * mpmath.pi)
+
+    def density(t):
+        return scale * mpmath.exp(-(degrees + 1) / 2 * mpmath.log1p(t * t / degrees))
+
+    # From the nearer end: ∞ for the tails.
+    side = mpmath.sign(start) or 1
+    tail = min(probability, 1 - probability)
+    for _ in range(3):
+        ends = [abs(start), 2 * abs(start) + 1, 8 * abs(start) + 4, mpmath.inf]
+        start += side * (mpmath.quad(density, ends) - tail) / density(start)
+    return start
+
+
+# ---- functions of one column ----------------------------------------------------------------------
+
+
+def moments(name):
+    return exact_moments(columns[name])
+
+
+def percentile(name, level):
+    return [np.percentile(columns[name], 100.0 * float(level))]
+
+
+def ranks(name):
+    return scipy.stats.rankdata(columns[name])
+
+
+def mean_interval(name, confidence):
+    mean, deviation, _, _ = exact_moments(columns[name])
+    n = len(columns[name])
+    half = student_quantile(0.5 + 0.5 * float(confidence), n - 1) * deviation / math.sqrt(n)
+    return mean - half, mean + half
+
+
+def normal_deviation_interval(name, confidence):
+    deviation = exact_moments(columns[name])[1]
+    degrees = len(columns[name]) - 1
+    tail = 0.5 - 0.5 * float(confidence)
+    upper, lower = scipy.stats.chi2.ppf([tail, 1 - tail], degrees)
+    return deviation * math.sqrt(degrees / lower), deviation * math.sqrt(degrees / upper)
+
+
+def lower_bound(ascending, level, confidence):
+    """One-sided interpolated order statistic, Nyblom 1992; None if there is none."""
+    n = len(ascending)
+    holds = [r for r in range(1, n + 1) if scipy.stats.binom.sf(r - 1, n, level) >= confidence]
+    if not holds:
+        return None
+    r = max(holds)
+    high = scipy.stats.binom.sf(r - 1, n, level)
+    low = scipy.stats.binom.sf(r, n, level)
+    if r == n:
+        return ascending[-1]
+    ratio = r * (1 - level) * (confidence - low) / ((n - r) * level * (high - confidence))
+    weight = 1 / (1 + ratio)
+    return (1 - weight) * ascending[r - 1] + weight * ascending[r]
+
+
+def percentile_interval(name, level, confidence):
+    ascending = np.sort(columns[name])
+    one_sided = 0.5 + 0.5 * float(confidence)
+    if len(ascending) > 2000:  # The search above is linear; large columns are shifted copies.
+        return None
+    lower = lower_bound(ascending, float(level), one_sided)
+    upper = lower_bound(-ascending[::-1], 1 - float(level), one_sided)
+    return [] if lower is None or upper is None else [lower, -upper]
+
+
+def philox(counter, key):
+    """Philox4x32-10 of Salmon et al. 2011; four arrays of 32-bit words in 64 bits."""
+    low = np.uint64(0xFFFFFFFF)
+    c = [np.asarray(word, dtype=np.uint64) for word in counter]
+    k = [key & 0xFFFFFFFF, key >> 32]
+    for _ in range(10):
+        a = np.uint64(0xD2511F53) * c[0]
+        b = np.uint64(0xCD9E8D57) * c[2]
+        c = [(b >> np.uint64(32)) ^ c[1] ^ np.uint64(k[0]), b & low,
+             (a >> np.uint64(32)) ^ c[3] ^ np.uint64(k[1]), a & low]
+        k = [(k[0] + 0x9E3779B9) & 0xFFFFFFFF, (k[1] + 0xBB67AE85) & 0xFFFFFFFF]
+    return c
+
+
+def stream_id(name):
+    value = 0x811C9DC5
+    for byte in name.encode():
+        value = ((value ^ byte) * 0x01000193) & 0xFFFFFFFF
+    return value
+
+
+def resample_choices(num_resamples, num_groups):
+    resample, block = np.meshgrid(np.arange(num_resamples), np.arange((num_groups + 3) // 4),
+                                  indexing="ij")
+    words = philox([block, np.full_like(block, stream_id("statistics/bootstrap")), resample,
+                    np.zeros_like(block)], 1987)
+    words = np.stack(words, axis=-1).reshape(num_resamples, -1)[:, :num_groups]
+    return ((words * np.uint64(num_groups)) >> np.uint64(32)).astype(np.int64)
+
+
+def bootstrap_deviation_interval(name, confidence):
+    """BCa interval, Efron 1987 and 1993 (14.10) to (14.15)."""
+    values = columns[name]
+    n = len(values)
+    num_groups = min(n, 1024)
+    difference = values - float(exact_moments(values)[0])
+    edges = [g * n // num_groups for g in range(num_groups + 1)]
+    parts = [difference[a:b] for a, b in zip(edges, edges[1:])]
+    sums = np.array([[len(p), p.sum(), (p * p).sum()] for p in parts])
+
+    def deviation(s):
+        return np.sqrt((s[..., 2] - s[..., 1] ** 2 / s[..., 0]) / (s[..., 0] - 1))
+
+    total = sums.sum(axis=0)
+    estimate = deviation(total)
+    resamples = deviation(sums[resample_choices(1000, num_groups)].sum(axis=1))
+    bias = scipy.stats.norm.ppf(np.mean(resamples < estimate))
+    left_out = deviation(total - sums)
+    spread = left_out.mean() - left_out
+    rate = (spread**3).sum() / (6 * (spread**2).sum() ** 1.5)
+    tail = 0.5 - 0.5 * float(confidence)
+    shifted = bias + scipy.stats.norm.ppf([tail, 1 - tail])
+    return np.quantile(resamples, scipy.stats.norm.cdf(bias + shifted / (1 - rate * shifted)))
+
+
+# ---- functions of two columns ---------------------------------------------------------------------
+
+
+def with_interval(r, variance, confidence):
+    half = scipy.stats.norm.ppf(0.5 + 0.5 * float(confidence)) * math.sqrt(variance)
+    z = mpmath.atanh(r)
+    return r, mpmath.tanh(z - half), mpmath.tanh(z + half)
+
+
+def linear_correlation(x, y, confidence):
+    r = exact_correlation(columns[x], columns[y])
+    return with_interval(r, 1 / (len(columns[x]) - 3), confidence)
+
+
+def rank_correlation(x, y, confidence):
+    r = exact_correlation(ranks(x), ranks(y))
+    return with_interval(r, (1 + float(r) ** 2 / 2) / (len(columns[x]) - 3), confidence)
+
+
+def first_order_index(x, y):
+    order = np.argsort(columns[x], kind="stable")
+    # Central values of a column with an offset must come from the exact mean.
+    mean = exact_moments(columns[y])[0]
+    y = np.array([float(mpmath.mpf(float(v)) - mean) for v in columns[y]])[order]
+    n = len(y)
+    bins = min(max(math.isqrt(n) // 2, 4), 64)
+    edges = [b * n // bins for b in range(bins + 1)]
+    residuals = np.concatenate([y[a:b] - y[a:b].mean() for a, b in zip(edges, edges[1:])])
+    within = (residuals**2).sum() / (n - bins)
+    variance = (y**2).sum() / (n - 1)
+    index = 1 - within / variance
+    influence = ((1 - index) * y**2 - residuals**2) / variance
+    error = math.sqrt((influence**2).sum() / n**2 + 2 * (bins - 1) * (1 - index) ** 2 / n**2)
+    f = scipy.stats.f.ppf(0.95, bins - 1, n - bins)
+    between = (bins - 1) * f / (n - bins)  # Of the sum of squares within.
+    noise = 1 - (1 / (n - bins)) / ((1 + between) / (n - 1))
+    return index, error, noise, bins
+
+
+def compare_paired(a, b, confidence):
+    difference = columns[b] - columns[a]
+    n = len(difference)
+    mean, deviation, _, _ = exact_moments(difference)
+    half = student_quantile(0.5 + 0.5 * float(confidence), n - 1) * deviation / math.sqrt(n)
+    larger, smaller = int((difference > 0).sum()), int((difference < 0).sum())
+    sign = scipy.stats.binomtest(larger, larger + smaller).pvalue
+    kept = difference[difference != 0]
+    is_exact = len(kept) <= 50 and len(set(abs(kept))) == len(kept)
+    rank = scipy.stats.wilcoxon(kept, mode="exact" if is_exact else "approx", correction=False)
+    return mean, mean - half, mean + half, sign, rank.pvalue
+
+
+def compare_unpaired(a, b, confidence):
+    first, second = columns[a], columns[b]
+    welch = scipy.stats.ttest_ind(second, first, equal_var=False)
+    m, s = zip(*[exact_moments(c)[:2] for c in (first, second)])
+    e = [float(deviation) ** 2 / len(c) for deviation, c in zip(s, (first, second))]
+    degrees = sum(e) ** 2 / (e[0] ** 2 / (len(first) - 1) + e[1] ** 2 / (len(second) - 1))
+    half = student_quantile(0.5 + 0.5 * float(confidence), degrees) * math.sqrt(sum(e))
+    law = scipy.stats.ks_2samp(first, second, mode="exact")
+    difference = m[1] - m[0]
+    return (difference, difference - half, difference + half, welch.pvalue, law.statistic,
+            law.pvalue)
+
+
+def holm_adjusted(name):
+    p = columns[name]
+    return [max(min(1.0, (len(p) - i) * q) for i, q in enumerate(sorted(p)) if q <= value)
+            for value in p]
+
+
+# ---- laws -----------------------------------------------------------------------------------------
+
+
+def beta_tails(a, b, x):
+    """Both tails by integrating the density, exact logarithms of Γ."""
+    a, b, x = mpmath.mpf(a), mpmath.mpf(b), mpmath.mpf(float.fromhex(x))
+    if min(a, b) < 1:
+        lower = mpmath.betainc(a, b, 0, x, regularized=True) if max(a, b) < 1e5 else None
+        return None if lower is None else (lower, 1 - lower)
+    scale = mpmath.loggamma(a + b) - mpmath.loggamma(a) - mpmath.loggamma(b)
+
+    def log_density(t):
+        return scale + (a - 1) * mpmath.log(t) + (b - 1) * mpmath.log1p(-t)
+
+    unit = log_density(x)  # Integrals are accurate relative to 1, tails must be to themselves.
+
+    def density(t):
+        return mpmath.exp(log_density(t) - unit)
+
+    mean = a / (a + b)
+    deviation = mpmath.sqrt(mean * (1 - mean) / (a + b + 1))
+    points = [mean + k * deviation for k in range(-40, 41, 2)]
+    points = [mpmath.mpf(0)] + [p for p in points if 0 < p < 1] + [mpmath.mpf(1)]
+    lower = mpmath.quad(density, [p for p in points if p < x] + [x])
+    upper = mpmath.quad(density, [x] + [p for p in points if p > x])
+    return lower * mpmath.exp(unit), upper * mpmath.exp(unit)
+
+
+def gamma_tails(a, x):
+    a, x = mpmath.mpf(a), mpmath.mpf(float.fromhex(x))
+    if a > 1e5:
+        return None
+    return (mpmath.gammainc(a, 0, x, regularized=True),
+            mpmath.gammainc(a, x, mpmath.inf, regularized=True))
+
+
+def wilks_num_runs(coverage, confidence, order):
+    n = int(order)
+    while scipy.stats.binom.cdf(int(order) - 1, n, 1 - float(coverage)) > 1 - float(confidence):
+        n += 1
+    return [n]
+
+
+def wilks_upper(name, coverage, confidence):
+    values = columns[name]
+    n = len(values)
+    orders = [k + 1 for k in range(n)
+              if scipy.stats.binom.cdf(k, n, 1 - float(coverage)) <= 1 - float(confidence)]
+    value = np.sort(values)[n - max(orders)]
+    return value, max(orders), list(values).index(value)
+
+
+def binomial(k, n, p):
+    law = scipy.stats.binom(int(n), float(p))
+    return law.cdf(float(k)), law.sf(float(k) - 1)
+
+
+def fisher_quantile(probability, numerator, denominator):
+    """By the exact incomplete beta function, from scipy's quantile."""
+    a, b = mpmath.mpf(numerator) / 2, mpmath.mpf(denominator) / 2
+    start = scipy.stats.f.ppf(probability, numerator, denominator)
+    if denominator > 1e4:
+        return start
+
+    def excess(f):
+        x = numerator * f / (numerator * f + denominator)
+        return mpmath.betainc(a, b, 0, x, regularized=True) - mpmath.mpf(probability)
+
+    return mpmath.findroot(excess, start)
+
+
+def of_numbers(function):
+    return lambda *arguments: [function(*(float(a) for a in arguments))]
+
+
+# ---- comparison -----------------------------------------------------------------------------------
+
+CHECKS = {  # function: (values, relative tolerance)
+    "moments": (moments, STATISTIC),
+    "ranks": (ranks, 0.0),
+    "percentile": (percentile, STATISTIC),
+    "mean_interval": (mean_interval, LAW),
+    "normal_deviation_interval": (normal_deviation_interval, LAW),
+    "percentile_interval": (percentile_interval, LAW),
+    "bootstrap_deviation_interval": (bootstrap_deviation_interval, LAW),
+    "linear_correlation": (linear_correlation, LAW),
+    "rank_correlation": (rank_correlation, LAW),
+    "first_order_index": (first_order_index, LAW),
+    "compare_paired": (compare_paired, LAW),
+    "compare_unpaired": (compare_unpaired, LAW),
+    "holm_adjusted": (holm_adjusted, STATISTIC),
+    "student_quantile": (of_numbers(student_quantile), LAW),
+    "student_two_sided": (of_numbers(lambda t, n: 2 * scipy.stats.t.sf(abs(t), n)), LAW),
+    "chi_square_quantile": (of_numbers(scipy.stats.chi2.ppf), LAW),
+    "fisher_quantile": (of_numbers(fisher_quantile), LAW),
+    "beta_quantile": (of_numbers(scipy.stats.beta.ppf), LAW),
+    "normal_cumulative": (of_numbers(scipy.special.ndtr), STATISTIC),
+    "kolmogorov_upper": (of_numbers(scipy.special.kolmogorov), STATISTIC),
+    "binomial": (binomial, LAW),
+    "regularised_beta": (beta_tails, None),
+    "regularised_gamma": (gamma_tails, None),
+    "wilks_num_runs": (wilks_num_runs, 0.0),
+    "wilks_upper": (wilks_upper, 0.0),
+}
+
+
+def tolerance_of_tails(arguments):
+    return 1e-13 if max(float(a) for a in arguments[:-1]) <= 1e4 else 1e-11
+
+
+def difference(value, expected):
+    """Relative to the expected value."""
+    if value == expected or abs(expected) < 1e-300:
+        return abs(value)  if value != expected else 0.0
+    return float(abs((mpmath.mpf(value) - mpmath.mpf(expected)) / mpmath.mpf(expected)))
+
+
+def confirm(line, worst):
+    question, _, numbers = line.partition(" :")
+    function, *arguments = question.split()
+    values = [float.fromhex(number) for number in numbers.split()]
+    compute, tolerance = CHECKS[function]
+    expected = compute(*arguments)
+    if expected is None:
+        return
+    if tolerance is None:
+        tolerance = tolerance_of_tails(arguments)
+    assert len(values) == len(expected), f"{question}: {len(values)} values, not {len(expected)}"
+    for value, other in zip(values, expected):
+        found = difference(value, float(other) if tolerance == 0.0 else other)
+        worst[function] = max(worst.get(function, 0.0), found)
+        assert found <= tolerance, f"{question}: {value!r}, not {other} ({found:.1e} relative)"
+
+
+def main(path):
+    worst = {}
+    failures = []
+    num_confirmed = 0
+    with open(path, encoding="ascii") as lines:
+        for line in lines:
+            if line.startswith("column "):
+                _, name, *numbers = line.split()
+                columns[name] = np.array([float.fromhex(number) for number in numbers])
+                continue
+            try:
+                confirm(line, worst)
+                num_confirmed += 1
+            except AssertionError as error:
+                failures.append(str(error))
+    missing = sorted(set(CHECKS) - set(worst))
+    for function, found in sorted(worst.items()):
+        print(f"{function}: {found:.1e}")
+    if missing:
+        failures.append(f"never asked: {', '.join(missing)}")
+    if failures:
+        sys.exit("\n".join(failures))
+    print(f"{num_confirmed} lines, all confirmed")
+
+
+main(sys.argv[1])
