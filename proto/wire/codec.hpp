@@ -10,8 +10,9 @@
 
 namespace proofmass::wire {
 
-/// Size limits of an encoded message, bytes. Only a Welcome may be as large as the first.
-inline constexpr std::size_t welcome_size_max = std::size_t{64} << 20;
+/// Size limits of an encoded message, bytes. Only a CampaignDefinition may be as large as the
+/// first.
+inline constexpr std::size_t definition_size_max = std::size_t{64} << 20;
 inline constexpr std::size_t message_size_max = std::size_t{4} << 20;
 
 enum class DecodeFault : std::uint8_t {
@@ -30,12 +31,12 @@ struct DecodeError {
 
 /// The bytes of a message.
 /// @throws InvalidArgument if they are more than the message may have.
-[[nodiscard]] std::string encode(const Message& message);
+[[nodiscard]] std::string encode(const Packet& packet);
 
 /// Checks everything: sizes, counts, enumerators, that numbers are finite, that a campaign is
 /// complete and valid. What it returns can be used without further checks of form.
 ///
 /// @param bytes  Anything at all, from anybody.
-[[nodiscard]] std::variant<Message, DecodeError> decode(std::string_view bytes);
+[[nodiscard]] std::variant<Packet, DecodeError> decode(std::string_view bytes);
 
 }  // namespace proofmass::wire

@@ -8,6 +8,21 @@
 namespace proofmass::wire {
 namespace {
 
+template <typename Ranges>
+void write_ranges(const std::vector<RunRange>& ranges, Ranges& messages) {
+  for (const RunRange& range : ranges) {
+    proto::Range& message = *messages.Add();
+    message.set_first(range.first.value);
+    message.set_count(range.count);
+  }
+}
+
+void write_held(const HeldRuns& held, proto::HeldRuns& message) {
+  message.set_campaign(held.campaign.value);
+  message.set_attempt(held.attempt.value);
+  write_ranges(held.ranges, *message.mutable_ranges());
+}
+
 void write(const Hello& hello, proto::Envelope& envelope) {
   proto::Hello& message = *envelope.mutable_hello();
   message.set_worker_name(hello.worker_name);
@@ -15,14 +30,18 @@ void write(const Hello& hello, proto::Envelope& envelope) {
   message.set_process_id(hello.process_id);
   message.set_num_slots(hello.num_slots);
   message.set_model_version(hello.model_version);
+  message.set_build(hello.build);
+  message.set_reference_digest(hello.reference_digest);
+  if (!hello.former) return;
+  message.mutable_former()->set_session(hello.former->session.value);
+  message.mutable_former()->set_reason(static_cast<proto::LossReason>(hello.former->reason));
+  message.mutable_former()->set_signal(hello.former->signal);
 }
 
 void write(const Welcome& welcome, proto::Envelope& envelope) {
-  PROOFMASS_EXPECT(welcome.campaign != nullptr);
   proto::Welcome& message = *envelope.mutable_welcome();
   message.set_worker_id(welcome.worker.value);
   message.set_heartbeat_interval_s(welcome.heartbeat_interval_s);
-  detail::encode_campaign(*welcome.campaign, *message.mutable_campaign());
 }
 
 void write(const Reject& reject, proto::Envelope& envelope) {
@@ -30,17 +49,40 @@ void write(const Reject& reject, proto::Envelope& envelope) {
   envelope.mutable_reject()->set_text(reject.text);
 }
 
-void write(const Credit& credit, proto::Envelope& envelope) {
-  envelope.mutable_credit()->set_num_runs_max(credit.num_runs_max);
+void write(const CampaignRequest& request, proto::Envelope& envelope) {
+  envelope.mutable_campaign_request()->set_campaign(request.campaign.value);
+}
+
+void write(const CampaignDefinition& definition, proto::Envelope& envelope) {
+  PROOFMASS_EXPECT(definition.definition != nullptr);
+  proto::CampaignDefinition& message = *envelope.mutable_campaign_definition();
+  message.set_campaign(definition.campaign.value);
+  detail::encode_campaign(*definition.definition, *message.mutable_definition());
+}
+
+void write(const Forget& forget, proto::Envelope& envelope) {
+  envelope.mutable_forget()->set_campaign(forget.campaign.value);
 }
 
 void write(const RunLease& lease, proto::Envelope& envelope) {
   proto::RunLease& message = *envelope.mutable_run_lease();
-  message.set_lease_id(lease.lease.value);
+  message.set_campaign(lease.campaign.value);
   message.set_first_run(lease.runs.first.value);
   message.set_num_runs(static_cast<std::uint32_t>(lease.runs.count));
   message.set_attempt(lease.attempt.value);
+  message.set_is_alone(lease.is_alone);
   message.mutable_table_values()->Assign(lease.table_values.begin(), lease.table_values.end());
+}
+
+void write(const Retract& retract, proto::Envelope& envelope) {
+  envelope.mutable_retract()->set_campaign(retract.campaign.value);
+  write_ranges(retract.ranges, *envelope.mutable_retract()->mutable_ranges());
+}
+
+void write(const GiveBack& give_back, proto::Envelope& envelope) {
+  proto::GiveBack& message = *envelope.mutable_give_back();
+  message.set_reason(static_cast<proto::LossReason>(give_back.reason));
+  for (const HeldRuns& held : give_back.runs) write_held(held, *message.add_runs());
 }
 
 void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
@@ -60,34 +102,48 @@ void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
 
 void write(const ResultBatch& batch, proto::Envelope& envelope) {
   proto::ResultBatch& message = *envelope.mutable_result_batch();
-  message.set_lease_id(batch.lease.value);
+  message.set_campaign(batch.campaign.value);
   message.set_attempt(batch.attempt.value);
   for (const ComputedRun& computed : batch.results) write_run(computed, *message.add_results());
 }
 
 void write(const ResultAck& ack, proto::Envelope& envelope) {
+  envelope.mutable_result_ack()->set_campaign(ack.campaign.value);
   for (const RunIndex run : ack.runs) envelope.mutable_result_ack()->add_runs(run.value);
 }
 
 void write(const Heartbeat& heartbeat, proto::Envelope& envelope) {
   proto::Heartbeat& message = *envelope.mutable_heartbeat();
+  message.set_num_runs_max(heartbeat.num_runs_max);
   message.set_num_orbits_done(heartbeat.num_orbits_done);
-  for (const LeaseId lease : heartbeat.leases) message.add_lease_ids(lease.value);
+  for (const HeldRuns& held : heartbeat.held) write_held(held, *message.add_held());
+  for (const ComputedBatch& batch : heartbeat.computing) {
+    proto::ComputedBatch& content = *message.add_computing();
+    content.set_campaign(batch.campaign.value);
+    content.set_num_orbits_done(batch.num_orbits_done);
+    write_ranges(batch.ranges, *content.mutable_ranges());
+  }
+}
+
+void write(const Bye& bye, proto::Envelope& envelope) {
+  envelope.mutable_bye()->set_reason(static_cast<proto::LossReason>(bye.reason));
 }
 
 void write(const HeartbeatAck&, proto::Envelope& envelope) { envelope.mutable_heartbeat_ack(); }
-void write(const Bye&, proto::Envelope& envelope) { envelope.mutable_bye(); }
 void write(const Drain&, proto::Envelope& envelope) { envelope.mutable_drain(); }
 void write(const Stop&, proto::Envelope& envelope) { envelope.mutable_stop(); }
 
 }  // namespace
 
-std::string encode(const Message& message) {
+std::string encode(const Packet& packet) {
   proto::Envelope envelope;
   envelope.set_protocol_version(protocol_version);
-  std::visit([&](const auto& content) { write(content, envelope); }, message);
-  const std::size_t size_max =
-      std::holds_alternative<Welcome>(message) ? welcome_size_max : message_size_max;
+  envelope.set_session(packet.header.session.value);
+  envelope.set_epoch(packet.header.epoch.value);
+  envelope.set_sequence(packet.header.sequence);
+  std::visit([&](const auto& content) { write(content, envelope); }, packet.message);
+  const bool is_definition = std::holds_alternative<CampaignDefinition>(packet.message);
+  const std::size_t size_max = is_definition ? definition_size_max : message_size_max;
   if (envelope.ByteSizeLong() > size_max) {
     throw InvalidArgument(fmt::format("message size = {} bytes (must be at most {})",
                                       envelope.ByteSizeLong(), size_max));

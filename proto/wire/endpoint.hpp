@@ -1,16 +1,44 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
 namespace proofmass::wire {
 
-/// Accepts the addresses at which coordinator and worker may meet: `ipc://PATH`,
-/// `tcp://127.0.0.1:PORT` and `tcp://[::1]:PORT`. What they say is not encrypted, so nothing that
-/// another machine could reach is accepted.
+enum class EndpointUse : std::uint8_t { bind, connect };
+
+/// What keeps strangers away from an address.
+enum class Protection : std::uint8_t {
+  none,    ///< Nothing: only this machine may reach it.
+  keys,    ///< Both ends prove who they are, and all is encrypted.
+  waived,  ///< Nothing, and the user knows it: --insecure-plain.
+};
+
+/// Accepts the addresses at which a coordinator can meet its workers and clients:
 ///
-/// @param option  Name of the command-line option that the endpoint comes from, for the message.
+///     ipc://PATH  tcp://127.0.0.1:PORT  tcp://[::1]:PORT           anyhow
+///     tcp://HOST:PORT  tcp://[IPV6]:PORT                           with keys, or waived
+///     tcp://*:PORT  tcp://INTERFACE:PORT                           likewise, to bind
+///
+/// A port to bind may be `*`: the system chooses one.
+///
+/// @param option  Name of the option that the endpoint comes from, for the message.
 /// @throws InvalidArgument reading `option = endpoint (rule)`.
+void check_endpoint(std::string_view option, const std::string& endpoint, EndpointUse use,
+                    Protection protection);
+
+/// To bind, without keys.
 void check_endpoint(std::string_view option, const std::string& endpoint);
+
+/// True if no other machine can reach the address.
+///
+/// @param endpoint  check_endpoint() holds.
+[[nodiscard]] bool is_local(const std::string& endpoint);
+
+/// True if the address may turn out to be one of IPv6.
+///
+/// @param endpoint  check_endpoint() holds.
+[[nodiscard]] bool may_be_ipv6(const std::string& endpoint, EndpointUse use);
 
 }  // namespace proofmass::wire

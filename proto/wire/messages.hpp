@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -16,10 +17,10 @@
 namespace proofmass::wire {
 
 /// Grows with every change that an older peer would misunderstand.
-inline constexpr std::uint32_t protocol_version = 1;
+inline constexpr std::uint32_t protocol_version = 2;
 
-inline constexpr std::uint32_t runs_per_lease_max = 4096;
-inline constexpr std::size_t leases_held_max = 4096;
+inline constexpr std::uint32_t runs_per_lease_max = 4096;  ///< Also of a batch of results.
+inline constexpr std::size_t ranges_per_message_max = 4096;
 inline constexpr std::uint32_t slots_max = 1024;
 
 /// Number of a worker's registration with a coordinator, from 1.
@@ -28,16 +29,71 @@ struct WorkerId {
   auto operator<=>(const WorkerId&) const = default;
 };
 
-/// Number of a lease, unique for a coordinator's lifetime, from 1.
-struct LeaseId {
+/// A worker process, by a random number that it chooses when it starts; not 0. It stays the same
+/// through all connections and registrations of that process.
+struct SessionId {
   std::uint64_t value = 0;
-  auto operator<=>(const LeaseId&) const = default;
+  auto operator<=>(const SessionId&) const = default;
+};
+
+/// A coordinator process, by a random number that it chooses when it starts; 0: none known.
+struct Epoch {
+  std::uint64_t value = 0;
+  auto operator<=>(const Epoch&) const = default;
+};
+
+/// A campaign file, by a random number from when it was made; not 0.
+struct CampaignId {
+  std::uint64_t value = 0;
+  auto operator<=>(const CampaignId&) const = default;
 };
 
 /// How often runs have been lent, this time included; from 1.
 struct Attempt {
   std::uint32_t value = 1;
   auto operator<=>(const Attempt&) const = default;
+};
+
+/// What comes with every message.
+struct Header {
+  SessionId session;  ///< Of the worker that sends or receives the message.
+  Epoch epoch;        ///< Of the coordinator as the sender knows it; none in a Hello.
+  /// Number of the message among those of its sender to this receiver, ascending. Tells which of
+  /// two statements that replace each other is the later one.
+  std::uint64_t sequence = 0;
+
+  auto operator<=>(const Header&) const = default;
+};
+
+/// Runs of one campaign that a worker holds or gives back, under one attempt.
+struct HeldRuns {
+  CampaignId campaign;
+  Attempt attempt;
+  std::vector<RunRange> ranges;  ///< Not empty; each of 1 run or more.
+
+  auto operator<=>(const HeldRuns&) const = default;
+};
+
+/// Why runs came back without a result. The values are stored and sent: never renumber.
+enum class LossReason : std::uint8_t {
+  silent = 1,         ///< The worker was not heard for too long.
+  crashed = 2,        ///< Its process was ended by a signal. Counts against the runs it computed.
+  out_of_memory = 3,  ///< Its process was ended for its use of memory. Counts as well.
+  hung = 4,           ///< No orbit was finished for too long. Counts as well.
+  drained = 5,        ///< The worker was told to leave.
+  walltime = 6,       ///< The worker's time is up.
+  preempted = 7,      ///< The worker was asked to end by a signal.
+  retracted = 8,      ///< The coordinator wanted them back.
+  never_arrived = 9,  ///< The worker does not hold them: a message was lost.
+  protocol = 10,      ///< The worker broke the rules, or lost its permission.
+  failed = 11,        ///< The worker says that it cannot compute.
+};
+
+/// How a worker's process before this one ended, told by its successor.
+struct FormerSession {
+  SessionId session;
+  LossReason reason = LossReason::crashed;  ///< crashed or out_of_memory.
+  std::uint32_t signal = 0;
 };
 
 /// Worker → coordinator: asks to be registered.
@@ -47,23 +103,26 @@ struct Hello {
   std::uint64_t process_id = 0;
   std::uint32_t num_slots = 1;  ///< Runs that it simulates at a time, 1 to slots_max.
   std::string model_version;    ///< is_name() holds.
+  std::string build;            ///< is_name() holds; program version, for people.
+  /// Digest of core's reference simulation, computed by this worker on this processor.
+  std::uint64_t reference_digest = 0;
+  std::optional<FormerSession> former;
 };
 
-/// Coordinator → worker: registered, with no lease yet.
+/// Coordinator → worker: registered; the header's epoch is the coordinator's.
 struct Welcome {
   WorkerId worker;
   double heartbeat_interval_s = 0.0;  ///< > 0.
-  /// Without the `table` values, which come with each lease. Shared by the coordinator's state and
-  /// all messages under way, because an environment table may have millions of numbers.
-  std::shared_ptr<const Campaign> campaign;
 };
 
 /// The values are sent: never renumber.
 enum class RejectReason : std::uint8_t {
   not_registered = 1,  ///< Say Hello (again); the only reason that is not final.
-  incompatible = 2,    ///< Other protocol or model.
+  incompatible = 2,    ///< Other protocol, model or reference digest.
   malformed = 3,       ///< Something that the worker sent broke the rules.
   full = 4,            ///< The coordinator serves as many workers as it can.
+  quarantined = 5,     ///< Too much was lost on this host.
+  revoked = 6,         ///< The worker's key is not on the list any more.
 };
 
 /// Coordinator → worker: not registered, and why.
@@ -72,18 +131,44 @@ struct Reject {
   std::string text;  ///< For people.
 };
 
-/// Worker → coordinator: the most unfinished runs that it wants to hold altogether. Absolute, so
-/// that a lost or repeated one does no harm.
-struct Credit {
-  std::uint32_t num_runs_max = 0;  ///< At most runs_per_lease_max.
+/// Worker → coordinator: asks for the definition of a campaign of which it was lent runs.
+struct CampaignRequest {
+  CampaignId campaign;
+};
+
+/// Coordinator → worker: the answer.
+struct CampaignDefinition {
+  CampaignId campaign;
+  /// Without the `table` values, which come with each lease. Shared by the coordinator's state and
+  /// all messages under way, because an environment table may have millions of numbers.
+  std::shared_ptr<const Campaign> definition;
+};
+
+/// Coordinator → worker: drop all runs and results of a campaign that is not served (any more).
+struct Forget {
+  CampaignId campaign;
 };
 
 /// Coordinator → worker: runs that are lent to it.
 struct RunLease {
-  LeaseId lease;
+  CampaignId campaign;
   RunRange runs;  ///< 1 to runs_per_lease_max of them.
   Attempt attempt;
+  /// The runs may have crashed a worker: compute each in a batch of its own.
+  bool is_alone = false;
   std::vector<double> table_values;  ///< Shape [runs.count, table quantities].
+};
+
+/// Coordinator → worker: give back those of these runs that are not being computed yet.
+struct Retract {
+  CampaignId campaign;
+  std::vector<RunRange> ranges;  ///< 1 to ranges_per_message_max.
+};
+
+/// Worker → coordinator: it holds these runs no more and will send no result.
+struct GiveBack {
+  LossReason reason = LossReason::retracted;
+  std::vector<HeldRuns> runs;  ///< At most ranges_per_message_max ranges altogether; not empty.
 };
 
 /// A result and what it took.
@@ -92,31 +177,58 @@ struct ComputedRun {
   double compute_s = 0.0;  ///< ≥ 0.
 };
 
-/// Worker → coordinator: results of one lease, repeated until acknowledged.
+/// Worker → coordinator: results, repeated until acknowledged.
 struct ResultBatch {
-  LeaseId lease;
+  CampaignId campaign;
   Attempt attempt;
   std::vector<ComputedRun> results;  ///< 1 to runs_per_lease_max.
 };
 
-/// Coordinator → worker: these runs are durably stored.
+/// Coordinator → worker: these results are durably stored and may be forgotten.
 struct ResultAck {
+  CampaignId campaign;
   std::vector<RunIndex> runs;  ///< 1 to runs_per_lease_max.
 };
 
-/// Worker → coordinator: it lives, and this is what it holds.
+/// Runs that one thread of a worker computes together.
+struct ComputedBatch {
+  CampaignId campaign;
+  std::vector<RunRange> ranges;  ///< Not empty.
+  std::uint32_t num_orbits_done = 0;
+
+  auto operator<=>(const ComputedBatch&) const = default;
+};
+
+/// Worker → coordinator: it lives, and this is what it holds and wants. A later one replaces all
+/// earlier ones.
 struct Heartbeat {
+  /// Most unfinished runs that it wants to hold altogether, at most runs_per_lease_max.
+  std::uint32_t num_runs_max = 0;
   std::uint64_t num_orbits_done = 0;  ///< Since the process began.
-  /// Leases of which a run is unfinished or not acknowledged; at most leases_held_max.
-  std::vector<LeaseId> leases;
+  /// Runs that wait, are being computed, or whose result is not acknowledged; at most
+  /// ranges_per_message_max ranges.
+  std::vector<HeldRuns> held;
+  std::vector<ComputedBatch> computing;  ///< At most slots_max.
 };
 
 struct HeartbeatAck {};  ///< Coordinator → worker: the coordinator lives.
-struct Bye {};    ///< Worker → coordinator: it leaves; what it holds may be lent to others.
+
+/// Worker → coordinator: it leaves; what it holds may be lent to others.
+struct Bye {
+  LossReason reason = LossReason::preempted;  ///< drained, walltime, preempted or failed.
+};
+
 struct Drain {};  ///< Coordinator → worker: deliver what you hold, then say Bye and end.
 struct Stop {};   ///< Coordinator → worker: drop what you hold and end.
 
-using Message = std::variant<Hello, Welcome, Reject, Credit, RunLease, ResultBatch, ResultAck,
-                             Heartbeat, HeartbeatAck, Bye, Drain, Stop>;
+using Message = std::variant<Hello, Welcome, Reject, CampaignRequest, CampaignDefinition, Forget,
+                             RunLease, Retract, GiveBack, ResultBatch, ResultAck, Heartbeat,
+                             HeartbeatAck, Bye, Drain, Stop>;
+
+/// A message as it travels.
+struct Packet {
+  Header header;
+  Message message;
+};
 
 }  // namespace proofmass::wire

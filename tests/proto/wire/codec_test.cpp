@@ -15,13 +15,18 @@ namespace {
 
 std::uint64_t bits(double value) { return std::bit_cast<std::uint64_t>(value); }
 
+constexpr Header some_header{
+    .session = {0xffff'ffff'ffff'fff1}, .epoch = {1ULL << 63}, .sequence = 1ULL << 40};
+
 template <typename Content>
 Content round_trip(const Content& content) {
-  const auto decoded = decode(encode(content));
+  const auto decoded = decode(encode({.header = some_header, .message = content}));
   if (const auto* const error = std::get_if<DecodeError>(&decoded)) {
     throw Error("not decoded: " + error->text);
   }
-  return std::get<Content>(std::get<Message>(decoded));
+  const Packet& packet = std::get<Packet>(decoded);
+  EXPECT_EQ(packet.header, some_header);
+  return std::get<Content>(packet.message);
 }
 
 /// Numbers of which text or single precision would lose bits.
@@ -76,27 +81,50 @@ Campaign unusual_campaign() {
   return campaign;
 }
 
+const Hello some_hello{.worker_name = "w-1",
+                       .host = "h",
+                       .process_id = 1ULL << 40,
+                       .num_slots = 2,
+                       .model_version = "m-1",
+                       .build = "1.0",
+                       .reference_digest = 0xdead'beef'0000'0001,
+                       .former = {}};
+
 TEST(Codec, KeepsAHello) {
-  const Hello hello = round_trip(Hello{.worker_name = "w-1",
-                                       .host = "h",
-                                       .process_id = 1ULL << 40,
-                                       .num_slots = 2,
-                                       .model_version = "m-1"});
+  const Hello hello = round_trip(some_hello);
   EXPECT_EQ(hello.worker_name, "w-1");
   EXPECT_EQ(hello.host, "h");
   EXPECT_EQ(hello.process_id, 1ULL << 40);
   EXPECT_EQ(hello.num_slots, 2U);
   EXPECT_EQ(hello.model_version, "m-1");
+  EXPECT_EQ(hello.build, "1.0");
+  EXPECT_EQ(hello.reference_digest, 0xdead'beef'0000'0001);
+  EXPECT_FALSE(hello.former);
+}
+
+TEST(Codec, KeepsHowTheFormerProcessEnded) {
+  Hello hello = some_hello;
+  hello.former = FormerSession{.session = {77}, .reason = LossReason::out_of_memory, .signal = 9};
+  const auto former = round_trip(hello).former;
+  ASSERT_TRUE(former);
+  EXPECT_EQ(former->session, SessionId{77});
+  EXPECT_EQ(former->reason, LossReason::out_of_memory);
+  EXPECT_EQ(former->signal, 9U);
+}
+
+TEST(Codec, KeepsAWelcome) {
+  const Welcome welcome = round_trip(Welcome{.worker = {5}, .heartbeat_interval_s = 0.1});
+  EXPECT_EQ(welcome.worker, WorkerId{5});
+  EXPECT_EQ(bits(welcome.heartbeat_interval_s), bits(0.1));
 }
 
 TEST(Codec, KeepsEveryBitOfACampaign) {
   const auto sent = std::make_shared<const Campaign>(unusual_campaign());
-  const Welcome welcome =
-      round_trip(Welcome{.worker = {5}, .heartbeat_interval_s = 0.1, .campaign = sent});
+  const CampaignDefinition definition =
+      round_trip(CampaignDefinition{.campaign = {6}, .definition = sent});
 
-  EXPECT_EQ(welcome.worker, WorkerId{5});
-  EXPECT_EQ(bits(welcome.heartbeat_interval_s), bits(0.1));
-  const Campaign& got = *welcome.campaign;
+  EXPECT_EQ(definition.campaign, CampaignId{6});
+  const Campaign& got = *definition.definition;
   EXPECT_EQ(got.name, sent->name);
   EXPECT_EQ(got.seed, sent->seed);
   EXPECT_EQ(got.num_runs, sent->num_runs);
@@ -111,11 +139,9 @@ TEST(Codec, KeepsEveryBitOfACampaign) {
 TEST(Codec, LeavesTableColumnsOut) {
   Campaign campaign = unusual_campaign();
   campaign.table_columns = {std::vector<double>(12345, 1e-3)};
-  const Welcome welcome =
-      round_trip(Welcome{.worker = {5},
-                         .heartbeat_interval_s = 1.0,
-                         .campaign = std::make_shared<const Campaign>(campaign)});
-  EXPECT_TRUE(welcome.campaign->table_columns.empty());
+  const CampaignDefinition definition = round_trip(CampaignDefinition{
+      .campaign = {6}, .definition = std::make_shared<const Campaign>(campaign)});
+  EXPECT_TRUE(definition.definition->table_columns.empty());
 }
 
 TEST(Codec, KeepsARejectWithItsReason) {
@@ -124,17 +150,20 @@ TEST(Codec, KeepsARejectWithItsReason) {
   EXPECT_EQ(reject.text, "full");
 }
 
-TEST(Codec, KeepsACredit) {
-  EXPECT_EQ(round_trip(Credit{.num_runs_max = 4096}).num_runs_max, 4096U);
+TEST(Codec, KeepsWhichCampaignIsMeant) {
+  EXPECT_EQ(round_trip(CampaignRequest{.campaign = {9}}).campaign, CampaignId{9});
+  EXPECT_EQ(round_trip(Forget{.campaign = {1ULL << 63}}).campaign, CampaignId{1ULL << 63});
 }
 
 TEST(Codec, KeepsALeaseWithItsTableValues) {
   const RunLease lease =
-      round_trip(RunLease{.lease = {9},
+      round_trip(RunLease{.campaign = {9},
                           .runs = {.first = {100}, .count = 5},
                           .attempt = {2},
+                          .is_alone = true,
                           .table_values = {hard_numbers.begin(), hard_numbers.end()}});
-  EXPECT_EQ(lease.lease, LeaseId{9});
+  EXPECT_EQ(lease.campaign, CampaignId{9});
+  EXPECT_TRUE(lease.is_alone);
   EXPECT_EQ(lease.runs, (RunRange{.first = {100}, .count = 5}));
   EXPECT_EQ(lease.attempt, Attempt{2});
   ASSERT_EQ(lease.table_values.size(), hard_numbers.size());
@@ -144,14 +173,14 @@ TEST(Codec, KeepsALeaseWithItsTableValues) {
 }
 
 TEST(Codec, KeepsEveryBitOfResultsOfEachStatus) {
-  ResultBatch sent{.lease = {3}, .attempt = {1}, .results = {}};
+  ResultBatch sent{.campaign = {3}, .attempt = {1}, .results = {}};
   for (const RunStatus status : {RunStatus::completed, RunStatus::not_converged,
                                  RunStatus::not_finite, RunStatus::no_draw}) {
     sent.results.push_back(
         {.result = some_result({sent.results.size()}, status), .compute_s = 2.5});
   }
   const ResultBatch got = round_trip(sent);
-  EXPECT_EQ(got.lease, sent.lease);
+  EXPECT_EQ(got.campaign, sent.campaign);
   EXPECT_EQ(got.attempt, sent.attempt);
   ASSERT_EQ(got.results.size(), 4U);
   for (std::size_t run = 0; run < 4; ++run) {
@@ -170,43 +199,70 @@ TEST(Codec, KeepsEveryBitOfResultsOfEachStatus) {
 }
 
 TEST(Codec, KeepsAnAcknowledgement) {
-  EXPECT_EQ(round_trip(ResultAck{.runs = {{0}, {7}}}).runs, (std::vector<RunIndex>{{0}, {7}}));
+  const ResultAck ack = round_trip(ResultAck{.campaign = {3}, .runs = {{0}, {7}}});
+  EXPECT_EQ(ack.campaign, CampaignId{3});
+  EXPECT_EQ(ack.runs, (std::vector<RunIndex>{{0}, {7}}));
+}
+
+const HeldRuns some_runs{.campaign = {3},
+                         .attempt = {2},
+                         .ranges = {{.first = {5}, .count = 1}, {.first = {9}, .count = 90}}};
+
+TEST(Codec, KeepsWhatIsRetractedAndGivenBack) {
+  const Retract retract = round_trip(Retract{.campaign = {3}, .ranges = some_runs.ranges});
+  EXPECT_EQ(retract.campaign, CampaignId{3});
+  EXPECT_EQ(retract.ranges, some_runs.ranges);
+  const GiveBack give_back =
+      round_trip(GiveBack{.reason = LossReason::walltime, .runs = {some_runs}});
+  EXPECT_EQ(give_back.reason, LossReason::walltime);
+  EXPECT_EQ(give_back.runs, std::vector{some_runs});
 }
 
 TEST(Codec, KeepsAHeartbeat) {
-  const Heartbeat heartbeat =
-      round_trip(Heartbeat{.num_orbits_done = 1ULL << 33, .leases = {{4}, {2}}});
+  const ComputedBatch batch{
+      .campaign = {3}, .ranges = {{.first = {9}, .count = 2}}, .num_orbits_done = 139};
+  const Heartbeat heartbeat = round_trip(Heartbeat{.num_runs_max = 4096,
+                                                   .num_orbits_done = 1ULL << 33,
+                                                   .held = {some_runs, some_runs},
+                                                   .computing = {batch}});
+  EXPECT_EQ(heartbeat.num_runs_max, 4096U);
   EXPECT_EQ(heartbeat.num_orbits_done, 1ULL << 33);
-  EXPECT_EQ(heartbeat.leases, (std::vector<LeaseId>{{4}, {2}}));
+  EXPECT_EQ(heartbeat.held, (std::vector{some_runs, some_runs}));
+  EXPECT_EQ(heartbeat.computing, std::vector{batch});
+}
+
+TEST(Codec, KeepsWhyAWorkerLeaves) {
+  EXPECT_EQ(round_trip(Bye{.reason = LossReason::walltime}).reason, LossReason::walltime);
 }
 
 TEST(Codec, KeepsTheKindOfAMessageWithoutContent) {
   EXPECT_NO_THROW((void)round_trip(HeartbeatAck{}));
-  EXPECT_NO_THROW((void)round_trip(Bye{}));
   EXPECT_NO_THROW((void)round_trip(Drain{}));
   EXPECT_NO_THROW((void)round_trip(Stop{}));
 }
 
-// Around the text are 14 bytes: version 2, reason 2, and tag and length of text and message 5 each.
+// Around the text are 39 bytes: version 2, session and epoch 9 each, sequence 7, reason 2, and tag
+// and length of text and message 5 each.
 TEST(Codec, DoesNotEncodeMoreThanMayBeSent) {
   Reject reject{.reason = RejectReason::full, .text = std::string(message_size_max, 'x')};
   try {
-    (void)encode(reject);
+    (void)encode({.header = some_header, .message = reject});
     FAIL();
   } catch (const InvalidArgument& error) {
-    EXPECT_EQ(std::string(error.what()), "message size = 4194318 bytes (must be at most 4194304)");
+    EXPECT_EQ(std::string(error.what()), "message size = 4194343 bytes (must be at most 4194304)");
   }
 }
 
 // The largest lease and the largest batch of results must fit, or a campaign could stand still.
 TEST(Codec, HasRoomForTheLargestLeaseAndBatch) {
-  const RunLease lease{.lease = {1},
+  const RunLease lease{.campaign = {1},
                        .runs = {.first = {0}, .count = runs_per_lease_max},
                        .attempt = {1},
+                       .is_alone = false,
                        .table_values = std::vector<double>(runs_per_lease_max * num_drawn, 0.1)};
   EXPECT_EQ(round_trip(lease).table_values.size(), lease.table_values.size());
 
-  ResultBatch batch{.lease = {~0ULL}, .attempt = {~0U}, .results = {}};
+  ResultBatch batch{.campaign = {~0ULL}, .attempt = {~0U}, .results = {}};
   for (std::uint64_t i = 0; i < runs_per_lease_max; ++i) {
     batch.results.push_back(
         {.result = some_result({num_runs_max - 1 - i}, RunStatus::completed), .compute_s = 0.1});
@@ -214,11 +270,15 @@ TEST(Codec, HasRoomForTheLargestLeaseAndBatch) {
   EXPECT_EQ(round_trip(batch).results.size(), batch.results.size());
 }
 
+std::string encoded_definition() {
+  return encode(
+      {.header = some_header,
+       .message = CampaignDefinition{
+           .campaign = {6}, .definition = std::make_shared<const Campaign>(unusual_campaign())}});
+}
+
 TEST(Codec, SurvivesAnyTruncation) {
-  const std::string bytes =
-      encode(Welcome{.worker = {5},
-                     .heartbeat_interval_s = 1.0,
-                     .campaign = std::make_shared<const Campaign>(unusual_campaign())});
+  const std::string bytes = encoded_definition();
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     const auto decoded = decode(std::string_view(bytes).substr(0, size));
     ASSERT_TRUE(std::holds_alternative<DecodeError>(decoded)) << size;
@@ -229,14 +289,16 @@ TEST(Codec, SurvivesAnyTruncation) {
 TEST(Codec, SurvivesRandomBytesAndRandomDamage) {
   std::mt19937_64 random(20130104);
   const ResultBatch batch{
-      .lease = {3},
+      .campaign = {3},
       .attempt = {1},
       .results = {{.result = some_result({1}, RunStatus::completed), .compute_s = 1.0}}};
-  const std::array<std::string, 3> good{
-      encode(batch), encode(Heartbeat{.num_orbits_done = 5, .leases = {{1}, {2}}}),
-      encode(Welcome{.worker = {5},
-                     .heartbeat_interval_s = 1.0,
-                     .campaign = std::make_shared<const Campaign>(unusual_campaign())})};
+  const std::array<std::string, 3> good{encode({.header = some_header, .message = batch}),
+                                        encode({.header = some_header,
+                                                .message = Heartbeat{.num_runs_max = 1,
+                                                                     .num_orbits_done = 5,
+                                                                     .held = {some_runs},
+                                                                     .computing = {}}}),
+                                        encoded_definition()};
   std::size_t num_refused = 0;
   for (int i = 0; i < 20000; ++i) {
     std::string bytes = good[random() % good.size()];

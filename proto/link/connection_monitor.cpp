@@ -1,0 +1,173 @@
+#include "proto/link/connection_monitor.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+#include <zmq.hpp>
+
+#include "core/error.hpp"
+#include "proto/link/socket_events.hpp"
+#include "proto/wire/endpoint.hpp"
+
+namespace proofmass::wire {
+namespace {
+
+using Duration = std::chrono::steady_clock::duration;
+using TimePoint = ConnectionMonitor::TimePoint;
+
+constexpr int watched_events =
+    ZMQ_EVENT_CONNECTED | ZMQ_EVENT_CONNECT_RETRIED | ZMQ_EVENT_DISCONNECTED |
+    ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
+    ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
+
+constexpr Duration pause_min = std::chrono::seconds(1);
+constexpr Duration pause_max = std::chrono::seconds(30);
+/// ZeroMQ gives a connection up for good on some errors; it is trying if there are events.
+constexpr Duration silence_max = std::chrono::seconds(30);
+/// A coordinator that ends during a handshake breaks it off too, but hardly twice.
+constexpr int breaks_before_report = 2;
+
+std::string refused_key_text(const std::string& endpoint, const CurveIdentity& identity) {
+  return fmt::format(
+      "key = {} (refused by the coordinator at {}: must be in its authorized_{}s, and this its "
+      "address for {}s)",
+      identity.keys.public_key.text(), endpoint, to_text(identity.role), to_text(identity.role));
+}
+
+std::string mismatch_text(const std::string& endpoint, const ClientSecurity& security) {
+  return fmt::format("coordinator = {} ({})", endpoint,
+                     security.identity ? "uses no keys: start it with --keys too"
+                                       : "admits only who has a key: give --keys");
+}
+
+std::string broken_off_text(const std::string& endpoint, const ClientSecurity& security) {
+  return fmt::format("coordinator = {} (breaks the connection off: {})", endpoint,
+                     security.identity
+                         ? "it has another key than coordinator.pub, or none, or is no "
+                           "coordinator"
+                         : "it wants --keys, or is no coordinator");
+}
+
+}  // namespace
+
+class ConnectionMonitor::Parts {
+ public:
+  Parts(zmq::context_t& context, zmq::socket_t& dealer, std::string endpoint,
+        const ClientSecurity& security, TimePoint now)
+      : dealer_(dealer),
+        endpoint_(std::move(endpoint)),
+        security_(security),
+        events_(context, dealer.handle(), watched_events),
+        last_sign_at_(now) {
+    connect();
+  }
+
+  [[nodiscard]] void* handle() const { return events_.handle(); }
+  [[nodiscard]] bool is_connected() const { return is_connected_; }
+  [[nodiscard]] std::optional<std::string> take_refusal() { return std::exchange(news_, {}); }
+
+  void update(TimePoint now) {
+    while (const auto event = events_.take()) {
+      last_sign_at_ = now;
+      take_in(*event, now);
+    }
+    if (is_connected_) return;
+    if (now - last_sign_at_ >= silence_max) retry_at_ = now;
+    if (retry_at_ && now >= *retry_at_) reconnect(now);
+  }
+
+ private:
+  void take_in(const SocketEvent& event, TimePoint now) {
+    switch (event.kind) {
+      case ZMQ_EVENT_HANDSHAKE_SUCCEEDED:
+        is_connected_ = true;
+        num_breaks_ = 0;
+        pause_ = pause_min;
+        reported_.clear();
+        news_.reset();
+        retry_at_.reset();
+        break;
+      case ZMQ_EVENT_DISCONNECTED:
+        is_connected_ = false;
+        break;
+      case ZMQ_EVENT_HANDSHAKE_FAILED_AUTH:
+        refused(security_.identity ? refused_key_text(endpoint_, *security_.identity)
+                                   : mismatch_text(endpoint_, security_),
+                now);
+        break;
+      case ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL:
+        refused(event.value == ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH
+                    ? mismatch_text(endpoint_, security_)
+                    : broken_off_text(endpoint_, security_),
+                now);
+        break;
+      case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
+        // ZeroMQ tries again by itself.
+        if (++num_breaks_ >= breaks_before_report) report(broken_off_text(endpoint_, security_));
+        break;
+      default:
+        break;
+    }
+  }
+
+  void refused(const std::string& text, TimePoint now) {
+    report(text);
+    retry_at_ = now + pause_;
+    pause_ = std::min(2 * pause_, pause_max);
+  }
+
+  void report(const std::string& text) {
+    // Which end notices first is a matter of chance, so reasons may alternate.
+    if (reported_.insert(text).second) news_ = text;
+  }
+
+  void connect() {
+    try {
+      dealer_.set(zmq::sockopt::ipv6, may_be_ipv6(endpoint_, EndpointUse::connect));
+      dealer_.connect(endpoint_);
+    } catch (const zmq::error_t& error) {
+      throw Error(fmt::format("connect = {} ({})", endpoint_, error.what()));
+    }
+  }
+
+  void reconnect(TimePoint now) {
+    try {
+      dealer_.disconnect(endpoint_);
+    } catch (const zmq::error_t& error) {
+      // A socket that ZeroMQ has given up already may have nothing to disconnect.
+      if (error.num() != ENOENT)
+        throw Error(fmt::format("connect = {} ({})", endpoint_, error.what()));
+    }
+    connect();
+    retry_at_.reset();
+    last_sign_at_ = now;
+  }
+
+  zmq::socket_t& dealer_;
+  std::string endpoint_;
+  ClientSecurity security_;
+  SocketEvents events_;
+  bool is_connected_ = false;
+  int num_breaks_ = 0;              ///< Handshakes broken off without a reason, in a row.
+  std::set<std::string> reported_;  ///< Since the last connection.
+  std::optional<std::string> news_;
+  std::optional<TimePoint> retry_at_;
+  Duration pause_ = pause_min;
+  TimePoint last_sign_at_;
+};
+
+ConnectionMonitor::ConnectionMonitor(zmq::context_t& context, zmq::socket_t& dealer,
+                                     std::string endpoint, const ClientSecurity& security,
+                                     TimePoint now)
+    : parts_(std::make_unique<Parts>(context, dealer, std::move(endpoint), security, now)) {}
+
+ConnectionMonitor::~ConnectionMonitor() = default;
+
+void* ConnectionMonitor::handle() const { return parts_->handle(); }
+void ConnectionMonitor::update(TimePoint now) { parts_->update(now); }
+bool ConnectionMonitor::is_connected() const { return parts_->is_connected(); }
+std::optional<std::string> ConnectionMonitor::take_refusal() { return parts_->take_refusal(); }
+
+}  // namespace proofmass::wire

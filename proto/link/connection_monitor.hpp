@@ -1,0 +1,54 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "proto/link/security.hpp"
+
+namespace zmq {
+class context_t;
+class socket_t;
+}  // namespace zmq
+
+namespace proofmass::wire {
+
+/// Keeps a DEALER connected and says why it is not. ZeroMQ by itself tells nobody about a refusal,
+/// and after one it never tries again: a key that is put on the list later would not help.
+class ConnectionMonitor {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  /// Connects the socket, in the background.
+  ///
+  /// @param dealer    From make_dealer(), with the same security; outlives the monitor.
+  /// @param endpoint  check_endpoint() holds.
+  /// @throws Error reading `connect = endpoint (reason)` if that can never be connected.
+  ConnectionMonitor(zmq::context_t& context, zmq::socket_t& dealer, std::string endpoint,
+                    const ClientSecurity& security, TimePoint now);
+  ~ConnectionMonitor();
+  ConnectionMonitor(const ConnectionMonitor&) = delete;
+  ConnectionMonitor& operator=(const ConnectionMonitor&) = delete;
+
+  /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t.
+  [[nodiscard]] void* handle() const;
+
+  /// Takes in what happened and connects again what was refused, after a pause of 1 s that doubles
+  /// to 30 s. Never waits. To be called when the handle is readable and once a second or more
+  /// often.
+  void update(TimePoint now);
+
+  /// True from a complete handshake to the loss of that connection.
+  [[nodiscard]] bool is_connected() const;
+
+  /// Why the peer at the address does not let this program in, for people; once for each reason
+  /// until a connection succeeds.
+  [[nodiscard]] std::optional<std::string> take_refusal();
+
+ private:
+  class Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace proofmass::wire

@@ -1,0 +1,204 @@
+#include "proto/link/key_files.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zmq.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <vector>
+
+#include "core/error.hpp"
+#include "proto/link/whole_file.hpp"
+
+namespace proofmass::wire {
+namespace {
+
+constexpr std::size_t key_length = 40;
+constexpr std::size_t key_file_size_max = 4096;
+constexpr std::string_view magic = "proofmass-key";
+constexpr std::string_view format_version = "1";
+
+enum class Half : std::uint8_t { secret, public_alone };
+
+std::string_view to_text(Half half) { return half == Half::secret ? "secret" : "public"; }
+
+[[noreturn]] void refuse(const std::filesystem::path& file, std::string_view rule) {
+  throw Error(fmt::format("key file = {} ({})", file.string(), rule));
+}
+
+bool is_key(std::string_view text) {
+  if (text.size() != key_length || text.find('\0') != std::string_view::npos) return false;
+  std::array<std::uint8_t, key_length * 4 / 5> bytes{};
+  return zmq_z85_decode(bytes.data(), std::string(text).c_str()) != nullptr;
+}
+
+std::string header_line(KeyRole role, Half half) {
+  return fmt::format("{} {} {} {}", magic, format_version, to_text(role), to_text(half));
+}
+
+/// Closes a file at the end of a scope.
+class OpenFile {
+ public:
+  // Opening a pipe must not wait for its other end.
+  explicit OpenFile(const std::filesystem::path& file)
+      : descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
+    if (descriptor_ < 0) refuse(file, std::strerror(errno));
+  }
+  ~OpenFile() { ::close(descriptor_); }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
+
+void check_is_private(const std::filesystem::path& file, const struct stat& status) {
+  if (status.st_uid != ::geteuid()) {
+    refuse(file, fmt::format("owner = user {}; must be owned by user {}, who runs this program",
+                             status.st_uid, ::geteuid()));
+  }
+  const mode_t mode = status.st_mode & 07777;
+  if ((mode & 077) == 0) return;
+  refuse(file, fmt::format("mode {:04o}; must be readable by its owner alone: chmod 600", mode));
+}
+
+std::string read_text(const std::filesystem::path& file, Half half) {
+  const OpenFile opened(file);
+  struct stat status {};
+  if (::fstat(opened.descriptor(), &status) != 0) refuse(file, std::strerror(errno));
+  if (!S_ISREG(status.st_mode)) refuse(file, "must be a regular file");
+  if (half == Half::secret) check_is_private(file, status);
+  std::string text(key_file_size_max, '\0');
+  const ssize_t size = ::read(opened.descriptor(), text.data(), text.size());
+  if (size < 0) refuse(file, std::strerror(errno));
+  text.resize(static_cast<std::size_t>(size));
+  return text;
+}
+
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  while (!text.empty()) {
+    const std::size_t end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+    text = end == std::string_view::npos ? std::string_view() : text.substr(end + 1);
+  }
+  return parts;
+}
+
+/// What stands in the file may be a secret, so no message repeats any of it but known words.
+void check_header(const std::filesystem::path& file, std::string_view line, KeyRole role,
+                  Half half) {
+  if (line == header_line(role, half)) return;
+  const std::vector<std::string_view> words = split(line, ' ');
+  if (words.empty() || words.front() != magic) refuse(file, "is not a key file of Proofmass");
+  for (const KeyRole other : {KeyRole::coordinator, KeyRole::worker, KeyRole::client}) {
+    for (const Half other_half : {Half::secret, Half::public_alone}) {
+      if (line != header_line(other, other_half)) continue;
+      refuse(file, fmt::format("is the {} key of a {}; must be the {} key of a {}",
+                               to_text(other_half), to_text(other), to_text(half), to_text(role)));
+    }
+  }
+  refuse(file, fmt::format("is of an unknown kind; must begin with `{}`", header_line(role, half)));
+}
+
+/// The text after `NAME ` in a line; empty if the line says something else.
+std::string_view value_of(std::string_view name, std::string_view line) {
+  if (!line.starts_with(name) || line.size() <= name.size()) return {};
+  return line[name.size()] == ' ' ? line.substr(name.size() + 1) : std::string_view();
+}
+
+std::vector<std::string_view> checked_lines(const std::filesystem::path& file,
+                                            std::string_view text, KeyRole role, Half half) {
+  const std::vector<std::string_view> lines = split(text, '\n');
+  check_header(file, lines.empty() ? std::string_view() : lines.front(), role, half);
+  if (lines.size() != (half == Half::secret ? 3U : 2U)) refuse(file, "is damaged");
+  return lines;
+}
+
+bool belong_together(const PublicKey& public_key, const SecretKey& secret_key) {
+  std::array<char, key_length + 1> derived{};
+  return zmq_curve_public(derived.data(), secret_key.reveal().c_str()) == 0 &&
+         public_key.text() == derived.data();
+}
+
+}  // namespace
+
+std::string_view to_text(KeyRole role) {
+  switch (role) {
+    case KeyRole::coordinator:
+      return "coordinator";
+    case KeyRole::worker:
+      return "worker";
+    case KeyRole::client:
+      return "client";
+  }
+  return "";
+}
+
+std::optional<PublicKey> PublicKey::parse(std::string_view text) {
+  if (!is_key(text)) return std::nullopt;
+  return PublicKey(text);
+}
+
+std::optional<SecretKey> SecretKey::parse(std::string_view text) {
+  if (!is_key(text)) return std::nullopt;
+  return SecretKey(text);
+}
+
+KeyPair make_key_pair() {
+  std::array<char, key_length + 1> public_text{};
+  std::array<char, key_length + 1> secret_text{};
+  if (zmq_curve_keypair(public_text.data(), secret_text.data()) != 0) {
+    throw Error(fmt::format("key pair: {}", zmq_strerror(zmq_errno())));
+  }
+  const auto public_key = PublicKey::parse(public_text.data());
+  const auto secret_key = SecretKey::parse(secret_text.data());
+  PROOFMASS_EXPECT(public_key && secret_key);
+  return {.public_key = *public_key, .secret_key = *secret_key};
+}
+
+void write_key_pair(const std::filesystem::path& directory, std::string_view name, KeyRole role,
+                    const KeyPair& pair) {
+  const std::filesystem::path secret_file = directory / fmt::format("{}.key", name);
+  const std::filesystem::path public_file = directory / fmt::format("{}.pub", name);
+  const std::string public_line = fmt::format("public {}\n", pair.public_key.text());
+  // A half that is there alone belongs to another pair.
+  for (const auto& file : {secret_file, public_file}) {
+    if (std::filesystem::exists(std::filesystem::symlink_status(file))) refuse(file, "File exists");
+  }
+  write_whole_file("key file", secret_file,
+                   fmt::format("{}\n{}secret {}\n", header_line(role, Half::secret), public_line,
+                               pair.secret_key.reveal()),
+                   0600, IfExists::refuse);
+  write_whole_file("key file", public_file,
+                   fmt::format("{}\n{}", header_line(role, Half::public_alone), public_line), 0644,
+                   IfExists::refuse);
+}
+
+KeyPair read_key_pair(const std::filesystem::path& file, KeyRole role) {
+  const std::string text = read_text(file, Half::secret);
+  const auto lines = checked_lines(file, text, role, Half::secret);
+  const auto public_key = PublicKey::parse(value_of("public", lines[1]));
+  const auto secret_key = SecretKey::parse(value_of("secret", lines[2]));
+  if (!public_key || !secret_key) refuse(file, "is damaged");
+  if (!belong_together(*public_key, *secret_key)) {
+    refuse(file, "is damaged: its halves do not belong together");
+  }
+  return {.public_key = *public_key, .secret_key = *secret_key};
+}
+
+PublicKey read_public_key(const std::filesystem::path& file, KeyRole role) {
+  const std::string text = read_text(file, Half::public_alone);
+  const auto lines = checked_lines(file, text, role, Half::public_alone);
+  const auto public_key = PublicKey::parse(value_of("public", lines[1]));
+  if (!public_key) refuse(file, "is damaged");
+  return *public_key;
+}
+
+}  // namespace proofmass::wire

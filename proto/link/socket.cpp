@@ -1,0 +1,86 @@
+#include "proto/link/socket.hpp"
+
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <zmq.hpp>
+
+#include "core/error.hpp"
+#include "proto/wire/codec.hpp"
+#include "proto/wire/endpoint.hpp"
+
+namespace proofmass::wire {
+namespace {
+
+// Times in ms.
+constexpr int handshake_duration_max = 5000;
+constexpr int transport_heartbeat_interval = 5000;
+constexpr int transport_silence_max = 20000;
+constexpr int reconnect_interval_min = 100;
+constexpr int reconnect_interval_max = 5000;
+constexpr int linger_of_router = 1000;
+constexpr int linger_of_dealer = 2000;
+
+void limit(zmq::socket_t& socket, std::size_t message_size, int linger) {
+  socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(message_size));
+  socket.set(zmq::sockopt::linger, linger);
+  socket.set(zmq::sockopt::handshake_ivl, handshake_duration_max);
+  socket.set(zmq::sockopt::heartbeat_ivl, transport_heartbeat_interval);
+  socket.set(zmq::sockopt::heartbeat_timeout, transport_silence_max);
+  socket.set(zmq::sockopt::tcp_keepalive, 1);
+}
+
+/// Campaigns come in by the clients' door, and go out to workers.
+std::size_t received_size_max(Domain domain) {
+  return domain == Domain::clients ? definition_size_max : message_size_max;
+}
+
+/// Without an authenticator nobody gets in, instead of everybody. The library takes this option
+/// although its header declares it for drafts only.
+void enforce_domain(zmq::socket_t& socket) {
+  constexpr int zap_enforce_domain = 93;
+  const int is_on = 1;
+  if (zmq_setsockopt(socket.handle(), zap_enforce_domain, &is_on, sizeof is_on) != 0) {
+    throw Error(fmt::format("ZeroMQ: ZAP_ENFORCE_DOMAIN: {}", zmq_strerror(zmq_errno())));
+  }
+}
+
+}  // namespace
+
+zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
+                          const std::string& endpoint, const ServerSecurity& security) {
+  zmq::socket_t socket(context, zmq::socket_type::router);
+  limit(socket, received_size_max(security.domain), linger_of_router);
+  socket.set(zmq::sockopt::router_mandatory, true);
+  if (security.keys) {
+    socket.set(zmq::sockopt::curve_server, true);
+    socket.set(zmq::sockopt::curve_secretkey, security.keys->secret_key.reveal());
+    socket.set(zmq::sockopt::zap_domain, std::string(to_text(security.domain)));
+    enforce_domain(socket);
+  }
+  socket.set(zmq::sockopt::ipv6, may_be_ipv6(endpoint, EndpointUse::bind));
+  try {
+    socket.bind(endpoint);
+  } catch (const zmq::error_t& error) {
+    throw Error(fmt::format("{} = {} ({})", option, endpoint, error.what()));
+  }
+  return socket;
+}
+
+zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& security) {
+  zmq::socket_t socket(context, zmq::socket_type::dealer);
+  limit(socket, definition_size_max, linger_of_dealer);
+  // Without a connection nothing is queued: whoever needs an answer asks again.
+  socket.set(zmq::sockopt::immediate, true);
+  socket.set(zmq::sockopt::reconnect_ivl, reconnect_interval_min);
+  socket.set(zmq::sockopt::reconnect_ivl_max, reconnect_interval_max);
+  if (security.identity) {
+    socket.set(zmq::sockopt::curve_serverkey, security.identity->coordinator.text());
+    socket.set(zmq::sockopt::curve_publickey, security.identity->keys.public_key.text());
+    socket.set(zmq::sockopt::curve_secretkey, security.identity->keys.secret_key.reveal());
+  }
+  return socket;
+}
+
+}  // namespace proofmass::wire

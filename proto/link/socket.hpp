@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "proto/link/security.hpp"
+
+// Only sources see the whole of these.
+namespace zmq {
+class context_t;
+class socket_t;
+}  // namespace zmq
+
+namespace proofmass::wire {
+
+// Sockets with every option set that the protocol relies on: limits on the size of messages and on
+// the time for a handshake, dead connections noticed, nothing queued for peers that are not there.
+// The sender of a message never waits: send with zmq::send_flags::dontwait.
+
+/// A ROUTER, bound. With keys, an Authenticator must be bound in the same context before: whoever
+/// comes earlier is refused.
+///
+/// @param option    Name of the option that the endpoint comes from, for the message.
+/// @param endpoint  check_endpoint() holds; the port may be `*`.
+/// @throws Error reading `option = endpoint (reason)` if it cannot be bound.
+[[nodiscard]] zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
+                                        const std::string& endpoint,
+                                        const ServerSecurity& security);
+
+/// A DEALER, not connected yet: a ConnectionMonitor connects it.
+[[nodiscard]] zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& security);
+
+}  // namespace proofmass::wire

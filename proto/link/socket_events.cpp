@@ -1,0 +1,56 @@
+#include "proto/link/socket_events.hpp"
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <string>
+#include <zmq.hpp>
+
+#include "core/error.hpp"
+
+namespace proofmass::wire {
+
+class SocketEvents::Parts {
+ public:
+  Parts(zmq::context_t& context, void* socket, int kinds)
+      : socket_(socket), events_(context, zmq::socket_type::pair) {
+    const std::string address = fmt::format("inproc://socket-events-{}", fmt::ptr(this));
+    if (zmq_socket_monitor(socket_, address.c_str(), kinds) != 0) {
+      throw Error(fmt::format("zmq_socket_monitor: {}", zmq_strerror(zmq_errno())));
+    }
+    events_.connect(address);
+  }
+  ~Parts() { zmq_socket_monitor(socket_, nullptr, 0); }
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
+
+  [[nodiscard]] void* handle() { return events_.handle(); }
+
+  std::optional<SocketEvent> take() {
+    zmq::message_t frame;
+    zmq::message_t address;
+    if (!events_.recv(frame, zmq::recv_flags::dontwait)) return std::nullopt;
+    (void)events_.recv(address);  // The parts of a message arrive together.
+    std::uint16_t kind = 0;
+    SocketEvent event;
+    PROOFMASS_EXPECT(frame.size() == sizeof kind + sizeof event.value);
+    std::memcpy(&kind, frame.data(), sizeof kind);
+    std::memcpy(&event.value, frame.data<char>() + sizeof kind, sizeof event.value);
+    event.kind = kind;
+    return event;
+  }
+
+ private:
+  void* socket_;
+  zmq::socket_t events_;
+};
+
+SocketEvents::SocketEvents(zmq::context_t& context, void* socket, int kinds)
+    : parts_(std::make_unique<Parts>(context, socket, kinds)) {}
+
+SocketEvents::~SocketEvents() = default;
+
+void* SocketEvents::handle() const { return parts_->handle(); }
+std::optional<SocketEvent> SocketEvents::take() { return parts_->take(); }
+
+}  // namespace proofmass::wire

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace proofmass::wire::detail {
+
+// What decoders require of values that a peer sent. They throw; decode() and its like turn that
+// into a DecodeError.
+
+/// @throws ConfigError unless the condition holds.
+void require(bool condition, std::string_view field, const std::string& value,
+             std::string_view rule);
+
+/// @throws ConfigError unless the value is in [minimum, maximum].
+void require_in(std::uint64_t value, std::uint64_t minimum, std::uint64_t maximum,
+                std::string_view field);
+
+/// @throws ConfigError unless a list has `minimum` to `maximum` entries.
+void require_count(int count, std::uint64_t minimum, std::uint64_t maximum, std::string_view field);
+
+/// The name. @throws ConfigError unless is_name() holds.
+[[nodiscard]] std::string checked_name(const std::string& name, std::string_view field);
+
+/// The value. @throws ConfigError unless it is finite and ≥ 0.
+[[nodiscard]] double checked_magnitude(double value, std::string_view field);
+
+/// The number. @throws ConfigError if it is 0.
+[[nodiscard]] std::uint64_t checked_id(std::uint64_t id, std::string_view field);
+
+/// The text, cut to 400 bytes, with `?` for all but printable ASCII: for logs and for the peer, as
+/// parts may come from that peer.
+[[nodiscard]] std::string printable(std::string_view text);
+
+/// From now on Protobuf does not write to standard error what is wrong with a peer's bytes.
+void silence_protobuf();
+
+}  // namespace proofmass::wire::detail

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "proto/wire/client_messages.hpp"
+#include "proto/wire/codec.hpp"
+
+namespace proofmass::wire {
+
+// What clients and coordinator exchange, as bytes. An envelope holds protocol_version, the number
+// of a request and its content; the reply repeats the number.
+
+/// Size limits, bytes. A SubmitRequest may be as large as the first, any other as the second.
+inline constexpr std::size_t submit_size_max = std::size_t{64} << 20;
+inline constexpr std::size_t request_size_max = std::size_t{64} << 10;
+inline constexpr std::size_t reply_size_max = std::size_t{4} << 20;
+
+inline constexpr std::size_t campaigns_per_reply_max = 4096;
+inline constexpr std::size_t workers_per_reply_max = 4096;
+inline constexpr std::size_t reply_text_size_max = 4096;  ///< Of any text in a reply, bytes.
+inline constexpr int priority_max = 100;                  ///< And its negative.
+
+/// A request as it travels.
+struct RequestPacket {
+  std::uint64_t id = 0;  ///< Chosen by the client; not 0.
+  ClientRequest request;
+};
+
+/// A reply as it travels.
+struct ReplyPacket {
+  std::uint64_t id = 0;  ///< Of the request; 0 if that could not be decoded.
+  ClientReply reply;
+};
+
+/// The bytes of a request or reply. Texts of a reply are cut to reply_text_size_max; what is not
+/// printable ASCII or the end of a line becomes `?` in them, since they go to terminals.
+/// @throws InvalidArgument if they are more than the message may have.
+[[nodiscard]] std::string encode(const RequestPacket& packet);
+[[nodiscard]] std::string encode(const ReplyPacket& packet);
+
+/// Checks everything, like decode(): what they return needs no further check of form. The campaign
+/// of a SubmitRequest has its table columns and has passed Campaign::validate().
+///
+/// @param bytes  Anything at all, from anybody.
+[[nodiscard]] std::variant<RequestPacket, DecodeError> decode_request(std::string_view bytes);
+[[nodiscard]] std::variant<ReplyPacket, DecodeError> decode_reply(std::string_view bytes);
+
+/// `pause`, `active`: for people, logs and JSON.
+[[nodiscard]] std::string_view name_of(ControlAction action);
+[[nodiscard]] std::string_view name_of(CampaignPhase phase);
+
+}  // namespace proofmass::wire

@@ -1,0 +1,222 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "core/error.hpp"
+#include "proto/client.pb.h"
+#include "proto/wire/campaign_codec.hpp"
+#include "proto/wire/checks.hpp"
+#include "proto/wire/client_codec.hpp"
+#include "proto/wire/field_count.hpp"
+
+namespace proofmass::wire {
+namespace {
+
+using detail::checked_magnitude;
+using detail::checked_name;
+using detail::require;
+using detail::require_count;
+using detail::require_in;
+
+/// A campaign with all the sessions, excitations and lines that it may have, has 34,000; a reply
+/// with 4096 campaigns 62,000.
+constexpr std::size_t fields_max = std::size_t{1} << 16;
+
+int checked_priority(int priority) {
+  require(priority >= -priority_max && priority <= priority_max, "priority",
+          fmt::format("{}", priority),
+          fmt::format("must be in [{}, {}]", -priority_max, priority_max));
+  return priority;
+}
+
+template <typename Core, typename Sent>
+Core enumerator(Sent sent, std::uint64_t maximum, std::string_view field) {
+  const int value = static_cast<int>(sent);
+  require(value >= 1 && static_cast<std::uint64_t>(value) <= maximum, field,
+          fmt::format("{}", value), fmt::format("must be in [1, {}]", maximum));
+  return static_cast<Core>(value);
+}
+
+ClientRequest read(const proto::SubmitRequest& message) {
+  const double fraction = message.audit_fraction();
+  require(fraction >= 0.0 && fraction <= 1.0, "audit", fmt::format("{}", fraction),
+          "must be in [0, 1]");
+  SubmitRequest submit{.campaign = detail::decode_campaign(message.campaign()),
+                       .priority = checked_priority(message.priority()),
+                       .audit_fraction = fraction};
+  for (const proto::TableColumn& column : message.table_columns()) {
+    submit.campaign.table_columns.emplace_back(column.values().begin(), column.values().end());
+  }
+  submit.campaign.validate();
+  return submit;
+}
+
+ClientRequest read(const proto::ControlRequest& message) {
+  return ControlRequest{.action = enumerator<ControlAction>(message.action(), 3, "action"),
+                        .campaign = checked_name(message.campaign(), "campaign")};
+}
+
+bool may_be_in_text(char c) { return c == '\n' || (c >= ' ' && c <= '~'); }
+
+std::string checked_text(const std::string& text, std::string_view field) {
+  require(text.size() <= reply_text_size_max, field, fmt::format("{} bytes", text.size()),
+          fmt::format("must be at most {}", reply_text_size_max));
+  // It goes to a terminal.
+  require(std::all_of(text.begin(), text.end(), may_be_in_text), field,
+          fmt::format("{} bytes", text.size()), "must be printable ASCII and line ends");
+  return text;
+}
+
+std::optional<double> remaining_time(const proto::CampaignStatus& message) {
+  if (!message.has_remaining_s()) return std::nullopt;
+  return checked_magnitude(message.remaining_s(), "remaining_s");
+}
+
+CampaignStatus read_campaign(const proto::CampaignStatus& message) {
+  require_in(message.num_runs(), 1, num_runs_max, "num_runs");
+  require_in(message.num_given_up(), 0, message.num_runs(), "num_given_up");
+  require_in(message.num_done(), 0, message.num_runs() - message.num_given_up(), "num_done");
+  return {.name = checked_name(message.name(), "name"),
+          .phase = enumerator<CampaignPhase>(message.phase(), 4, "phase"),
+          .priority = checked_priority(message.priority()),
+          .num_runs = message.num_runs(),
+          .num_done = message.num_done(),
+          .num_without_estimate = message.num_without_estimate(),
+          .num_given_up = message.num_given_up(),
+          .num_lent = message.num_lent(),
+          .num_duplicates = message.num_duplicates(),
+          .num_audited = message.num_audited(),
+          .num_mismatches = message.num_mismatches(),
+          .rate_hz = checked_magnitude(message.rate_hz(), "rate_hz"),
+          .remaining_s = remaining_time(message),
+          .storage_failure = checked_text(message.storage_failure(), "storage_failure")};
+}
+
+ClientReply read(const proto::StatusReply& message) {
+  require_count(message.campaigns_size(), 0, campaigns_per_reply_max, "campaigns");
+  StatusReply status{.version = checked_name(message.version(), "version"),
+                     .model_version = checked_name(message.model_version(), "model_version"),
+                     .uptime_s = checked_magnitude(message.uptime_s(), "uptime_s"),
+                     .num_workers = message.num_workers(),
+                     .num_slots = message.num_slots(),
+                     .campaigns = {}};
+  for (const auto& campaign : message.campaigns()) {
+    status.campaigns.push_back(read_campaign(campaign));
+  }
+  return status;
+}
+
+WorkerStatus read_worker(const proto::WorkerStatus& message) {
+  return {.id = {detail::checked_id(message.worker_id(), "worker_id")},
+          .name = checked_name(message.name(), "name"),
+          .host = checked_name(message.host(), "host"),
+          .process_id = message.process_id(),
+          .num_slots = message.num_slots(),
+          .num_lent = message.num_lent(),
+          .num_results = message.num_results(),
+          .silent_s = checked_magnitude(message.silent_s(), "silent_s"),
+          .is_quarantined = message.is_quarantined()};
+}
+
+ClientReply read(const proto::WorkersReply& message) {
+  require_count(message.workers_size(), 0, workers_per_reply_max, "workers");
+  WorkersReply reply;
+  for (const auto& worker : message.workers()) reply.workers.push_back(read_worker(worker));
+  return reply;
+}
+
+ClientRequest read_content(const proto::RequestEnvelope& envelope) {
+  switch (envelope.request_case()) {
+    case proto::RequestEnvelope::kSubmit:
+      return read(envelope.submit());
+    case proto::RequestEnvelope::kStatus:
+      return StatusRequest{};
+    case proto::RequestEnvelope::kWorkers:
+      return WorkersRequest{};
+    case proto::RequestEnvelope::kControl:
+      return read(envelope.control());
+    case proto::RequestEnvelope::REQUEST_NOT_SET:
+      break;
+  }
+  PROOFMASS_EXPECT(false);
+}
+
+ClientReply read_content(const proto::ReplyEnvelope& envelope) {
+  switch (envelope.reply_case()) {
+    case proto::ReplyEnvelope::kStatus:
+      return read(envelope.status());
+    case proto::ReplyEnvelope::kWorkers:
+      return read(envelope.workers());
+    case proto::ReplyEnvelope::kDone:
+      return DoneReply{checked_text(envelope.done().text(), "text")};
+    case proto::ReplyEnvelope::kError:
+      return ErrorReply{checked_text(envelope.error().text(), "text")};
+    case proto::ReplyEnvelope::REPLY_NOT_SET:
+      break;
+  }
+  PROOFMASS_EXPECT(false);
+}
+
+DecodeError fault(DecodeFault kind, std::string text) { return {kind, std::move(text)}; }
+
+DecodeError too_large(std::string_view what, std::size_t size, std::size_t size_max) {
+  return fault(DecodeFault::too_large,
+               fmt::format("{} size = {} bytes (must be at most {})", what, size, size_max));
+}
+
+/// What is wrong with the bytes before the content is looked at, if anything is.
+template <typename Envelope>
+std::optional<DecodeError> parse(std::string_view bytes, std::string_view what,
+                                 std::size_t size_max, Envelope& envelope) {
+  detail::silence_protobuf();
+  if (bytes.size() > size_max) return too_large(what, bytes.size(), size_max);
+  const bool is_parsed = detail::has_fields_at_most(bytes, *Envelope::descriptor(), fields_max) &&
+                         envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+  if (!is_parsed) {
+    return fault(DecodeFault::unparsable,
+                 fmt::format("{} = {} bytes (must be an envelope of at most {} fields)", what,
+                             bytes.size(), fields_max));
+  }
+  if (envelope.protocol_version() != protocol_version) {
+    return fault(DecodeFault::wrong_version,
+                 fmt::format("protocol_version = {} (must be {})", envelope.protocol_version(),
+                             protocol_version));
+  }
+  return std::nullopt;
+}
+
+DecodeError empty(std::string_view what) {
+  return fault(DecodeFault::empty, fmt::format("{} = none (must be of a known kind)", what));
+}
+
+}  // namespace
+
+std::variant<RequestPacket, DecodeError> decode_request(std::string_view bytes) {
+  proto::RequestEnvelope envelope;
+  if (const auto error = parse(bytes, "request", submit_size_max, envelope)) return *error;
+  if (envelope.request_case() == proto::RequestEnvelope::REQUEST_NOT_SET) return empty("request");
+  if (!envelope.has_submit() && bytes.size() > request_size_max) {
+    return too_large("request", bytes.size(), request_size_max);
+  }
+  try {
+    return RequestPacket{.id = detail::checked_id(envelope.request_id(), "request_id"),
+                         .request = read_content(envelope)};
+  } catch (const Error& error) {
+    return fault(DecodeFault::invalid, detail::printable(error.what()));
+  }
+}
+
+std::variant<ReplyPacket, DecodeError> decode_reply(std::string_view bytes) {
+  proto::ReplyEnvelope envelope;
+  if (const auto error = parse(bytes, "reply", reply_size_max, envelope)) return *error;
+  if (envelope.reply_case() == proto::ReplyEnvelope::REPLY_NOT_SET) return empty("reply");
+  try {
+    return ReplyPacket{.id = envelope.request_id(), .reply = read_content(envelope)};
+  } catch (const Error& error) {
+    return fault(DecodeFault::invalid, detail::printable(error.what()));
+  }
+}
+
+}  // namespace proofmass::wire

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/campaign/campaign.hpp"
+#include "proto/wire/messages.hpp"
+
+namespace proofmass::wire {
+
+// What people's programs say to a coordinator, at another port and with other keys than workers.
+// One request, one reply.
+
+/// Asks for a campaign to be computed: a new one, or more runs of one that is there.
+struct SubmitRequest {
+  Campaign campaign;            ///< Its name is the campaign's; is_name() holds.
+  int priority = 0;             ///< -100 to 100; runs of a higher one are lent first.
+  double audit_fraction = 0.0;  ///< 0 to 1.
+};
+
+struct StatusRequest {};
+struct WorkersRequest {};
+
+enum class ControlAction : std::uint8_t { pause = 1, resume = 2, cancel = 3 };
+
+struct ControlRequest {
+  ControlAction action = ControlAction::pause;
+  std::string campaign;  ///< Name; is_name() holds.
+};
+
+using ClientRequest = std::variant<SubmitRequest, StatusRequest, WorkersRequest, ControlRequest>;
+
+/// The values are sent: never renumber.
+enum class CampaignPhase : std::uint8_t { active = 1, paused = 2, finished = 3, cancelled = 4 };
+
+/// Where a campaign stands. Counts of runs, each exact.
+struct CampaignStatus {
+  std::string name;
+  CampaignPhase phase = CampaignPhase::active;
+  int priority = 0;
+  std::uint64_t num_runs = 0;
+  std::uint64_t num_done = 0;              ///< Durably stored.
+  std::uint64_t num_without_estimate = 0;  ///< Of those stored since the coordinator started.
+  std::uint64_t num_given_up = 0;          ///< Crashed too many workers.
+  std::uint64_t num_lent = 0;
+  std::uint64_t num_duplicates = 0;  ///< Results that were there already.
+  std::uint64_t num_audited = 0;
+  std::uint64_t num_mismatches = 0;   ///< Of the audited and duplicate ones; must be 0.
+  double rate_hz = 0.0;               ///< Runs stored per second, recently.
+  std::optional<double> remaining_s;  ///< At that rate.
+  std::string storage_failure;        ///< Why nothing can be stored; empty if all is well.
+};
+
+struct StatusReply {
+  std::string version;  ///< Of the coordinator's program.
+  std::string model_version;
+  double uptime_s = 0.0;
+  std::uint64_t num_workers = 0;
+  std::uint64_t num_slots = 0;
+  std::vector<CampaignStatus> campaigns;  ///< In the order in which they were submitted.
+};
+
+/// A registered worker.
+struct WorkerStatus {
+  WorkerId id;
+  std::string name;
+  std::string host;
+  std::uint64_t process_id = 0;
+  std::uint64_t num_slots = 0;
+  std::uint64_t num_lent = 0;
+  std::uint64_t num_results = 0;
+  double silent_s = 0.0;  ///< Since its last message.
+  bool is_quarantined = false;
+};
+
+struct WorkersReply {
+  std::vector<WorkerStatus> workers;
+};
+
+/// The request was carried out.
+struct DoneReply {
+  std::string text;  ///< For people: `campaign hardy2013: 100 runs, 0 of them done`.
+};
+
+/// The request was refused.
+struct ErrorReply {
+  std::string text;  ///< `field = value (rule)`.
+};
+
+using ClientReply = std::variant<StatusReply, WorkersReply, DoneReply, ErrorReply>;
+
+}  // namespace proofmass::wire

@@ -1,0 +1,229 @@
+#include "proto/link/connection_monitor.hpp"
+
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <functional>
+#include <set>
+#include <string>
+#include <zmq.hpp>
+
+#include "core/error.hpp"
+#include "proto/link/socket.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
+
+namespace proofmass::wire {
+namespace {
+
+using ::testing::AnyOf;
+using Clock = std::chrono::steady_clock;
+
+// Someone who connects. Its clock runs as fast as the test wants.
+class Peer {
+ public:
+  Peer(const std::string& endpoint, const ClientSecurity& security)
+      : dealer_(make_dealer(context_, security)),
+        monitor_(context_, dealer_, endpoint, security, now_) {}
+
+  // Lets things happen until `is_enough`, or 20 s of real time have passed.
+  bool until(const std::function<bool()>& is_enough) {
+    const auto deadline = Clock::now() + std::chrono::seconds(20);
+    while (!is_enough()) {
+      if (Clock::now() > deadline) return false;
+      zmq::pollitem_t item{monitor_.handle(), 0, ZMQ_POLLIN, 0};
+      zmq::poll(&item, 1, std::chrono::milliseconds(20));
+      monitor_.update(now_);
+    }
+    return true;
+  }
+
+  std::string refusal() {
+    std::optional<std::string> text;
+    until([&] { return (text = monitor_.take_refusal()).has_value(); });
+    return text.value_or("none");
+  }
+
+  bool connects() {
+    return until([&] { return monitor_.is_connected(); });
+  }
+
+  ConnectionMonitor& monitor() { return monitor_; }
+  void let_pass(std::chrono::seconds duration) { now_ += duration; }
+
+ private:
+  Clock::time_point now_{};
+  zmq::context_t context_;
+  zmq::socket_t dealer_;
+  ConnectionMonitor monitor_;
+};
+
+ClientSecurity worker_of(const PublicKey& coordinator) {
+  return {.identity = CurveIdentity{
+              .role = KeyRole::worker, .keys = make_key_pair(), .coordinator = coordinator}};
+}
+
+constexpr const char* other_key_rule =
+    "breaks the connection off: it has another key than coordinator.pub, or none, or is no "
+    "coordinator";
+
+std::string endpoint_of(const zmq::socket_t& socket) {
+  return socket.get(zmq::sockopt::last_endpoint);
+}
+
+TEST(ConnectionMonitor, SeesTheConnectionComeAndGo) {
+  zmq::context_t context;
+  zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*", {});
+  Peer peer(endpoint_of(router), {});
+  EXPECT_FALSE(peer.monitor().is_connected());
+  ASSERT_TRUE(peer.connects());
+  router.close();
+  EXPECT_TRUE(peer.until([&] { return !peer.monitor().is_connected(); }));
+  EXPECT_FALSE(peer.monitor().take_refusal());
+}
+
+TEST(ConnectionMonitor, ConnectsByNameAndBySocketFile) {
+  const test::ScratchDirectory directory;
+  zmq::context_t context;
+  for (const std::string& address :
+       {std::string("tcp://127.0.0.1:*"), "ipc://" + (directory / "socket").string()}) {
+    const zmq::socket_t router = make_router(context, "bind", address, {});
+    std::string endpoint = endpoint_of(router);
+    if (const std::size_t host = endpoint.find("127.0.0.1"); host != std::string::npos) {
+      endpoint.replace(host, 9, "localhost");
+    }
+    EXPECT_TRUE(Peer(endpoint, {}).connects()) << endpoint;
+  }
+}
+
+std::string mismatch(const std::string& endpoint, const std::string& rule) {
+  return "coordinator = " + endpoint + " (" + rule + ")";
+}
+
+// Whichever end notices first breaks off, and the other then knows less.
+TEST(ConnectionMonitor, TellsAPlainPeerThatKeysAreNeeded) {
+  zmq::context_t context;
+  const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*",
+                                           {.domain = Domain::workers, .keys = make_key_pair()});
+  const std::string endpoint = endpoint_of(router);
+  Peer peer(endpoint, {});
+  EXPECT_THAT(peer.refusal(),
+              AnyOf(mismatch(endpoint, "admits only who has a key: give --keys"),
+                    mismatch(endpoint,
+                             "breaks the connection off: it wants --keys, or is no coordinator")));
+}
+
+TEST(ConnectionMonitor, TellsAPeerWithKeysThatTheCoordinatorUsesNone) {
+  zmq::context_t context;
+  const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*", {});
+  const std::string endpoint = endpoint_of(router);
+  Peer peer(endpoint, worker_of(make_key_pair().public_key));
+  EXPECT_THAT(peer.refusal(), AnyOf(mismatch(endpoint, "uses no keys: start it with --keys too"),
+                                    mismatch(endpoint, other_key_rule)));
+}
+
+TEST(ConnectionMonitor, TellsThatTheCoordinatorHasAnotherKey) {
+  zmq::context_t context;
+  const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*",
+                                           {.domain = Domain::workers, .keys = make_key_pair()});
+  Peer peer(endpoint_of(router), worker_of(make_key_pair().public_key));
+  EXPECT_EQ(peer.refusal(), mismatch(endpoint_of(router), other_key_rule));
+}
+
+TEST(ConnectionMonitor, SaysEachReasonOnce) {
+  zmq::context_t context;
+  const zmq::socket_t router = make_router(context, "bind", "tcp://127.0.0.1:*",
+                                           {.domain = Domain::workers, .keys = make_key_pair()});
+  Peer peer(endpoint_of(router), {});
+  std::multiset<std::string> reasons;
+  int num_turns = 0;
+  EXPECT_TRUE(peer.until([&] {
+    if (const auto reason = peer.monitor().take_refusal()) reasons.insert(*reason);
+    peer.let_pass(std::chrono::seconds(40));  // Each turn connects again.
+    return ++num_turns > 40 && !reasons.empty();
+  }));
+  for (const std::string& reason : reasons) EXPECT_EQ(reasons.count(reason), 1u) << reason;
+}
+
+// After a refusal ZeroMQ never connects again by itself.
+TEST(ConnectionMonitor, ConnectsAgainAfterARefusal) {
+  zmq::context_t strict_context;
+  zmq::socket_t strict = make_router(strict_context, "bind", "tcp://127.0.0.1:*",
+                                     {.domain = Domain::workers, .keys = make_key_pair()});
+  const std::string endpoint = endpoint_of(strict);
+  Peer peer(endpoint, {});
+  ASSERT_NE(peer.refusal(), "none");
+  strict.close();
+  strict_context.close();
+  zmq::context_t open_context;
+  const zmq::socket_t open = make_router(open_context, "bind", endpoint, {});
+
+  int num_turns = 0;
+  EXPECT_FALSE(peer.until([&] { return ++num_turns > 10 || peer.monitor().is_connected(); }) &&
+               peer.monitor().is_connected());
+  peer.let_pass(std::chrono::seconds(1));
+
+  EXPECT_TRUE(peer.connects());
+}
+
+// A listener of another protocol: takes connections and says something else.
+class Stranger {
+ public:
+  explicit Stranger(std::string greeting) : greeting_(std::move(greeting)) {
+    listener_ = ::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    ::bind(listener_, reinterpret_cast<sockaddr*>(&address), sizeof address);
+    ::listen(listener_, 8);
+    socklen_t size = sizeof address;
+    ::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &size);
+    port_ = ntohs(address.sin_port);
+  }
+  ~Stranger() { ::close(listener_); }
+  Stranger(const Stranger&) = delete;
+  Stranger& operator=(const Stranger&) = delete;
+
+  [[nodiscard]] std::string endpoint() const { return "tcp://127.0.0.1:" + std::to_string(port_); }
+
+  void serve() const {
+    const int connection = ::accept(listener_, nullptr, nullptr);
+    if (connection < 0) return;
+    [[maybe_unused]] const auto sent = ::send(connection, greeting_.data(), greeting_.size(), 0);
+    ::close(connection);
+  }
+
+ private:
+  std::string greeting_;
+  int listener_;
+  int port_;
+};
+
+TEST(ConnectionMonitor, TellsThatThePeerIsNoCoordinator) {
+  for (const std::string& greeting :
+       {std::string(), std::string("HTTP/1.1 400 Bad Request\r\n\r\n"), std::string(64, '\x01')}) {
+    const Stranger stranger(greeting);
+    Peer peer(stranger.endpoint(), {});
+    std::optional<std::string> refusal;
+    EXPECT_TRUE(peer.until([&] {
+      stranger.serve();
+      peer.let_pass(std::chrono::seconds(31));
+      return (refusal = peer.monitor().take_refusal()).has_value();
+    })) << greeting;
+    EXPECT_EQ(refusal.value_or("none"),
+              "coordinator = " + stranger.endpoint() +
+                  " (breaks the connection off: it wants --keys, or is no coordinator)");
+  }
+}
+
+TEST(ConnectionMonitor, AddressThatCanNeverBeConnectedIsAnError) {
+  EXPECT_EQ(test::refusal_of([] { Peer peer("carrier-pigeon://home", {}); }),
+            "connect = carrier-pigeon://home (Protocol not supported)");
+}
+
+}  // namespace
+}  // namespace proofmass::wire

@@ -1,0 +1,216 @@
+#include "proto/wire/client_codec.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "core/error.hpp"
+
+namespace proofmass::wire {
+namespace {
+
+constexpr std::uint64_t some_id = 0xfedc'ba98'7654'3210;
+
+template <typename Content>
+Content round_trip_request(const Content& content) {
+  const auto decoded = decode_request(encode(RequestPacket{some_id, content}));
+  if (const auto* const error = std::get_if<DecodeError>(&decoded)) throw Error(error->text);
+  EXPECT_EQ(std::get<RequestPacket>(decoded).id, some_id);
+  return std::get<Content>(std::get<RequestPacket>(decoded).request);
+}
+
+template <typename Content>
+Content round_trip_reply(const Content& content) {
+  const auto decoded = decode_reply(encode(ReplyPacket{some_id, content}));
+  if (const auto* const error = std::get_if<DecodeError>(&decoded)) throw Error(error->text);
+  EXPECT_EQ(std::get<ReplyPacket>(decoded).id, some_id);
+  return std::get<Content>(std::get<ReplyPacket>(decoded).reply);
+}
+
+Campaign campaign_with_tables() {
+  Campaign campaign;
+  campaign.name = "tables";
+  campaign.seed = 7;
+  campaign.num_runs = 2;
+  campaign.scenario.noise.scale = 0.1;
+  campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
+  campaign.dispersions[9] = {.law = Law::table, .file = "f.csv", .column = "b"};
+  campaign.table_columns = {{0.1, -2.0 / 3.0}, {1e-3, std::numeric_limits<double>::denorm_min()}};
+  return campaign;
+}
+
+TEST(SubmitRequest, KeepsTheCampaignAndItsTables) {
+  const Campaign campaign = campaign_with_tables();
+  const SubmitRequest submit = round_trip_request(
+      SubmitRequest{.campaign = campaign, .priority = -100, .audit_fraction = 0.1});
+  EXPECT_EQ(submit.priority, -100);
+  EXPECT_EQ(submit.audit_fraction, 0.1);
+  EXPECT_EQ(submit.campaign.name, "tables");
+  EXPECT_EQ(submit.campaign.seed, 7U);
+  EXPECT_EQ(submit.campaign.num_runs, 2U);
+  EXPECT_EQ(submit.campaign.scenario.noise.scale, 0.1);
+  EXPECT_EQ(submit.campaign.dispersions, campaign.dispersions);
+  EXPECT_EQ(submit.campaign.table_columns, campaign.table_columns);
+}
+
+TEST(QuestionRequests, AreTold) {
+  (void)round_trip_request(StatusRequest{});
+  (void)round_trip_request(WorkersRequest{});
+}
+
+TEST(ControlRequest, KeepsActionAndCampaign) {
+  for (const auto action : {ControlAction::pause, ControlAction::resume, ControlAction::cancel}) {
+    const auto control =
+        round_trip_request(ControlRequest{.action = action, .campaign = "hardy2013"});
+    EXPECT_EQ(control.action, action);
+    EXPECT_EQ(control.campaign, "hardy2013");
+  }
+}
+
+CampaignStatus some_status() {
+  return {.name = "a",
+          .phase = CampaignPhase::paused,
+          .priority = -3,
+          .num_runs = 100,
+          .num_done = 11,
+          .num_without_estimate = 2,
+          .num_given_up = 3,
+          .num_lent = 4,
+          .num_duplicates = 5,
+          .num_audited = 6,
+          .num_mismatches = 7,
+          .rate_hz = 0.1,
+          .remaining_s = 0.2,
+          .storage_failure = "disk full"};
+}
+
+CampaignStatus status_named(const std::string& name) {
+  CampaignStatus status;
+  status.name = name;
+  status.num_runs = 1;
+  return status;
+}
+
+StatusReply reply_with(const std::vector<CampaignStatus>& campaigns) {
+  StatusReply reply;
+  reply.version = "v";
+  reply.model_version = "m";
+  reply.campaigns = campaigns;
+  return reply;
+}
+
+TEST(StatusReply, KeepsEverything) {
+  const auto status =
+      round_trip_reply(StatusReply{.version = "0.1.0",
+                                   .model_version = "m-2",
+                                   .uptime_s = 0.3,
+                                   .num_workers = 8,
+                                   .num_slots = 9,
+                                   .campaigns = {some_status(), status_named("b")}});
+  EXPECT_EQ(status.version, "0.1.0");
+  EXPECT_EQ(status.model_version, "m-2");
+  EXPECT_EQ(status.uptime_s, 0.3);
+  EXPECT_EQ(status.num_workers, 8U);
+  EXPECT_EQ(status.num_slots, 9U);
+  ASSERT_EQ(status.campaigns.size(), 2U);
+  EXPECT_EQ(status.campaigns[1].name, "b");
+  EXPECT_EQ(status.campaigns[1].remaining_s, std::nullopt);
+}
+
+TEST(StatusReply, KeepsACampaign) {
+  const CampaignStatus sent = some_status();
+  const CampaignStatus campaign = round_trip_reply(reply_with({sent})).campaigns.at(0);
+  EXPECT_EQ(campaign.name, sent.name);
+  EXPECT_EQ(campaign.phase, sent.phase);
+  EXPECT_EQ(campaign.priority, sent.priority);
+  EXPECT_EQ(campaign.num_runs, sent.num_runs);
+  EXPECT_EQ(campaign.num_done, sent.num_done);
+  EXPECT_EQ(campaign.num_without_estimate, sent.num_without_estimate);
+  EXPECT_EQ(campaign.num_given_up, sent.num_given_up);
+  EXPECT_EQ(campaign.num_lent, sent.num_lent);
+  EXPECT_EQ(campaign.num_duplicates, sent.num_duplicates);
+  EXPECT_EQ(campaign.num_audited, sent.num_audited);
+  EXPECT_EQ(campaign.num_mismatches, sent.num_mismatches);
+  EXPECT_EQ(campaign.rate_hz, sent.rate_hz);
+  EXPECT_EQ(campaign.remaining_s, sent.remaining_s);
+  EXPECT_EQ(campaign.storage_failure, sent.storage_failure);
+}
+
+TEST(StatusReply, MayNameAsManyCampaignsAsAreServed) {
+  const std::vector<CampaignStatus> campaigns(campaigns_per_reply_max, some_status());
+  EXPECT_EQ(round_trip_reply(reply_with(campaigns)).campaigns.size(), campaigns_per_reply_max);
+}
+
+TEST(WorkersReply, KeepsEverything) {
+  const WorkerStatus sent{.id = {3},
+                          .name = "w",
+                          .host = "h",
+                          .process_id = 4,
+                          .num_slots = 5,
+                          .num_lent = 6,
+                          .num_results = 7,
+                          .silent_s = 0.1,
+                          .is_quarantined = true};
+  const auto reply =
+      round_trip_reply(WorkersReply{.workers = {sent, {.id = {4}, .name = "x", .host = "y"}}});
+  ASSERT_EQ(reply.workers.size(), 2U);
+  const WorkerStatus& worker = reply.workers[0];
+  EXPECT_EQ(worker.id, sent.id);
+  EXPECT_EQ(worker.name, sent.name);
+  EXPECT_EQ(worker.host, sent.host);
+  EXPECT_EQ(worker.process_id, sent.process_id);
+  EXPECT_EQ(worker.num_slots, sent.num_slots);
+  EXPECT_EQ(worker.num_lent, sent.num_lent);
+  EXPECT_EQ(worker.num_results, sent.num_results);
+  EXPECT_EQ(worker.silent_s, sent.silent_s);
+  EXPECT_TRUE(worker.is_quarantined);
+  EXPECT_FALSE(reply.workers[1].is_quarantined);
+}
+
+TEST(TextReplies, KeepTheirText) {
+  EXPECT_EQ(round_trip_reply(DoneReply{"done\nwell"}).text, "done\nwell");
+  EXPECT_EQ(round_trip_reply(ErrorReply{"a = b (c)"}).text, "a = b (c)");
+}
+
+// A text may hold the path of a file, which may hold anything.
+TEST(TextReplies, AreSentWithoutWhatATerminalWouldObey) {
+  EXPECT_EQ(round_trip_reply(ErrorReply{"a\x1b[2Jb\tc\xff"
+                                        "d"})
+                .text,
+            "a?[2Jb?c?d");
+}
+
+TEST(TextReplies, AreCutToTheirLimit) {
+  EXPECT_EQ(round_trip_reply(DoneReply{std::string(5000, 'x')}).text, std::string(4096, 'x'));
+}
+
+TEST(ReplyPacket, MayAnswerARequestThatCouldNotBeRead) {
+  const auto decoded = decode_reply(encode(ReplyPacket{0, ErrorReply{"x"}}));
+  EXPECT_EQ(std::get<ReplyPacket>(decoded).id, 0U);
+}
+
+TEST(RequestPacket, OfTooManyBytesIsNotMade) {
+  Campaign campaign = campaign_with_tables();
+  campaign.table_columns = {std::vector<double>(std::size_t{1} << 23), {}};
+  try {
+    (void)encode(RequestPacket{1, SubmitRequest{.campaign = campaign}});
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    const std::string text = error.what();
+    EXPECT_EQ(text.substr(0, 15), "request size = ");
+    EXPECT_EQ(text.substr(text.find('(')), "(must be at most 67108864)");
+  }
+}
+
+TEST(ClientNames, AreThoseOfTheEnumerators) {
+  EXPECT_EQ(name_of(ControlAction::pause), "pause");
+  EXPECT_EQ(name_of(ControlAction::resume), "resume");
+  EXPECT_EQ(name_of(ControlAction::cancel), "cancel");
+  EXPECT_EQ(name_of(CampaignPhase::active), "active");
+  EXPECT_EQ(name_of(CampaignPhase::paused), "paused");
+  EXPECT_EQ(name_of(CampaignPhase::finished), "finished");
+  EXPECT_EQ(name_of(CampaignPhase::cancelled), "cancelled");
+}
+
+}  // namespace
+}  // namespace proofmass::wire

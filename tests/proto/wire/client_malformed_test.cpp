@@ -1,0 +1,293 @@
+// What a client or a coordinator may not send: each rule of the client decoders, broken by one
+// change of a good message.
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <string>
+#include <variant>
+
+#include "proto/client.pb.h"
+#include "proto/wire/client_codec.hpp"
+
+namespace proofmass::wire {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+DecodeError refusal_of_request(const std::string& bytes) {
+  const auto decoded = decode_request(bytes);
+  const auto* const error = std::get_if<DecodeError>(&decoded);
+  return error != nullptr ? *error : DecodeError{DecodeFault::invalid, "accepted"};
+}
+
+DecodeError refusal_of_reply(const std::string& bytes) {
+  const auto decoded = decode_reply(bytes);
+  const auto* const error = std::get_if<DecodeError>(&decoded);
+  return error != nullptr ? *error : DecodeError{DecodeFault::invalid, "accepted"};
+}
+
+/// Why the request is refused after the change.
+std::string refusal(const ClientRequest& good,
+                    const std::function<void(proto::RequestEnvelope&)>& change) {
+  proto::RequestEnvelope envelope;
+  EXPECT_TRUE(envelope.ParseFromString(encode(RequestPacket{1, good})));
+  EXPECT_EQ(refusal_of_request(envelope.SerializeAsString()).text, "accepted");
+  change(envelope);
+  const DecodeError error = refusal_of_request(envelope.SerializeAsString());
+  EXPECT_EQ(error.fault, DecodeFault::invalid);
+  return error.text;
+}
+
+std::string refusal(const ClientReply& good,
+                    const std::function<void(proto::ReplyEnvelope&)>& change) {
+  proto::ReplyEnvelope envelope;
+  EXPECT_TRUE(envelope.ParseFromString(encode(ReplyPacket{1, good})));
+  EXPECT_EQ(refusal_of_reply(envelope.SerializeAsString()).text, "accepted");
+  change(envelope);
+  const DecodeError error = refusal_of_reply(envelope.SerializeAsString());
+  EXPECT_EQ(error.fault, DecodeFault::invalid);
+  return error.text;
+}
+
+std::string refusal_of_submit(const std::function<void(proto::SubmitRequest&)>& change) {
+  return refusal(SubmitRequest{}, [&](auto& envelope) { change(*envelope.mutable_submit()); });
+}
+
+std::string refusal_of_control(const std::function<void(proto::ControlRequest&)>& change) {
+  return refusal(ControlRequest{.action = ControlAction::pause, .campaign = "a"},
+                 [&](auto& envelope) { change(*envelope.mutable_control()); });
+}
+
+std::string refusal_of_status(const std::function<void(proto::StatusReply&)>& change) {
+  CampaignStatus campaign;
+  campaign.name = "a";
+  campaign.num_runs = 10;
+  campaign.remaining_s = 1.0;
+  StatusReply good;
+  good.version = "v";
+  good.model_version = "m";
+  good.campaigns = {campaign};
+  return refusal(good, [&](auto& envelope) { change(*envelope.mutable_status()); });
+}
+
+std::string refusal_of_campaign(const std::function<void(proto::CampaignStatus&)>& change) {
+  return refusal_of_status([&](auto& status) { change(*status.mutable_campaigns(0)); });
+}
+
+std::string refusal_of_worker(const std::function<void(proto::WorkerStatus&)>& change) {
+  const WorkersReply good{.workers = {{.id = {1}, .name = "w", .host = "h"}}};
+  return refusal(good,
+                 [&](auto& envelope) { change(*envelope.mutable_workers()->mutable_workers(0)); });
+}
+
+proto::RequestEnvelope status_request() {
+  proto::RequestEnvelope envelope;
+  envelope.set_protocol_version(protocol_version);
+  envelope.set_request_id(1);
+  envelope.mutable_status();
+  return envelope;
+}
+
+// Envelopes.
+
+TEST(MalformedRequest, OfTooManyBytesIsRefusedUnread) {
+  const DecodeError error = refusal_of_request(std::string(submit_size_max + 1, 'x'));
+  EXPECT_EQ(error.fault, DecodeFault::too_large);
+  EXPECT_EQ(error.text, "request size = 67108865 bytes (must be at most 67108864)");
+}
+
+TEST(MalformedRequest, MayBeLargeForACampaignOnly) {
+  proto::RequestEnvelope envelope = status_request();
+  envelope.mutable_control()->set_campaign(std::string(request_size_max, 'x'));
+  const DecodeError error = refusal_of_request(envelope.SerializeAsString());
+  EXPECT_EQ(error.fault, DecodeFault::too_large);
+  EXPECT_EQ(error.text, "request size = 65548 bytes (must be at most 65536)");
+}
+
+TEST(MalformedRequest, ThatIsNoneIsUnparsable) {
+  const DecodeError error = refusal_of_request("GET / HTTP/1.1");
+  EXPECT_EQ(error.fault, DecodeFault::unparsable);
+  EXPECT_EQ(error.text, "request = 14 bytes (must be an envelope of at most 65536 fields)");
+}
+
+TEST(MalformedRequest, OfAnotherVersionIsRefused) {
+  proto::RequestEnvelope envelope = status_request();
+  envelope.set_protocol_version(protocol_version + 1);
+  const DecodeError error = refusal_of_request(envelope.SerializeAsString());
+  EXPECT_EQ(error.fault, DecodeFault::wrong_version);
+  EXPECT_EQ(error.text, "protocol_version = 3 (must be 2)");
+}
+
+TEST(MalformedRequest, WithoutContentIsRefused) {
+  proto::RequestEnvelope envelope = status_request();
+  envelope.clear_request();
+  const DecodeError error = refusal_of_request(envelope.SerializeAsString());
+  EXPECT_EQ(error.fault, DecodeFault::empty);
+  EXPECT_EQ(error.text, "request = none (must be of a known kind)");
+}
+
+TEST(MalformedRequest, HasANumber) {
+  EXPECT_EQ(refusal(StatusRequest{}, [](auto& envelope) { envelope.clear_request_id(); }),
+            "request_id = 0 (must not be 0)");
+}
+
+TEST(MalformedRequest, OfAWorkerIsRefused) {
+  const std::string bye =
+      encode(Packet{.header = {.session = {1}, .epoch = {}, .sequence = 1}, .message = Bye{}});
+  EXPECT_NE(refusal_of_request(bye).text, "accepted");
+}
+
+TEST(MalformedReply, OfTooManyBytesIsRefusedUnread) {
+  const DecodeError error = refusal_of_reply(std::string(reply_size_max + 1, 'x'));
+  EXPECT_EQ(error.fault, DecodeFault::too_large);
+  EXPECT_EQ(error.text, "reply size = 4194305 bytes (must be at most 4194304)");
+}
+
+TEST(MalformedReply, OfAnotherVersionOrWithoutContentIsRefused) {
+  proto::ReplyEnvelope envelope;
+  envelope.set_protocol_version(1);
+  EXPECT_EQ(refusal_of_reply(envelope.SerializeAsString()).fault, DecodeFault::wrong_version);
+  envelope.set_protocol_version(protocol_version);
+  const DecodeError error = refusal_of_reply(envelope.SerializeAsString());
+  EXPECT_EQ(error.fault, DecodeFault::empty);
+  EXPECT_EQ(error.text, "reply = none (must be of a known kind)");
+}
+
+// Two bytes may stand for a message that takes more than a hundred bytes of memory.
+TEST(MalformedRequest, OfManyEmptySessionsIsRefusedBeforeItIsParsed) {
+  proto::RequestEnvelope envelope = status_request();
+  for (int i = 0; i < 65536; ++i) envelope.mutable_submit()->mutable_campaign()->add_sessions();
+  const DecodeError error = refusal_of_request(envelope.SerializeAsString());
+  EXPECT_EQ(error.fault, DecodeFault::unparsable);
+}
+
+TEST(MalformedRequest, OfManyUnknownFieldsIsRefusedBeforeItIsParsed) {
+  std::string bytes = status_request().SerializeAsString();
+  for (int i = 0; i < 65534; ++i) bytes += "\x78\x01";  // Field 15, a number.
+  EXPECT_EQ(refusal_of_request(bytes).fault, DecodeFault::unparsable);
+}
+
+TEST(MalformedRequest, MayNotHideFieldsInAGroup) {
+  const std::string group = "\x7b\x08\x01\x7c";  // Field 15 begins, field 1 in it, field 15 ends.
+  proto::RequestEnvelope envelope;
+  ASSERT_TRUE(envelope.ParseFromString(status_request().SerializeAsString() + group));
+  EXPECT_EQ(refusal_of_request(status_request().SerializeAsString() + group).fault,
+            DecodeFault::unparsable);
+}
+
+// Requests.
+
+TEST(MalformedSubmitRequest, HasAPriorityAndAFraction) {
+  for (const int priority : {-101, 101, std::numeric_limits<int>::min()}) {
+    EXPECT_EQ(refusal_of_submit([&](auto& submit) { submit.set_priority(priority); }),
+              "priority = " + std::to_string(priority) + " (must be in [-100, 100])");
+  }
+  for (const auto& [value, text] : {std::pair{-0.1, "-0.1"}, {1.1, "1.1"}, {nan, "nan"}}) {
+    EXPECT_EQ(refusal_of_submit([&](auto& submit) { submit.set_audit_fraction(value); }),
+              std::string("audit = ") + text + " (must be in [0, 1])");
+  }
+}
+
+TEST(MalformedSubmitRequest, HasACampaignThatPassesItsRules) {
+  EXPECT_EQ(refusal_of_submit([](auto& submit) { submit.clear_campaign(); }),
+            "num_runs = 0 (must be in [1, 1000000000])");
+  EXPECT_EQ(refusal_of_submit([](auto& submit) { submit.mutable_campaign()->set_name("../a"); }),
+            "campaign.name = \"../a\" (must be 1 to 64 letters, digits, _, - or .)");
+}
+
+TEST(MalformedSubmitRequest, HasTheTableColumnsThatItsLawsNeed) {
+  EXPECT_EQ(refusal_of_submit([](auto& submit) { submit.add_table_columns(); }),
+            "dispersion = 1 columns (laws of kind table are 0)");
+}
+
+TEST(MalformedControlRequest, HasAnActionAndACampaign) {
+  EXPECT_EQ(refusal_of_control([](auto& control) { control.clear_action(); }),
+            "action = 0 (must be in [1, 3])");
+  EXPECT_EQ(refusal_of_control(
+                [](auto& control) { control.set_action(static_cast<proto::ControlAction>(4)); }),
+            "action = 4 (must be in [1, 3])");
+  EXPECT_EQ(refusal_of_control([](auto& control) { control.set_campaign("a b"); }),
+            "campaign = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+}
+
+// Replies.
+
+TEST(MalformedStatusReply, HasVersionsAndATime) {
+  EXPECT_EQ(refusal_of_status([](auto& status) { status.set_version(""); }),
+            "version = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal_of_status([](auto& status) { status.set_model_version("\n"); }),
+            "model_version = 1 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal_of_status([](auto& status) { status.set_uptime_s(-1.0); }),
+            "uptime_s = -1 (must be >= 0)");
+}
+
+TEST(MalformedStatusReply, NamesABoundedNumberOfCampaigns) {
+  EXPECT_EQ(refusal_of_status([](auto& status) {
+              for (int i = 0; i < 4096; ++i) status.add_campaigns();
+            }),
+            "campaigns = 4097 entries (must be in [0, 4096])");
+}
+
+TEST(MalformedCampaignStatus, HasANameAPhaseAndAPriority) {
+  EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.set_name(""); }),
+            "name = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.clear_phase(); }),
+            "phase = 0 (must be in [1, 4])");
+  EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.set_priority(101); }),
+            "priority = 101 (must be in [-100, 100])");
+}
+
+TEST(MalformedCampaignStatus, CountsNoMoreRunsThanThereAre) {
+  EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.set_num_runs(0); }),
+            "num_runs = 0 (must be in [1, 1000000000])");
+  EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.set_num_given_up(11); }),
+            "num_given_up = 11 (must be in [0, 10])");
+  EXPECT_EQ(refusal_of_campaign([](auto& campaign) {
+              campaign.set_num_given_up(3);
+              campaign.set_num_done(8);
+            }),
+            "num_done = 8 (must be in [0, 7])");
+}
+
+TEST(MalformedCampaignStatus, HasFiniteNumbers) {
+  EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.set_rate_hz(nan); }),
+            "rate_hz = nan (must be >= 0)");
+  EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.set_remaining_s(-1.0); }),
+            "remaining_s = -1 (must be >= 0)");
+}
+
+TEST(MalformedTexts, AreBoundedAndHarmlessToATerminal) {
+  EXPECT_EQ(refusal_of_campaign(
+                [](auto& campaign) { campaign.set_storage_failure(std::string(4097, 'x')); }),
+            "storage_failure = 4097 bytes (must be at most 4096)");
+  EXPECT_EQ(
+      refusal(DoneReply{"a"}, [](auto& envelope) { envelope.mutable_done()->set_text("\x1b[2J"); }),
+      "text = 4 bytes (must be printable ASCII and line ends)");
+  EXPECT_EQ(
+      refusal(ErrorReply{"a"}, [](auto& envelope) { envelope.mutable_error()->set_text("\r"); }),
+      "text = 1 bytes (must be printable ASCII and line ends)");
+}
+
+TEST(MalformedWorkersReply, NamesABoundedNumberOfWorkers) {
+  EXPECT_EQ(refusal(WorkersReply{},
+                    [](auto& envelope) {
+                      for (int i = 0; i < 4097; ++i) envelope.mutable_workers()->add_workers();
+                    }),
+            "workers = 4097 entries (must be in [0, 4096])");
+}
+
+TEST(MalformedWorkerStatus, HasANumberNamesAndATime) {
+  EXPECT_EQ(refusal_of_worker([](auto& worker) { worker.clear_worker_id(); }),
+            "worker_id = 0 (must not be 0)");
+  EXPECT_EQ(refusal_of_worker([](auto& worker) { worker.set_name(""); }),
+            "name = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal_of_worker([](auto& worker) { worker.set_host("a\n"); }),
+            "host = 2 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal_of_worker([](auto& worker) { worker.set_silent_s(nan); }),
+            "silent_s = nan (must be >= 0)");
+}
+
+}  // namespace
+}  // namespace proofmass::wire
