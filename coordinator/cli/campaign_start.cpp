@@ -14,8 +14,8 @@
 namespace proofmass::coordinator {
 namespace {
 
-void require_same(const Store& store, const Campaign& wanted,
-                  const std::filesystem::path& database) {
+void require_same(const Store& store, const Campaign& wanted, const std::filesystem::path& database,
+                  std::string_view remedy) {
   std::vector<std::string> differences = definition_differences(stored_campaign(store), wanted);
   if (store.model_version() != model_version) {
     differences.push_back(fmt::format("model: {} in the database, {} in this program",
@@ -24,7 +24,7 @@ void require_same(const Store& store, const Campaign& wanted,
   if (differences.empty()) return;
   std::string text = fmt::format("{} holds another campaign:", database.string());
   for (const std::string& difference : differences) text += "\n  " + difference;
-  throw UsageError(text + "\nname another database with --db");
+  throw UsageError(fmt::format("{}\n{}", text, remedy));
 }
 
 }  // namespace
@@ -39,12 +39,9 @@ Campaign stored_campaign(const Store& store) {
   return parse_stored_campaign(store.definition(), store.environment_table(), std::move(columns));
 }
 
-Store open_or_create(const Campaign& wanted, const std::filesystem::path& database) {
-  if (!std::filesystem::exists(database)) {
-    return Store::create(database, wanted, canonical_definition(wanted));
-  }
-  Store store = Store::open(database);
-  require_same(store, wanted, database);
+void extend_to(Store& store, const Campaign& wanted, const std::filesystem::path& database,
+               std::string_view remedy) {
+  require_same(store, wanted, database, remedy);
   const std::uint64_t num_runs = store.num_runs();
   if (wanted.num_runs < num_runs) {
     throw UsageError(
@@ -52,17 +49,16 @@ Store open_or_create(const Campaign& wanted, const std::filesystem::path& databa
                     wanted.num_runs, num_runs, database.string()));
   }
   if (wanted.num_runs > num_runs) store.extend(wanted, canonical_definition(wanted));
-  return store;
 }
 
-Commit commit_to(Store& store, Log log) {
-  return [&store, log = std::move(log)](std::span<const Delivery> deliveries) {
-    const CommitSummary summary = store.commit(deliveries);
-    if (summary.num_contradicting == 0) return;
-    log({.severity = Severity::error,
-         .kind = "results_contradict",
-         .text = fmt::format("runs={} (the stored results stand)", summary.num_contradicting)});
-  };
+Store open_or_create(const Campaign& wanted, const std::filesystem::path& database,
+                     std::string_view remedy) {
+  if (!std::filesystem::exists(database)) {
+    return Store::create(database, wanted, canonical_definition(wanted));
+  }
+  Store store = Store::open(database);
+  extend_to(store, wanted, database, remedy);
+  return store;
 }
 
 }  // namespace proofmass::coordinator

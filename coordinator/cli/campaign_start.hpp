@@ -2,9 +2,9 @@
 
 #include <filesystem>
 #include <memory>
+#include <string_view>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/net/campaign_service.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 
@@ -13,13 +13,17 @@ namespace proofmass::coordinator {
 /// The campaign that a database holds.
 [[nodiscard]] Campaign stored_campaign(const Store& store);
 
-/// The database for a campaign: a new one, or the one that exists, with more runs if more are asked
-/// for.
-/// @throws UsageError if it holds another campaign, naming what differs, or more runs than wanted.
-/// @throws StoreError if it cannot be used.
-[[nodiscard]] Store open_or_create(const Campaign& wanted, const std::filesystem::path& database);
+/// Gives a campaign's database as many runs as are wanted.
+///
+/// @param remedy  What to do if it cannot be, for the message: `name another database with --db`.
+/// @throws UsageError if the database holds another campaign, naming what differs, or more runs
+///         than wanted.
+void extend_to(Store& store, const Campaign& wanted, const std::filesystem::path& database,
+               std::string_view remedy);
 
-/// Stores deliveries; a result that contradicts the stored one goes into the log.
-[[nodiscard]] Commit commit_to(Store& store, Log log);
+/// The database for a campaign: a new one, or the one that exists, after extend_to().
+/// @throws UsageError as extend_to() does; StoreError if it cannot be used.
+[[nodiscard]] Store open_or_create(const Campaign& wanted, const std::filesystem::path& database,
+                                   std::string_view remedy = "name another database with --db");
 
 }  // namespace proofmass::coordinator

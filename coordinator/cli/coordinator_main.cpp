@@ -1,18 +1,62 @@
+#include <map>
+
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/serve_command.hpp"
 
+namespace {
+
+using namespace proofmass::coordinator;
+
+void add_addresses(CLI::App& app, ServeOptions& options) {
+  app.add_option("--bind", options.endpoint, "Where workers connect: ipc://PATH or tcp://HOST:PORT")
+      ->envname("PROOFMASS_BIND")
+      ->required();
+  app.add_option("--bind-clients", options.clients_endpoint,
+                 "Where clients connect; a socket in the directory by default")
+      ->envname("PROOFMASS_BIND_CLIENTS");
+  app.add_option("--keys", options.keys, "Directory of keys, made by `proofmass keygen`")
+      ->envname("PROOFMASS_KEYS");
+  app.add_flag("--insecure-plain", options.is_plain_waived,
+               "Serve other machines without keys: on a network that you trust");
+}
+
+void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
+  app.add_option("FILE", options.campaign_files, "Campaign files (TOML) to serve as well");
+  app.add_option("--directory", options.directory, "Directory of the campaigns, one NAME.db each")
+      ->envname("PROOFMASS_DIRECTORY")
+      ->required();
+  app.add_flag("--exit-when-done", ends_when_done, "End when every campaign is finished");
+  app.add_option("--drain-time", options.drain_time_s,
+                 "Seconds that workers have after SIGTERM to deliver what they hold")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  const std::map<std::string, LogFormat> formats{{"text", LogFormat::text},
+                                                 {"json", LogFormat::json}};
+  app.add_option("--log-format", options.log_format, "text or json")
+      ->envname("PROOFMASS_LOG_FORMAT")
+      ->transform(CLI::CheckedTransformer(formats));
+  // For tests of the program by itself.
+  app.add_option("--faults", options.faults)->group("");
+  app.add_option("--time-scale", options.time_scale)->group("")->check(CLI::PositiveNumber);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
-  using namespace proofmass::coordinator;
   CLI::App app(
-      "Lends the runs of a campaign to workers and stores their results.\n"
-      "SIGTERM lets workers finish what they hold; SIGINT, or a second signal, does not.");
+      "Lends the runs of campaigns to workers and stores their results.\n"
+      "SIGTERM lets workers deliver what they hold; SIGINT, or a second signal, does not.");
   app.footer(exit_codes_text);
   app.set_version_flag("--version", "proofmass-coordinator " PROOFMASS_VERSION);
+  app.set_config("--config", "", "File with these options, as in `bind = \"tcp://*:5555\"`")
+      ->envname("PROOFMASS_CONFIG");
+  app.allow_config_extras(CLI::config_extras_mode::error);
   ServeOptions options;
-  app.add_option("FILE", options.campaign_file, "Campaign file (TOML)")->required();
-  app.add_option("--db", options.database, "Database; made if it does not exist")->required();
-  app.add_option("--bind", options.endpoint,
-                 "Where workers connect: ipc://PATH or tcp://127.0.0.1:PORT")
-      ->required();
-  return run_program(app, argc, argv, [&] { return serve_campaign(options); });
+  bool ends_when_done = false;
+  add_service(app, options, ends_when_done);
+  add_addresses(app, options);
+  return run_program(app, argc, argv, [&] {
+    if (ends_when_done) options.end = ServiceEnd::when_done;
+    return serve_campaigns(options);
+  });
 }

@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::size_t columns_max = 79;
 
-std::uint64_t percent(const CampaignProgress& progress) {
-  return progress.num_done * 100 / std::max<std::uint64_t>(1, progress.num_runs);
+std::uint64_t percent(const wire::CampaignStatus& status) {
+  return status.num_done * 100 / std::max<std::uint64_t>(1, status.num_runs);
 }
 
 std::string rate_text(double rate_hz) {
@@ -23,15 +23,13 @@ std::string rate_text(double rate_hz) {
   return fmt::format("  {:.2f} runs/min", 60.0 * rate_hz);
 }
 
-std::string left_text(const CampaignProgress& progress) {
-  if (progress.rate_hz <= 0.0 || progress.num_done >= progress.num_runs) return "";
-  const auto num_left = static_cast<double>(progress.num_runs - progress.num_done);
-  return fmt::format("  {} left", duration_text(num_left / progress.rate_hz));
+std::string left_text(const wire::CampaignStatus& status) {
+  if (!status.remaining_s || status.num_done >= status.num_runs) return "";
+  return fmt::format("  {} left", duration_text(*status.remaining_s));
 }
 
-std::string figures(const CampaignProgress& progress) {
-  return fmt::format("{:3} %{}{}", percent(progress), rate_text(progress.rate_hz),
-                     left_text(progress));
+std::string figures(const wire::CampaignStatus& status) {
+  return fmt::format("{:3} %{}{}", percent(status), rate_text(status.rate_hz), left_text(status));
 }
 
 }  // namespace
@@ -45,22 +43,22 @@ std::string duration_text(double seconds) {
   return fmt::format("{} d {} h", total / 86400, total % 86400 / 3600);
 }
 
-std::string progress_bar(const CampaignProgress& progress) {
-  const std::string left = fmt::format("{}/{} runs [", progress.num_done, progress.num_runs);
-  const std::string right = fmt::format("] {}", figures(progress));
+std::string progress_bar(const wire::CampaignStatus& status) {
+  const std::string left = fmt::format("{}/{} runs [", status.num_done, status.num_runs);
+  const std::string right = fmt::format("] {}", figures(status));
   const std::size_t used = left.size() + right.size();
   constexpr std::size_t width_max = 30;
   constexpr std::size_t width_min = 1;
   const std::size_t room = columns_max > used ? columns_max - used : 0;
   const std::size_t width = std::clamp(room, width_min, width_max);
-  const std::size_t filled = width * percent(progress) / 100;
+  const std::size_t filled = width * percent(status) / 100;
   const std::string line =
       left + std::string(filled, '#') + std::string(width - filled, '.') + right;
   return line.substr(0, columns_max);
 }
 
-std::string progress_line(const CampaignProgress& progress) {
-  return fmt::format("{}/{} runs  {}", progress.num_done, progress.num_runs, figures(progress));
+std::string progress_line(const wire::CampaignStatus& status) {
+  return fmt::format("{}/{} runs  {}", status.num_done, status.num_runs, figures(status));
 }
 
 DisplayMode display_mode_for(std::FILE* stream) {
@@ -74,18 +72,18 @@ ProgressDisplay::~ProgressDisplay() {
   if (has_bar_) fmt::print(stream_, "\n");
 }
 
-void ProgressDisplay::update(const CampaignProgress& progress) {
-  if (mode_ == DisplayMode::bar) return show_bar(progress);
+void ProgressDisplay::update(const wire::CampaignStatus& status) {
+  if (mode_ == DisplayMode::bar) return show_bar(status);
   if (mode_ == DisplayMode::quiet) return;
-  const std::uint64_t tenths = percent(progress) / 10;
+  const std::uint64_t tenths = percent(status) / 10;
   if (!is_first_ && tenths <= tenths_shown_) return;
   is_first_ = false;
   tenths_shown_ = tenths;
-  fmt::print(stream_, "{}\n", progress_line(progress));
+  fmt::print(stream_, "{}\n", progress_line(status));
 }
 
-void ProgressDisplay::show_bar(const CampaignProgress& progress) {
-  std::string line = progress_bar(progress);
+void ProgressDisplay::show_bar(const wire::CampaignStatus& status) {
+  std::string line = progress_bar(status);
   if (has_bar_ && line == shown_) return;
   // The longer line before it is wiped by the erasure to the end of the line.
   fmt::print(stream_, "\r{}\033[K", line);

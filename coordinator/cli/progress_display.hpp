@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "coordinator/net/campaign_service.hpp"
+#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
@@ -17,10 +17,10 @@ enum class DisplayMode : std::uint8_t {
 };
 
 /// A line of at most 79 columns: runs done, percent, rate, time left.
-[[nodiscard]] std::string progress_bar(const CampaignProgress& progress);
+[[nodiscard]] std::string progress_bar(const wire::CampaignStatus& status);
 
 /// The same without a bar.
-[[nodiscard]] std::string progress_line(const CampaignProgress& progress);
+[[nodiscard]] std::string progress_line(const wire::CampaignStatus& status);
 
 /// For people: `42 s`, `3 min 20 s`, `5 h 10 min`, `12 d 4 h`.
 [[nodiscard]] std::string duration_text(double seconds);
@@ -35,12 +35,12 @@ class ProgressDisplay {
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
   /// May be called as often as one likes.
-  void update(const CampaignProgress& progress);
+  void update(const wire::CampaignStatus& status);
   /// A line of its own that stays.
   void note(std::string_view text);
 
  private:
-  void show_bar(const CampaignProgress& progress);
+  void show_bar(const wire::CampaignStatus& status);
 
   DisplayMode mode_;
   std::FILE* stream_;

@@ -5,76 +5,37 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <span>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "coordinator/cli/campaign_start.hpp"
 #include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/local_workers.hpp"
 #include "coordinator/cli/progress_display.hpp"
 #include "coordinator/cli/stop_signals.hpp"
-#include "coordinator/cli/worker_processes.hpp"
-#include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/private_endpoint.hpp"
+#include "coordinator/net/service.hpp"
 #include "coordinator/report/report.hpp"
+#include "core/simulation/reference_digest.hpp"
 #include "core/simulation/run.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-constexpr int crashes_in_a_row_max = 3;
-
-/// The local workers of a campaign: starts them, and others in the place of those that die.
-class Crew {
- public:
-  Crew(CampaignService& service, ProgressDisplay& display)
-      : service_(service), display_(display), processes_(worker_executable(), service.endpoint()) {}
-
-  void start(std::uint64_t num_workers) {
-    for (std::uint64_t i = 1; i <= num_workers; ++i) {
-      processes_.start(fmt::format("local-{}", i));
-    }
-  }
-
-  /// @throws Error if workers die again and again without finishing a run.
-  void replace_dead() {
-    for (const WorkerProcesses::Exit& exit : processes_.take_exits()) {
-      const auto process_id = static_cast<std::uint64_t>(exit.process_id);
-      const std::string runs = to_text(service_.runs_held_by(process_id));
-      count_crash(exit, runs);
-      display_.note(fmt::format("worker {} (pid {}) ended: {}; it held runs {}; starting another",
-                                exit.name, exit.process_id, exit.reason, runs));
-      service_.process_ended(process_id, "process_ended");
-      processes_.start(exit.name);
-    }
-  }
-
- private:
-  void count_crash(const WorkerProcesses::Exit& exit, const std::string& runs) {
-    const std::uint64_t num_done = service_.progress().num_done;
-    num_crashes_ = num_done > num_done_at_crash_ ? 1 : num_crashes_ + 1;
-    num_done_at_crash_ = num_done;
-    if (num_crashes_ < crashes_in_a_row_max) return;
-    throw Error(
-        fmt::format("{} workers in a row ended without a finished run; the last, {}: {}, "
-                    "holding runs {}",
-                    num_crashes_, exit.name, exit.reason, runs));
-  }
-
-  CampaignService& service_;
-  ProgressDisplay& display_;
-  WorkerProcesses processes_;
-  int num_crashes_ = 0;
-  std::uint64_t num_done_at_crash_ = 0;
-};
-
 std::filesystem::path database_of(const RunOptions& options) {
   return options.database.value_or(options.campaign_file.stem().string() + ".db");
 }
 
+std::uint64_t count(std::span<const RunRange> ranges) {
+  std::uint64_t num_runs = 0;
+  for (const RunRange& range : ranges) num_runs += range.count;
+  return num_runs;
+}
+
 std::uint64_t num_missing(const Store& store) {
-  std::uint64_t num_finished = 0;
-  for (const RunRange& range : store.finished_runs()) num_finished += range.count;
-  return store.num_runs() - num_finished;
+  return store.num_runs() - count(store.finished_runs());
 }
 
 /// No more than there are batches: runs of one batch take no longer than one of them.
@@ -84,36 +45,68 @@ std::uint64_t num_workers(const RunOptions& options, std::uint64_t num_runs_miss
   return std::min<std::uint64_t>(options.num_workers.value_or(num_processors), num_batches);
 }
 
+/// The service of one campaign for the workers of this process.
+ServiceConfig service_config(const PrivateEndpoint& endpoint, std::uint64_t num_workers) {
+  ServiceConfig config;
+  config.workers_endpoint = endpoint.address();
+  config.end = ServiceEnd::when_done;
+  config.given_up = GivenUpRuns::retry;
+  config.version = PROOFMASS_VERSION;
+  config.dispatch.reference_digest = reference_digest(best_instruction_set());
+  config.dispatch.reattach_wait = Duration::zero();  // Workers of the last time ended with it.
+  // All workers may die at once, and runs must be found guilty before the machine is.
+  config.dispatch.crashes_per_host_max =
+      config.dispatch.crashes_per_run_max * static_cast<std::uint32_t>(num_workers + 1);
+  return config;
+}
+
 /// What nobody needs to see while all goes well goes into the database only.
-Log log_to(Store& store, ProgressDisplay& display) {
-  return [&store, &display](const Event& event) {
-    store.record_event(event.kind, event.text);
-    if (event.severity == Severity::error) {
-      display.note(fmt::format("proofmass: error: {} {}", event.kind, event.text));
-    }
+Log log_to(ProgressDisplay& display) {
+  return [&display](const Event& event) {
+    if (event.severity != Severity::error) return;
+    display.note(fmt::format("proofmass: error: {} {}", event.kind, event.text));
   };
 }
 
-/// Computes the missing runs; false if interrupted.
-bool compute(const Campaign& campaign, Store& store, const RunOptions& options) {
+ServedCampaign served(const Campaign& campaign, Store store, const std::filesystem::path& database,
+                      const RunOptions& options) {
+  const Entry control = CampaignControl{.phase = wire::CampaignPhase::active,
+                                        .priority = store.control().priority,
+                                        .audit_fraction = options.audit_fraction};
+  (void)store.write({&control, 1});
+  // Shared with the dispatch and with messages under way.
+  return {.file = database,
+          .store = std::move(store),
+          .definition = std::make_shared<const Campaign>(campaign)};
+}
+
+/// What came of a campaign.
+struct Outcome {
+  Store store;
+  bool is_done = false;  ///< Every run is stored or given up.
+};
+
+/// Computes the missing runs.
+Outcome compute(const Campaign& campaign, Store store, const std::filesystem::path& database,
+                const RunOptions& options) {
   const std::uint64_t num_runs_missing = num_missing(store);
-  if (num_runs_missing == 0) return true;
+  if (num_runs_missing == 0) return {.store = std::move(store), .is_done = true};
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   ProgressDisplay display(options.is_quiet ? DisplayMode::quiet : display_mode_for(stderr), stderr);
-  const Log log = log_to(store, display);
   const PrivateEndpoint endpoint;
-  CampaignService service(std::make_shared<const Campaign>(campaign), store.finished_runs(),
-                          endpoint.address(), commit_to(store, log), log);
-  Crew crew(service, display);
-  crew.start(num_workers(options, num_runs_missing));
-  const bool is_finished = service.run(stop, [&] {
-    const CampaignProgress progress = service.progress();
-    const bool needs_workers = stop == StopRequest::none && progress.num_done < progress.num_runs;
-    if (needs_workers) crew.replace_dead();
-    display.update(progress);
+  const std::uint64_t num_local = num_workers(options, num_runs_missing);
+  std::vector<ServedCampaign> campaigns;
+  campaigns.push_back(served(campaign, std::move(store), database, options));
+  Service service(std::move(campaigns), service_config(endpoint, num_local), log_to(display));
+  LocalWorkers workers(service, display);
+  workers.start(num_local);
+  service.run(stop, [&] {
+    if (stop == StopRequest::none && !service.is_done()) workers.replace_dead();
+    display.update(service.campaigns().front());
   });
-  display.update(service.progress());
-  return is_finished;
+  display.update(service.campaigns().front());
+  const bool is_done = service.is_done();
+  return {.store = std::move(service.close().front().store), .is_done = is_done};
 }
 
 int say_interrupted(const Store& store, const std::filesystem::path& database) {
@@ -125,17 +118,26 @@ int say_interrupted(const Store& store, const std::filesystem::path& database) {
   return exit_interrupted;
 }
 
+int say_given_up(std::span<const RunRange> given_up, std::uint64_t num_runs) {
+  const RunSet runs(given_up);
+  fmt::print(stderr,
+             "proofmass: error: {} of {} runs given up, having crashed their workers: {}\n"
+             "proofmass: the same command tries them again\n",
+             runs.size(), num_runs, to_text(runs));
+  return exit_cannot_be_done;
+}
+
 }  // namespace
 
 int run_campaign(const RunOptions& options) {
   const Campaign campaign = read_campaign(options.campaign_file, options.overrides);
   const std::filesystem::path database = database_of(options);
-  Store store = open_or_create(campaign, database);
-  const bool is_finished = compute(campaign, store, options);
-  update_statistics(store, campaign.scenario);
-  if (!is_finished) return say_interrupted(store, database);
-  fmt::print("{}", report_text(store, campaign.scenario));
-  return exit_done;
+  Outcome outcome = compute(campaign, open_or_create(campaign, database), database, options);
+  update_statistics(outcome.store, campaign.scenario);
+  if (!outcome.is_done) return say_interrupted(outcome.store, database);
+  fmt::print("{}", report_text(outcome.store, campaign.scenario));
+  const std::vector<RunRange> given_up = outcome.store.given_up_runs();
+  return given_up.empty() ? exit_done : say_given_up(given_up, campaign.num_runs);
 }
 
 }  // namespace proofmass::coordinator

@@ -14,10 +14,13 @@ struct RunOptions {
   std::optional<std::filesystem::path> database;  ///< By default STEM.db in the current directory.
   Overrides overrides;
   std::optional<unsigned> num_workers;  ///< By default one for each processor.
+  double audit_fraction = 0.0;          ///< Of the runs that are missing, computed twice; 0 to 1.
   bool is_quiet = false;
 };
 
-/// Runs what is missing of a campaign with local workers and prints its tables.
+/// Runs what is missing of a campaign with local workers and prints its tables. A run that crashes
+/// its workers is given up, and tried again the next time.
+///
 /// @return An ExitCode.
 /// @throws CampaignFileError, UsageError, StoreError, Error.
 [[nodiscard]] int run_campaign(const RunOptions& options);

@@ -1,17 +1,22 @@
 #include "coordinator/cli/serve_command.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <chrono>
 #include <memory>
+#include <utility>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/cli/campaign_start.hpp"
+#include "coordinator/cli/campaign_folder.hpp"
+#include "coordinator/cli/event_format.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/stop_signals.hpp"
-#include "coordinator/net/campaign_service.hpp"
 #include "coordinator/report/report.hpp"
-#include "proto/wire/endpoint.hpp"
+#include "core/simulation/reference_digest.hpp"
+#include "core/simulation/run.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -28,32 +33,106 @@ spdlog::level::level_enum level_of(Severity severity) {
   PROOFMASS_EXPECT(false);
 }
 
-Log log_to(Store& store) {
-  return [&store](const Event& event) {
-    spdlog::log(level_of(event.severity), "{} {}", event.kind, event.text);
-    store.record_event(event.kind, event.text);
+Log make_log(LogFormat format) {
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("proofmass-coordinator"));
+  if (format == LogFormat::text) {
+    return [](const Event& event) {
+      spdlog::log(level_of(event.severity), "{} {}", event.kind, event.text);
+    };
+  }
+  spdlog::set_pattern("%v");
+  return [](const Event& event) {
+    spdlog::log(level_of(event.severity), "{}", json_line(event, std::chrono::system_clock::now()));
   };
+}
+
+/// Those of the directory, and those of campaign files that are not among them or have more runs.
+std::vector<ServedCampaign> campaigns_of(const ServeOptions& options, CampaignFolder& folder,
+                                         const Log& log) {
+  std::vector<ServedCampaign> campaigns = folder.load([&](const std::string& what) {
+    log({.severity = Severity::warning,
+         .kind = "campaign_not_served",
+         .text = fmt::format("reason=\"{}\"", what)});
+  });
+  for (const std::filesystem::path& file : options.campaign_files) {
+    const Campaign wanted = read_campaign(file);
+    const auto known = std::find_if(
+        campaigns.begin(), campaigns.end(),
+        [&](const ServedCampaign& campaign) { return campaign.definition->name == wanted.name; });
+    if (known == campaigns.end()) {
+      campaigns.push_back(folder.open(wanted));
+    } else {
+      known->definition = folder.extend(known->store, wanted);
+    }
+  }
+  return campaigns;
+}
+
+/// Multiplies what a coordinator waits for workers and disks.
+void scale_times(ServiceConfig& config, double factor) {
+  DispatchConfig& dispatch = config.dispatch;
+  for (Duration* const time :
+       {&dispatch.heartbeat_interval, &dispatch.suspect_after, &dispatch.lost_after,
+        &dispatch.arrival_max, &dispatch.hung_after_min, &dispatch.reattach_wait,
+        &config.writer.retry_after}) {
+    *time = std::chrono::duration_cast<Duration>(factor * *time);
+  }
+}
+
+ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
+  ServiceConfig config;
+  config.workers_endpoint = options.endpoint;
+  config.clients_endpoint = options.clients_endpoint.value_or(
+      "ipc://" + (std::filesystem::absolute(options.directory) / "clients").string());
+  config.keys = options.keys;
+  config.is_plain_waived = options.is_plain_waived;
+  config.end = options.end;
+  config.drain_max =
+      std::chrono::duration_cast<Duration>(std::chrono::duration<double>(options.drain_time_s));
+  config.files = &folder;
+  config.version = PROOFMASS_VERSION;
+  config.dispatch.reference_digest = reference_digest(best_instruction_set());
+  if (!options.faults.empty()) config.faults = wire::FaultPlan::parse(options.faults);
+  scale_times(config, options.time_scale);
+  return config;
+}
+
+void log_start(const Service& service, const Log& log) {
+  log({.kind = "coordinator_started",
+       .text = fmt::format("bind={} bind_clients={} campaigns={}", service.workers_endpoint(),
+                           service.clients_endpoint(), service.campaigns().size())});
+}
+
+/// @return True if runs were given up.
+bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
+  bool has_given_up = false;
+  for (auto& [file, store, definition, has_new_results] : campaigns) {
+    if (has_new_results) update_statistics(store, definition->scenario);
+    has_given_up = has_given_up || !store.given_up_runs().empty();
+  }
+  log({.kind = "coordinator_ended", .text = fmt::format("campaigns={}", campaigns.size())});
+  return has_given_up;
 }
 
 }  // namespace
 
-int serve_campaign(const ServeOptions& options) {
-  wire::check_endpoint("bind", options.endpoint);
-  const auto campaign =
-      std::make_shared<const Campaign>(read_campaign(options.campaign_file, Overrides{}));
-  spdlog::set_default_logger(spdlog::stderr_logger_st("proofmass-coordinator"));
+int serve_campaigns(const ServeOptions& options) {
+  const Log log = make_log(options.log_format);
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::drain);
-
-  Store store = open_or_create(*campaign, options.database);
-  const Log log = log_to(store);
-  CampaignService service(campaign, store.finished_runs(), options.endpoint, commit_to(store, log),
-                          log);
-  spdlog::info("coordinator_started endpoint={} runs={} done={}", service.endpoint(),
-               service.progress().num_runs, service.progress().num_done);
-  const bool is_finished = service.run(stop, [] {});
-  update_statistics(store, campaign->scenario);
-  spdlog::info("coordinator_ended done={}", service.progress().num_done);
-  return is_finished ? exit_done : exit_interrupted;
+  CampaignFolder folder(options.directory);
+  const ServiceConfig config = config_of(options, folder);
+  if (config.faults && config.faults->kill) {
+    wire::arm_kill_point(config.faults->kill->point, config.faults->kill->passage);
+  }
+  Service service(campaigns_of(options, folder, log), config, log);
+  log_start(service, log);
+  service.run(stop, [] {});
+  const bool is_done = service.is_done();
+  const bool has_given_up = finish(service.close(), log);
+  const bool is_in_order =
+      options.end == ServiceEnd::when_done ? is_done : stop != StopRequest::now;
+  if (!is_in_order) return exit_interrupted;
+  return has_given_up && options.end == ServiceEnd::when_done ? exit_cannot_be_done : exit_done;
 }
 
 }  // namespace proofmass::coordinator

@@ -1,20 +1,39 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
+
+#include "coordinator/net/service.hpp"
 
 namespace proofmass::coordinator {
 
-/// Arguments of `proofmass-coordinator`.
-struct ServeOptions {
-  std::filesystem::path campaign_file;
-  std::filesystem::path database;
-  std::string endpoint;
+/// How the log on standard error looks.
+enum class LogFormat : std::uint8_t {
+  text,  ///< `[time] [info] worker_registered worker=1 name=a`.
+  json,  ///< An object a line.
 };
 
-/// Serves a campaign's runs to the workers that connect, until all are stored.
+/// Arguments of `proofmass-coordinator`.
+struct ServeOptions {
+  std::filesystem::path directory;              ///< Of the campaign files.
+  std::string endpoint;                         ///< For workers.
+  std::optional<std::string> clients_endpoint;  ///< By default a socket in the directory.
+  std::optional<std::filesystem::path> keys;    ///< Directory of `proofmass keygen`.
+  bool is_plain_waived = false;
+  ServiceEnd end = ServiceEnd::never;
+  double drain_time_s = 120.0;  ///< ≥ 0.
+  LogFormat log_format = LogFormat::text;
+  std::string faults;       ///< As FaultPlan::parse() reads them.
+  double time_scale = 1.0;  ///< > 0; of all that is waited for. Below 1 in tests of this program.
+  std::vector<std::filesystem::path> campaign_files;  ///< To be served beside those that are there.
+};
+
+/// Serves all campaigns of a directory to the workers that connect.
 /// @return An ExitCode.
 /// @throws CampaignFileError, UsageError, InvalidArgument, StoreError, Error.
-[[nodiscard]] int serve_campaign(const ServeOptions& options);
+[[nodiscard]] int serve_campaigns(const ServeOptions& options);
 
 }  // namespace proofmass::coordinator

@@ -3,7 +3,7 @@
 #include <atomic>
 #include <cstdint>
 
-#include "coordinator/net/campaign_service.hpp"
+#include "coordinator/net/service.hpp"
 
 namespace proofmass::coordinator {
 

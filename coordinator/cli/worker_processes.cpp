@@ -7,8 +7,11 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
 #include <chrono>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -22,7 +25,12 @@ namespace {
 
 constexpr int grace_ms = 3000;  // A worker looks at signals between two orbits, some 20 ms apart.
 
-std::string reason_of(int status) {
+std::uint64_t num_oom_kills() {
+  std::ifstream stream("/proc/vmstat");
+  return oom_kills_in(std::string(std::istreambuf_iterator<char>(stream), {}));
+}
+
+std::string text_of(int status) {
   if (!WIFSIGNALED(status)) return fmt::format("exit code {}", WEXITSTATUS(status));
   const int signal = WTERMSIG(status);
   return fmt::format("killed by signal {} ({})", signal, strsignal(signal));
@@ -40,8 +48,20 @@ std::filesystem::path worker_executable() {
   return worker;
 }
 
+std::uint64_t oom_kills_in(std::string_view vmstat) {
+  constexpr std::string_view label = "\noom_kill ";
+  const std::size_t found = vmstat.find(label);
+  if (found == std::string_view::npos) return 0;
+  const char* const digits = vmstat.data() + found + label.size();
+  std::uint64_t count = 0;
+  std::from_chars(digits, vmstat.data() + vmstat.size(), count);
+  return count;
+}
+
 WorkerProcesses::WorkerProcesses(std::filesystem::path executable, std::string endpoint)
-    : executable_(std::move(executable)), endpoint_(std::move(endpoint)) {}
+    : executable_(std::move(executable)),
+      endpoint_(std::move(endpoint)),
+      num_oom_kills_(num_oom_kills()) {}
 
 WorkerProcesses::~WorkerProcesses() {
   wait_until_ended(0);
@@ -74,11 +94,20 @@ std::vector<WorkerProcesses::Exit> WorkerProcesses::take_exits() {
   std::erase_if(processes_, [&](const Process& process) {
     int status = 0;
     if (waitpid(process.process_id, &status, WNOHANG) != process.process_id) return false;
-    exits.push_back(
-        {.name = process.name, .process_id = process.process_id, .reason = reason_of(status)});
+    exits.push_back({.name = process.name,
+                     .process_id = process.process_id,
+                     .text = text_of(status),
+                     .reason = reason_of(status)});
     return true;
   });
   return exits;
+}
+
+wire::LossReason WorkerProcesses::reason_of(int status) {
+  if (!WIFSIGNALED(status)) return wire::LossReason::failed;
+  if (WTERMSIG(status) != SIGKILL) return wire::LossReason::crashed;
+  const std::uint64_t num_before = std::exchange(num_oom_kills_, num_oom_kills());
+  return num_oom_kills_ > num_before ? wire::LossReason::out_of_memory : wire::LossReason::crashed;
 }
 
 void WorkerProcesses::wait_until_ended(int milliseconds_max) {

@@ -2,16 +2,23 @@
 
 #include <sys/types.h>
 
-#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "proto/wire/messages.hpp"
 
 namespace proofmass::coordinator {
 
 /// The worker program that belongs to this one: the file `proofmass-worker` beside it.
 /// @throws Error if it is not there.
 [[nodiscard]] std::filesystem::path worker_executable();
+
+/// How many processes the kernel has ended for want of memory since it started.
+/// @param vmstat  Text of /proc/vmstat; 0 if it does not say.
+[[nodiscard]] std::uint64_t oom_kills_in(std::string_view vmstat);
 
 /// Worker processes of this machine, of one thread each: what kills one costs the runs of that
 /// thread only. They end with this process, however it ends.
@@ -21,7 +28,10 @@ class WorkerProcesses {
   struct Exit {
     std::string name;
     pid_t process_id = 0;
-    std::string reason;  ///< `killed by signal 9 (Killed)`, `exit code 1`.
+    std::string text;  ///< `killed by signal 9 (Killed)`, `exit code 1`.
+    /// crashed if a signal ended it; out_of_memory if that was SIGKILL and the kernel has ended
+    /// processes for want of memory since the last call; failed otherwise.
+    wire::LossReason reason = wire::LossReason::failed;
   };
 
   WorkerProcesses(std::filesystem::path executable, std::string endpoint);
@@ -42,10 +52,12 @@ class WorkerProcesses {
   };
 
   void wait_until_ended(int milliseconds_max);
+  [[nodiscard]] wire::LossReason reason_of(int status);
 
   std::filesystem::path executable_;
   std::string endpoint_;
   std::vector<Process> processes_;
+  std::uint64_t num_oom_kills_;  ///< As the kernel counted them when last looked at.
 };
 
 }  // namespace proofmass::coordinator

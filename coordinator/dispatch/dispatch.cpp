@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "coordinator/dispatch/blame.hpp"
+#include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
-#include "core/error.hpp"
+#include "coordinator/dispatch/workers.hpp"
 #include "core/simulation/run.hpp"
 
 namespace proofmass::coordinator {
@@ -16,42 +18,46 @@ namespace {
 
 double seconds(Duration duration) { return std::chrono::duration<double>(duration).count(); }
 
-/// The worker of a message, marked as heard; null, and told so, if it is not registered.
-Worker* heard(State& state, WorkerId id, TimePoint now, Outbox& outbox) {
-  const auto found = state.workers.find(id);
-  if (found == state.workers.end()) {
-    outbox.send(id, wire::Reject{.reason = wire::RejectReason::not_registered,
-                                 .text = "this worker is not registered"});
-    return nullptr;
-  }
-  found->second.heard_at = now;
-  return &found->second;
-}
-
-/// Why a worker that says Hello cannot be taken; empty if it can.
+/// Why a worker that says Hello cannot be taken; nothing if it can.
 std::optional<wire::Reject> refusal(const State& state, const wire::Hello& hello) {
+  using wire::RejectReason;
   if (hello.model_version != model_version) {
-    return wire::Reject{.reason = wire::RejectReason::incompatible,
+    return wire::Reject{.reason = RejectReason::incompatible,
                         .text = fmt::format("model_version = {} (must be {}, the coordinator's)",
                                             hello.model_version, model_version)};
   }
+  if (hello.reference_digest != state.config.reference_digest) {
+    return wire::Reject{
+        .reason = RejectReason::incompatible,
+        .text = fmt::format("reference_digest = {:016x} (must be {:016x}, the coordinator's)",
+                            hello.reference_digest, state.config.reference_digest)};
+  }
+  if (state.quarantined.contains(hello.host)) {
+    return wire::Reject{.reason = RejectReason::quarantined,
+                        .text = fmt::format("host = {} (too much crashed there)", hello.host)};
+  }
   if (state.workers.size() >= state.config.num_workers_max) {
     return wire::Reject{
-        .reason = wire::RejectReason::full,
+        .reason = RejectReason::full,
         .text = fmt::format("number of workers = {} (no more are served)", state.workers.size())};
   }
   return std::nullopt;
 }
 
-void register_worker(State& state, WorkerId id, const wire::Hello& hello, TimePoint now,
-                     Outbox& outbox) {
-  Worker worker;
+void register_worker(State& state, WorkerId id, SessionId session, const wire::Hello& hello,
+                     TimePoint now, Outbox& outbox) {
+  Worker& worker = state.workers[id];
+  worker.session = session;
   worker.name = hello.worker_name;
   worker.host = hello.host;
   worker.process_id = hello.process_id;
   worker.num_slots = hello.num_slots;
+  worker.registered_at = now;
   worker.heard_at = now;
-  state.workers.emplace(id, std::move(worker));
+  worker.heartbeat_at = now;
+  worker.retracted_at = now - state.config.heartbeat_interval;
+  state.num_slots += worker.num_slots;
+  ++state.hosts[worker.host].num_workers;
   outbox.log(
       {.severity = Severity::info,
        .kind = "worker_registered",
@@ -59,175 +65,188 @@ void register_worker(State& state, WorkerId id, const wire::Hello& hello, TimePo
                            hello.host, hello.process_id, hello.num_slots)});
 }
 
-Event gone_event(const State& state, WorkerId id, std::string_view reason) {
-  const Worker& worker = state.workers.at(id);
-  return {.severity = Severity::warning,
-          .kind = "worker_gone",
-          .text = fmt::format("worker={} name={} reason={} orbits={}", id.value, worker.name,
-                              reason, worker.num_orbits_done)};
+/// True if a Hello may be answered: there is an allowance of so many a second.
+bool take_hello_allowance(State& state, TimePoint now) {
+  const double passed_s = seconds(now - state.hello_allowance_at);
+  state.hello_allowance_at = now;
+  state.hello_allowance =
+      std::min(state.config.hellos_per_s_max,
+               state.hello_allowance + passed_s * state.config.hellos_per_s_max);
+  if (state.hello_allowance < 1.0) return false;
+  state.hello_allowance -= 1.0;
+  return true;
 }
 
-/// Forgets the worker; what it holds becomes pending.
-void remove_worker(State& state, WorkerId id, Event event, Outbox& outbox) {
-  outbox.log(std::move(event));
-  detail::take_back_all(state, id, outbox);
-  state.workers.erase(id);
-}
-
-void add_run_time(double compute_s, double& mean_s) {
-  constexpr double weight = 0.2;  // Of the newest run: the mean spans about the last ten.
-  mean_s = mean_s > 0.0 ? mean_s + weight * (compute_s - mean_s) : compute_s;
-}
-
-/// A result of an open run goes to the store; true if it is durable already.
-bool take_result(State& state, WorkerId id, const wire::ResultBatch& batch,
-                 const wire::ComputedRun& computed, Outbox& outbox) {
-  const RunIndex run = computed.result.run;
-  if (detail::close_run(state, run, batch.lease)) {
-    state.delivered.emplace(run, std::vector<WorkerId>{id});
-    if (!computed.result.has_estimate()) ++state.num_without_estimate;
-    outbox.store({.worker = id, .attempt = batch.attempt, .computed = computed});
-    return false;
+/// The process before this one crashed: that is sooner known than that it is silent.
+void note_former(State& state, const wire::FormerSession& former, Outbox& outbox) {
+  state.awaited.erase(former.session);
+  const auto found =
+      std::find_if(state.workers.begin(), state.workers.end(),
+                   [&](const auto& item) { return item.second.session == former.session; });
+  if (found != state.workers.end()) {
+    detail::part_with(state, found->first, former.reason, outbox);
   }
-  ++state.num_duplicates;
-  const auto waiting = state.delivered.find(run);
-  if (waiting == state.delivered.end()) return true;
-  if (std::find(waiting->second.begin(), waiting->second.end(), id) == waiting->second.end()) {
-    waiting->second.push_back(id);
-  }
-  return false;
+}
+
+/// Registered workers are answered again: the answer before may have been lost.
+void welcome(State& state, WorkerId id, Outbox& outbox) {
+  outbox.send(id, wire::Welcome{.worker = id,
+                                .heartbeat_interval_s = seconds(state.config.heartbeat_interval)});
+  if (!state.is_lending) outbox.send(id, wire::Drain{});
 }
 
 void send_to_all(const State& state, const wire::Message& message, Outbox& outbox) {
   for (const auto& [id, worker] : state.workers) outbox.send(id, message);
 }
 
-void send_acks(const State& state, std::map<WorkerId, std::vector<RunIndex>> runs_by_worker,
-               Outbox& outbox) {
-  for (auto& [id, runs] : runs_by_worker) {
-    if (!state.workers.contains(id)) continue;
-    for (std::size_t first = 0; first < runs.size(); first += wire::runs_per_lease_max) {
-      const auto begin = runs.begin() + static_cast<std::ptrdiff_t>(first);
-      const auto count = std::min<std::size_t>(wire::runs_per_lease_max, runs.size() - first);
-      outbox.send(id, wire::ResultAck{.runs = {begin, begin + static_cast<std::ptrdiff_t>(count)}});
-    }
-  }
-}
-
 }  // namespace
 
-void on_hello(State& state, WorkerId id, const wire::Hello& hello, TimePoint now, Outbox& outbox) {
-  if (!state.is_lending) return outbox.send(id, wire::Stop{});
-  if (!state.workers.contains(id)) {
-    if (auto reject = refusal(state, hello)) {
-      outbox.log({.severity = Severity::warning,
-                  .kind = "worker_refused",
-                  .text = fmt::format("name={} {}", hello.worker_name, reject->text)});
-      return outbox.send(id, *std::move(reject));
-    }
-    register_worker(state, id, hello, now, outbox);
+namespace detail {
+
+Worker* heard(State& state, WorkerId id, TimePoint now, Outbox& outbox) {
+  const auto found = state.workers.find(id);
+  if (found == state.workers.end()) {
+    reject_unregistered(id, outbox);
+    return nullptr;
   }
-  state.workers.at(id).heard_at = now;
-  outbox.send(id, wire::Welcome{.worker = id,
-                                .heartbeat_interval_s = seconds(state.config.heartbeat_interval),
-                                .campaign = state.campaign});
+  found->second.heard_at = now;
+  return &found->second;
 }
 
-void on_credit(State& state, WorkerId id, const wire::Credit& credit, TimePoint now,
-               Outbox& outbox) {
-  Worker* const worker = heard(state, id, now, outbox);
+void part_with(State& state, WorkerId id, LossReason reason, Outbox& outbox) {
+  const Worker& worker = state.workers.at(id);
+  outbox.log({.severity = Severity::warning,
+              .kind = "worker_gone",
+              .text = fmt::format("worker={} name={} reason={} orbits={}", id.value, worker.name,
+                                  name_of(reason), worker.num_orbits_done)});
+  const RunsByCampaign blamed =
+      is_blamed(reason) ? blame_crash(state, id, outbox) : RunsByCampaign();
+  remove_worker(state, id, reason, blamed, outbox);
+}
+
+void part_with_hung(State& state, WorkerId id, const wire::ComputedBatch& batch, Outbox& outbox) {
+  outbox.log({.severity = Severity::warning,
+              .kind = "worker_gone",
+              .text = fmt::format("worker={} name={} reason=hung runs={} orbits={}", id.value,
+                                  state.workers.at(id).name, to_text(RunSet(batch.ranges)),
+                                  batch.num_orbits_done),
+              .campaign = batch.campaign});
+  outbox.send(id, wire::Stop{});
+  const RunsByCampaign blamed = blame_batch(state, id, batch, outbox);
+  remove_worker(state, id, LossReason::hung, blamed, outbox);
+}
+
+}  // namespace detail
+
+void reject_unregistered(WorkerId id, Outbox& outbox) {
+  outbox.send(id, wire::Reject{.reason = wire::RejectReason::not_registered,
+                               .text = "this worker is not registered"});
+}
+
+void on_hello(State& state, WorkerId id, SessionId session, const wire::Hello& hello, TimePoint now,
+              Outbox& outbox) {
+  if (!take_hello_allowance(state, now)) return;
+  if (state.is_stopped) return outbox.send(id, wire::Stop{});
+  if (hello.former) note_former(state, *hello.former, outbox);
+  const bool is_new = !state.workers.contains(id);
+  const auto reject = is_new ? refusal(state, hello) : std::nullopt;
+  if (reject) {
+    state.awaited.erase(session);
+    outbox.log({.severity = Severity::warning,
+                .kind = "worker_refused",
+                .text = fmt::format("name={} {}", hello.worker_name, reject->text)});
+    outbox.send(id, *reject);
+  } else {
+    if (is_new) register_worker(state, id, session, hello, now, outbox);
+    state.workers.at(id).heard_at = now;
+    welcome(state, id, outbox);
+  }
+  detail::settle(state, now, outbox);
+}
+
+void on_campaign_request(State& state, WorkerId id, const wire::CampaignRequest& request,
+                         TimePoint now, Outbox& outbox) {
+  if (detail::heard(state, id, now, outbox) == nullptr) return;
+  const auto found = state.campaigns.find(request.campaign);
+  if (found == state.campaigns.end() || found->second.phase == Phase::cancelled) {
+    return outbox.send(id, wire::Forget{.campaign = request.campaign});
+  }
+  outbox.send(id, wire::CampaignDefinition{.campaign = request.campaign,
+                                           .definition = found->second.definition});
+}
+
+void on_heartbeat(State& state, WorkerId id, const wire::Heartbeat& heartbeat,
+                  std::uint64_t sequence, TimePoint now, Outbox& outbox) {
+  Worker* const worker = detail::heard(state, id, now, outbox);
   if (worker == nullptr) return;
-  worker->num_runs_max = credit.num_runs_max;
-  detail::lend(state, id, now, outbox);
-}
-
-void on_results(State& state, WorkerId id, const wire::ResultBatch& batch, TimePoint now,
-                Outbox& outbox) {
-  Worker* const worker = heard(state, id, now, outbox);
-  if (worker == nullptr) return;
-  const auto is_foreign = [&](const wire::ComputedRun& computed) {
-    return computed.result.run.value >= state.campaign->num_runs;
-  };
-  if (std::any_of(batch.results.begin(), batch.results.end(), is_foreign)) {
-    outbox.send(id, wire::Reject{.reason = wire::RejectReason::malformed,
-                                 .text = "run = beyond the campaign (must be below num_runs)"});
-    return on_gone(state, id, "foreign_run", now, outbox);
-  }
-  std::map<WorkerId, std::vector<RunIndex>> durable;
-  for (const wire::ComputedRun& computed : batch.results) {
-    add_run_time(computed.compute_s, worker->run_time_s);
-    add_run_time(computed.compute_s, state.run_time_s);
-    if (take_result(state, id, batch, computed, outbox)) {
-      durable[id].push_back(computed.result.run);
-    }
-  }
-  send_acks(state, std::move(durable), outbox);
-  detail::lend(state, id, now, outbox);
-}
-
-void on_committed(State& state, std::span<const RunIndex> runs, Outbox& outbox) {
-  std::map<WorkerId, std::vector<RunIndex>> acknowledged;
-  for (const RunIndex run : runs) {
-    const auto waiting = state.delivered.find(run);
-    PROOFMASS_EXPECT(waiting != state.delivered.end());
-    for (const WorkerId id : waiting->second) acknowledged[id].push_back(run);
-    state.delivered.erase(waiting);
-    state.committed.add({.first = run, .count = 1});
-  }
-  state.num_committed_here += runs.size();
-  send_acks(state, std::move(acknowledged), outbox);
-  if (!is_finished(state) || !state.is_lending) return;
-  outbox.log({.severity = Severity::info,
-              .kind = "campaign_finished",
-              .text = fmt::format("runs={} duplicates={}", state.campaign->num_runs,
-                                  state.num_duplicates)});
-  on_stop(state, outbox);
-}
-
-void on_heartbeat(State& state, WorkerId id, const wire::Heartbeat& heartbeat, TimePoint now,
-                  Outbox& outbox) {
-  Worker* const worker = heard(state, id, now, outbox);
-  if (worker == nullptr) return;
-  worker->num_orbits_done = heartbeat.num_orbits_done;
   outbox.send(id, wire::HeartbeatAck{});
-  bool any_back = false;
-  for (auto lease = state.leases.begin(); lease != state.leases.end();) {
-    const auto current = lease++;
-    const auto& [lease_id, content] = *current;
-    if (content.worker != id || now - content.lent_at < state.config.lease_arrival_max) continue;
-    const auto& held = heartbeat.leases;
-    if (std::find(held.begin(), held.end(), lease_id) != held.end()) continue;
-    detail::take_back(state, current, outbox);
-    any_back = true;
+  if (sequence <= worker->heartbeat_sequence) return;
+  worker->heartbeat_sequence = sequence;
+  worker->num_runs_max = heartbeat.num_runs_max;
+  detail::note_progress(state, *worker, heartbeat, now);
+  if (state.is_stopped) return outbox.send(id, wire::Stop{});
+  if (!state.is_lending) outbox.send(id, wire::Drain{});
+  detail::reconcile(state, id, heartbeat, now, outbox);
+  state.awaited.erase(worker->session);
+  detail::lend(state, id, now, outbox);
+  detail::settle(state, now, outbox);
+}
+
+void on_give_back(State& state, WorkerId id, const wire::GiveBack& give_back, TimePoint now,
+                  Outbox& outbox) {
+  Worker* const worker = detail::heard(state, id, now, outbox);
+  if (worker == nullptr) return;
+  for (const wire::HeldRuns& held : give_back.runs) {
+    const RunSet runs(held.ranges);
+    if (const auto found = worker->unleased.find(held.campaign); found != worker->unleased.end()) {
+      found->second.remove(runs);
+      if (found->second.empty()) worker->unleased.erase(found);
+    }
+    const std::set<LeaseId> leases = worker->leases;
+    for (const LeaseId lease_id : leases) {
+      const Lease& lease = state.leases.at(lease_id);
+      if (lease.campaign != held.campaign || lease.known_as != held.attempt) continue;
+      const RunSet lost = lease.remaining.overlap(runs);
+      if (!lost.empty()) detail::lose(state, lease_id, lost, give_back.reason, {}, outbox);
+    }
   }
-  if (any_back) detail::lend_to_all(state, now, outbox);
+  detail::lend(state, id, now, outbox);
+  detail::settle(state, now, outbox);
 }
 
-void on_bye(State& state, WorkerId id, TimePoint now, Outbox& outbox) {
-  if (!state.workers.contains(id)) return;
-  remove_worker(state, id,
-                {.severity = Severity::info,
-                 .kind = "worker_left",
-                 .text = fmt::format("worker={}", id.value)},
-                outbox);
-  detail::lend_to_all(state, now, outbox);
+void on_bye(State& state, WorkerId id, const wire::Bye& bye, TimePoint now, Outbox& outbox) {
+  const auto found = state.workers.find(id);
+  if (found == state.workers.end()) return;
+  outbox.log({.severity = Severity::info,
+              .kind = "worker_left",
+              .text = fmt::format("worker={} name={} reason={}", id.value, found->second.name,
+                                  name_of(bye.reason))});
+  detail::remove_worker(state, id, bye.reason, {}, outbox);
+  detail::settle(state, now, outbox);
 }
 
-void on_gone(State& state, WorkerId id, const std::string& reason, TimePoint now, Outbox& outbox) {
+void on_gone(State& state, WorkerId id, LossReason reason, TimePoint now, Outbox& outbox) {
   if (!state.workers.contains(id)) return;
-  remove_worker(state, id, gone_event(state, id, reason), outbox);
-  detail::lend_to_all(state, now, outbox);
+  detail::part_with(state, id, reason, outbox);
+  detail::settle(state, now, outbox);
 }
 
 void on_tick(State& state, TimePoint now, Outbox& outbox) {
+  if (!state.awaited.empty() && now >= state.awaited_until) state.awaited.clear();
   std::vector<WorkerId> silent;
+  std::vector<std::pair<WorkerId, wire::ComputedBatch>> hung;
   for (const auto& [id, worker] : state.workers) {
-    if (now - worker.heard_at >= state.config.lost_after) silent.push_back(id);
+    if (now - worker.heard_at >= state.config.lost_after) {
+      silent.push_back(id);
+    } else if (const auto* const batch = detail::hung_batch(state, worker, now)) {
+      hung.emplace_back(id, *batch);
+    }
   }
   // All of them go before anything is lent again, or one would be lent what another lost.
-  for (const WorkerId id : silent)
-    remove_worker(state, id, gone_event(state, id, "silent"), outbox);
-  if (!silent.empty()) detail::lend_to_all(state, now, outbox);
+  for (const WorkerId id : silent) detail::part_with(state, id, LossReason::silent, outbox);
+  for (const auto& [id, batch] : hung) detail::part_with_hung(state, id, batch, outbox);
+  detail::settle(state, now, outbox);
+  detail::share_tail(state, now, outbox);
 }
 
 void on_drain(State& state, Outbox& outbox) {
@@ -237,6 +256,7 @@ void on_drain(State& state, Outbox& outbox) {
 
 void on_stop(State& state, Outbox& outbox) {
   state.is_lending = false;
+  state.is_stopped = true;
   send_to_all(state, wire::Stop{}, outbox);
 }
 

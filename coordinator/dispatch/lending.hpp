@@ -8,17 +8,32 @@ namespace proofmass::coordinator::detail {
 /// Lends the worker what brings it to its share, if it has run low.
 void lend(State& state, WorkerId worker, TimePoint now, Outbox& outbox);
 
-/// The same for every worker, in the order of registration.
-void lend_to_all(State& state, TimePoint now, Outbox& outbox);
+/// The same for all workers that would take more, while there is something to lend.
+void lend_to_hungry(State& state, TimePoint now, Outbox& outbox);
 
-/// Takes the lease back; its remaining runs will be lent under the next attempt.
-void take_back(State& state, std::map<LeaseId, Lease>::iterator lease, Outbox& outbox);
+/// True if nothing is lent to the worker: it may be gone, or its host crashes what it computes, or
+/// it tries a suspect.
+[[nodiscard]] bool is_passed_over(const State& state, const Worker& worker, TimePoint now);
 
-/// Takes back all that the worker holds.
-void take_back_all(State& state, WorkerId worker, Outbox& outbox);
+/// True if workers that were attached before may still say what they hold: nothing is lent.
+[[nodiscard]] bool is_reattaching(const State& state, TimePoint now);
 
-/// Removes the run from wherever it is open.
-/// @return False if it is not open: delivered or committed already.
-bool close_run(State& state, RunIndex run, LeaseId computed_under);
+/// True if runs of the campaign are lent.
+[[nodiscard]] bool is_lent(const CampaignState& campaign);
+
+/// True if so many results wait for the store that no more runs are lent for now.
+[[nodiscard]] bool is_backed_up(const State& state, const CampaignState& campaign);
+
+/// Tells the worker of a new lease.
+void send_lease(const State& state, LeaseId lease, Outbox& outbox);
+
+/// To be called after all that changes the phase or the priority of a campaign.
+void sort_served(State& state);
+
+/// Ends the campaign if it is finished.
+void finish_if_done(State& state, CampaignId id, Outbox& outbox);
+
+/// After runs were lost, or given up: ends campaigns and lends to whoever waits.
+void settle(State& state, TimePoint now, Outbox& outbox);
 
 }  // namespace proofmass::coordinator::detail

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/campaign/identifiers.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::coordinator {
@@ -11,18 +12,30 @@ namespace proofmass::coordinator {
 /// How much a person should care; *error* means that somebody must act.
 enum class Severity : std::uint8_t { info, warning, error };
 
-/// Something that happened in a campaign: one line of the log.
+/// Something that happened: one line of the log.
 struct Event {
   Severity severity = Severity::info;
-  std::string_view kind;  ///< A literal: `lease_expired`.
-  std::string text;       ///< `worker=7 runs=120..183 attempt=1`.
+  std::string_view kind;        ///< A literal: `runs_lost`.
+  std::string text;             ///< `worker=7 runs=120..183 attempt=1`.
+  wire::CampaignId campaign{};  ///< 0 if it concerns all campaigns.
 };
 
 /// A result that a worker delivered, on its way to the store.
 struct Arrival {
+  wire::CampaignId campaign;
   wire::WorkerId worker;
   wire::Attempt attempt;  ///< Under which it was computed.
   wire::ComputedRun computed;
+};
+
+/// Runs that came back without a result.
+struct Loss {
+  wire::CampaignId campaign;
+  RunRange runs;
+  wire::Attempt attempt;
+  wire::WorkerId worker;
+  wire::LossReason reason = wire::LossReason::silent;
+  bool is_blamed = false;  ///< It counts against these runs.
 };
 
 /// What the dispatch does to the world. The service carries it out; a test writes it down.
@@ -35,6 +48,13 @@ class Outbox {
   /// Must lead to on_committed() with this run once the result is durable, or to the end of the
   /// service. Called at most once for a run.
   virtual void store(Arrival arrival) = 0;
+  /// Must lead to on_compared() with the run once the result has been compared with the stored one.
+  /// Called for runs that were handed to store() before, or committed.
+  virtual void compare(Arrival arrival) = 0;
+  /// To be kept for the history of attempts; need not be durable at once.
+  virtual void record(const Loss& loss) = 0;
+  /// The run crashed too many workers: to be kept as given up, so that the campaign can end.
+  virtual void give_up(wire::CampaignId campaign, RunIndex run) = 0;
   virtual void log(Event event) = 0;
 };
 

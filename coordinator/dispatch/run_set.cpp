@@ -26,6 +26,10 @@ void RunSet::add(RunRange range) {
   size_ += end - first;
 }
 
+void RunSet::add(const RunSet& runs) {
+  for (const auto& [first, end] : runs.ends_) add({.first = {first}, .count = end - first});
+}
+
 bool RunSet::remove(RunIndex run) {
   auto found = ends_.upper_bound(run.value);
   if (found == ends_.begin()) return false;
@@ -37,6 +41,26 @@ bool RunSet::remove(RunIndex run) {
   if (run.value + 1 < end) ends_.emplace(run.value + 1, end);
   --size_;
   return true;
+}
+
+void RunSet::remove(RunRange range) {
+  auto next = ends_.upper_bound(range.first.value);
+  if (next != ends_.begin()) --next;
+  while (next != ends_.end() && next->first < range.end()) {
+    const auto [first, end] = *next;
+    if (end <= range.first.value) {
+      ++next;
+      continue;
+    }
+    next = ends_.erase(next);
+    if (first < range.first.value) ends_.emplace_hint(next, first, range.first.value);
+    if (range.end() < end) next = ends_.emplace_hint(next, range.end(), end);
+    size_ -= std::min(end, range.end()) - std::max(first, range.first.value);
+  }
+}
+
+void RunSet::remove(const RunSet& runs) {
+  for (const auto& [first, end] : runs.ends_) remove({.first = {first}, .count = end - first});
 }
 
 RunRange RunSet::take_first(std::uint64_t count_max) {
@@ -52,6 +76,40 @@ RunRange RunSet::take_first(std::uint64_t count_max) {
 bool RunSet::contains(RunIndex run) const {
   const auto next = ends_.upper_bound(run.value);
   return next != ends_.begin() && run.value < std::prev(next)->second;
+}
+
+RunSet RunSet::take_last(std::uint64_t count) {
+  PROOFMASS_EXPECT(count <= size_);
+  RunSet taken;
+  while (taken.size() < count) {
+    const auto [first, end] = *std::prev(ends_.end());
+    const std::uint64_t part = std::min(count - taken.size(), end - first);
+    taken.add({.first = {end - part}, .count = part});
+    remove({.first = {end - part}, .count = part});
+  }
+  return taken;
+}
+
+RunSet RunSet::overlap(RunRange range) const {
+  RunSet overlap;
+  auto next = ends_.upper_bound(range.first.value);
+  if (next != ends_.begin()) --next;
+  for (; next != ends_.end() && next->first < range.end(); ++next) {
+    const std::uint64_t first = std::max(next->first, range.first.value);
+    const std::uint64_t end = std::min(next->second, range.end());
+    if (first < end) overlap.add({.first = {first}, .count = end - first});
+  }
+  return overlap;
+}
+
+RunSet RunSet::overlap(const RunSet& runs) const {
+  RunSet common;
+  const RunSet& fewer = num_ranges() < runs.num_ranges() ? *this : runs;
+  const RunSet& more = &fewer == this ? runs : *this;
+  for (const auto& [first, end] : fewer.ends_) {
+    common.add(more.overlap(RunRange{.first = {first}, .count = end - first}));
+  }
+  return common;
 }
 
 std::vector<RunRange> RunSet::ranges() const {

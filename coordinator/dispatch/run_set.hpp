@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,19 +17,34 @@ class RunSet {
  public:
   RunSet() = default;
   explicit RunSet(RunRange range) { add(range); }
+  explicit RunSet(std::span<const RunRange> ranges) {
+    for (const RunRange& range : ranges) add(range);
+  }
 
   /// Adds the runs of the range; those that are in the set already stay.
   void add(RunRange range);
+  void add(const RunSet& runs);
   /// @return False if the run was not in the set.
   bool remove(RunIndex run);
+  /// Removes those runs of the range that are in the set.
+  void remove(RunRange range);
+  void remove(const RunSet& runs);
   /// Removes and returns the longest range at the beginning of the set with at most `count_max`
   /// runs. @pre Not empty; count_max > 0.
   [[nodiscard]] RunRange take_first(std::uint64_t count_max);
 
+  /// Removes and returns the last `count` runs. @pre There are that many.
+  [[nodiscard]] RunSet take_last(std::uint64_t count);
+
   [[nodiscard]] bool contains(RunIndex run) const;
+  /// The runs of the range that are in the set.
+  [[nodiscard]] RunSet overlap(RunRange range) const;
+  [[nodiscard]] RunSet overlap(const RunSet& runs) const;
   [[nodiscard]] bool empty() const { return ends_.empty(); }
   [[nodiscard]] std::uint64_t size() const { return size_; }  ///< Number of runs.
-  [[nodiscard]] std::vector<RunRange> ranges() const;         ///< Ascending.
+  [[nodiscard]] std::size_t num_ranges() const { return ends_.size(); }
+  [[nodiscard]] std::vector<RunRange> ranges() const;                      ///< Ascending.
+  [[nodiscard]] RunIndex first() const { return {ends_.begin()->first}; }  ///< @pre Not empty.
 
   bool operator==(const RunSet&) const = default;
 

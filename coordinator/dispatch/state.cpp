@@ -1,81 +1,97 @@
 #include "coordinator/dispatch/state.hpp"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
-namespace {
 
-/// Adds the ranges to a set that must hold none of them yet.
-void add_disjoint(const RunSet& runs, RunSet& all) {
-  const std::uint64_t size_expected = all.size() + runs.size();
-  for (const RunRange& range : runs.ranges()) all.add(range);
-  PROOFMASS_EXPECT(all.size() == size_expected);
-}
-
-RunSet delivered_runs(const State& state) {
-  RunSet runs;
-  for (const auto& entry : state.delivered) runs.add({.first = entry.first, .count = 1});
-  return runs;
-}
-
-void check_leases(const State& state) {
-  std::map<WorkerId, std::uint64_t> num_lent;
-  for (const auto& [id, lease] : state.leases) {
-    PROOFMASS_EXPECT(id.value >= 1 && id.value < state.next_lease);
-    PROOFMASS_EXPECT(state.workers.contains(lease.worker));
-    PROOFMASS_EXPECT(!lease.remaining.empty());
-    num_lent[lease.worker] += lease.remaining.size();
-  }
-  for (const auto& [id, worker] : state.workers) {
-    PROOFMASS_EXPECT(worker.num_lent == num_lent[id]);
-  }
-}
-
-}  // namespace
-
-State initial_state(std::shared_ptr<const Campaign> campaign, std::span<const RunRange> finished,
-                    const DispatchConfig& config) {
+State initial_state(const DispatchConfig& config, std::set<SessionId> awaited, TimePoint now) {
   State state;
   state.config = config;
-  state.campaign = std::move(campaign);
-  RunSet open;
-  std::uint64_t next = 0;
-  for (const RunRange& range : finished) {
-    PROOFMASS_EXPECT(range.first.value >= next && range.end() <= state.campaign->num_runs);
-    open.add({.first = {next}, .count = range.first.value - next});
-    state.committed.add(range);
-    next = range.end();
-  }
-  open.add({.first = {next}, .count = state.campaign->num_runs - next});
-  if (!open.empty()) state.pending.emplace(Attempt{1}, std::move(open));
+  state.awaited = std::move(awaited);
+  state.awaited_until = now + config.reattach_wait;
+  state.hello_allowance = config.hellos_per_s_max;
+  state.hello_allowance_at = now;
   return state;
 }
 
-bool is_finished(const State& state) { return state.committed.size() == state.campaign->num_runs; }
-
-bool is_quiet(const State& state) { return state.leases.empty() && state.delivered.empty(); }
-
-RunSet runs_held(const State& state, WorkerId worker) {
-  RunSet runs;
-  for (const auto& [id, lease] : state.leases) {
-    if (lease.worker != worker) continue;
-    for (const RunRange& range : lease.remaining.ranges()) runs.add(range);
-  }
-  return runs;
+bool is_finished(const CampaignState& campaign) {
+  const std::uint64_t num_ended = campaign.committed.size() + campaign.given_up.size();
+  return num_ended == campaign.definition->num_runs && campaign.to_audit.empty() &&
+         campaign.audits.empty() && campaign.num_comparing == 0;
 }
 
-void check_invariants(const State& state) {
-  check_leases(state);
-  RunSet all = state.committed;
-  for (const auto& [attempt, runs] : state.pending) {
-    PROOFMASS_EXPECT(attempt.value >= 1 && !runs.empty());
-    add_disjoint(runs, all);
+bool is_quiet(const State& state) {
+  if (!state.leases.empty()) return false;
+  for (const auto& [id, campaign] : state.campaigns) {
+    if (!campaign.delivered.empty() || campaign.num_comparing > 0) return false;
   }
-  for (const auto& [id, lease] : state.leases) add_disjoint(lease.remaining, all);
-  add_disjoint(delivered_runs(state), all);
-  PROOFMASS_EXPECT(all == RunSet({.first = {0}, .count = state.campaign->num_runs}));
+  return true;
+}
+
+std::string runs_held_text(const State& state, WorkerId worker) {
+  const auto found = state.workers.find(worker);
+  if (found == state.workers.end()) return "none";
+  std::map<CampaignId, RunSet> runs;
+  for (const LeaseId id : found->second.leases) {
+    const Lease& lease = state.leases.at(id);
+    runs[lease.campaign].add(lease.remaining);
+  }
+  std::string text;
+  for (const auto& [id, set] : runs) {
+    if (!text.empty()) text += ' ';
+    if (state.campaigns.size() > 1) text += state.campaigns.at(id).definition->name + ':';
+    text += to_text(set);
+  }
+  return text.empty() ? "none" : text;
+}
+
+bool is_blamed(LossReason reason) {
+  return reason == LossReason::crashed || reason == LossReason::out_of_memory ||
+         reason == LossReason::hung;
+}
+
+std::string_view name_of(LossReason reason) {
+  switch (reason) {
+    case LossReason::silent:
+      return "silent";
+    case LossReason::crashed:
+      return "crashed";
+    case LossReason::out_of_memory:
+      return "out_of_memory";
+    case LossReason::hung:
+      return "hung";
+    case LossReason::drained:
+      return "drained";
+    case LossReason::walltime:
+      return "walltime";
+    case LossReason::preempted:
+      return "preempted";
+    case LossReason::retracted:
+      return "retracted";
+    case LossReason::never_arrived:
+      return "never_arrived";
+    case LossReason::protocol:
+      return "protocol";
+    case LossReason::failed:
+      return "failed";
+  }
+  PROOFMASS_EXPECT(false);
+}
+
+bool is_audited(std::uint64_t campaign_seed, RunIndex run, double fraction) {
+  // SplitMix64 [Steele2014] of both numbers, one after the other.
+  std::uint64_t number = 0;
+  for (const std::uint64_t part : {campaign_seed, run.value}) {
+    number += part + 0x9e3779b97f4a7c15U;
+    number = (number ^ (number >> 30)) * 0xbf58476d1ce4e5b9U;
+    number = (number ^ (number >> 27)) * 0x94d049bb133111ebU;
+    number ^= number >> 31;
+  }
+  return static_cast<double>(number >> 11) * 0x1.0p-53 < fraction;
 }
 
 }  // namespace proofmass::coordinator

@@ -5,19 +5,18 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <span>
+#include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "coordinator/dispatch/identifiers.hpp"
+#include "coordinator/dispatch/lease_index.hpp"
 #include "coordinator/dispatch/run_set.hpp"
 #include "core/campaign/campaign.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::coordinator {
-
-using wire::Attempt;
-using wire::LeaseId;
-using wire::WorkerId;
 
 /// A monotonic time, handed in by the caller: nothing in the dispatch reads a clock.
 using TimePoint = std::chrono::steady_clock::time_point;
@@ -25,68 +24,227 @@ using Duration = std::chrono::steady_clock::duration;
 
 /// Settings of the dispatch.
 struct DispatchConfig {
-  Duration heartbeat_interval = std::chrono::seconds(2);  ///< Asked of every worker.
-  Duration lost_after = std::chrono::seconds(30);         ///< Of silence, then runs are lent again.
-  /// A lease that a heartbeat does not list, this long after it was sent, did not arrive. Longer
-  /// than a message and its answer ever take while the worker is not lost.
-  Duration lease_arrival_max = std::chrono::seconds(10);
+  Duration heartbeat_interval = std::chrono::seconds(5);  ///< Asked of every worker.
+  Duration suspect_after = std::chrono::seconds(15);  ///< Of silence; then nothing more is lent.
+  Duration lost_after = std::chrono::seconds(60);     ///< Of silence; then runs are lent again.
+  /// Runs that a heartbeat does not list, this long after they were lent, did not arrive. Longer
+  /// than a message and its answer ever take while the worker is not suspect.
+  Duration arrival_max = std::chrono::seconds(12);
   double lease_work_s = 1.5;  ///< Work that a slot is lent at a time, once run times are known.
+  /// Runs of a campaign that are lent or on their way to the store: near that many, workers get no
+  /// more than two rounds; with half of it on the way to the store, nothing. A disk that is slower
+  /// than the workers must not fill the memory.
+  std::uint64_t uncommitted_max = 100'000;
+  /// A batch that finishes no orbit for this many times the usual time of one, and for at least
+  /// `hung_after_min`, hangs.
+  double hung_after_orbits = 50.0;
+  Duration hung_after_min = std::chrono::seconds(60);
+  std::uint32_t crashes_per_run_max = 3;   ///< Then a run is given up.
+  std::uint32_t crashes_per_host_max = 5;  ///< In a row, without a finished run; then quarantine.
+  /// After a start with workers that should still be attached, nothing is lent until all of them
+  /// have said what they hold, or until this has passed.
+  Duration reattach_wait = std::chrono::seconds(15);
   std::size_t num_workers_max = 4096;
+  double hellos_per_s_max = 500.0;  ///< More are not answered; workers repeat them.
+  /// Digest of core's reference simulation, as this coordinator computes it.
+  std::uint64_t reference_digest = 0;
+};
+
+/// A batch that a worker computes, and since when it has come no further.
+struct Progress {
+  wire::ComputedBatch batch;
+  TimePoint advanced_at;
 };
 
 /// A registered worker.
 struct Worker {
+  SessionId session;
   std::string name;
   std::string host;
   std::uint64_t process_id = 0;
   std::uint32_t num_slots = 1;
-  TimePoint heard_at;              ///< Last message of any kind.
+  TimePoint registered_at;
+  TimePoint heard_at;                    ///< Last message of any kind.
+  std::uint64_t heartbeat_sequence = 0;  ///< Of the newest heartbeat ...
+  TimePoint heartbeat_at;                ///< ... which arrived then.
   std::uint32_t num_runs_max = 0;  ///< Its credit: most unfinished runs that it wants to hold.
   std::uint64_t num_lent = 0;      ///< Runs on its leases, as far as the coordinator knows.
   std::uint64_t num_orbits_done = 0;
-  double run_time_s = 0.0;  ///< Running mean of what a run takes in its slot; 0: not known yet.
+  std::uint64_t num_results = 0;
+  std::vector<Progress> computing;  ///< As the newest heartbeat has it.
+  std::set<LeaseId> leases;
+  std::uint64_t num_alone = 0;  ///< Suspects on its leases; nothing else is lent with one.
+  /// Open runs that it holds though they are not lent to it, as the newest heartbeat has it.
+  std::map<CampaignId, RunSet> unleased;
+  /// Until then it may get a copy that is lent to it no more: a heartbeat without it proves
+  /// nothing.
+  TimePoint clear_at;
+  TimePoint retracted_at;  ///< When runs were last asked back for idle workers.
+  /// Running mean of what a run takes in its slot, by campaign; nothing if not known yet.
+  std::map<CampaignId, double> run_time_s;
 };
 
-/// Runs lent to a worker. It exists while one of them has not been delivered.
+/// Why runs are lent. Only the runs of `first` leases count as open; the others are extra.
+enum class LeaseKind : std::uint8_t {
+  first,  ///< To be computed.
+  copy,   ///< Of a run that another worker seems to be too slow with.
+  audit,  ///< Of a run that is stored: to be compared with it.
+};
+
+/// Runs lent to a worker at a time. It exists while one of them has not been delivered.
 struct Lease {
+  CampaignId campaign;
   WorkerId worker;
   Attempt attempt;
+  Attempt known_as;  ///< Attempt by which the worker names it; older if it held the runs before.
+  LeaseKind kind = LeaseKind::first;
+  bool is_alone = false;      ///< Of one run, which is suspected.
+  bool is_retracted = false;  ///< The worker is asked, at each heartbeat, to give back what it can.
   RunSet remaining;
   TimePoint lent_at;
+  WorkerId audited;  ///< Of an audit: whose results are compared; 0 if not known.
 };
 
-/// All that the dispatch knows. Each run of the campaign is in exactly one of `pending`, the
-/// leases, `delivered` and `committed`. Only the functions of dispatch.hpp change it.
-struct State {
-  DispatchConfig config;
-  std::shared_ptr<const Campaign> campaign;  ///< Shared with Welcome messages under way.
-  std::map<WorkerId, Worker> workers;
+/// Whether a campaign's runs are lent.
+enum class Phase : std::uint8_t {
+  active,
+  paused,
+  finished,   ///< Every run is stored or given up.
+  cancelled,  ///< Open runs are dropped; what is stored stands.
+};
+
+/// What speaks against a run.
+struct Suspicion {
+  /// Crashes on one host, and those among them in which the worker computed nothing else.
+  struct OnHost {
+    std::uint32_t num_crashes = 0;
+    std::uint32_t num_alone = 0;
+  };
+  std::uint32_t num_crashes = 0;
+  std::map<std::string, OnHost> hosts;  ///< Of the present epoch.
+};
+
+/// A result on its way to the store, with the workers that wait for the acknowledgement; the first
+/// one's result is stored.
+struct Delivered {
+  Attempt attempt;
+  std::vector<WorkerId> waiting;
+};
+
+/// Leases of a run besides the first one.
+struct Copies {
+  std::vector<LeaseId> leases;  ///< At most two; none if all were lost.
+  Attempt newest;               ///< Highest attempt under which the run has been lent.
+};
+
+/// Where runs to be audited come from: another worker is to compute them.
+struct AuditKey {
+  WorkerId first_worker;  ///< 0 if not known.
+  Attempt attempt;        ///< Under which they will be lent.
+  auto operator<=>(const AuditKey&) const = default;
+};
+
+/// One campaign. Each of its runs is in exactly one of `pending`, `pending_suspects`, `lent`,
+/// `delivered`, `committed` and `given_up`. All other fields can be found by walking the leases, or
+/// count.
+struct CampaignState {
+  std::shared_ptr<const Campaign> definition;  ///< Shared with messages under way.
+  Phase phase = Phase::active;
+  int priority = 0;                   ///< Runs of a higher one are lent first.
+  double audit_fraction = 0.0;        ///< Of its runs, computed a second time, by another worker.
   std::map<Attempt, RunSet> pending;  ///< By the attempt under which they will be lent.
-  std::map<LeaseId, Lease> leases;
-  /// Handed to the store and not committed yet, with the workers that wait for the acknowledgement.
-  std::map<RunIndex, std::vector<WorkerId>> delivered;
+  std::map<RunIndex, Attempt> pending_suspects;  ///< Pending ones that are to be lent alone.
+  LeaseIndex lent;                               ///< Runs on first leases.
+  std::map<RunIndex, Delivered> delivered;       ///< Handed to the store, not committed yet.
   RunSet committed;
-  std::uint64_t next_lease = 1;
+  RunSet given_up;
+  std::map<RunIndex, Suspicion> suspects;           ///< Open runs that were blamed for a crash.
+  std::map<RunIndex, Copies> copies;                ///< Of runs in `lent`, once there was one.
+  std::map<AuditKey, RunSet> to_audit;              ///< Committed, and not lent for audit yet.
+  std::uint64_t num_to_audit = 0;                   ///< Runs in that.
+  std::map<RunIndex, LeaseId> audits;               ///< Runs on audit leases.
+  std::map<RunIndex, std::uint32_t> audit_crashes;  ///< Of runs in the two above.
+  std::uint64_t num_comparing = 0;                  ///< Results on their way to be compared.
   double run_time_s = 0.0;                 ///< Running mean over all workers; 0 if not known yet.
-  bool is_lending = true;                  ///< False once the campaign ends or is stopped.
+  double orbit_time_s = 0.0;               ///< Running mean of what an orbit takes in its slot.
+  std::string storage_failure;             ///< Why nothing can be stored; empty if all is well.
   std::uint64_t num_committed_here = 0;    ///< Without those that were finished before.
   std::uint64_t num_without_estimate = 0;  ///< Delivered here, with a status that has none.
   std::uint64_t num_duplicates = 0;        ///< Results that were there already.
+  std::uint64_t num_audited = 0;           ///< Results compared with the stored ones ...
+  std::uint64_t num_mismatches = 0;        ///< ... and found different.
 };
 
-/// A campaign of which the `finished` runs are in the store.
-/// @pre campaign->validate() passed; the finished runs are below campaign->num_runs.
-[[nodiscard]] State initial_state(std::shared_ptr<const Campaign> campaign,
-                                  std::span<const RunRange> finished, const DispatchConfig& config);
+/// A campaign as the store has it when the coordinator starts.
+struct StoredCampaign {
+  std::shared_ptr<const Campaign> definition;
+  Phase phase = Phase::active;
+  int priority = 0;
+  double audit_fraction = 0.0;
+  std::vector<RunRange> finished;
+  std::vector<RunRange> given_up;
+  std::vector<RunRange> compared = {};  ///< Finished runs of which a second result was compared.
+  /// Open runs that were blamed for crashes, how often, and under how many attempts they were lent.
+  struct Blamed {
+    RunIndex run;
+    std::uint32_t num_crashes = 0;
+    Attempt attempt;
+  };
+  std::vector<Blamed> blamed;
+};
 
-/// True if every run is durably stored.
-[[nodiscard]] bool is_finished(const State& state);
+/// A computer with workers, or with a history.
+struct Host {
+  std::uint32_t num_workers = 0;  ///< Registered.
+  std::uint32_t num_crashes = 0;  ///< Since one of its workers last delivered a result.
+  std::uint64_t num_results = 0;
+};
+
+/// All that the dispatch knows. Only the functions of dispatch.hpp change it.
+struct State {
+  DispatchConfig config;
+  std::map<CampaignId, CampaignState> campaigns;
+  std::vector<CampaignId> order;   ///< In which they were added.
+  std::vector<CampaignId> served;  ///< Active ones, in the order in which their runs are lent.
+  std::map<WorkerId, Worker> workers;
+  std::map<LeaseId, Lease> leases;
+  std::uint64_t next_lease = 1;
+  std::uint64_t num_slots = 0;  ///< Of all workers.
+  std::set<WorkerId> hungry;    ///< Workers that were lent less than they would take.
+  std::map<std::string, Host> hosts;
+  std::set<std::string> quarantined;  ///< Hosts that are lent nothing.
+  /// Sessions that should be attached and have not said yet what they hold.
+  std::set<SessionId> awaited;
+  TimePoint awaited_until{};
+  bool is_lending = true;   ///< False once the service ends, ...
+  bool is_stopped = false;  ///< ... and this is true if it does not even wait for results.
+  double hello_allowance = 0.0;
+  TimePoint hello_allowance_at{};
+};
+
+/// A coordinator without campaigns.
+/// @param awaited  Sessions that were attached when the coordinator before this one ended.
+[[nodiscard]] State initial_state(const DispatchConfig& config, std::set<SessionId> awaited,
+                                  TimePoint now);
+
+/// True if every run is durably stored or given up, and every audit done.
+[[nodiscard]] bool is_finished(const CampaignState& campaign);
 
 /// True if no result is expected or on its way to the store any more.
 [[nodiscard]] bool is_quiet(const State& state);
 
-/// Runs on the worker's leases.
-[[nodiscard]] RunSet runs_held(const State& state, WorkerId worker);
+/// Runs on the worker's leases, of all campaigns, as text for logs.
+[[nodiscard]] std::string runs_held_text(const State& state, WorkerId worker);
+
+/// True if these losses count against the runs that were being computed.
+[[nodiscard]] bool is_blamed(LossReason reason);
+
+/// `out_of_memory`, for logs and the database.
+[[nodiscard]] std::string_view name_of(LossReason reason);
+
+/// True if the run is one of the fraction that is audited: a pure function, the same after a
+/// restart.
+[[nodiscard]] bool is_audited(std::uint64_t campaign_seed, RunIndex run, double fraction);
 
 /// Aborts if the state contradicts itself. Walks all of it: for tests.
 void check_invariants(const State& state);

@@ -6,9 +6,10 @@ namespace proofmass::coordinator {
 
 std::string report_text(const Store& store, const Scenario& scenario) {
   const CampaignStatistics statistics = read_statistics(store, scenario);
-  return fmt::format("{}\n{}\n{}",
+  return fmt::format("{}{}\n{}\n{}",
                      summary_text(store.name(), store.seed(), store.num_runs(), statistics),
-                     accuracy_table(scenario, statistics), budget_table(scenario, statistics));
+                     given_up_text(store.given_up_runs()), accuracy_table(scenario, statistics),
+                     budget_table(scenario, statistics));
 }
 
 std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_t num_runs,
@@ -32,8 +33,28 @@ CampaignStatistics read_statistics(const Store& store, const Scenario& scenario)
   return accumulator.statistics();
 }
 
+std::string given_up_text(std::span<const RunRange> given_up) {
+  if (given_up.empty()) return "";
+  std::uint64_t num_runs = 0;
+  for (const RunRange& range : given_up) num_runs += range.count;
+  constexpr std::size_t columns_max = 76;  // And an ellipsis.
+  std::string line = fmt::format("          {} given up, having crashed workers:", num_runs);
+  for (const RunRange& range : given_up) {
+    const std::string item = range.count == 1
+                                 ? fmt::format(" {}", range.first.value)
+                                 : fmt::format(" {}..{}", range.first.value, range.end() - 1);
+    if (line.size() + item.size() > columns_max) return line + " ...\n";
+    line += item;
+  }
+  return line + "\n";
+}
+
 void update_statistics(Store& store, const Scenario& scenario) {
-  const CampaignStatistics statistics = read_statistics(store, scenario);
+  write_statistics(store, scenario, read_statistics(store, scenario));
+}
+
+void write_statistics(Store& store, const Scenario& scenario,
+                      const CampaignStatistics& statistics) {
   store.write_statistics(statistics, budget_before_calibration(scenario),
                          budget_after_calibration(scenario, statistics.worst_errors()),
                          budget_after_calibration(scenario, statistics.mean_errors()));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -20,6 +21,10 @@ namespace proofmass::coordinator {
                                        std::uint64_t num_runs,
                                        const CampaignStatistics& statistics);
 
+/// The line that names the runs that were given up; empty if there are none.
+/// @param given_up  Ascending.
+[[nodiscard]] std::string given_up_text(std::span<const RunRange> given_up);
+
 /// Accuracy of each parameter beside [Hardy2013] tab:perfo-numerical.
 [[nodiscard]] std::string accuracy_table(const Scenario& scenario,
                                          const CampaignStatistics& statistics);
@@ -30,6 +35,9 @@ namespace proofmass::coordinator {
 
 /// Statistics of the results in a campaign file.
 [[nodiscard]] CampaignStatistics read_statistics(const Store& store, const Scenario& scenario);
+
+/// Stores statistics and the budgets that follow from them in the file.
+void write_statistics(Store& store, const Scenario& scenario, const CampaignStatistics& statistics);
 
 /// Brings the statistics and budgets that are stored in the file up to its results.
 void update_statistics(Store& store, const Scenario& scenario);

@@ -3,11 +3,15 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <optional>
 #include <system_error>
 #include <utility>
+#include <variant>
 
 #include "coordinator/store/detail/campaign_rows.hpp"
+#include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
@@ -24,8 +28,6 @@ using detail::Transaction;
 
 namespace {
 
-constexpr std::size_t event_text_size_max = 2000;
-
 // A file from elsewhere is data: nothing in its schema may call functions with side effects.
 void configure(Database& database) {
   database.execute("PRAGMA trusted_schema = OFF; PRAGMA foreign_keys = ON");
@@ -36,6 +38,17 @@ void check_presence(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path, ignored)) {
     throw StoreError(fmt::format("campaign file = {} (does not exist)", path.string()));
   }
+}
+
+// Lock and log go by the name of the file: by another name it has others, and both would write.
+void check_that_name_is_the_only_one(const std::filesystem::path& path) {
+  std::error_code ignored;
+  const std::uintmax_t num_names = std::filesystem::hard_link_count(path, ignored);
+  if (num_names == 1) return;
+  throw StoreError(
+      fmt::format("campaign file = {} (has {} names (hard links), must have one; make copies "
+                  "instead)",
+                  path.string(), num_names));
 }
 
 void check_absence(const std::filesystem::path& path) {
@@ -80,17 +93,12 @@ void make_campaign_file(const std::filesystem::path& path, const Campaign& campa
   detail::synchronise_directory_of(path);
 }
 
-void insert_event(const Database& database, std::string_view kind, std::string_view text) {
-  database.prepare("INSERT INTO event (kind, text) VALUES (?, substr(?, 1, ?))")
-      .run(kind, text, std::uint64_t{event_text_size_max});
-  database.prepare("DELETE FROM event WHERE event_id <= last_insert_rowid() - 10000").run();
-}
-
 }  // namespace
 
 struct Store::Parts {
   std::unique_ptr<detail::StoreLock> lock;  // Of a coordinator; a reader has none.
   Database database;
+  std::optional<detail::EntryRows> rows;  // Prepared when they are first needed.
 
   explicit Parts(const std::filesystem::path& path);
   Parts(const std::filesystem::path& path, std::unique_ptr<detail::StoreLock> lock);
@@ -142,6 +150,7 @@ Store Store::create(const std::filesystem::path& path, const Campaign& campaign,
 
 Store Store::open(const std::filesystem::path& path) {
   check_presence(path);
+  check_that_name_is_the_only_one(path);
   detail::check_directory_of(path);
   return Store(std::make_unique<Parts>(path, std::make_unique<detail::StoreLock>(path)));
 }
@@ -149,6 +158,11 @@ Store Store::open(const std::filesystem::path& path) {
 Store Store::open_read_only(const std::filesystem::path& path) {
   check_presence(path);
   return Store(std::make_unique<Parts>(path));
+}
+
+wire::CampaignId Store::id() const {
+  return {
+      static_cast<std::uint64_t>(parts_->database.integer("SELECT campaign_uid FROM campaign"))};
 }
 
 std::string Store::name() const { return parts_->database.text("SELECT name FROM campaign"); }
@@ -173,6 +187,8 @@ std::string Store::model_version() const {
   return parts_->database.text("SELECT model_version FROM campaign");
 }
 
+std::string Store::build() const { return parts_->database.text("SELECT build FROM campaign"); }
+
 EnvironmentTable Store::environment_table() const {
   return detail::read_environment_table(parts_->database);
 }
@@ -192,45 +208,59 @@ void Store::extend(const Campaign& campaign, std::string_view definition) {
   transaction.commit();
 }
 
+CampaignControl Store::control() const { return detail::read_control(parts_->database); }
+
 std::vector<RunRange> Store::finished_runs() const {
-  Statement select =
-      parts_->database.prepare("SELECT run_index FROM run_result ORDER BY run_index");
+  Statement select = parts_->database.prepare("SELECT run_index FROM delivery ORDER BY run_index");
   std::vector<RunRange> ranges;
-  while (select.step()) {
-    const std::uint64_t run = select.count(0);
-    if (!ranges.empty() && ranges.back().end() == run) {
-      ++ranges.back().count;
-    } else {
-      ranges.push_back({.first = RunIndex{run}, .count = 1});
-    }
-  }
+  while (select.step()) detail::append_run(ranges, RunIndex{select.count(0)});
   return ranges;
 }
 
-CommitSummary Store::commit(std::span<const Delivery> deliveries) {
-  const std::uint64_t num_runs_wanted = num_runs();
-  for (const Delivery& delivery : deliveries) detail::check_delivery(delivery, num_runs_wanted);
+std::vector<RunRange> Store::given_up_runs() const {
+  return detail::read_given_up_runs(parts_->database);
+}
 
-  Database& database = parts_->database;
-  Transaction transaction(database);
-  detail::ResultRows results(database);
-  Statement insert_delivery = database.prepare(
-      "INSERT INTO delivery (run_index, worker, attempt, compute_s) VALUES (?, ?, ?, ?)");
-  CommitSummary summary;
-  for (const auto& [result, worker, attempt, compute_s] : deliveries) {
-    if (results.insert(result)) {
-      insert_delivery.run(result.run.value, worker, attempt, compute_s);
-      ++summary.num_new;
-      continue;
-    }
-    ++summary.num_duplicate;
-    if (detail::are_equal(result, results.read(result.run))) continue;
-    ++summary.num_contradicting;
-    insert_event(database, "contradicting_result",
-                 fmt::format("run={} worker={} attempt={}", result.run.value, worker, attempt));
-  }
+std::vector<BlamedRun> Store::blamed_runs() const {
+  return detail::read_blamed_runs(parts_->database);
+}
+
+std::vector<wire::SessionId> Store::attached_sessions() const {
+  return detail::read_attached_sessions(parts_->database);
+}
+
+void Store::begin_coordinator(const CoordinatorStart& start) {
+  Transaction transaction(parts_->database);
+  detail::insert_start(parts_->database, start);
   transaction.commit();
-  return summary;
+}
+
+void Store::end_coordinator(wire::Epoch epoch) {
+  Transaction transaction(parts_->database);
+  detail::end_start(parts_->database, epoch);
+  transaction.commit();
+}
+
+CommitSummary Store::write(std::span<const Entry> entries) {
+  const std::uint64_t num_runs_wanted = num_runs();
+  for (const Entry& entry : entries) {
+    const auto* delivery = std::get_if<Delivery>(&entry);
+    if (delivery != nullptr) detail::check_delivery(*delivery, num_runs_wanted);
+  }
+  if (!parts_->rows) parts_->rows.emplace(parts_->database);
+  try {
+    Transaction transaction(parts_->database);
+    CommitSummary summary = parts_->rows->write(entries);
+    transaction.commit();
+    return summary;
+  } catch (...) {
+    parts_->rows.reset();  // It knows of rows that are rolled back.
+    throw;
+  }
+}
+
+CommitSummary Store::commit(std::span<const Delivery> deliveries) {
+  return write(std::vector<Entry>(deliveries.begin(), deliveries.end()));
 }
 
 void Store::for_each_result(const std::function<void(const RunResult&)>& visit) const {
@@ -250,9 +280,8 @@ void Store::write_statistics(const CampaignStatistics& statistics, const Budget&
 }
 
 void Store::record_event(std::string_view kind, std::string_view text) {
-  Transaction transaction(parts_->database);
-  insert_event(parts_->database, kind, text);
-  transaction.commit();
+  const Entry event = EventEntry{.kind = std::string(kind), .text = std::string(text)};
+  write({&event, 1});
 }
 
 }  // namespace proofmass::coordinator

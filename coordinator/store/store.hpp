@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "coordinator/store/records.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/campaign/budget.hpp"
 #include "core/campaign/campaign.hpp"
@@ -17,24 +18,9 @@
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"
 #include "core/environment/environment_table.hpp"
+#include "proto/wire/messages.hpp"
 
 namespace proofmass::coordinator {
-
-/// A result and where it comes from.
-struct Delivery {
-  RunResult result;
-  std::string worker;         ///< Name of the worker, for people.
-  std::uint32_t attempt = 0;  ///< Of the lease under which the run was computed.
-  double compute_s = 0.0;     ///< Time that the worker spent on the run.
-};
-
-/// What became of the deliveries of one commit.
-struct CommitSummary {
-  std::uint64_t num_new = 0;
-  std::uint64_t num_duplicate = 0;  ///< Runs that were there already; nothing was changed.
-  /// Duplicates whose result is not the stored one: some worker computes wrongly.
-  std::uint64_t num_contradicting = 0;
-};
 
 /// A campaign file: one SQLite database with everything about one campaign (see README.md).
 ///
@@ -53,13 +39,12 @@ class Store {
 
   /// Opens a campaign file for its coordinator: takes the lock, brings an older file up to date.
   /// @throws StoreError if the file is missing, foreign, newer than this program or damaged, or if
-  ///         another coordinator has it; on a network file system.
+  ///         another coordinator has it; on a network file system; if it has another hard link.
   static Store open(const std::filesystem::path& path);
 
   /// Opens a campaign file for reading, also while a coordinator writes to it.
-  /// @throws StoreError as open() does, but for lock and file system; if the file is older than
-  /// this
-  ///         program.
+  /// @throws StoreError as open() does, but for lock, file system and hard links; if the file is
+  ///         older than this program.
   static Store open_read_only(const std::filesystem::path& path);
 
   /// Closes the file. Of a coordinator's, no other file (log, lock) remains unless somebody reads.
@@ -67,11 +52,14 @@ class Store {
   Store(Store&&) noexcept;
   Store& operator=(Store&&) noexcept;
 
+  /// A random number since the file was made; not 0, and below 2⁶³.
+  [[nodiscard]] wire::CampaignId id() const;
   [[nodiscard]] std::string name() const;
   [[nodiscard]] std::uint64_t seed() const;
   [[nodiscard]] std::uint64_t num_runs() const;  ///< Runs wanted, finished or not.
   [[nodiscard]] std::string definition() const;
   [[nodiscard]] std::string model_version() const;  ///< That of the program that made the file.
+  [[nodiscard]] std::string build() const;          ///< The same; empty before version 4.
   [[nodiscard]] EnvironmentTable environment_table() const;
 
   /// Values of `table` quantities for each run, shape [elements][num_runs].
@@ -84,12 +72,30 @@ class Store {
   ///         table values of the old runs are not those of the file. The caller compares the rest.
   void extend(const Campaign& campaign, std::string_view definition);
 
+  [[nodiscard]] CampaignControl control() const;
+
   /// Ascending; neighbours are one range.
   [[nodiscard]] std::vector<RunRange> finished_runs() const;
+  [[nodiscard]] std::vector<RunRange> given_up_runs() const;  ///< The same; none is finished.
+  /// Runs that are neither finished nor given up, ascending.
+  [[nodiscard]] std::vector<BlamedRun> blamed_runs() const;
 
-  /// Stores the results of runs that have none yet, all of them or, if it throws, none.
-  /// @throws StoreError if a run is not one of the campaign's or a number that matters is not
-  /// finite.
+  /// Workers that joined and have not ended, as far as the file knows: those that may come back
+  /// after the coordinator before this one was killed.
+  [[nodiscard]] std::vector<wire::SessionId> attached_sessions() const;
+  /// Writes down that a coordinator serves the campaign.
+  void begin_coordinator(const CoordinatorStart& start);
+  /// Writes down that this coordinator ended in order.
+  void end_coordinator(wire::Epoch epoch);
+
+  /// Writes all entries in order, or, if it throws, none. A run is stored once: a second delivery
+  /// is only compared.
+  /// @throws StoreError if a delivery's run is not one of the campaign's or a number that matters
+  /// is
+  ///         not finite.
+  CommitSummary write(std::span<const Entry> entries);
+
+  /// Stores results like write().
   CommitSummary commit(std::span<const Delivery> deliveries);
 
   /// Calls visit(result) for each finished run, in run order. Zeros have no sign.
@@ -102,8 +108,6 @@ class Store {
                         const Budget& after_worst, const Budget& after_mean);
 
   /// Appends to the campaign's log, of which the newest 10,000 entries are kept.
-  /// @param kind  What happened, in one word: `coordinator_started`.
-  /// @param text  Details; what is beyond 2,000 characters is cut.
   void record_event(std::string_view kind, std::string_view text);
 
  private:

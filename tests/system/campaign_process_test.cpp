@@ -1,78 +1,17 @@
 // Whole campaigns with real processes, which are killed and interrupted. What is compared is every
 // column of run_result, doubles by their bits.
 
+#include "tests/system/campaign_process.hpp"
+
 #include <gtest/gtest.h>
 #include <signal.h>
 
 #include <filesystem>
-#include <fstream>
-#include <regex>
 #include <string>
 #include <vector>
 
-#include "tests/coordinator/cli/temporary_directory.hpp"
-#include "tests/system/process.hpp"
-#include "tests/system/stored_runs.hpp"
-
 namespace proofmass::test {
 namespace {
-
-using Arguments = std::vector<std::string>;
-using testing::Test;
-
-const std::string programs = PROOFMASS_PROGRAMS;
-constexpr std::size_t num_runs = 320;  // 20 batches, so that there is an end to be killed before.
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
-/// A directory with a campaign whose batches take a tenth of a second or two: the paper's, with
-/// sessions of two orbits.
-class CampaignProcess : public Test {
- protected:
-  void SetUp() override {
-    ASSERT_EQ(
-        Process(directory / "", "init", programs + "/proofmass", {"init", "paper.toml"}).wait(), 0);
-    std::string text = read_file(directory / "paper.toml");
-    text = std::regex_replace(text, std::regex("\norbits = [0-9]+"), "\norbits = 2");
-    text = std::regex_replace(text, std::regex("\nruns = [0-9]+"),
-                              "\nruns = " + std::to_string(num_runs));
-    text = std::regex_replace(text, std::regex("\nsample_period_s = [0-9.]+"),
-                              "\nsample_period_s = 1");
-    std::ofstream(directory / "short.toml") << text;
-  }
-
-  [[nodiscard]] std::filesystem::path path(const std::string& name) const {
-    return directory / name;
-  }
-
-  /// `proofmass run short.toml --db NAME.db` with further arguments; output in NAME.out, NAME.err.
-  [[nodiscard]] Process start(const std::string& name, const Arguments& further) const {
-    Arguments arguments{"run", "short.toml", "--db", name + ".db"};
-    arguments.insert(arguments.end(), further.begin(), further.end());
-    return Process(directory / "", name, programs + "/proofmass", arguments);
-  }
-
-  [[nodiscard]] std::string errors_of(const std::string& name) const {
-    return read_file(path(name + ".err"));
-  }
-
-  /// The whole campaign, by one worker, undisturbed.
-  [[nodiscard]] std::map<std::int64_t, StoredRun> reference() const {
-    EXPECT_EQ(start("reference", {"--workers", "1"}).wait(), 0) << errors_of("reference");
-    auto runs = stored_runs(path("reference.db"));
-    EXPECT_EQ(runs.size(), num_runs);
-    return runs;
-  }
-
-  /// Waits until so many runs are stored while the campaign goes on.
-  void wait_for_runs(const std::string& name, std::size_t count) const {
-    wait_until("stored runs", [&] { return num_stored(path(name + ".db")) >= count; });
-  }
-
-  TemporaryDirectory directory;
-};
 
 TEST_F(CampaignProcess, ARunAloneHasTheBitsThatItHasInACampaign) {
   EXPECT_EQ(start("alone", {"--runs", "1"}).wait(), 0) << errors_of("alone");
@@ -195,6 +134,58 @@ TEST_F(CampaignProcess, GivesUpIfWorkersDieAgainAndAgain) {
       << errors_of("dying");
 }
 
+/// `proofmass run` with other workers than its own: a shell script in the place of theirs.
+class OtherWorkers : public CampaignProcess {
+ protected:
+  [[nodiscard]] Process start_with(const std::string& worker, const std::string& name) const {
+    std::filesystem::create_directories(path("bin"));
+    std::filesystem::copy_file(programs + "/proofmass", path("bin/proofmass"),
+                               std::filesystem::copy_options::overwrite_existing);
+    std::ofstream(path("bin/proofmass-worker")) << "#!/bin/sh\n" << worker << '\n';
+    std::filesystem::permissions(path("bin/proofmass-worker"), std::filesystem::perms::owner_all);
+    return Process(directory / "", name, path("bin/proofmass"),
+                   {"run", "short.toml", "--db", "other.db", "--runs", "64", "--workers", "2"});
+  }
+
+  const std::string null_worker = "exec " + programs + "/proofmass-null-worker \"$@\"";
+};
+
+TEST_F(OtherWorkers, ThatCrashAtOneRunComputeTheOthersAndThatOneLater) {
+  Process poisoned = start_with(null_worker + " --poison 17", "poisoned");
+  EXPECT_EQ(poisoned.wait(), 1) << errors_of("poisoned");
+  EXPECT_TRUE(contains(errors_of("poisoned"),
+                       "proofmass: error: 1 of 64 runs given up, having crashed their workers: 17\n"
+                       "proofmass: the same command tries them again\n"))
+      << errors_of("poisoned");
+  EXPECT_TRUE(contains(read_file(path("poisoned.out")), "1 given up, having crashed workers: 17"));
+  EXPECT_EQ(num_stored(path("other.db")), 63U);
+
+  Process healed = start_with(null_worker, "healed");
+  EXPECT_EQ(healed.wait(), 0) << errors_of("healed");
+  EXPECT_EQ(num_stored(path("other.db")), 64U);
+}
+
+TEST_F(OtherWorkers, ThatCannotStartEndTheCommand) {
+  Process run = start_with("exit 7", "failing");
+  EXPECT_EQ(run.wait(), 1);
+  EXPECT_TRUE(contains(errors_of("failing"),
+                       "proofmass: error: 3 workers in a row ended without a finished run; the "
+                       "last, local-"))
+      << errors_of("failing");
+  EXPECT_TRUE(contains(errors_of("failing"), ": exit code 7, holding runs none"))
+      << errors_of("failing");
+}
+
+TEST_F(CampaignProcess, ComputesRunsTwiceIfAskedToAudit) {
+  EXPECT_EQ(start("audited", {"--runs", "32", "--workers", "2", "--audit", "0.5"}).wait(), 0)
+      << errors_of("audited");
+  const std::string num_audited =
+      stored_text(path("audited.db"), "SELECT count(*) FROM audit WHERE is_equal = 1");
+  EXPECT_GT(std::stoi(num_audited), 0);
+  EXPECT_EQ(stored_text(path("audited.db"), "SELECT count(*) FROM audit WHERE is_equal = 0"), "0");
+  EXPECT_EQ(num_stored(path("audited.db")), 32U);
+}
+
 TEST_F(CampaignProcess, ShowsNothingIfQuiet) {
   EXPECT_EQ(start("quiet", {"--runs", "1", "--quiet"}).wait(), 0);
   EXPECT_EQ(errors_of("quiet"), "");
@@ -223,95 +214,6 @@ TEST_F(CampaignProcess, SaysItsVersion) {
   Process run(directory / "", "version", programs + "/proofmass", {"--version"});
   EXPECT_EQ(run.wait(), 0);
   EXPECT_EQ(read_file(path("version.out")), "proofmass " PROOFMASS_VERSION "\n");
-}
-
-/// The three programs by hand.
-class CoordinatorProcess : public CampaignProcess {
- protected:
-  [[nodiscard]] std::string endpoint() const { return "ipc://" + path("socket").string(); }
-
-  [[nodiscard]] Process start_coordinator() const {
-    return Process(directory / "", "coordinator", programs + "/proofmass-coordinator",
-                   {"short.toml", "--db", "served.db", "--bind", endpoint()});
-  }
-  [[nodiscard]] Process start_worker(const std::string& name,
-                                     const std::string& num_threads = "1") const {
-    return Process(directory / "", name, programs + "/proofmass-worker",
-                   {"--connect", endpoint(), "--name", name, "--threads", num_threads});
-  }
-};
-
-TEST_F(CoordinatorProcess, ServesWorkersThatConnectAndLeave) {
-  Process early = start_worker("early");  // It waits for its coordinator.
-  Process coordinator = start_coordinator();
-  wait_for_runs("served", 1);
-  Process late = start_worker("late");
-  wait_for_runs("served", 2);
-  early.signal(SIGTERM);
-  EXPECT_EQ(early.wait(), 0) << errors_of("early");
-  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
-  EXPECT_EQ(late.wait(), 0) << errors_of("late");
-  EXPECT_EQ(stored_runs(path("served.db")), reference());
-}
-
-TEST_F(CoordinatorProcess, ThreeThreadsOfAWorkerGiveTheBitsOfOne) {
-  Process worker = start_worker("threads", "3");
-  Process coordinator = start_coordinator();
-  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
-  EXPECT_EQ(worker.wait(), 0) << errors_of("threads");
-  EXPECT_TRUE(contains(errors_of("coordinator"), "name=threads ")) << errors_of("coordinator");
-  EXPECT_TRUE(contains(errors_of("coordinator"), " slots=48")) << errors_of("coordinator");
-  EXPECT_EQ(stored_runs(path("served.db")), reference());
-}
-
-TEST_F(CoordinatorProcess, RefusesMoreThreadsThanAWorkerMayHave) {
-  for (const std::string num_threads : {"0", "65"}) {
-    Process worker = start_worker("many", num_threads);
-    EXPECT_EQ(worker.wait(), 2) << num_threads;
-    EXPECT_TRUE(contains(errors_of("many"), "--threads")) << errors_of("many");
-  }
-}
-
-TEST_F(CoordinatorProcess, DrainsOnSigtermAndResumes) {
-  Process worker = start_worker("first");
-  Process coordinator = start_coordinator();
-  wait_for_runs("served", 1);
-  coordinator.signal(SIGTERM);
-  EXPECT_EQ(coordinator.wait(), 130) << errors_of("coordinator");
-  EXPECT_EQ(worker.wait(), 0) << errors_of("first");
-  ASSERT_LT(num_stored(path("served.db")), num_runs);
-
-  Process second = start_worker("second");
-  Process resumed = start_coordinator();
-  EXPECT_EQ(resumed.wait(), 0) << errors_of("coordinator");
-  EXPECT_EQ(second.wait(), 0) << errors_of("second");
-  EXPECT_EQ(stored_runs(path("served.db")), reference());
-}
-
-// The worker keeps its results, registers with the new coordinator and goes on.
-TEST_F(CoordinatorProcess, MayBeKilledAndStartedAgainUnderItsWorkers) {
-  Process worker = start_worker("faithful");
-  {
-    Process coordinator = start_coordinator();
-    wait_for_runs("served", 2);
-    coordinator.signal(SIGKILL);
-    EXPECT_EQ(coordinator.wait(), -SIGKILL);
-  }
-  Process coordinator = start_coordinator();
-  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
-  EXPECT_EQ(worker.wait(), 0) << errors_of("faithful");
-  EXPECT_EQ(stored_runs(path("served.db")), reference());
-}
-
-TEST_F(CoordinatorProcess, RefusesAnAddressThatOthersCanReach) {
-  Process coordinator(directory / "", "open", programs + "/proofmass-coordinator",
-                      {"short.toml", "--db", "served.db", "--bind", "tcp://0.0.0.0:7001"});
-  EXPECT_EQ(coordinator.wait(), 2);
-  EXPECT_TRUE(contains(errors_of("open"), "bind = tcp://0.0.0.0:7001 (must be on loopback"));
-  Process worker(directory / "", "far", programs + "/proofmass-worker",
-                 {"--connect", "tcp://10.0.0.1:7001"});
-  EXPECT_EQ(worker.wait(), 2);
-  EXPECT_TRUE(contains(errors_of("far"), "connect = tcp://10.0.0.1:7001 (must be on loopback"));
 }
 
 }  // namespace

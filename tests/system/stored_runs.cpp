@@ -39,6 +39,19 @@ std::map<std::int64_t, StoredRun> stored_runs(const std::filesystem::path& datab
   return runs;
 }
 
+std::string stored_text(const std::filesystem::path& database, const std::string& query) {
+  sqlite3* connection = nullptr;
+  sqlite3_stmt* statement = nullptr;
+  sqlite3_open_v2(database.c_str(), &connection, SQLITE_OPEN_READONLY, nullptr);
+  sqlite3_busy_timeout(connection, 5000);
+  sqlite3_prepare_v2(connection, query.c_str(), -1, &statement, nullptr);
+  const bool has_row = statement != nullptr && sqlite3_step(statement) == SQLITE_ROW;
+  std::string text = has_row ? column_text(statement, 0) : "";
+  sqlite3_finalize(statement);
+  sqlite3_close(connection);
+  return text;
+}
+
 std::size_t num_stored(const std::filesystem::path& database) {
   return stored_runs(database).size();
 }

@@ -17,4 +17,8 @@ using StoredRun = std::vector<std::string>;
 /// Number of those rows.
 [[nodiscard]] std::size_t num_stored(const std::filesystem::path& database);
 
+/// The first value that a query gives; empty if there is none.
+[[nodiscard]] std::string stored_text(const std::filesystem::path& database,
+                                      const std::string& query);
+
 }  // namespace proofmass::test

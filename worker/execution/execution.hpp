@@ -1,8 +1,10 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,30 +13,63 @@
 
 namespace proofmass::worker {
 
-/// A finished run and the lease that it belongs to.
+/// A monotonic time, handed in by the caller.
+using TimePoint = std::chrono::steady_clock::time_point;
+using Duration = std::chrono::steady_clock::duration;
+
+/// A finished run and the campaign that it belongs to.
 struct FinishedRun {
-  wire::LeaseId lease;
+  wire::CampaignId campaign;
+  wire::ComputedRun computed;
+};
+
+/// A result that is kept until the coordinator has acknowledged it.
+struct KeptResult {
+  wire::CampaignId campaign;
   wire::Attempt attempt;
   wire::ComputedRun computed;
 };
 
+/// Runs that are being computed together.
+struct RunningBatch {
+  std::uint64_t number = 0;  ///< No other batch of the execution has it.
+  wire::ComputedBatch progress;
+  /// Until its results are there, if it goes on as it has; nothing before its first orbit is done.
+  std::optional<Duration> time_left;
+};
+
 /// What the conversation with a coordinator needs of whatever computes runs. Neither knows how the
-/// other works.
+/// other works. A run is in one of three places: it waits, is in a batch, or is finished.
 class Execution {
  public:
   virtual ~Execution() = default;
 
-  /// Begins with this campaign; forgets everything of the one before.
-  virtual void start(std::shared_ptr<const Campaign> campaign) = 0;
-  /// Queues the runs of a lease. @pre start() has been called.
+  /// True from define() on; false again after forget(), or once the campaign has had no runs here
+  /// and room was needed for others.
+  [[nodiscard]] virtual bool is_defined(wire::CampaignId campaign) const = 0;
+  /// What the runs of a campaign compute. @pre It is not defined.
+  virtual void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) = 0;
+
+  /// Queues runs; those of a campaign that is not defined wait until it is.
+  /// @pre The execution has none of them.
   virtual void submit(wire::RunLease lease) = 0;
-  /// Drops all runs that are not finished, also those that are being computed.
+
+  /// Drops those of these runs that wait, and returns them in ascending order.
+  [[nodiscard]] virtual std::vector<RunIndex> drop_waiting(wire::CampaignId campaign,
+                                                           std::span<const RunRange> ranges) = 0;
+  /// Drops the runs of a batch; false if there is no such batch (any more).
+  [[nodiscard]] virtual bool drop_batch(std::uint64_t number) = 0;
+  /// Drops all runs of a campaign, finished ones included, and its definition.
+  virtual void forget(wire::CampaignId campaign) = 0;
+  /// Drops all runs that are not finished.
   virtual void abandon() = 0;
 
   /// Finished runs, each handed out once, in the order in which they finished.
   [[nodiscard]] virtual std::vector<FinishedRun> take_finished() = 0;
-  /// Leases with a run that take_finished() has not handed out, each once, in order.
-  [[nodiscard]] virtual std::vector<wire::LeaseId> open_leases() const = 0;
+  [[nodiscard]] virtual std::vector<RunningBatch> computing() const = 0;
+  /// The longest that a latest batch took, of the campaigns that are defined; nothing if none has
+  /// finished one.
+  [[nodiscard]] virtual std::optional<Duration> usual_batch_time() const = 0;
   [[nodiscard]] virtual std::uint64_t num_orbits_done() const = 0;
   /// Why no run can be computed any more, if so.
   [[nodiscard]] virtual std::optional<std::string> failure() const = 0;

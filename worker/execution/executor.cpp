@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/error.hpp"
+#include "worker/execution/run_ranges.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -13,61 +14,127 @@ namespace {
 /// Leaves a simulation from within, between two orbits.
 struct Abandoned {};
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+TimePoint now() { return std::chrono::steady_clock::now(); }
+
+std::vector<RunRange> requested_ranges(const std::vector<RunRequest>& requests) {
+  std::vector<RunIndex> runs;
+  for (const RunRequest& request : requests) runs.push_back(request.run);
+  std::ranges::sort(runs);
+  return ranges_of(runs);
 }
 
-std::vector<RunRequest> requests_of(const std::vector<Assignment>& assignments) {
-  std::vector<RunRequest> requests;
-  for (const Assignment& assignment : assignments) requests.push_back(assignment.request);
-  return requests;
+/// At the pace of the orbits that are done; nothing if there are none.
+std::optional<Duration> time_left(Duration elapsed, int num_done, int num_orbits) {
+  if (num_done < 1) return std::nullopt;
+  return elapsed * std::max(0, num_orbits - num_done) / num_done;
 }
 
 }  // namespace
 
 Executor::Executor(Prepare prepare, std::function<void()> on_change, const ExecutorConfig& config)
-    : prepare_(std::move(prepare)), on_change_(std::move(on_change)), config_(config) {
-  PROOFMASS_EXPECT(config.num_threads >= 1 && config.batch_size_max >= 1);
+    : prepare_(std::move(prepare)),
+      on_change_(std::move(on_change)),
+      config_(config),
+      num_serving_(config.num_threads) {
+  PROOFMASS_EXPECT(config.num_threads >= 1 && config.batch_size_max >= 1 &&
+                   config.num_campaigns_max >= 1);
   for (std::size_t i = 0; i < config.num_threads; ++i) {
     threads_.emplace_back([this] { serve(); });
   }
 }
 
 Executor::~Executor() {
-  {
-    const std::lock_guard lock(mutex_);
-    is_ending_ = true;
-    ++generation_;
-  }
-  changed_.notify_all();
+  (void)end_within(Duration::zero());
   for (std::thread& thread : threads_) thread.join();
 }
 
-void Executor::start(std::shared_ptr<const Campaign> campaign) {
+bool Executor::end_within(Duration time_max) {
+  std::unique_lock lock(mutex_);
+  is_ending_ = true;
+  queue_.clear();
+  drop_batches([](const Batch&) { return true; });
+  changed_.notify_all();
+  return changed_.wait_for(lock, time_max, [&] { return num_serving_ == 0; });
+}
+
+bool Executor::is_defined(wire::CampaignId campaign) const {
+  const std::lock_guard lock(mutex_);
+  return campaigns_.contains(campaign);
+}
+
+void Executor::define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) {
   {
     const std::lock_guard lock(mutex_);
-    campaign_ = std::move(campaign);
-    simulate_.reset();
-    queue_.clear();
-    finished_.clear();
-    ++generation_;
+    PROOFMASS_EXPECT(definition != nullptr && !campaigns_.contains(campaign));
+    make_room();
+    campaigns_[campaign].definition = std::move(definition);
+    campaigns_[campaign].used = ++num_uses_;
   }
   changed_.notify_all();
+}
+
+/// A campaign that a thread prepares stays, as do those with runs: it would be asked for again.
+void Executor::make_room() {
+  while (campaigns_.size() >= config_.num_campaigns_max) {
+    auto oldest = campaigns_.end();
+    for (auto known = campaigns_.begin(); known != campaigns_.end(); ++known) {
+      if (is_in_use(known->first)) continue;
+      if (oldest == campaigns_.end() || known->second.used < oldest->second.used) oldest = known;
+    }
+    if (oldest == campaigns_.end()) return;
+    campaigns_.erase(oldest);
+  }
+}
+
+bool Executor::is_in_use(wire::CampaignId campaign) const {
+  const auto is_of_it = [&](const auto& batch) {
+    return batch.second->assignment.campaign == campaign;
+  };
+  return campaigns_.at(campaign).is_preparing || queue_.has(campaign) ||
+         std::ranges::any_of(batches_, is_of_it);
 }
 
 void Executor::submit(wire::RunLease lease) {
   {
     const std::lock_guard lock(mutex_);
-    PROOFMASS_EXPECT(campaign_ != nullptr);
-    queue_.add(std::move(lease));
+    queue_.add(lease);
   }
   changed_.notify_all();
+}
+
+std::vector<RunIndex> Executor::drop_waiting(wire::CampaignId campaign,
+                                             std::span<const RunRange> ranges) {
+  const std::lock_guard lock(mutex_);
+  return queue_.drop(campaign, ranges);
+}
+
+bool Executor::drop_batch(std::uint64_t number) {
+  const std::lock_guard lock(mutex_);
+  const std::size_t num_batches = batches_.size();
+  drop_batches([&](const Batch& batch) { return batch.number == number; });
+  return batches_.size() < num_batches;
+}
+
+void Executor::drop_batches(const std::function<bool(const Batch&)>& is_unwanted) {
+  std::erase_if(batches_, [&](const auto& entry) {
+    if (!is_unwanted(*entry.second)) return false;
+    entry.second->is_dropped = true;
+    return true;
+  });
+}
+
+void Executor::forget(wire::CampaignId campaign) {
+  const std::lock_guard lock(mutex_);
+  queue_.drop(campaign);
+  drop_batches([&](const Batch& batch) { return batch.assignment.campaign == campaign; });
+  std::erase_if(finished_, [&](const FinishedRun& run) { return run.campaign == campaign; });
+  campaigns_.erase(campaign);
 }
 
 void Executor::abandon() {
   const std::lock_guard lock(mutex_);
   queue_.clear();
-  ++generation_;
+  drop_batches([](const Batch&) { return true; });
 }
 
 std::vector<FinishedRun> Executor::take_finished() {
@@ -75,13 +142,26 @@ std::vector<FinishedRun> Executor::take_finished() {
   return std::exchange(finished_, {});
 }
 
-std::vector<wire::LeaseId> Executor::open_leases() const {
+std::vector<RunningBatch> Executor::computing() const {
   const std::lock_guard lock(mutex_);
-  const std::vector<wire::LeaseId> queued = queue_.leases();
-  std::set<wire::LeaseId> leases(queued.begin(), queued.end());
-  leases.insert(computing_.begin(), computing_.end());
-  for (const FinishedRun& run : finished_) leases.insert(run.lease);
-  return {leases.begin(), leases.end()};
+  std::vector<RunningBatch> running;
+  for (const auto& [number, batch] : batches_) {
+    const int num_done = batch->num_orbits_done;
+    running.push_back(
+        {.number = number,
+         .progress = {.campaign = batch->assignment.campaign,
+                      .ranges = requested_ranges(batch->assignment.requests),
+                      .num_orbits_done = static_cast<std::uint32_t>(num_done)},
+         .time_left = time_left(now() - batch->started_at, num_done, batch->prepared->num_orbits)});
+  }
+  return running;
+}
+
+std::optional<Duration> Executor::usual_batch_time() const {
+  const std::lock_guard lock(mutex_);
+  std::optional<Duration> longest;
+  for (const auto& [id, known] : campaigns_) longest = std::max(longest, known.batch_time);
+  return longest;
 }
 
 std::optional<std::string> Executor::failure() const {
@@ -90,91 +170,110 @@ std::optional<std::string> Executor::failure() const {
 }
 
 void Executor::serve() {
+  bool has_failed = false;
   try {
-    while (const auto batch = next_batch()) compute(*batch);
+    while (const std::shared_ptr<Batch> batch = next_batch()) compute(*batch);
   } catch (const std::exception& error) {
-    {
-      const std::lock_guard lock(mutex_);
-      if (!failure_) failure_ = error.what();
-    }
-    changed_.notify_all();
-    on_change_();
+    const std::lock_guard lock(mutex_);
+    if (!failure_) failure_ = error.what();
+    has_failed = true;
   }
-}
-
-std::optional<Executor::Batch> Executor::next_batch() {
-  std::unique_lock lock(mutex_);
-  while (true) {
-    changed_.wait(lock, [&] {
-      const bool can_prepare = campaign_ && !simulate_ && !is_preparing_;
-      return is_ending_ || failure_ || can_prepare || (simulate_ && !queue_.empty());
-    });
-    if (is_ending_ || failure_) return std::nullopt;
-    if (simulate_) break;
-    prepare(lock);
-  }
-  Batch batch{.simulate = simulate_,
-              .assignments = queue_.take(config_.batch_size_max),
-              .generation = generation_};
-  for (const Assignment& assignment : batch.assignments) computing_.insert(assignment.lease);
-  return batch;
-}
-
-void Executor::prepare(std::unique_lock<std::mutex>& lock) {
-  const std::shared_ptr<const Campaign> campaign = campaign_;
-  is_preparing_ = true;
-  lock.unlock();
-  auto prepared = std::make_shared<const Simulate>(prepare_(*campaign));
-  lock.lock();
-  is_preparing_ = false;
-  if (campaign_ == campaign) simulate_ = std::move(prepared);
+  if (has_failed) on_change_();
+  const std::lock_guard lock(mutex_);
+  --num_serving_;
   changed_.notify_all();
 }
 
-void Executor::compute(const Batch& batch) {
-  const auto start = std::chrono::steady_clock::now();
-  try {
-    std::vector<RunResult> results = simulate(batch);
-    finish(batch, std::move(results), seconds_since(start));
-  } catch (const Abandoned&) {
-    const std::lock_guard lock(mutex_);
-    close(batch);
+std::shared_ptr<Executor::Batch> Executor::next_batch() {
+  const auto is_ready_now = [this](wire::CampaignId campaign) { return is_ready(campaign); };
+  std::unique_lock lock(mutex_);
+  while (true) {
+    if (is_ending_ || failure_) return nullptr;
+    Assignment assignment = queue_.take(config_.batch_size_max, is_ready_now);
+    if (!assignment.requests.empty()) {
+      KnownCampaign& known = campaigns_.at(assignment.campaign);
+      known.used = ++num_uses_;
+      const auto batch = std::make_shared<Batch>();
+      batch->number = ++num_batches_;
+      batch->assignment = std::move(assignment);
+      batch->prepared = known.prepared;
+      batch->started_at = now();
+      return batches_[batch->number] = batch;
+    }
+    if (const wire::CampaignId campaign = campaign_to_prepare(); campaign.value != 0) {
+      prepare(campaign, lock);
+    } else {
+      changed_.wait(lock);
+    }
   }
 }
 
-std::vector<RunResult> Executor::simulate(const Batch& batch) {
-  const std::vector<RunRequest> requests = requests_of(batch.assignments);
+bool Executor::is_ready(wire::CampaignId campaign) const {
+  const auto found = campaigns_.find(campaign);
+  return found != campaigns_.end() && found->second.prepared != nullptr;
+}
+
+wire::CampaignId Executor::campaign_to_prepare() const {
+  return queue_.first_campaign([this](wire::CampaignId campaign) {
+    const auto found = campaigns_.find(campaign);
+    return found != campaigns_.end() && !found->second.prepared && !found->second.is_preparing;
+  });
+}
+
+void Executor::prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock) {
+  const std::shared_ptr<const Campaign> definition = campaigns_.at(id).definition;
+  campaigns_.at(id).is_preparing = true;
+  lock.unlock();
+  auto prepared = std::make_shared<const PreparedCampaign>(prepare_(*definition));
+  lock.lock();
+  // It may have been forgotten meanwhile, and even defined again.
+  const auto found = campaigns_.find(id);
+  if (found != campaigns_.end() && found->second.definition == definition) {
+    found->second.is_preparing = false;
+    found->second.prepared = std::move(prepared);
+  }
+  changed_.notify_all();
+}
+
+void Executor::compute(Batch& batch) {
+  try {
+    finish(batch, simulate(batch));
+  } catch (const Abandoned&) {
+    // Whoever dropped the batch has taken it from the list.
+  }
+}
+
+std::vector<RunResult> Executor::simulate(Batch& batch) {
+  const std::vector<RunRequest>& requests = batch.assignment.requests;
   int num_orbits = 0;
   const auto on_progress = [&](int num_orbits_now) {
+    if (batch.is_dropped) throw Abandoned{};
     const int num_new = std::max(0, num_orbits_now - num_orbits);
+    if (num_new == 0) return;
     num_orbits += num_new;
+    batch.num_orbits_done = num_orbits;
     num_orbits_done_ += static_cast<std::uint64_t>(num_new) * requests.size();
-    if (batch.generation != generation_) throw Abandoned{};
   };
-  std::vector<RunResult> results = (*batch.simulate)(requests, on_progress);
+  std::vector<RunResult> results = batch.prepared->simulate(requests, on_progress);
   PROOFMASS_EXPECT(results.size() == requests.size());
   return results;
 }
 
-void Executor::finish(const Batch& batch, std::vector<RunResult> results, double compute_s) {
+void Executor::finish(const Batch& batch, const std::vector<RunResult>& results) {
+  const Duration elapsed = now() - batch.started_at;
+  const double compute_s = std::chrono::duration<double>(elapsed).count();
+  const wire::CampaignId campaign = batch.assignment.campaign;
   {
     const std::lock_guard lock(mutex_);
-    close(batch);
-    if (batch.generation != generation_) return;
-    for (std::size_t i = 0; i < results.size(); ++i) {
-      const Assignment& assignment = batch.assignments[i];
-      finished_.push_back({.lease = assignment.lease,
-                           .attempt = assignment.attempt,
-                           .computed = {.result = results[i], .compute_s = compute_s}});
+    if (batch.is_dropped) return;
+    batches_.erase(batch.number);
+    campaigns_.at(campaign).batch_time = elapsed;
+    for (const RunResult& result : results) {
+      finished_.push_back(
+          {.campaign = campaign, .computed = {.result = result, .compute_s = compute_s}});
     }
   }
   on_change_();
-}
-
-void Executor::close(const Batch& batch) {
-  for (const Assignment& assignment : batch.assignments) {
-    computing_.erase(computing_.find(assignment.lease));
-  }
 }
 
 }  // namespace proofmass::worker

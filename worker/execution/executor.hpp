@@ -4,10 +4,12 @@
 #include <condition_variable>
 #include <cstddef>
 #include <functional>
+#include <map>
+#include <memory>
 #include <mutex>
-#include <set>
 #include <span>
 #include <thread>
+#include <vector>
 
 #include "core/campaign/run_result.hpp"
 #include "core/simulation/run.hpp"
@@ -22,69 +24,101 @@ namespace proofmass::worker {
 using Simulate = std::function<std::vector<RunResult>(std::span<const RunRequest> requests,
                                                       const std::function<void(int)>& progress)>;
 
+/// A campaign whose runs can be computed.
+struct PreparedCampaign {
+  Simulate simulate;
+  int num_orbits = 1;  ///< Of one run, all sessions together; at least 1.
+};
+
 /// Prepares what the runs of a campaign share, which may take some time.
-using Prepare = std::function<Simulate(const Campaign& campaign)>;
+using Prepare = std::function<PreparedCampaign(const Campaign& campaign)>;
 
 /// How much an executor computes at a time.
 struct ExecutorConfig {
-  std::size_t num_threads = 1;     ///< At least 1.
-  std::size_t batch_size_max = 1;  ///< Runs that a thread computes together; at least 1.
+  std::size_t num_threads = 1;        ///< At least 1.
+  std::size_t batch_size_max = 1;     ///< Runs that a thread computes together; at least 1.
+  std::size_t num_campaigns_max = 4;  ///< Kept without runs of theirs at hand; at least 1.
 };
 
 /// Computes runs on threads of its own, in the order in which they are submitted.
 ///
-/// A free thread takes a batch of runs from the queue, of as many leases as it takes, and starts at
-/// once with what is there: a batch that is not full costs no more than a full one. Each run takes
-/// the time of its batch, and that is its `compute_s`.
+/// A free thread takes a batch of runs of one campaign from the queue, of as many leases as it
+/// takes, and starts at once with what is there. Each run takes the time of its batch, and that is
+/// its `compute_s`. A campaign is prepared by a thread when its first run is due, while the others
+/// go on.
 class Executor final : public Execution {
  public:
-  /// @param prepare    Called on one of the threads, once a campaign, for all of them.
+  /// @param prepare    Called on the threads, once for each definition.
   /// @param on_change  Called on any of the threads when there is something new to take.
   Executor(Prepare prepare, std::function<void()> on_change, const ExecutorConfig& config);
-  ~Executor() override;  ///< Abandons everything; waits at most for the orbits that are computed.
+  ~Executor() override;  ///< Abandons everything; waits for all threads to come to an orbit's end.
 
-  void start(std::shared_ptr<const Campaign> campaign) override;
+  [[nodiscard]] bool is_defined(wire::CampaignId campaign) const override;
+  void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) override;
   void submit(wire::RunLease lease) override;
+  [[nodiscard]] std::vector<RunIndex> drop_waiting(wire::CampaignId campaign,
+                                                   std::span<const RunRange> ranges) override;
+  [[nodiscard]] bool drop_batch(std::uint64_t number) override;
+  void forget(wire::CampaignId campaign) override;
   void abandon() override;
   [[nodiscard]] std::vector<FinishedRun> take_finished() override;
-  [[nodiscard]] std::vector<wire::LeaseId> open_leases() const override;
+  [[nodiscard]] std::vector<RunningBatch> computing() const override;
+  [[nodiscard]] std::optional<Duration> usual_batch_time() const override;
   [[nodiscard]] std::uint64_t num_orbits_done() const override { return num_orbits_done_; }
   [[nodiscard]] std::optional<std::string> failure() const override;
 
+  /// Abandons everything and waits until no thread computes any more, at most for this time. False
+  /// if one still does: it hangs, and the destructor would as well.
+  [[nodiscard]] bool end_within(Duration time_max);
+
  private:
-  /// Runs that one thread computes together.
+  struct KnownCampaign {
+    std::shared_ptr<const Campaign> definition;  ///< Shared with the thread that prepares it.
+    std::shared_ptr<const PreparedCampaign>
+        prepared;  ///< Shared with its batches; null until then.
+    bool is_preparing = false;
+    std::uint64_t used = 0;              ///< Grows with each use: the smallest is the longest ago.
+    std::optional<Duration> batch_time;  ///< Of the batch that finished last.
+  };
+
+  /// Runs that one thread computes together. The thread shares it with `batches_`, from which it is
+  /// taken when it is dropped.
   struct Batch {
-    /// Shared with the executor, which replaces it when a new campaign starts.
-    std::shared_ptr<const Simulate> simulate;
-    std::vector<Assignment> assignments;
-    std::uint64_t generation = 0;  ///< Of the executor when it was taken.
+    std::uint64_t number = 0;
+    Assignment assignment;
+    std::shared_ptr<const PreparedCampaign> prepared;
+    TimePoint started_at;
+    std::atomic<int> num_orbits_done = 0;
+    std::atomic<bool> is_dropped = false;
   };
 
   void serve();
-  /// Waits for runs, and prepares their campaign if no other thread does; empty at the end.
-  [[nodiscard]] std::optional<Batch> next_batch();
-  void prepare(std::unique_lock<std::mutex>& lock);
-  void compute(const Batch& batch);
-  [[nodiscard]] std::vector<RunResult> simulate(const Batch& batch);
-  void finish(const Batch& batch, std::vector<RunResult> results, double compute_s);
-  void close(const Batch& batch);  ///< Its runs are no longer being computed.
+  /// Waits for runs, and prepares their campaign if no other thread does; null at the end.
+  [[nodiscard]] std::shared_ptr<Batch> next_batch();
+  [[nodiscard]] bool is_ready(wire::CampaignId campaign) const;
+  [[nodiscard]] wire::CampaignId campaign_to_prepare() const;  ///< 0 if there is none.
+  void prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock);
+  void compute(Batch& batch);
+  [[nodiscard]] std::vector<RunResult> simulate(Batch& batch);
+  void finish(const Batch& batch, const std::vector<RunResult>& results);
+  void drop_batches(const std::function<bool(const Batch&)>& is_unwanted);
+  void make_room();
+  [[nodiscard]] bool is_in_use(wire::CampaignId campaign) const;
 
   Prepare prepare_;
   std::function<void()> on_change_;
   ExecutorConfig config_;
   std::atomic<std::uint64_t> num_orbits_done_ = 0;
-  /// Grows with every start() and abandon(): a batch of an older generation is dropped.
-  std::atomic<std::uint64_t> generation_ = 0;
 
   mutable std::mutex mutex_;  ///< Guards all that follows but the threads.
   std::condition_variable changed_;
   bool is_ending_ = false;
-  bool is_preparing_ = false;
-  /// Shared with the thread that prepares it, even if another one starts meanwhile.
-  std::shared_ptr<const Campaign> campaign_;
-  std::shared_ptr<const Simulate> simulate_;  ///< Of `campaign_`; null until it is prepared.
+  std::size_t num_serving_ = 0;  ///< Threads that have not come to their end.
+  std::uint64_t num_uses_ = 0;
+  std::uint64_t num_batches_ = 0;
+  std::map<wire::CampaignId, KnownCampaign> campaigns_;
   RunQueue queue_;
-  std::multiset<wire::LeaseId> computing_;  ///< Of each run in a batch of any generation.
+  std::map<std::uint64_t, std::shared_ptr<Batch>> batches_;
   std::vector<FinishedRun> finished_;
   std::optional<std::string> failure_;
 

@@ -1,42 +1,66 @@
 #include "worker/execution/run_queue.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace proofmass::worker {
 
-void RunQueue::add(wire::RunLease lease) { leases_.push_back(std::move(lease)); }
-
-void RunQueue::clear() {
-  leases_.clear();
-  num_taken_ = 0;
+void RunQueue::add(const wire::RunLease& lease) {
+  const auto width = static_cast<std::ptrdiff_t>(lease.table_values.size() / lease.runs.count);
+  auto values = lease.table_values.begin();
+  for (std::uint64_t run = lease.runs.first.value; run < lease.runs.end(); ++run) {
+    runs_.push_back({.campaign = lease.campaign,
+                     .is_alone = lease.is_alone,
+                     .request = {.run = {run}, .table_values = {values, values + width}}});
+    values += width;
+  }
 }
 
-std::vector<Assignment> RunQueue::take(std::size_t count_max) {
-  std::vector<Assignment> assignments;
-  while (assignments.size() < count_max && !empty()) assignments.push_back(take_first());
-  return assignments;
-}
-
-std::vector<wire::LeaseId> RunQueue::leases() const {
-  std::vector<wire::LeaseId> leases;
-  for (const wire::RunLease& lease : leases_) leases.push_back(lease.lease);
-  return leases;
-}
-
-Assignment RunQueue::take_first() {
-  const wire::RunLease& lease = leases_.front();
-  const std::size_t width = lease.table_values.size() / lease.runs.count;
-  const auto values = lease.table_values.begin() + static_cast<std::ptrdiff_t>(num_taken_ * width);
-  Assignment assignment{
-      .lease = lease.lease,
-      .attempt = lease.attempt,
-      .request = {.run = {lease.runs.first.value + num_taken_},
-                  .table_values = {values, values + static_cast<std::ptrdiff_t>(width)}}};
-  if (++num_taken_ == lease.runs.count) {
-    leases_.pop_front();
-    num_taken_ = 0;
+Assignment RunQueue::take(std::size_t count_max, const IsReady& is_ready) {
+  Assignment assignment;
+  assignment.campaign = first_campaign(is_ready);
+  for (auto run = runs_.begin(); run != runs_.end() && assignment.requests.size() < count_max;) {
+    const bool can_join = assignment.requests.empty() || !run->is_alone;
+    if (run->campaign != assignment.campaign || !can_join) {
+      ++run;
+      continue;
+    }
+    const bool is_alone = run->is_alone;
+    assignment.requests.push_back(std::move(run->request));
+    run = runs_.erase(run);
+    if (is_alone) break;
   }
   return assignment;
+}
+
+std::vector<RunIndex> RunQueue::drop(wire::CampaignId campaign, std::span<const RunRange> ranges) {
+  const auto is_in_range = [&](RunIndex run) {
+    return std::ranges::any_of(ranges, [&](const RunRange& range) {
+      return range.first <= run && run.value < range.end();
+    });
+  };
+  std::vector<RunIndex> dropped;
+  runs_.remove_if([&](const Waiting& waiting) {
+    if (waiting.campaign != campaign || !is_in_range(waiting.request.run)) return false;
+    dropped.push_back(waiting.request.run);
+    return true;
+  });
+  std::ranges::sort(dropped);
+  return dropped;
+}
+
+void RunQueue::drop(wire::CampaignId campaign) {
+  runs_.remove_if([&](const Waiting& waiting) { return waiting.campaign == campaign; });
+}
+
+bool RunQueue::has(wire::CampaignId campaign) const {
+  return std::ranges::any_of(runs_, [&](const Waiting& run) { return run.campaign == campaign; });
+}
+
+wire::CampaignId RunQueue::first_campaign(const IsReady& is_wanted) const {
+  const auto found =
+      std::ranges::find_if(runs_, [&](const Waiting& run) { return is_wanted(run.campaign); });
+  return found == runs_.end() ? wire::CampaignId{} : found->campaign;
 }
 
 }  // namespace proofmass::worker

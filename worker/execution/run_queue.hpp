@@ -1,8 +1,9 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
-#include <deque>
+#include <functional>
+#include <list>
+#include <span>
 #include <vector>
 
 #include "core/simulation/run.hpp"
@@ -10,31 +11,41 @@
 
 namespace proofmass::worker {
 
-/// A run that is to be computed, and the lease that it belongs to.
+/// Runs of one campaign that are to be computed together.
 struct Assignment {
-  wire::LeaseId lease;
-  wire::Attempt attempt;
-  RunRequest request;
+  wire::CampaignId campaign;
+  std::vector<RunRequest> requests;  ///< Not empty.
 };
 
-/// The runs of a worker's leases that nobody has begun to compute, in the order in which they came.
+/// The runs of a worker that nobody has begun to compute, in the order in which they came.
 class RunQueue {
  public:
-  void add(wire::RunLease lease);
-  void clear();
+  using IsReady = std::function<bool(wire::CampaignId)>;
 
-  /// Removes the first runs, of as many leases as it takes; fewer than `count_max` if there are no
-  /// more.
-  [[nodiscard]] std::vector<Assignment> take(std::size_t count_max);
+  void add(const wire::RunLease& lease);
 
-  [[nodiscard]] bool empty() const { return leases_.empty(); }
-  [[nodiscard]] std::vector<wire::LeaseId> leases() const;  ///< Those with a run in the queue.
+  /// Removes the first run whose campaign is ready, and the next ones of that campaign, whatever
+  /// lease they are of; fewer than `count_max` if there are no more, none if no campaign is ready.
+  /// A run that is to be alone is.
+  [[nodiscard]] Assignment take(std::size_t count_max, const IsReady& is_ready);
+
+  /// Removes those of the runs that are here and returns them in ascending order.
+  std::vector<RunIndex> drop(wire::CampaignId campaign, std::span<const RunRange> ranges);
+  void drop(wire::CampaignId campaign);
+  void clear() { runs_.clear(); }
+
+  [[nodiscard]] bool has(wire::CampaignId campaign) const;
+  /// The first campaign with a run here for which `is_wanted` holds; 0 if there is none.
+  [[nodiscard]] wire::CampaignId first_campaign(const IsReady& is_wanted) const;
 
  private:
-  [[nodiscard]] Assignment take_first();
+  struct Waiting {
+    wire::CampaignId campaign;
+    bool is_alone = false;
+    RunRequest request;
+  };
 
-  std::deque<wire::RunLease> leases_;  ///< Of the first, the runs from `num_taken_` on are left.
-  std::uint64_t num_taken_ = 0;
+  std::list<Waiting> runs_;
 };
 
 }  // namespace proofmass::worker

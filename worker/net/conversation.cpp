@@ -3,197 +3,372 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 #include <variant>
 
-#include "proto/wire/codec.hpp"
+#include "core/error.hpp"
+#include "worker/execution/run_ranges.hpp"
+#include "worker/net/held_runs.hpp"
 
 namespace proofmass::worker {
 namespace {
 
-/// Equal for equal campaigns.
-std::string bytes_of(const std::shared_ptr<const Campaign>& campaign) {
-  return wire::encode(
-      wire::Welcome{.worker = {1}, .heartbeat_interval_s = 1.0, .campaign = campaign});
+/// The mixing of SplitMix64: a number without visible relation to its argument, in [0, 1).
+double fraction_from(std::uint64_t number) {
+  number += 0x9e3779b97f4a7c15U;
+  number = (number ^ (number >> 30)) * 0xbf58476d1ce4e5b9U;
+  number = (number ^ (number >> 27)) * 0x94d049bb133111ebU;
+  number ^= number >> 31;
+  return static_cast<double>(number >> 11) * 0x1.0p-53;
+}
+
+Duration times(double factor, Duration duration) {
+  return std::chrono::duration_cast<Duration>(factor * duration);
+}
+
+std::int64_t whole_seconds(Duration duration) {
+  return std::chrono::duration_cast<std::chrono::seconds>(duration).count();
+}
+
+/// The table values of some of a lease's runs.
+std::vector<double> values_of(const wire::RunLease& lease, RunRange runs, std::size_t width) {
+  const auto first =
+      lease.table_values.begin() +
+      static_cast<std::ptrdiff_t>((runs.first.value - lease.runs.first.value) * width);
+  return {first, first + static_cast<std::ptrdiff_t>(runs.count * width)};
 }
 
 }  // namespace
 
-Conversation::Conversation(wire::Hello hello, Execution& execution, Send send, TimePoint now,
-                           const ConversationConfig& config)
-    : hello_(std::move(hello)),
+Conversation::Conversation(wire::SessionId session, wire::Hello hello, Execution& execution,
+                           Send send, TimePoint now, const ConversationConfig& config)
+    : session_(session),
+      hello_(std::move(hello)),
       execution_(execution),
       send_(std::move(send)),
       config_(config),
       heard_at_(now) {
-  say_hello(now);
+  PROOFMASS_EXPECT(session.value != 0);
+  register_again(now);
 }
 
-void Conversation::on_message(const wire::Message& message, TimePoint now) {
-  if (ending_) return;
-  heard_at_ = now;
-  std::visit([&](const auto& content) { handle(content, now); }, message);
-}
-
-void Conversation::on_connected(TimePoint now) {
-  if (!ending_ && !is_registered_) say_hello(now);
-}
-
-void Conversation::handle(const wire::Welcome& welcome, TimePoint now) {
-  if (is_registered_) return;  // The answer to a repeated Hello.
-  std::string bytes = bytes_of(welcome.campaign);
-  if (campaign_bytes_.empty()) {
-    execution_.start(welcome.campaign);
-    table_width_ = table_elements(welcome.campaign->dispersions).size();
-    campaign_bytes_ = std::move(bytes);
-  } else if (campaign_bytes_ != bytes) {
-    return end(Ending::Kind::failed, "the coordinator serves another campaign now");
+void Conversation::restore(std::vector<KeptResult> results) {
+  for (KeptResult& result : results) {
+    const RunKey key{result.campaign, result.computed.result.run};
+    unacknowledged_[key] = {.attempt = result.attempt,
+                            .computed = result.computed,
+                            .due_at = TimePoint::min(),
+                            .resend_after = config_.resend_after};
   }
+}
+
+// What arrives.
+
+void Conversation::on_packet(const wire::Packet& packet, TimePoint now) {
+  if (ending_ || packet.header.session != session_) return;
+  heard_at_ = now;
+  const bool is_about_registration = std::holds_alternative<wire::Welcome>(packet.message) ||
+                                     std::holds_alternative<wire::Reject>(packet.message);
+  // What another coordinator process has said before it ended means nothing to the present one.
+  if (!is_about_registration && packet.header.epoch != epoch_) return;
+  std::visit([&](const auto& content) { handle(content, packet.header, now); }, packet.message);
+}
+
+void Conversation::handle(const wire::Welcome& welcome, const wire::Header& header, TimePoint now) {
+  if (is_registered_) return;  // The answer to a repeated Hello.
   is_registered_ = true;
+  epoch_ = header.epoch;
   heartbeat_interval_ = std::chrono::duration_cast<Duration>(
       std::chrono::duration<double>(welcome.heartbeat_interval_s));
-  resend_results(now, Duration::zero());
   send_heartbeat(now);
+  repeat_results(now);
 }
 
-void Conversation::handle(const wire::Reject& reject, TimePoint now) {
+void Conversation::handle(const wire::Reject& reject, const wire::Header&, TimePoint now) {
   if (reject.reason != wire::RejectReason::not_registered) {
     return end(Ending::Kind::failed, "refused by the coordinator: " + reject.text);
   }
-  if (!is_registered_) return;  // A Hello is under way.
-  is_registered_ = false;
-  execution_.abandon();  // The runs will be lent again; a new registration begins with none.
-  say_hello(now);
+  if (is_registered_) register_again(now);  // Otherwise a Hello is under way.
 }
 
-void Conversation::handle(const wire::RunLease& lease, TimePoint) {
-  if (!is_registered_ || is_draining_) return;
-  const std::vector<wire::LeaseId> open = execution_.open_leases();
-  if (std::find(open.begin(), open.end(), lease.lease) != open.end()) return;
-  if (lease.table_values.size() != lease.runs.count * table_width_) {
-    return end(Ending::Kind::failed,
-               fmt::format("table_values = {} entries (must be {} for each run)",
-                           lease.table_values.size(), table_width_));
+void Conversation::handle(const wire::CampaignDefinition& answer, const wire::Header&, TimePoint) {
+  if (requested_at_.erase(answer.campaign) == 0) return;
+  const std::size_t width = table_elements(answer.definition->dispersions).size();
+  if (agrees_on_table(answer.campaign, width)) {
+    execution_.define(answer.campaign, answer.definition);
   }
-  execution_.submit(lease);
 }
 
-void Conversation::handle(const wire::ResultAck& ack, TimePoint) {
-  for (const RunIndex run : ack.runs) unacknowledged_.erase(run);
-  leave_if_drained();
+void Conversation::handle(const wire::Forget& forget, const wire::Header&, TimePoint) {
+  const auto is_of_it = [&](const auto& entry) { return entry.first.first == forget.campaign; };
+  std::erase_if(unfinished_, is_of_it);
+  std::erase_if(unacknowledged_, is_of_it);
+  requested_at_.erase(forget.campaign);
+  table_widths_.erase(forget.campaign);
+  execution_.forget(forget.campaign);
+  leave_if_done();
 }
 
-void Conversation::handle(const wire::Drain&, TimePoint) {
-  is_draining_ = true;
-  send_credit();
-  leave_if_drained();
+void Conversation::handle(const wire::RunLease& lease, const wire::Header&, TimePoint now) {
+  if (!is_registered_) return;
+  const std::size_t width = lease.table_values.size() / lease.runs.count;
+  const std::vector<RunRange> ranges = new_runs(lease);
+  if (leaving_) {
+    if (ranges.empty()) return;
+    return send(wire::GiveBack{leaving_->reason, {{lease.campaign, lease.attempt, ranges}}});
+  }
+  if (!agrees_on_table(lease.campaign, width)) return;
+  for (const RunRange& runs : ranges) {
+    wire::RunLease part{lease.campaign, runs, lease.attempt, lease.is_alone, {}};
+    part.table_values = values_of(lease, runs, width);
+    execution_.submit(std::move(part));
+    for (const RunIndex run : indices_of(std::array{runs}))
+      unfinished_[{lease.campaign, run}] = lease.attempt;
+  }
+  const bool is_requested = requested_at_.contains(lease.campaign);
+  if (!execution_.is_defined(lease.campaign) && !is_requested) request(lease.campaign, now);
 }
 
-void Conversation::handle(const wire::Stop&, TimePoint) {
+void Conversation::handle(const wire::Retract& retract, const wire::Header&, TimePoint) {
+  give_back(wire::LossReason::retracted, retract.campaign,
+            execution_.drop_waiting(retract.campaign, retract.ranges));
+}
+
+void Conversation::handle(const wire::ResultAck& ack, const wire::Header&, TimePoint) {
+  for (const RunIndex run : ack.runs) unacknowledged_.erase({ack.campaign, run});
+  leave_if_done();
+}
+
+void Conversation::handle(const wire::Drain&, const wire::Header&, TimePoint now) {
+  if (!leaving_) begin_to_leave({.reason = wire::LossReason::drained, .deadline = {}}, now);
+}
+
+void Conversation::handle(const wire::Stop&, const wire::Header&, TimePoint) {
   execution_.abandon();
   end(Ending::Kind::done, "told to stop");
 }
 
+// What happens here.
+
+void Conversation::on_connected(TimePoint now) {
+  if (ending_) return;
+  refusal_.clear();
+  if (!is_registered_) return register_again(now);
+  send_heartbeat(now);
+  repeat_results(now);
+}
+
+void Conversation::on_refused(const std::string& reason) { refusal_ = reason; }
+
 void Conversation::on_progress(TimePoint now) {
   if (ending_) return;
+  const std::vector<RunKey> runs = keep_finished(now);
   if (const auto failure = execution_.failure()) {
-    send_(wire::Bye{});
+    if (is_registered_) send(wire::Bye{wire::LossReason::failed});
     return end(Ending::Kind::failed, *failure);
   }
-  std::vector<SentRun*> runs;
-  for (FinishedRun& finished : execution_.take_finished()) {
-    const RunIndex run = finished.computed.result.run;
-    SentRun& sent = unacknowledged_[run];
-    sent.finished = std::move(finished);
-    runs.push_back(&sent);
-  }
-  send_results(std::move(runs), now);
+  if (is_registered_) send_results(runs, now);
+  leave_if_done();
 }
 
 void Conversation::on_tick(TimePoint now) {
   if (ending_) return;
-  if (now - heard_at_ >= config_.unreachable_after) {
-    return end(
-        Ending::Kind::failed,
-        fmt::format("coordinator = silent for {} s (is it running?)",
-                    std::chrono::duration_cast<std::chrono::seconds>(now - heard_at_).count()));
+  if (now - heard_at_ >= config_.give_up_after) {
+    return end(Ending::Kind::failed,
+               fmt::format("coordinator = silent for {} s ({})", whole_seconds(now - heard_at_),
+                           refusal_.empty() ? "is it running?" : refusal_));
   }
+  watch_time(now);
+  if (ending_) return;
   if (!is_registered_) {
-    if (now - hello_at_ >= config_.hello_interval) say_hello(now);
+    if (now >= hello_due_at_) say_hello(now);
     return;
   }
-  resend_results(now, config_.resend_after);
-  if (now - heartbeat_at_ >= heartbeat_interval_) send_heartbeat(now);
-  leave_if_drained();
+  request_definitions(now);
+  send_due_results(now);
+  const Duration since_heartbeat = now - heartbeat_at_;
+  const bool has_news = since_heartbeat >= config_.news_interval && computes_other_batches();
+  if (has_news || since_heartbeat >= heartbeat_interval_) send_heartbeat(now);
 }
 
-void Conversation::on_stop_request() {
-  if (ending_) return;
-  execution_.abandon();
-  send_(wire::Bye{});
-  end(Ending::Kind::done, "asked to stop");
+std::vector<KeptResult> Conversation::unacknowledged() const {
+  std::vector<KeptResult> results;
+  for (const auto& [key, sent] : unacknowledged_) {
+    results.push_back({key.first, sent.attempt, sent.computed});
+  }
+  return results;
+}
+
+// Registration.
+
+void Conversation::send(wire::Message message) {
+  const bool is_hello = std::holds_alternative<wire::Hello>(message);
+  send_({.header = {.session = session_,
+                    .epoch = is_hello ? wire::Epoch{} : epoch_,
+                    .sequence = ++num_sent_},
+         .message = std::move(message)});
+}
+
+void Conversation::register_again(TimePoint now) {
+  is_registered_ = false;
+  hello_delay_ = config_.hello_delay;
+  say_hello(now);
 }
 
 void Conversation::say_hello(TimePoint now) {
-  hello_at_ = now;
-  send_(hello_);
+  send(hello_);
+  const double jitter = 0.25 * fraction_from(session_.value + num_sent_);
+  hello_due_at_ = now + times(1.0 + jitter, hello_delay_);
+  hello_delay_ = std::min(2 * hello_delay_, config_.hello_delay_max);
 }
 
 /// What is not acknowledged counts against the credit, so that a coordinator that cannot store
 /// results does not fill this worker's memory.
-void Conversation::send_credit() {
+std::uint32_t Conversation::credit() const {
+  if (leaving_) return 0;
   const std::size_t kept = std::min<std::size_t>(unacknowledged_.size(), wire::runs_per_lease_max);
-  const auto num_runs_max = static_cast<std::uint32_t>(wire::runs_per_lease_max - kept);
-  send_(wire::Credit{.num_runs_max = is_draining_ ? 0 : num_runs_max});
+  return static_cast<std::uint32_t>(wire::runs_per_lease_max - kept);
 }
 
-/// Credit goes with every heartbeat: one that is lost is made good by the next.
 void Conversation::send_heartbeat(TimePoint now) {
   heartbeat_at_ = now;
-  std::vector<wire::LeaseId> leases = execution_.open_leases();
-  for (const auto& [run, sent] : unacknowledged_) leases.push_back(sent.finished.lease);
-  std::sort(leases.begin(), leases.end());
-  leases.erase(std::unique(leases.begin(), leases.end()), leases.end());
-  leases.resize(std::min(leases.size(), wire::leases_held_max));
-  send_(wire::Heartbeat{.num_orbits_done = execution_.num_orbits_done(),
-                        .leases = std::move(leases)});
-  send_credit();
-}
-
-/// One message for each lease, with its runs in order.
-void Conversation::send_results(std::vector<SentRun*> runs, TimePoint now) {
-  std::map<wire::LeaseId, wire::ResultBatch> batches;
-  for (SentRun* const run : runs) {
-    run->sent_at = now;
-    const FinishedRun& finished = run->finished;
-    wire::ResultBatch& batch = batches[finished.lease];
-    batch.lease = finished.lease;
-    batch.attempt = finished.attempt;
-    batch.results.push_back(finished.computed);
-    if (batch.results.size() < wire::runs_per_lease_max) continue;
-    send_(batch);
-    batches.erase(finished.lease);
+  std::vector<HeldRun> held;
+  held.reserve(unfinished_.size() + unacknowledged_.size());
+  for (const auto& [key, attempt] : unfinished_) held.push_back({key.first, attempt, key.second});
+  for (const auto& [key, result] : unacknowledged_) {
+    held.push_back({key.first, result.attempt, key.second});
   }
-  for (const auto& [lease, batch] : batches) send_(batch);
-}
-
-void Conversation::resend_results(TimePoint now, Duration older_than) {
-  std::vector<SentRun*> runs;
-  for (auto& [run, sent] : unacknowledged_) {
-    if (now - sent.sent_at >= older_than) runs.push_back(&sent);
+  wire::Heartbeat heartbeat{.num_runs_max = credit(),
+                            .num_orbits_done = execution_.num_orbits_done(),
+                            .held = grouped(std::move(held), wire::ranges_per_message_max),
+                            .computing = {}};
+  reported_batches_.clear();
+  for (RunningBatch& batch : execution_.computing()) {
+    reported_batches_.push_back(batch.number);
+    heartbeat.computing.push_back(std::move(batch.progress));
   }
-  send_results(std::move(runs), now);
+  send(std::move(heartbeat));
 }
 
-void Conversation::leave_if_drained() {
-  if (ending_ || !is_draining_ || !unacknowledged_.empty()) return;
-  if (!execution_.open_leases().empty()) return;
-  send_(wire::Bye{});
-  end(Ending::Kind::done, "drained");
+/// If the process crashes, the runs that were being computed are blamed: the coordinator should
+/// know which.
+bool Conversation::computes_other_batches() const {
+  const std::vector<RunningBatch> batches = execution_.computing();
+  return !std::ranges::equal(batches, reported_batches_, {}, &RunningBatch::number);
 }
 
-void Conversation::end(Ending::Kind kind, std::string reason) {
-  ending_ = Ending{.kind = kind, .reason = std::move(reason)};
+// Campaigns and leases.
+
+void Conversation::request(wire::CampaignId campaign, TimePoint now) {
+  requested_at_[campaign] = now;
+  send(wire::CampaignRequest{campaign});
+}
+
+void Conversation::request_definitions(TimePoint now) {
+  const auto has_no_run = [&](const auto& entry) {
+    const auto first = unfinished_.lower_bound({entry.first, RunIndex{0}});
+    return first == unfinished_.end() || first->first.first != entry.first;
+  };
+  std::erase_if(requested_at_, has_no_run);
+  for (const auto& [campaign, requested_at] : requested_at_) {
+    if (now - requested_at >= config_.request_interval) request(campaign, now);
+  }
+}
+
+/// Every lease and the definition of a campaign must have the same number of table values a run.
+bool Conversation::agrees_on_table(wire::CampaignId campaign, std::size_t width) {
+  const std::size_t expected = table_widths_.try_emplace(campaign, width).first->second;
+  if (width == expected) return true;
+  execution_.abandon();
+  end(Ending::Kind::failed,
+      fmt::format("table_values = {} for each run (must be {})", width, expected));
+  return false;
+}
+
+/// Those runs of the lease that are not here. Of the others, the attempt may have grown: they were
+/// taken from this worker and lent to it again.
+std::vector<RunRange> Conversation::new_runs(const wire::RunLease& lease) {
+  std::vector<RunIndex> runs;
+  for (const RunIndex run : indices_of(std::array{lease.runs})) {
+    const RunKey key{lease.campaign, run};
+    const auto found = unfinished_.find(key);
+    if (found != unfinished_.end()) {
+      found->second = std::max(found->second, lease.attempt);
+    } else if (!unacknowledged_.contains(key)) {
+      runs.push_back(run);
+    }
+  }
+  return ranges_of(runs);
+}
+
+void Conversation::give_back(wire::LossReason reason, wire::CampaignId campaign,
+                             std::span<const RunIndex> runs) {
+  std::vector<HeldRun> held;
+  for (const RunIndex run : runs) {
+    const auto found = unfinished_.find({campaign, run});
+    PROOFMASS_EXPECT(found != unfinished_.end());
+    held.push_back({campaign, found->second, run});
+    unfinished_.erase(found);
+  }
+  // Without a registration, the next heartbeat says the same by not naming them.
+  if (held.empty() || !is_registered_) return;
+  send(wire::GiveBack{reason, grouped(std::move(held), wire::ranges_per_message_max)});
+}
+
+// Results.
+
+std::vector<Conversation::RunKey> Conversation::keep_finished(TimePoint now) {
+  std::vector<RunKey> runs;
+  for (FinishedRun& finished : execution_.take_finished()) {
+    const RunKey key{finished.campaign, finished.computed.result.run};
+    const auto found = unfinished_.find(key);
+    PROOFMASS_EXPECT(found != unfinished_.end());
+    unacknowledged_[key] = {.attempt = found->second,
+                            .computed = finished.computed,
+                            .due_at = now,
+                            .resend_after = config_.resend_after};
+    unfinished_.erase(found);
+    runs.push_back(key);
+  }
+  return runs;
+}
+
+void Conversation::repeat_results(TimePoint now) {
+  for (auto& [key, result] : unacknowledged_) {
+    result.due_at = now;
+    result.resend_after = config_.resend_after;
+  }
+  send_due_results(now);
+}
+
+/// As many as one message may have; the next tick has the others.
+void Conversation::send_due_results(TimePoint now) {
+  std::vector<RunKey> runs;
+  for (const auto& [key, result] : unacknowledged_) {
+    if (runs.size() == wire::runs_per_lease_max) break;
+    if (result.due_at <= now) runs.push_back(key);
+  }
+  send_results(runs, now);
+}
+
+/// @pre All of them are kept.
+void Conversation::send_results(std::span<const RunKey> runs, TimePoint now) {
+  std::map<std::pair<wire::CampaignId, wire::Attempt>, wire::ResultBatch> batches;
+  for (const RunKey& run : runs) {
+    SentResult& result = unacknowledged_.at(run);
+    wire::ResultBatch& batch = batches[{run.first, result.attempt}];
+    batch.campaign = run.first;
+    batch.attempt = result.attempt;
+    batch.results.push_back(result.computed);
+    result.due_at = now + result.resend_after;
+    result.resend_after = std::min(2 * result.resend_after, config_.resend_after_max);
+    if (batch.results.size() == wire::runs_per_lease_max) {
+      send(std::exchange(batch, {}));
+      batches.erase({run.first, result.attempt});
+    }
+  }
+  for (auto& [key, batch] : batches) send(std::move(batch));
 }
 
 }  // namespace proofmass::worker

@@ -4,9 +4,10 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "proto/wire/messages.hpp"
@@ -14,88 +15,153 @@
 
 namespace proofmass::worker {
 
-/// A monotonic time, handed in by the caller.
-using TimePoint = std::chrono::steady_clock::time_point;
-using Duration = std::chrono::steady_clock::duration;
-
 /// How a worker's service ended.
 struct Ending {
   enum class Kind : std::uint8_t {
-    done,    ///< It was told to end, or asked to.
+    done,    ///< It was told to end, asked to, or its time was up.
     failed,  ///< It cannot go on.
   };
   Kind kind = Kind::done;
   std::string reason;  ///< For people.
 };
 
-/// Periods of a worker's conversation.
+/// Times of a worker's conversation.
 struct ConversationConfig {
-  Duration hello_interval = std::chrono::seconds(1);
-  Duration resend_after = std::chrono::seconds(5);  ///< Results without an acknowledgement.
-  Duration unreachable_after = std::chrono::seconds(60);
+  /// Between a Hello and the next; doubles from the first to the second, plus up to a quarter, by
+  /// which a thousand workers of a coordinator that restarts come one after the other.
+  Duration hello_delay = std::chrono::milliseconds(250);
+  Duration hello_delay_max = std::chrono::seconds(32);
+  Duration request_interval = std::chrono::seconds(1);  ///< Of a definition that does not come.
+  /// Until a result without an acknowledgement is sent again; doubles from the first to the second.
+  Duration resend_after = std::chrono::seconds(5);
+  Duration resend_after_max = std::chrono::seconds(60);
+  /// From a heartbeat to the next if other runs are being computed by then; otherwise the
+  /// coordinator says how long.
+  Duration news_interval = std::chrono::seconds(1);
+  Duration give_up_after = std::chrono::hours(1);   ///< Of a coordinator that says nothing.
+  Duration drain_time = std::chrono::seconds(100);  ///< To finish batches when asked to end.
+  /// Kept free at the end of the drain or walltime, for results to be sent and acknowledged.
+  Duration delivery_time = std::chrono::seconds(5);
+  std::optional<TimePoint> walltime_end = {};  ///< When the process must have ended.
 };
 
-/// A worker's side of the protocol, without socket, clock or thread: registers, hands leases to the
-/// execution, keeps results until they are acknowledged, shows that it lives.
+/// A worker's side of the protocol, without socket, clock, thread or random device: registers,
+/// hands leases to the execution, keeps results until they are acknowledged, says what it holds.
+///
+/// A coordinator that does not know the worker (any more) costs nothing: the runs at hand go on,
+/// and after the next Welcome a heartbeat names them all.
 class Conversation {
  public:
-  using Send = std::function<void(const wire::Message&)>;
+  using Send = std::function<void(const wire::Packet&)>;
 
+  /// @param session    Random; jitter follows from it, too.
   /// @param execution  Must outlive this object.
   /// @param send       May lose messages.
-  Conversation(wire::Hello hello, Execution& execution, Send send, TimePoint now,
-               const ConversationConfig& config = {});
+  Conversation(wire::SessionId session, wire::Hello hello, Execution& execution, Send send,
+               TimePoint now, const ConversationConfig& config = {});
 
-  void on_message(const wire::Message& message, TimePoint now);
-  /// Messages sent before had nowhere to go: repeats the Hello at once.
+  /// Takes over results of a process before this one, to be delivered first.
+  void restore(std::vector<KeptResult> results);
+
+  void on_packet(const wire::Packet& packet, TimePoint now);
+  /// Messages sent before had nowhere to go.
   void on_connected(TimePoint now);
+  /// The coordinator does not let this worker in. It may some day; until then nothing else changes.
+  void on_refused(const std::string& reason);
   /// The execution has something new to take.
   void on_progress(TimePoint now);
   /// To be called some times a second.
   void on_tick(TimePoint now);
-  /// Gives everything back and leaves.
-  void on_stop_request();
+  /// Gives back what has not begun, finishes what can be finished in time, delivers, leaves.
+  void on_drain_request(TimePoint now);
+  /// Leaves at once. Whoever asks keeps the results, or they will be computed again.
+  void on_abandon_request();
 
   /// Present once the conversation is over.
   [[nodiscard]] const std::optional<Ending>& ending() const { return ending_; }
+  [[nodiscard]] bool is_registered() const { return is_registered_; }
+  [[nodiscard]] bool is_leaving() const { return leaving_.has_value(); }
   [[nodiscard]] std::size_t num_unacknowledged() const { return unacknowledged_.size(); }
+  /// Results without an acknowledgement, in order of campaign and run.
+  [[nodiscard]] std::vector<KeptResult> unacknowledged() const;
+  /// Runs that wait or are being computed.
+  [[nodiscard]] std::size_t num_unfinished() const { return unfinished_.size(); }
 
  private:
-  struct SentRun {
-    FinishedRun finished;
-    TimePoint sent_at;
+  using RunKey = std::pair<wire::CampaignId, RunIndex>;
+
+  struct SentResult {
+    wire::Attempt attempt;
+    wire::ComputedRun computed;
+    TimePoint due_at;       ///< When to send it (again).
+    Duration resend_after;  ///< From then on.
   };
 
-  void handle(const wire::Welcome& welcome, TimePoint now);
-  void handle(const wire::Reject& reject, TimePoint now);
-  void handle(const wire::RunLease& lease, TimePoint now);
-  void handle(const wire::ResultAck& ack, TimePoint now);
-  void handle(const wire::Drain& drain, TimePoint now);
-  void handle(const wire::Stop& stop, TimePoint now);
-  template <typename Other>
-  void handle(const Other&, TimePoint) {}  // What only a worker sends means nothing here.
+  /// The worker takes no more runs and ends when it holds none.
+  struct Leaving {
+    wire::LossReason reason = wire::LossReason::drained;
+    std::optional<TimePoint> deadline;  ///< Nothing: as long as it takes.
+  };
 
+  void handle(const wire::Welcome& welcome, const wire::Header& header, TimePoint now);
+  void handle(const wire::Reject& reject, const wire::Header& header, TimePoint now);
+  void handle(const wire::CampaignDefinition& answer, const wire::Header& header, TimePoint now);
+  void handle(const wire::Forget& forget, const wire::Header& header, TimePoint now);
+  void handle(const wire::RunLease& lease, const wire::Header& header, TimePoint now);
+  void handle(const wire::Retract& retract, const wire::Header& header, TimePoint now);
+  void handle(const wire::ResultAck& ack, const wire::Header& header, TimePoint now);
+  void handle(const wire::Drain& drain, const wire::Header& header, TimePoint now);
+  void handle(const wire::Stop& stop, const wire::Header& header, TimePoint now);
+  template <typename Other>
+  void handle(const Other&, const wire::Header&, TimePoint) {}  // Nothing is to be done.
+
+  void send(wire::Message message);
   void say_hello(TimePoint now);
-  void send_credit();
+  void register_again(TimePoint now);
+  void request(wire::CampaignId campaign, TimePoint now);
+  void request_definitions(TimePoint now);
+  [[nodiscard]] bool agrees_on_table(wire::CampaignId campaign, std::size_t width);
+  [[nodiscard]] std::vector<RunRange> new_runs(const wire::RunLease& lease);
   void send_heartbeat(TimePoint now);
-  void send_results(std::vector<SentRun*> runs, TimePoint now);
-  void resend_results(TimePoint now, Duration older_than);
-  void leave_if_drained();
+  [[nodiscard]] bool computes_other_batches() const;
+  [[nodiscard]] std::uint32_t credit() const;
+  [[nodiscard]] std::vector<RunKey> keep_finished(TimePoint now);
+  void repeat_results(TimePoint now);
+  void send_due_results(TimePoint now);
+  void send_results(std::span<const RunKey> runs, TimePoint now);
+  void watch_time(TimePoint now);
+  void begin_to_leave(const Leaving& leaving, TimePoint now);
+  void give_back_waiting();
+  void give_back_late_batches(TimePoint now);
+  void give_back(wire::LossReason reason, wire::CampaignId campaign,
+                 std::span<const RunIndex> runs);
+  void leave_if_done();
+  void leave(const std::string& reason);
   void end(Ending::Kind kind, std::string reason);
 
+  wire::SessionId session_;
   wire::Hello hello_;
   Execution& execution_;
   Send send_;
   ConversationConfig config_;
+
+  wire::Epoch epoch_;  ///< Of the coordinator that sent the newest Welcome.
+  std::uint64_t num_sent_ = 0;
   bool is_registered_ = false;
-  bool is_draining_ = false;
-  std::string campaign_bytes_;   ///< Of the campaign that the execution has; empty if none.
-  std::size_t table_width_ = 0;  ///< Table values of one run.
   Duration heartbeat_interval_{};
   TimePoint heard_at_;
-  TimePoint hello_at_;
+  TimePoint hello_due_at_;
+  Duration hello_delay_{};
   TimePoint heartbeat_at_;
-  std::map<RunIndex, SentRun> unacknowledged_;
+  std::vector<std::uint64_t> reported_batches_;  ///< By the heartbeat sent last.
+  std::string refusal_;  ///< Why there is no connection; empty if not known.
+
+  /// Table values of one run, as the first lease or the definition of a campaign has them.
+  std::map<wire::CampaignId, std::size_t> table_widths_;
+  std::map<wire::CampaignId, TimePoint> requested_at_;  ///< Definitions that runs wait for.
+  std::map<RunKey, wire::Attempt> unfinished_;          ///< All runs that the execution has.
+  std::map<RunKey, SentResult> unacknowledged_;
+  std::optional<Leaving> leaving_;
   std::optional<Ending> ending_;
 };
 

@@ -1,166 +1,215 @@
 #include "worker/net/serve.hpp"
 
 #include <fmt/format.h>
-#include <signal.h>
 #include <spdlog/spdlog.h>
-#include <sys/eventfd.h>
-#include <sys/signalfd.h>
-#include <unistd.h>
 
+#include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
-#include <span>
-#include <string_view>
+#include <chrono>
 #include <utility>
 #include <variant>
-#include <zmq.hpp>
 
-#include "core/error.hpp"
+#include "proto/link/kill_point.hpp"
 #include "proto/wire/codec.hpp"
+#include "worker/net/coordinator_link.hpp"
+#include "worker/spool/spooler.hpp"
+#include "worker/supervision/init_system.hpp"
 
 namespace proofmass::worker {
 namespace {
 
-constexpr std::chrono::milliseconds tick_interval(200);
+constexpr std::chrono::milliseconds tick_interval(100);
+constexpr std::chrono::milliseconds fault_interval(5);  ///< How exactly faults are timed.
+constexpr std::chrono::seconds spool_interval(30);
+constexpr std::chrono::seconds status_interval(10);
 
-/// A file descriptor that becomes readable when something happened.
-class Descriptor {
+TimePoint time_now() { return std::chrono::steady_clock::now(); }
+
+/// True, and the time is set to come after the interval, if it has come.
+bool take_turn(TimePoint& due_at, TimePoint now, Duration interval) {
+  if (now < due_at) return false;
+  due_at = now + interval;
+  return true;
+}
+
+/// Keeps results that nobody acknowledges in a file, if there is one.
+class Keeping {
  public:
-  explicit Descriptor(int fd, std::string_view what) : fd_(fd) {
-    if (fd_ < 0) throw Error(fmt::format("{}: {}", what, std::strerror(errno)));
-  }
-  ~Descriptor() { close(fd_); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  [[nodiscard]] int fd() const { return fd_; }
-
-  /// Makes an eventfd readable.
-  void notify() const {
-    const std::uint64_t one = 1;
-    // It fails only if the counter is full, and then the descriptor is readable already.
-    [[maybe_unused]] const auto written = write(fd_, &one, sizeof one);
+  Keeping(const std::optional<std::filesystem::path>& path, std::string_view model,
+          Conversation& conversation)
+      : conversation_(conversation) {
+    if (!path) return;
+    spool_.emplace(*path, model);
+    spooler_.emplace(*spool_);
+    if (spool_->num_bytes_dropped() > 0) {
+      spdlog::warn("spool_torn bytes_dropped={}", spool_->num_bytes_dropped());
+    }
+    if (spool_->former_results().empty()) return;
+    spdlog::info("spool_read results={}", spool_->former_results().size());
+    conversation_.restore(spool_->former_results());
   }
 
-  /// Makes an eventfd not readable.
-  void clear() const {
-    std::uint64_t count = 0;
-    [[maybe_unused]] const auto got = read(fd_, &count, sizeof count);
+  void on_tick(TimePoint now) {
+    if (!spooler_ || !take_turn(due_at_, now, spool_interval)) return;
+    warn(spooler_->look(conversation_.unacknowledged()));
+  }
+
+  void finish() {
+    if (spooler_) {
+      warn(spooler_->finish(conversation_.unacknowledged()));
+    } else if (conversation_.num_unacknowledged() > 0) {
+      spdlog::warn("results_lost results={} reason=\"no spool\"",
+                   conversation_.num_unacknowledged());
+    }
   }
 
  private:
-  int fd_;
+  void warn(const std::optional<std::string>& reason) {
+    if (reason && reason != former_reason_) spdlog::warn("spool_failed {}", *reason);
+    former_reason_ = reason;
+  }
+
+  Conversation& conversation_;
+  std::optional<Spool> spool_;
+  std::optional<Spooler> spooler_;
+  std::optional<std::string> former_reason_;
+  TimePoint due_at_ = TimePoint::min();
 };
 
-int open_signals(Signals signals) {
-  sigset_t set;
-  sigemptyset(&set);
-  sigaddset(&set, SIGTERM);
-  if (signals == Signals::terminate_and_interrupt) sigaddset(&set, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &set, nullptr);
-  return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-}
+/// Tells the init system how the worker is.
+class Notices {
+ public:
+  explicit Notices(const Conversation& conversation) : conversation_(conversation) {}
 
-zmq::socket_t connect(zmq::context_t& context, const std::string& endpoint) {
-  zmq::socket_t socket(context, zmq::socket_type::dealer);
-  // Without a connection nothing is queued: the conversation repeats what matters.
-  socket.set(zmq::sockopt::immediate, true);
-  socket.set(zmq::sockopt::linger, 2000);
-  socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(wire::welcome_size_max));
-  socket.set(zmq::sockopt::reconnect_ivl, 100);
-  socket.set(zmq::sockopt::reconnect_ivl_max, 5000);
-  socket.set(zmq::sockopt::handshake_ivl, 5000);
-  socket.set(zmq::sockopt::heartbeat_ivl, 5000);
-  socket.set(zmq::sockopt::heartbeat_timeout, 20000);
-  socket.set(zmq::sockopt::tcp_keepalive, 1);
-  socket.connect(endpoint);
-  return socket;
-}
+  void on_tick(TimePoint now) {
+    if (conversation_.is_registered() && !std::exchange(is_ready_, true)) notify("READY=1");
+    if (conversation_.is_leaving()) stopping();
+    const auto watchdog = init_system_.watchdog_interval();
+    if (watchdog && take_turn(watchdog_at_, now, *watchdog)) notify("WATCHDOG=1");
+    if (take_turn(status_at_, now, status_interval)) {
+      notify(fmt::format("STATUS={}, {} runs at hand, {} results not acknowledged",
+                         conversation_.is_registered() ? "registered" : "not registered",
+                         conversation_.num_unfinished(), conversation_.num_unacknowledged()));
+    }
+  }
+
+  void stopping() {
+    if (!std::exchange(is_stopping_, true)) notify("STOPPING=1");
+  }
+
+ private:
+  void notify(std::string_view lines) const { init_system_.notify(lines); }
+
+  const Conversation& conversation_;
+  InitSystem init_system_ = InitSystem::from_environment();
+  bool is_ready_ = false;
+  bool is_stopping_ = false;
+  TimePoint watchdog_at_ = TimePoint::min();
+  TimePoint status_at_ = TimePoint::min();
+};
 
 class Service {
  public:
-  Service(const std::string& endpoint, const wire::Hello& hello, Prepare prepare,
-          const ExecutorConfig& config, Signals signals)
-      : signals_(open_signals(signals), "signalfd"),
-        progress_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd"),
-        socket_(connect(context_, endpoint)),
-        executor_(
-            std::move(prepare), [this] { progress_.notify(); }, config),
+  Service(const ServeConfig& config, Execution& execution, const Wake& progress,
+          StopSignals& signals)
+      : progress_(progress),
+        signals_(signals),
+        wait_max_(config.faults ? fault_interval : tick_interval),
+        link_(config.endpoint, config.security, config.faults),
         conversation_(
-            hello, executor_, [this](const wire::Message& message) { send(message); }, now()) {}
+            config.session, config.hello, execution,
+            [this](const wire::Packet& packet) { send(packet); }, time_now(), config.conversation),
+        keeping_(config.spool, config.hello.model_version, conversation_),
+        notices_(conversation_) {}
 
   Ending run() {
+    TimePoint tick_at = time_now();
     while (!conversation_.ending()) {
-      const short wanted = is_connected_ ? ZMQ_POLLIN : ZMQ_POLLIN | ZMQ_POLLOUT;
-      std::array<zmq::pollitem_t, 3> items{zmq::pollitem_t{socket_.handle(), 0, wanted, 0},
-                                           zmq::pollitem_t{nullptr, progress_.fd(), ZMQ_POLLIN, 0},
-                                           zmq::pollitem_t{nullptr, signals_.fd(), ZMQ_POLLIN, 0}};
-      poll(items);
-      if ((items[0].revents & ZMQ_POLLOUT) != 0) {
-        is_connected_ = true;
-        conversation_.on_connected(now());
-      }
-      if ((items[0].revents & ZMQ_POLLIN) != 0) receive();
-      if (items[1].revents != 0) {
-        progress_.clear();
-        conversation_.on_progress(now());
-      }
-      if (items[2].revents != 0) conversation_.on_stop_request();
-      conversation_.on_tick(now());
+      link_.wait(std::array{progress_.descriptor(), signals_.descriptor()}, wait_max_);
+      const TimePoint now = time_now();
+      heed_link(now);
+      if (progress_.take()) conversation_.on_progress(now);
+      heed_signals(now);
+      if (take_turn(tick_at, now, tick_interval)) on_tick(now);
     }
+    notices_.stopping();
+    keeping_.finish();
     return *conversation_.ending();
   }
 
  private:
-  static TimePoint now() { return std::chrono::steady_clock::now(); }
+  void heed_link(TimePoint now) {
+    if (link_.take_connected()) {
+      spdlog::info("connected");
+      conversation_.on_connected(now);
+    }
+    if (const auto refusal = link_.take_refusal()) {
+      spdlog::error("connection_refused reason=\"{}\"", *refusal);
+      conversation_.on_refused(*refusal);
+    }
+    link_.receive(now, [&](std::string_view bytes) {
+      receive(bytes, now);
+      return !conversation_.ending();
+    });
+  }
 
-  static void poll(std::span<zmq::pollitem_t> items) {
-    try {
-      zmq::poll(items.data(), items.size(), tick_interval);
-    } catch (const zmq::error_t& error) {
-      // A process that was stopped and continued comes back here.
-      if (error.num() != EINTR) throw;
+  void receive(std::string_view bytes, TimePoint now) {
+    const auto decoded = wire::decode(bytes);
+    if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
+      return spdlog::error("malformed_message {}", error->text);
+    }
+    const auto& packet = std::get<wire::Packet>(decoded);
+    if (std::holds_alternative<wire::RunLease>(packet.message)) {
+      wire::kill_point(wire::KillPoint::after_lease);
+    }
+    const bool was_registered = conversation_.is_registered();
+    conversation_.on_packet(packet, now);
+    if (conversation_.is_registered() && !was_registered) spdlog::info("registered");
+  }
+
+  void send(const wire::Packet& packet) {
+    const bool has_results = std::holds_alternative<wire::ResultBatch>(packet.message);
+    if (has_results) wire::kill_point(wire::KillPoint::before_result);
+    if (std::holds_alternative<wire::Bye>(packet.message)) {
+      wire::kill_point(wire::KillPoint::before_bye);
+    }
+    link_.send(wire::encode(packet), time_now());
+    if (has_results) wire::kill_point(wire::KillPoint::after_result);
+  }
+
+  void heed_signals(TimePoint now) {
+    const StopRequest request = signals_.request();
+    if (request == former_request_) return;
+    former_request_ = request;
+    spdlog::info("asked_to_end how={}", request == StopRequest::drain ? "drain" : "at_once");
+    if (request == StopRequest::drain) {
+      conversation_.on_drain_request(now);
+    } else {
+      conversation_.on_abandon_request();
     }
   }
 
-  void receive() {
-    zmq::message_t frame;
-    while (!conversation_.ending() && socket_.recv(frame, zmq::recv_flags::dontwait)) {
-      const auto decoded = wire::decode(frame.to_string_view());
-      if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
-        spdlog::error("malformed_message {}", error->text);
-        continue;
-      }
-      conversation_.on_message(std::get<wire::Message>(decoded), now());
-    }
+  void on_tick(TimePoint now) {
+    conversation_.on_tick(now);
+    keeping_.on_tick(now);
+    notices_.on_tick(now);
   }
 
-  void send(const wire::Message& message) {
-    const std::string bytes = wire::encode(message);
-    if (!socket_.send(zmq::buffer(bytes), zmq::send_flags::dontwait)) {
-      spdlog::debug("message_not_sent bytes={}", bytes.size());
-    }
-  }
-
-  Descriptor signals_;
-  Descriptor progress_;
-  zmq::context_t context_;
-  zmq::socket_t socket_;
-  bool is_connected_ = false;  ///< The socket found its coordinator once.
-  Executor executor_;
+  const Wake& progress_;
+  StopSignals& signals_;
+  StopRequest former_request_ = StopRequest::none;
+  Duration wait_max_;
+  CoordinatorLink link_;
   Conversation conversation_;
+  Keeping keeping_;
+  Notices notices_;
 };
 
 }  // namespace
 
-Ending serve(const std::string& endpoint, const wire::Hello& hello, Prepare prepare,
-             const ExecutorConfig& config, Signals signals) {
-  try {
-    return Service(endpoint, hello, std::move(prepare), config, signals).run();
-  } catch (const zmq::error_t& error) {
-    throw Error(fmt::format("connect = {} ({})", endpoint, error.what()));
-  }
+Ending serve(const ServeConfig& config, Execution& execution, const Wake& progress,
+             StopSignals& signals) {
+  return Service(config, execution, progress, signals).run();
 }
 
 }  // namespace proofmass::worker

@@ -1,26 +1,37 @@
 #pragma once
 
-#include <cstdint>
+#include <filesystem>
+#include <optional>
 #include <string>
 
+#include "proto/link/faults.hpp"
+#include "proto/link/security.hpp"
 #include "proto/wire/messages.hpp"
-#include "worker/execution/executor.hpp"
 #include "worker/net/conversation.hpp"
+#include "worker/net/stop_signals.hpp"
+#include "worker/net/wake.hpp"
 
 namespace proofmass::worker {
 
-/// Which signals ask a worker to leave.
-enum class Signals : std::uint8_t {
-  terminate_and_interrupt,  ///< SIGTERM and SIGINT.
-  terminate,                ///< SIGTERM; whoever started the worker deals with SIGINT.
+/// Whom a worker serves, and how.
+struct ServeConfig {
+  std::string endpoint;  ///< wire::check_endpoint() holds.
+  wire::ClientSecurity security;
+  wire::SessionId session;  ///< Random, not 0.
+  wire::Hello hello;
+  ConversationConfig conversation;
+  SignalSource signals = SignalSource::anyone;
+  std::optional<std::filesystem::path> spool;  ///< Where results survive this process.
+  std::optional<wire::FaultPlan> faults;       ///< On all messages; for tests of this program.
 };
 
-/// Computes runs for the coordinator at the endpoint until told to stop. Blocks the signals for the
-/// process; to be called before any other thread is made.
+/// Computes runs for the coordinator at the endpoint until told to stop. To be called by the thread
+/// that made all others, with the signals blocked: StopSignals of the same source exists.
 ///
-/// @param endpoint  check_endpoint() holds.
-/// @throws Error if the socket cannot be made.
-[[nodiscard]] Ending serve(const std::string& endpoint, const wire::Hello& hello, Prepare prepare,
-                           const ExecutorConfig& config, Signals signals);
+/// @param execution  Its runs may still be computed when the function returns.
+/// @param progress   Notified by the execution when it has something new.
+/// @throws Error if the socket cannot be made, or the spool not be used.
+[[nodiscard]] Ending serve(const ServeConfig& config, Execution& execution, const Wake& progress,
+                           StopSignals& signals);
 
 }  // namespace proofmass::worker

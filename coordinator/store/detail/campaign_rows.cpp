@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cstddef>
+#include <limits>
 #include <string>
 
 #include "coordinator/store/store_error.hpp"
@@ -11,6 +12,8 @@
 
 namespace proofmass::coordinator::detail {
 namespace {
+
+constexpr std::int64_t campaign_uid_max = std::numeric_limits<std::int64_t>::max();
 
 std::uint64_t stored_num_runs(const Database& database) {
   return static_cast<std::uint64_t>(database.integer("SELECT num_runs FROM campaign"));
@@ -75,10 +78,10 @@ void check_same_values(std::string_view drawn_name, const std::vector<double>& g
 void insert_campaign(Database& database, const Campaign& campaign, std::string_view definition) {
   database
       .prepare(
-          "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version) "
-          "VALUES (1, ?, ?, ?, ?, ?)")
+          "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version,"
+          " build, campaign_uid) VALUES (1, ?, ?, ?, ?, ?, ?, 1 + (random() & ?))")
       .run(campaign.name, std::to_string(campaign.seed), campaign.num_runs, definition,
-           model_version);
+           model_version, std::string_view(PROOFMASS_BUILD), campaign_uid_max - 1);
   insert_parameters(database, campaign.scenario.objectives);
   insert_environment(database, campaign.environment_table);
   insert_dispersion_values(database, campaign, 0);

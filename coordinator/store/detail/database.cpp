@@ -162,6 +162,8 @@ std::string Database::text(std::string_view sql) const {
 
 std::int64_t Database::num_changes() const { return sqlite3_changes64(connection_.get()); }
 
+std::int64_t Database::last_row() const { return sqlite3_last_insert_rowid(connection_.get()); }
+
 bool Database::in_transaction() const { return sqlite3_get_autocommit(connection_.get()) == 0; }
 
 void Database::fail(int code) const {

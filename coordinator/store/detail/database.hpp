@@ -85,6 +85,8 @@ class Database {
 
   /// Rows changed by the last INSERT, UPDATE or DELETE.
   [[nodiscard]] std::int64_t num_changes() const;
+  /// Key of the row that was inserted last.
+  [[nodiscard]] std::int64_t last_row() const;
   [[nodiscard]] bool in_transaction() const;
 
   /// @throws StoreError `campaign file = path (what went wrong, with a remedy)`.

@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <optional>
 #include <string>
+
+#include "coordinator/store/store_error.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -40,6 +43,22 @@ std::string insert_sql() {
 
 std::string select_sql(std::string_view clause) {
   return fmt::format("SELECT {} FROM run_result {}", column_list(), clause);
+}
+
+/// Adds the bytes of a number to a digest, lowest first [RFC 9923].
+std::uint64_t digest_with(std::uint64_t digest, std::uint64_t number) {
+  constexpr std::uint64_t prime = 0x100000001b3;
+  for (int shift = 0; shift < 64; shift += 8) {
+    digest = (digest ^ ((number >> shift) & 0xff)) * prime;
+  }
+  return digest;
+}
+
+std::uint64_t digest_with(std::uint64_t digest, const ParameterArray& values) {
+  for (const double value : values) {
+    digest = digest_with(digest, std::bit_cast<std::uint64_t>(value + 0.0));  // -0 + 0 is +0.
+  }
+  return digest;
 }
 
 void check_finite(const RunResult& result, std::string_view kind, const ParameterInfo& info,
@@ -102,6 +121,19 @@ bool are_equal(const RunResult& left, const RunResult& right) {
          left.num_draws == right.num_draws && left.num_rounds == right.num_rounds &&
          (!left.has_truth() || left.truth == right.truth) &&
          (!left.has_estimate() || left.estimate == right.estimate);
+}
+
+std::uint64_t digest(const RunResult& result) {
+  constexpr std::uint64_t offset_basis = 0xcbf29ce484222325;
+  std::uint64_t digest = offset_basis;
+  for (const std::uint64_t number :
+       {result.run.value, static_cast<std::uint64_t>(result.status),
+        std::uint64_t{result.num_draws}, std::uint64_t{result.num_rounds}}) {
+    digest = digest_with(digest, number);
+  }
+  if (result.has_truth()) digest = digest_with(digest, result.truth);
+  if (result.has_estimate()) digest = digest_with(digest, result.estimate);
+  return digest;
 }
 
 void check_delivery(const Delivery& delivery, std::uint64_t num_runs) {

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
+
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/store.hpp"
+#include "coordinator/store/records.hpp"
 #include "core/campaign/run_result.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -29,6 +31,10 @@ class ResultRows {
 
 /// Whether two results of one run agree in everything that means something.
 [[nodiscard]] bool are_equal(const RunResult& left, const RunResult& right);
+
+/// FNV-1a of everything in a result that means something, zeros without a sign: what people
+/// compare.
+[[nodiscard]] std::uint64_t digest(const RunResult& result);
 
 /// Checks a delivery before it is stored.
 /// @throws StoreError naming the field.

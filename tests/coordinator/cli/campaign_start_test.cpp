@@ -84,24 +84,5 @@ TEST(CampaignStart, ReadsACampaignWithTablesBack) {
   EXPECT_TRUE(definition_differences(stored, campaign).empty());
 }
 
-TEST(CampaignStart, LogsResultsThatContradictTheStoredOnes) {
-  const test::TemporaryDirectory directory;
-  Store store = open_or_create(campaign_of(3), directory / "a.db");
-  std::vector<std::string> events;
-  const Commit commit = commit_to(store, [&](const Event& event) {
-    events.push_back(std::string(event.kind) + ' ' + event.text);
-  });
-  Delivery delivery;
-  delivery.attempt = 1;
-  delivery.worker = "w";
-  commit(std::vector{delivery});
-  commit(std::vector{delivery});
-  EXPECT_TRUE(events.empty());
-  delivery.result.estimate[0] = 1.0;
-  commit(std::vector{delivery});
-  EXPECT_EQ(events, std::vector<std::string>{"results_contradict runs=1 (the stored results "
-                                             "stand)"});
-}
-
 }  // namespace
 }  // namespace proofmass::coordinator

@@ -7,8 +7,13 @@
 namespace proofmass::coordinator {
 namespace {
 
-CampaignProgress progress(std::uint64_t num_done, std::uint64_t num_runs, double rate_hz) {
-  return {.num_done = num_done, .num_runs = num_runs, .num_workers = 2, .rate_hz = rate_hz};
+wire::CampaignStatus progress(std::uint64_t num_done, std::uint64_t num_runs, double rate_hz) {
+  wire::CampaignStatus status;
+  status.num_done = num_done;
+  status.num_runs = num_runs;
+  status.rate_hz = rate_hz;
+  if (rate_hz > 0.0) status.remaining_s = static_cast<double>(num_runs - num_done) / rate_hz;
+  return status;
 }
 
 /// What a display writes.

@@ -14,7 +14,6 @@ namespace {
 
 /// A run that a worker holds.
 struct HeldRun {
-  wire::LeaseId lease;
   wire::Attempt attempt;
   RunIndex run;
 };
@@ -42,23 +41,33 @@ class Rounds final : public Outbox {
          std::vector<RunRange> finished = {}) {
     Campaign campaign;
     campaign.num_runs = num_runs;
-    state_ = initial_state(std::make_shared<const Campaign>(campaign), finished, {});
+    state_ = initial_state({}, {}, {});
+    on_campaign(state_, id_,
+                {.definition = std::make_shared<const Campaign>(campaign),
+                 .finished = std::move(finished),
+                 .given_up = {},
+                 .blamed = {}},
+                {}, *this);
     const wire::Hello hello{.worker_name = "w",
                             .host = "h",
                             .process_id = 1,
                             .num_slots = static_cast<std::uint32_t>(num_threads * batch_lanes),
-                            .model_version = std::string(model_version)};
+                            .model_version = std::string(model_version),
+                            .build = "test",
+                            .former = {}};
     for (std::uint64_t i = 1; i <= num_workers; ++i) {
       workers_[WorkerId{i}].batches.resize(num_threads);
-      on_hello(state_, WorkerId{i}, hello, {}, *this);
-      on_credit(state_, WorkerId{i}, {.num_runs_max = wire::runs_per_lease_max}, {}, *this);
+      on_hello(state_, WorkerId{i}, SessionId{i}, hello, {}, *this);
+      on_heartbeat(state_, WorkerId{i},
+                   {.num_runs_max = wire::runs_per_lease_max, .held = {}, .computing = {}}, 1, {},
+                   *this);
     }
   }
 
   /// Rounds until the campaign is finished.
   int play(double batch_time_s) {
     int num_rounds = 0;
-    while (!is_finished(state_)) {
+    while (!is_finished(state_.campaigns.at(id_))) {
       for (auto& [id, worker] : workers_) worker.take_batches();
       for (auto& [id, worker] : workers_) {
         for (std::size_t i = 0; i < worker.batches.size(); ++i) deliver(id, i, batch_time_s);
@@ -76,35 +85,39 @@ class Rounds final : public Outbox {
     if (lease == nullptr) return;
     PlayedWorker& worker = workers_.at(id);
     for (std::uint64_t run = lease->runs.first.value; run < lease->runs.end(); ++run) {
-      worker.queue.push_back({.lease = lease->lease, .attempt = lease->attempt, .run = {run}});
+      worker.queue.push_back({.attempt = lease->attempt, .run = {run}});
     }
   }
   void store(Arrival arrival) override { stored_.push_back(arrival.computed.result.run); }
+  void compare(Arrival) override { ADD_FAILURE() << "a run was computed twice"; }
+  void record(const Loss&) override { ADD_FAILURE() << "runs were lost"; }
+  void give_up(CampaignId, RunIndex) override { ADD_FAILURE() << "a run was given up"; }
   void log(Event) override {}
 
  private:
-  /// One message a lease, as workers send them. The thread is free before its results arrive: it
+  /// One message an attempt, as workers send them. The thread is free before its results arrive: it
   /// finds what was lent before, but begins nothing before the round is over.
   void deliver(WorkerId id, std::size_t thread, double batch_time_s) {
     const std::vector<HeldRun> batch = std::exchange(workers_.at(id).batches[thread], {});
     if (batch.empty()) return;
     if (batch.size() < batch_lanes) ++num_partial_batches_;
-    std::map<wire::LeaseId, wire::ResultBatch> messages;
+    std::map<wire::Attempt, wire::ResultBatch> messages;
     for (const HeldRun& held : batch) {
       wire::ComputedRun computed;
       computed.result.run = held.run;
       computed.compute_s = batch_time_s;
-      messages[held.lease].lease = held.lease;
-      messages[held.lease].attempt = held.attempt;
-      messages[held.lease].results.push_back(computed);
+      messages[held.attempt].campaign = id_;
+      messages[held.attempt].attempt = held.attempt;
+      messages[held.attempt].results.push_back(computed);
     }
     workers_.at(id).take_batches();
-    for (const auto& [lease, message] : messages) {
+    for (const auto& [attempt, message] : messages) {
       on_results(state_, id, message, {}, *this);
-      on_committed(state_, std::exchange(stored_, {}), *this);
+      on_committed(state_, id_, std::exchange(stored_, {}), {}, *this);
     }
   }
 
+  const CampaignId id_{1};
   State state_;
   std::map<WorkerId, PlayedWorker> workers_;
   std::vector<RunIndex> stored_;

@@ -1,107 +1,137 @@
 // How much a worker is lent at a time.
 
-#include <gtest/gtest.h>
+#include "tests/coordinator/dispatch/dispatch_fixture.hpp"
 
-#include "core/simulation/run.hpp"
-#include "tests/coordinator/dispatch/recording_outbox.hpp"
-
-namespace proofmass::coordinator {
+namespace proofmass::test {
 namespace {
 
-constexpr WorkerId id{1};
+class LendingTest : public DispatchFixture {
+ protected:
+  void SetUp() override { begin(); }
 
-wire::Hello hello(std::uint32_t num_slots) {
-  return {.worker_name = "w",
-          .host = "h",
-          .process_id = 1,
-          .num_slots = num_slots,
-          .model_version = std::string(model_version)};
+  /// Runs that a worker holds after it delivered the first run.
+  std::string lent_after_first_run(std::uint64_t num_runs, double run_time_s,
+                                   std::uint32_t num_runs_max = 4096) {
+    add_campaign(one, num_runs);
+    add_worker(first);
+    EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 1}))
+        << "how long a run takes is not known yet";
+    heartbeat(first, {held(one, {{0}, 1})}, {}, num_runs_max);
+    wire::ComputedRun result;
+    result.compute_s = run_time_s;
+    on_results(state, first, {.campaign = one, .attempt = {1}, .results = {result}}, now, outbox);
+    outbox.forget();
+    return runs_held_text(state, first);
+  }
+};
+
+TEST_F(LendingTest, GivesASecondAndAHalfOfWork) {
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), "1..150");
 }
 
-/// Runs of the leases that a worker holds after it delivered the first run.
-std::vector<RunRange> lent_after_first_run(std::uint64_t num_runs, double run_time_s,
-                                           std::uint32_t num_runs_max = 4096) {
-  Campaign campaign;
-  campaign.num_runs = num_runs;
-  State state = initial_state(std::make_shared<const Campaign>(campaign), {}, {});
-  test::RecordingOutbox outbox;
-  on_hello(state, id, hello(1), {}, outbox);
-  (void)outbox.take_sent<wire::Welcome>(id);
-  on_credit(state, id, {.num_runs_max = num_runs_max}, {}, outbox);
-  const auto lease = outbox.take_sent<wire::RunLease>(id);
-  EXPECT_EQ(lease.runs, (RunRange{{0}, 1})) << "how long a run takes is not known yet";
-  wire::ComputedRun computed;
-  computed.compute_s = run_time_s;
-  on_results(state, id, {.lease = lease.lease, .attempt = {1}, .results = {computed}}, {}, outbox);
-  check_invariants(state);
-  return runs_held(state, id).ranges();
+TEST_F(LendingTest, GivesOneRunToComputeAndOneToWaitIfRunsAreLong) {
+  EXPECT_EQ(lent_after_first_run(1'000'000, 60.0), "1..2");
 }
 
-TEST(Lending, GivesASecondAndAHalfOfWork) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), (std::vector<RunRange>{{{1}, 150}}));
-  EXPECT_EQ(lent_after_first_run(1'000'000, 1.0), (std::vector<RunRange>{{{1}, 2}}));
+TEST_F(LendingTest, GivesNoMoreThanALeaseMayHave) {
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.0), "1..4096");
 }
 
-TEST(Lending, GivesOneRunToComputeAndOneToWaitIfRunsAreLong) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 60.0), (std::vector<RunRange>{{{1}, 2}}));
+TEST_F(LendingTest, GivesNoMoreThanTheCredit) {
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01, 20), "1..20");
 }
 
-TEST(Lending, GivesNoMoreThanALeaseMayHave) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 1e-9), (std::vector<RunRange>{{{1}, 4096}}));
+TEST_F(LendingTest, GivesNothingWithoutCredit) {
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01, 0), "none");
 }
 
-TEST(Lending, GivesNoMoreThanTheCredit) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01, 20), (std::vector<RunRange>{{{1}, 20}}));
+TEST_F(LendingTest, GivesHalfOfAFairShareNearTheEnd) {
+  EXPECT_EQ(lent_after_first_run(101, 0.001), "1..50");
 }
 
-TEST(Lending, GivesHalfOfAFairShareNearTheEnd) {
-  EXPECT_EQ(lent_after_first_run(101, 0.001), (std::vector<RunRange>{{{1}, 50}}));
+TEST_F(LendingTest, GivesLessWhenMuchIsNotStoredYet) {
+  state.config.uncommitted_max = 200;
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), "1..99") << "half of the room, after one result";
 }
 
-TEST(Lending, FillsAllSlotsOfAWorker) {
-  Campaign campaign;
-  campaign.num_runs = 10;
-  State state = initial_state(std::make_shared<const Campaign>(campaign), {}, {});
-  test::RecordingOutbox outbox;
-  on_hello(state, id, hello(4), {}, outbox);
-  on_credit(state, id, {.num_runs_max = 4096}, {}, outbox);
-  EXPECT_EQ(runs_held(state, id).size(), 4U);
+TEST_F(LendingTest, GivesNothingWhileTooManyResultsWaitForTheStore) {
+  state.config.uncommitted_max = 4;
+  add_campaign(one, 100);
+  add_worker(first, 2);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 2}));
+  deliver(first, one, {0, 1});
+  EXPECT_EQ(runs_held_text(state, first), "none");
+  commit(one);
+  outbox.drop_sent<wire::ResultAck>(first);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{2}, 4}))
+      << "two rounds, however small the room";
 }
 
-TEST(Lending, SendsTheTableValuesOfTheRuns) {
-  Campaign campaign;
-  campaign.num_runs = 3;
-  campaign.dispersions[5] = {.law = Law::table, .file = "f", .column = "a"};
-  campaign.dispersions[9] = {.law = Law::table, .file = "f", .column = "b"};
-  campaign.table_columns = {{1.0, 2.0, 3.0}, {10.0, 20.0, 30.0}};
-  const std::vector<RunRange> finished{{{0}, 1}};
-  State state = initial_state(std::make_shared<const Campaign>(campaign), finished, {});
-  test::RecordingOutbox outbox;
-  on_hello(state, id, hello(2), {}, outbox);
-  (void)outbox.take_sent<wire::Welcome>(id);
-  on_credit(state, id, {.num_runs_max = 4096}, {}, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(id).table_values,
+TEST_F(LendingTest, TakesNothingFromOthersForAWorkerThatWaitsForTheStore) {
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), "1..150");
+  add_worker(second);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{151}, 150}));
+  state.config.uncommitted_max = 2;
+  for (std::uint64_t run = 151; run <= 300; ++run) deliver(second, one, {run});
+  (void)outbox.take_stored();
+  on_tick(state, now, outbox);
+  EXPECT_EQ(runs_held_text(state, second), "none");
+}
+
+TEST_F(LendingTest, GivesNothingMoreWhenCreditIsRepeated) {
+  add_campaign(one, 100);
+  add_worker(first);
+  (void)outbox.take_sent<wire::RunLease>(first);
+  heartbeat(first, {held(one, {{0}, 1})});
+}
+
+TEST_F(LendingTest, FillsAllSlotsOfAWorker) {
+  add_campaign(one, 10);
+  add_worker(first, 4);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 4}));
+}
+
+TEST_F(LendingTest, SendsTheTableValuesOfTheRuns) {
+  Campaign definition;
+  definition.num_runs = 3;
+  definition.dispersions[5] = {.law = Law::table, .file = "f", .column = "a"};
+  definition.dispersions[9] = {.law = Law::table, .file = "f", .column = "b"};
+  definition.table_columns = {{1.0, 2.0, 3.0}, {10.0, 20.0, 30.0}};
+  StoredCampaign stored = stored_campaign(3);
+  stored.definition = std::make_shared<const Campaign>(definition);
+  stored.finished = {{{0}, 1}};
+  on_campaign(state, one, stored, now, outbox);
+  add_worker(first, 2);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).table_values,
             (std::vector<double>{2.0, 20.0, 3.0, 30.0}));
 }
 
 // Runs that a lost worker held come before those that were never lent.
-TEST(Lending, GivesRunsThatWereLentBeforeFirst) {
-  Campaign campaign;
-  campaign.num_runs = 10;
-  State state = initial_state(std::make_shared<const Campaign>(campaign), {}, {});
-  test::RecordingOutbox outbox;
-  on_hello(state, id, hello(3), {}, outbox);
-  on_credit(state, id, {.num_runs_max = 4096}, {}, outbox);
-  on_bye(state, id, {}, outbox);
-  on_hello(state, WorkerId{2}, hello(4), {}, outbox);
-  on_credit(state, WorkerId{2}, {.num_runs_max = 4096}, {}, outbox);
-  ASSERT_EQ(state.leases.size(), 2U);
-  EXPECT_EQ(state.leases.at(LeaseId{2}).attempt, Attempt{2});
-  EXPECT_EQ(to_text(state.leases.at(LeaseId{2}).remaining), "0..2");
-  EXPECT_EQ(state.leases.at(LeaseId{3}).attempt, Attempt{1});
-  EXPECT_EQ(to_text(state.leases.at(LeaseId{3}).remaining), "3");
-  check_invariants(state);
+TEST_F(LendingTest, GivesRunsThatWereLentBeforeFirst) {
+  add_campaign(one, 10);
+  add_worker(first, 3);
+  on_bye(state, first, {}, now, outbox);
+  outbox.forget();
+  add_worker(second, 4);
+  const auto again = outbox.take_sent<wire::RunLease>(second);
+  EXPECT_EQ(again.runs, (RunRange{{0}, 3}));
+  EXPECT_EQ(again.attempt, Attempt{2});
+  const auto fresh = outbox.take_sent<wire::RunLease>(second);
+  EXPECT_EQ(fresh.runs, (RunRange{{3}, 1}));
+  EXPECT_EQ(fresh.attempt, Attempt{1});
+}
+
+// Ranges that do not touch are one lease to the dispatch, and a message each.
+TEST_F(LendingTest, GivesSeveralRangesAtATime) {
+  StoredCampaign stored = stored_campaign(6);
+  stored.finished = {{{1}, 1}, {{3}, 1}};
+  on_campaign(state, one, stored, now, outbox);
+  add_worker(first, 4);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 1}));
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{2}, 1}));
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{4}, 2}));
+  EXPECT_EQ(state.leases.size(), 1U);
 }
 
 }  // namespace
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::test

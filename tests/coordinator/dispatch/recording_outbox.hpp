@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <variant>
@@ -21,6 +23,9 @@ class RecordingOutbox final : public coordinator::Outbox {
     sent_.emplace_back(worker, std::move(message));
   }
   void store(coordinator::Arrival arrival) override { stored_.push_back(std::move(arrival)); }
+  void compare(coordinator::Arrival arrival) override { compared_.push_back(std::move(arrival)); }
+  void record(const coordinator::Loss& loss) override { losses_.push_back(loss); }
+  void give_up(wire::CampaignId, RunIndex run) override { given_up_.push_back(run); }
   void log(coordinator::Event event) override {
     events_.push_back(std::string(event.kind) + ' ' + event.text);
   }
@@ -35,28 +40,61 @@ class RecordingOutbox final : public coordinator::Outbox {
     return std::get<Content>(message);
   }
 
-  /// Runs handed to the store since the last call.
-  std::vector<RunIndex> take_stored() {
-    std::vector<RunIndex> runs;
-    for (const auto& arrival : std::exchange(stored_, {})) {
-      runs.push_back(arrival.computed.result.run);
-    }
-    return runs;
+  /// Drops a message of this kind to this worker, which there must be among others.
+  template <typename Content>
+  void drop_sent(wire::WorkerId worker) {
+    const auto found = std::find_if(sent_.begin(), sent_.end(), [&](const auto& item) {
+      return item.first == worker && std::holds_alternative<Content>(item.second);
+    });
+    if (found == sent_.end()) throw std::logic_error("no such message was sent");
+    sent_.erase(found);
   }
 
-  [[nodiscard]] const std::vector<coordinator::Arrival>& stored() const { return stored_; }
-
+  /// Runs handed to the store since the last call.
+  std::vector<RunIndex> take_stored() { return runs_of(std::exchange(stored_, {})); }
+  /// Runs handed over to be compared since the last call.
+  std::vector<RunIndex> take_compared() { return runs_of(std::exchange(compared_, {})); }
+  std::vector<coordinator::Loss> take_losses() { return std::exchange(losses_, {}); }
+  std::vector<RunIndex> take_given_up() { return std::exchange(given_up_, {}); }
   std::vector<std::string> take_events() { return std::exchange(events_, {}); }
 
+  [[nodiscard]] const std::vector<coordinator::Arrival>& stored() const { return stored_; }
+  [[nodiscard]] std::size_t num_sent() const { return sent_.size(); }
+
+  /// Drops all that has been written down: what another test checks.
+  void forget() {
+    sent_.clear();
+    stored_.clear();
+    compared_.clear();
+    losses_.clear();
+    given_up_.clear();
+    events_.clear();
+  }
+
   void expect_nothing_more() {
-    EXPECT_EQ(sent_.size(), 0U);
-    EXPECT_EQ(stored_.size(), 0U);
+    for (const auto& [to, message] : sent_) {
+      ADD_FAILURE() << "message of kind " << message.index() << " to worker " << to.value;
+    }
+    EXPECT_EQ(take_stored().size(), 0U);
+    EXPECT_EQ(take_compared().size(), 0U);
+    EXPECT_EQ(take_losses().size(), 0U);
+    EXPECT_EQ(take_given_up().size(), 0U);
     EXPECT_EQ(take_events(), std::vector<std::string>{});
+    sent_.clear();
   }
 
  private:
+  static std::vector<RunIndex> runs_of(const std::vector<coordinator::Arrival>& arrivals) {
+    std::vector<RunIndex> runs;
+    for (const auto& arrival : arrivals) runs.push_back(arrival.computed.result.run);
+    return runs;
+  }
+
   std::vector<std::pair<wire::WorkerId, wire::Message>> sent_;
   std::vector<coordinator::Arrival> stored_;
+  std::vector<coordinator::Arrival> compared_;
+  std::vector<coordinator::Loss> losses_;
+  std::vector<RunIndex> given_up_;
   std::vector<std::string> events_;
 };
 

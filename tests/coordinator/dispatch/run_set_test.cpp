@@ -30,8 +30,8 @@ TEST(RunSet, HoldsABillionRunsAsOneRange) {
 
 TEST(RunSet, SplitsARangeAtARunThatIsRemoved) {
   RunSet runs(range(0, 3));
-  EXPECT_TRUE(runs.remove({1}));
-  EXPECT_FALSE(runs.remove({1}));
+  EXPECT_TRUE(runs.remove(RunIndex{1}));
+  EXPECT_FALSE(runs.remove(RunIndex{1}));
   EXPECT_EQ(runs.ranges(), (std::vector{range(0, 1), range(2, 1)}));
   EXPECT_EQ(runs.take_first(5), range(0, 1));
 }
@@ -41,6 +41,40 @@ TEST(RunSet, IsWrittenAsItsFirstRanges) {
   EXPECT_EQ(to_text(runs), "none");
   for (std::uint64_t i = 0; i < 8; ++i) runs.add(range(10 * i, 1 + i % 2));
   EXPECT_EQ(to_text(runs), "0,10..11,20,30..31,40,50..51,...");
+}
+
+TEST(RunSet, GivesItsLastRuns) {
+  RunSet runs;
+  runs.add(range(0, 3));
+  runs.add(range(10, 2));
+  EXPECT_EQ(runs.take_last(3).ranges(), (std::vector{range(2, 1), range(10, 2)}));
+  EXPECT_EQ(runs.ranges(), std::vector{range(0, 2)});
+}
+
+TEST(RunSet, OverlapsAndDifferencesAreThoseOfSets) {
+  std::mt19937 random(11);
+  for (int repetition = 0; repetition < 2000; ++repetition) {
+    RunSet a;
+    RunSet b;
+    std::set<std::uint64_t> in_a;
+    std::set<std::uint64_t> in_b;
+    for (int i = 0; i < 6; ++i) {
+      const RunRange of_a = range(random() % 40, random() % 6);
+      const RunRange of_b = range(random() % 40, random() % 6);
+      a.add(of_a);
+      b.add(of_b);
+      for (std::uint64_t run = of_a.first.value; run < of_a.end(); ++run) in_a.insert(run);
+      for (std::uint64_t run = of_b.first.value; run < of_b.end(); ++run) in_b.insert(run);
+    }
+    const RunSet common = a.overlap(b);
+    RunSet difference = a;
+    difference.remove(b);
+    ASSERT_EQ(common.size() + difference.size(), a.size());
+    for (std::uint64_t run = 0; run < 50; ++run) {
+      ASSERT_EQ(common.contains({run}), in_a.contains(run) && in_b.contains(run));
+      ASSERT_EQ(difference.contains({run}), in_a.contains(run) && !in_b.contains(run));
+    }
+  }
 }
 
 // Against std::set, which is too large for a campaign but obvious.
@@ -55,7 +89,7 @@ TEST(RunSet, AgreesWithASetOfNumbers) {
       runs.add(range(first, count));
       for (std::uint64_t run = first; run < first + count; ++run) expected.insert(run);
     } else {
-      ASSERT_EQ(runs.remove({first}), expected.erase(first) == 1);
+      ASSERT_EQ(runs.remove(RunIndex{first}), expected.erase(first) == 1);
     }
     ASSERT_EQ(runs.size(), expected.size());
     ASSERT_EQ(runs.empty(), expected.empty());

@@ -41,6 +41,21 @@ CampaignStatistics paper_statistics(std::uint64_t num_runs) {
   return statistics;
 }
 
+TEST(GivenUpRuns, AreNamed) {
+  EXPECT_EQ(given_up_text({}), "");
+  const std::vector<RunRange> runs{{{17}, 1}, {{40}, 3}};
+  EXPECT_EQ(given_up_text(runs), "          4 given up, having crashed workers: 17 40..42\n");
+}
+
+TEST(GivenUpRuns, AreNamedAsFarAsTheLineHasRoom) {
+  std::vector<RunRange> runs;
+  for (std::uint64_t run = 100'000'000; run < 100'000'100; run += 2) runs.push_back({{run}, 1});
+  const std::vector<std::string> lines = lines_of(given_up_text(runs));
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_THAT(lines[0], FitsATerminal());
+  EXPECT_THAT(lines[0], testing::EndsWith(" 100000004 ..."));
+}
+
 TEST(AccuracyTable, ShowsEachParameterBesideThePaper) {
   CampaignStatistics statistics = paper_statistics(100);
   statistics.accuracy[index(Parameter::a_c13)].num_beyond_objective = 3;

@@ -2,10 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <signal.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-
-#include <array>
 
 #include "coordinator/store/store.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
@@ -15,26 +11,14 @@ namespace {
 
 using test::campaign_of;
 using test::deliveries_of;
+using test::FileSizeLimit;
 using test::results_in;
+using test::run_and_kill;
 using test::store_error_of;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 using StoreCrash = test::StoreTest;
-
-/// Runs `action` in a child process that is killed at its end without any clean-up.
-void run_and_kill(const std::function<void()>& action) {
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    action();
-    ::raise(SIGKILL);
-  }
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  ASSERT_TRUE(WIFSIGNALED(status));
-  ASSERT_EQ(WTERMSIG(status), SIGKILL);
-}
 
 TEST_F(StoreCrash, LeavesEveryCommittedResult) {
   run_and_kill([&] {
@@ -71,26 +55,6 @@ TEST_F(StoreCrash, WhileCreatingIsRepairedByCreatingAgain) {
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
   EXPECT_EQ(Store::open(file()).num_runs(), 3u);
 }
-
-/// While it lives, no file can grow beyond a size: to a program, much like a full disk.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t size) {
-    ::signal(SIGXFSZ, SIG_IGN);
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{.rlim_cur = size, .rlim_max = before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    ::signal(SIGXFSZ, SIG_DFL);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  rlimit before_{};
-};
 
 TEST_F(StoreCrash, OfTheDiskFailsTheCommitAndKeepsTheEarlierOnes) {
   Store store = Store::create(file(), campaign_of(5000), "");

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -64,8 +67,27 @@ inline RunResult result_of(std::uint64_t run, RunStatus status = RunStatus::comp
   return result;
 }
 
+/// The worker of all deliveries here.
+inline constexpr wire::SessionId session_1{0xfedcba9876543210};
+
+inline coordinator::WorkerJoined worker_1() {
+  return {.session = session_1,
+          .name = "worker-1",
+          .host = "node-1",
+          .process_id = 4711,
+          .num_slots = 8};
+}
+
 inline coordinator::Delivery delivery_of(std::uint64_t run) {
-  return {.result = result_of(run), .worker = "worker-1", .attempt = 0, .compute_s = 0.5};
+  return {.result = result_of(run), .worker = session_1, .attempt = {1}, .compute_s = 0.5};
+}
+
+/// A result of the run that no sound worker computes: one estimate is off by the last bit.
+inline coordinator::Delivery wrong_delivery_of(std::uint64_t run) {
+  coordinator::Delivery delivery = delivery_of(run);
+  double& estimate = delivery.result.estimate[9];
+  estimate = std::nextafter(estimate, 1e300);
+  return delivery;
 }
 
 inline std::vector<coordinator::Delivery> deliveries_of(std::uint64_t first, std::uint64_t end) {
@@ -101,6 +123,40 @@ class OrdinaryUser {
   }
   OrdinaryUser(const OrdinaryUser&) = delete;
   OrdinaryUser& operator=(const OrdinaryUser&) = delete;
+};
+
+/// Runs `action` in a child process that is killed at its end without any clean-up.
+inline void run_and_kill(const std::function<void()>& action) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    action();
+    ::raise(SIGKILL);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  ASSERT_EQ(WTERMSIG(status), SIGKILL);
+}
+
+/// While it lives, no file can grow beyond a size: to a program, much like a full disk.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t size) {
+    ::signal(SIGXFSZ, SIG_IGN);
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{.rlim_cur = size, .rlim_max = before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    ::signal(SIGXFSZ, SIG_DFL);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit before_{};
 };
 
 }  // namespace proofmass::test

@@ -73,7 +73,7 @@ TEST_F(StoreRefusal, OfANewerFile) {
   create();
   Database(file(), Access::read_write).execute("PRAGMA user_version = 99");
   const std::string expected =
-      message("is newer than this program: its user_version is 99, the newest known one 3");
+      message("is newer than this program: its user_version is 99, the newest known one 4");
   EXPECT_EQ(error_of_open(), expected);
   EXPECT_EQ(error_of_open_read_only(), expected);
 }
@@ -83,7 +83,7 @@ TEST_F(StoreRefusal, ToReadAnOlderFile) {
   Database(file(), Access::read_write).execute("PRAGMA user_version = 2");
   EXPECT_EQ(
       error_of_open_read_only(),
-      message("is older than this program: its user_version is 2, not 3; resuming the campaign "
+      message("is older than this program: its user_version is 2, not 4; resuming the campaign "
               "brings it up to date"));
 }
 
@@ -113,6 +113,16 @@ TEST_F(StoreRefusal, OfASecondCoordinator) {
                                             std::to_string(::getpid()) +
                                             " on .+; a campaign has one coordinator at a time\\)"));
   EXPECT_THAT(store_error_of([&] { create(); }), HasSubstr("(held by process "));
+}
+
+TEST_F(StoreRefusal, OfAFileThatHasAnotherName) {
+  create();
+  std::filesystem::create_hard_link(file(), directory() / "other.db");
+  EXPECT_EQ(error_of_open(),
+            message("has 2 names (hard links), must have one; make copies instead"));
+  EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()); }), "");
+  std::filesystem::remove(directory() / "other.db");
+  EXPECT_EQ(error_of_open(), "");
 }
 
 TEST_F(StoreRefusal, OfADirectoryThatDoesNotExist) {

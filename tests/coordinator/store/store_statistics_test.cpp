@@ -21,11 +21,12 @@ CampaignStatistics distinct_statistics() {
   CampaignStatistics statistics{.num_runs = 9, .num_estimated = 7};
   for (std::size_t i = 0; i < num_parameters; ++i) {
     const double level = static_cast<double>(i) + 1.0;
-    statistics.accuracy[i] = {.worst = level,
-                              .worst_run = RunIndex{i + 100},
-                              .mean = level / 16.0,
-                              .standard_deviation = level / 32.0,
-                              .num_beyond_objective = i};
+    AccuracyStatistic& accuracy = statistics.accuracy[i];
+    accuracy.worst = level;
+    accuracy.worst_run = RunIndex{i + 100};
+    accuracy.mean = level / 16.0;
+    accuracy.standard_deviation = level / 32.0;
+    accuracy.num_beyond_objective = i;
   }
   return statistics;
 }

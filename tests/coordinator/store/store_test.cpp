@@ -22,6 +22,7 @@ using test::deliveries_of;
 using test::delivery_of;
 using test::result_of;
 using test::results_in;
+using test::session_1;
 using test::store_error_of;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
@@ -95,7 +96,8 @@ TEST_F(StoreTest, ReturnsResultsBitForBit) {
                     -5e-324,
                     std::numeric_limits<double>::epsilon()};
   extremes.num_draws = std::numeric_limits<std::uint32_t>::max();
-  const std::vector<Delivery> deliveries{{extremes, "w", 0, 1.0}, {result_of(1), "w", 0, 1.0}};
+  const std::vector<Delivery> deliveries{{extremes, session_1, {1}, 1.0},
+                                         {result_of(1), session_1, {1}, 1.0}};
   Store::create(file(), campaign_of(2), "").commit(deliveries);
 
   const std::vector<RunResult> results = results_in(Store::open(file()));
@@ -120,7 +122,7 @@ TEST_F(StoreTest, HasNullWhereAResultHasNoMeaning) {
     RunResult result = result_of(deliveries.size(), status);
     if (!result.has_estimate()) result.estimate.fill(std::numeric_limits<double>::quiet_NaN());
     if (!result.has_truth()) result.truth.fill(std::numeric_limits<double>::infinity());
-    deliveries.push_back({result, "w", 0, 1.0});
+    deliveries.push_back({result, session_1, {1}, 1.0});
   }
   EXPECT_EQ(Store::create(file(), campaign_of(4), "").commit(deliveries).num_new, 4u);
 
@@ -166,7 +168,7 @@ TEST_F(StoreTest, CommitsARunOnce) {
   Store store = Store::create(file(), campaign_of(4), "");
   EXPECT_EQ(store.commit(deliveries_of(0, 2)).num_new, 2u);
   std::vector<Delivery> again = deliveries_of(1, 4);
-  again[0].worker = "late";
+  again[0].worker = wire::SessionId{7};
   again.push_back(again.back());  // The same run twice in one commit.
 
   const CommitSummary summary = store.commit(again);
@@ -176,35 +178,10 @@ TEST_F(StoreTest, CommitsARunOnce) {
   EXPECT_EQ(summary.num_contradicting, 0u);
   EXPECT_EQ(results_in(store).size(), 4u);
   const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.text("SELECT worker FROM delivery WHERE run_index = 1"), "worker-1");
+  EXPECT_EQ(database.text("SELECT session FROM worker JOIN delivery ON worker = worker_key WHERE "
+                          "run_index = 1"),
+            "fedcba9876543210");
   EXPECT_EQ(database.integer("SELECT count(*) FROM delivery"), 4);
-}
-
-TEST_F(StoreTest, CountsAndLogsAResultThatContradictsTheStoredOne) {
-  Store store = Store::create(file(), campaign_of(1), "");
-  store.commit(deliveries_of(0, 1));
-  std::vector<Delivery> other = deliveries_of(0, 1);
-  double& estimate = other[0].result.estimate[9];
-  estimate = std::nextafter(estimate, 1e300);
-
-  EXPECT_EQ(store.commit(other).num_contradicting, 1u);
-
-  expect_same_bits(results_in(store)[0], result_of(0));
-  const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.text("SELECT kind || ' ' || text FROM event"),
-            "contradicting_result run=0 worker=worker-1 attempt=0");
-}
-
-TEST_F(StoreTest, KeepsWhoDeliveredARun) {
-  const Delivery delivery{.result = result_of(0), .worker = "näh", .attempt = 7, .compute_s = 2.25};
-  Store::create(file(), campaign_of(1), "").commit({&delivery, 1});
-  const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.text("SELECT worker || ' ' || attempt || ' ' || compute_s FROM delivery"),
-            "näh 7 2.25");
-  EXPECT_EQ(
-      database.integer("SELECT abs(strftime('%s', received_utc) - strftime('%s', 'now')) < 60 "
-                       "FROM delivery"),
-      1);
 }
 
 TEST_F(StoreTest, RefusesARunBeyondTheCampaign) {
@@ -318,18 +295,6 @@ TEST_F(StoreTest, IsReadableInADirectoryThatIsNotWritable) {
   }
   std::filesystem::permissions(directory(), std::filesystem::perms(0755));
   EXPECT_EQ(num_results, 3u);
-}
-
-TEST_F(StoreTest, KeepsTheNewestEventsAndCutsLongOnes) {
-  Store store = Store::create(file(), campaign_of(1), "");
-  store.record_event("long", std::string(3000, 'x'));
-  const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.text("SELECT text FROM event"), std::string(2000, 'x'));
-
-  Database(file(), Access::read_write)
-      .execute("INSERT INTO event (event_id, kind, text) VALUES (10000, 'old', '')");
-  store.record_event("new", "");
-  EXPECT_EQ(database.text("SELECT group_concat(kind) FROM event"), "old,new");
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <semaphore>
 #include <stdexcept>
@@ -10,13 +11,16 @@
 namespace proofmass::worker {
 namespace {
 
-using Leases = std::vector<wire::LeaseId>;
 using Indices = std::vector<std::uint64_t>;
 
-std::shared_ptr<const Campaign> campaign() { return std::make_shared<const Campaign>(); }
+constexpr wire::CampaignId first_campaign{1};
+constexpr wire::CampaignId second_campaign{2};
 
-wire::RunLease lease(std::uint64_t id, std::uint64_t first, std::uint64_t count) {
-  return {.lease = {id}, .runs = {{first}, count}, .attempt = {3}, .table_values = {}};
+std::shared_ptr<const Campaign> definition() { return std::make_shared<const Campaign>(); }
+
+wire::RunLease lease(std::uint64_t first, std::uint64_t count,
+                     wire::CampaignId campaign = first_campaign) {
+  return {.campaign = campaign, .runs = {{first}, count}, .attempt = {3}, .table_values = {}};
 }
 
 /// Runs that yield their index as number of draws, the size of their batch as number of rounds and
@@ -36,21 +40,25 @@ std::vector<RunResult> results_of(std::span<const RunRequest> requests) {
 
 /// Such runs, after `num_orbits` orbits, of each of which they report twice.
 Prepare prepare_counting(int num_orbits) {
-  return [num_orbits](const Campaign&) -> Simulate {
-    return [num_orbits](std::span<const RunRequest> requests,
-                        const std::function<void(int)>& progress) {
-      for (int half = 1; half <= 2 * num_orbits; ++half) progress(half / 2);
-      return results_of(requests);
-    };
+  return [num_orbits](const Campaign&) -> PreparedCampaign {
+    return {.simulate =
+                [num_orbits](std::span<const RunRequest> requests,
+                             const std::function<void(int)>& progress) {
+                  for (int half = 1; half <= 2 * num_orbits; ++half) progress(half / 2);
+                  return results_of(requests);
+                },
+            .num_orbits = num_orbits};
   };
 }
 
-/// An executor whose finished runs can be waited for.
+/// An executor whose finished runs can be waited for; its first campaign is defined.
 class Bench {
  public:
   explicit Bench(Prepare prepare, const ExecutorConfig& config = {})
       : executor(
-            std::move(prepare), [this] { changed_.release(); }, config) {}
+            std::move(prepare), [this] { changed_.release(); }, config) {
+    executor.define(first_campaign, definition());
+  }
 
   std::vector<FinishedRun> wait_for(std::size_t count) {
     std::vector<FinishedRun> all;
@@ -78,25 +86,22 @@ Indices indices_of(const std::vector<FinishedRun>& runs) {
 
 TEST(Executor, ComputesTheRunsOfItsLeasesInOrder) {
   Bench bench(prepare_counting(2));
-  bench.executor.start(campaign());
-  bench.executor.submit(lease(7, 10, 3));
-  bench.executor.submit(lease(8, 40, 1));
+  bench.executor.submit(lease(10, 3));
+  bench.executor.submit(lease(40, 1));
   const std::vector<FinishedRun> runs = bench.wait_for(4);
   EXPECT_EQ(indices_of(runs), (Indices{10, 11, 12, 40}));
-  for (std::size_t i = 0; i < 4; ++i) {
-    EXPECT_EQ(runs[i].computed.result.num_draws, runs[i].computed.result.run.value);
-    EXPECT_EQ(runs[i].lease.value, i < 3 ? 7U : 8U);
-    EXPECT_EQ(runs[i].attempt.value, 3U);
-    EXPECT_GE(runs[i].computed.compute_s, 0.0);
+  for (const FinishedRun& run : runs) {
+    EXPECT_EQ(run.campaign, first_campaign);
+    EXPECT_EQ(run.computed.result.num_draws, run.computed.result.run.value);
+    EXPECT_GE(run.computed.compute_s, 0.0);
   }
   EXPECT_EQ(bench.executor.num_orbits_done(), 8U);
-  EXPECT_TRUE(bench.executor.open_leases().empty());
+  EXPECT_TRUE(bench.executor.computing().empty());
 }
 
 TEST(Executor, HandsEachRunItsTableValues) {
   Bench bench(prepare_counting(1));
-  bench.executor.start(campaign());
-  wire::RunLease two = lease(1, 0, 2);
+  wire::RunLease two = lease(0, 2);
   two.table_values = {1.5, -1.0, 2.5, -2.0};
   bench.executor.submit(two);
   const std::vector<FinishedRun> runs = bench.wait_for(2);
@@ -104,20 +109,23 @@ TEST(Executor, HandsEachRunItsTableValues) {
   EXPECT_EQ(runs[1].computed.result.truth[0], 2.5);
 }
 
-/// Batches that wait in their first orbit until they are let go.
+/// Batches of ten orbits that wait, after their first, until they are let go.
 struct Gate {
   std::counting_semaphore<> entered{0};
   std::counting_semaphore<> open{0};
 
   Prepare prepare() {
-    return [this](const Campaign&) -> Simulate {
-      return
-          [this](std::span<const RunRequest> requests, const std::function<void(int)>& progress) {
-            entered.release();
-            open.acquire();
-            progress(1);
-            return results_of(requests);
-          };
+    return [this](const Campaign&) -> PreparedCampaign {
+      return {.simulate =
+                  [this](std::span<const RunRequest> requests,
+                         const std::function<void(int)>& progress) {
+                    progress(1);
+                    entered.release();
+                    open.acquire();
+                    progress(10);
+                    return results_of(requests);
+                  },
+              .num_orbits = 10};
     };
   }
 };
@@ -126,31 +134,29 @@ struct Gate {
 TEST(Executor, FillsABatchWithRunsOfSeveralLeases) {
   Gate gate;
   Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 4});
-  bench.executor.start(campaign());
-  bench.executor.submit(lease(1, 0, 1));
+  bench.executor.submit(lease(0, 1));
   gate.entered.acquire();
-  bench.executor.submit(lease(2, 10, 3));
-  bench.executor.submit(lease(3, 20, 3));
+  bench.executor.submit(lease(10, 3));
+  bench.executor.submit(lease(20, 3));
   gate.open.release(3);
   const std::vector<FinishedRun> runs = bench.wait_for(7);
   EXPECT_EQ(indices_of(runs), (Indices{0, 10, 11, 12, 20, 21, 22}));
-  const Indices lease_of_each{1, 2, 2, 2, 3, 3, 3};
   const Indices size_of_its_batch{1, 4, 4, 4, 4, 2, 2};
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    EXPECT_EQ(runs[i].lease.value, lease_of_each[i]);
     EXPECT_EQ(runs[i].computed.result.num_rounds, size_of_its_batch[i]);
   }
-  EXPECT_EQ(bench.executor.num_orbits_done(), 7U);
 }
 
 TEST(Executor, GivesEachRunTheTimeOfItsBatch) {
   Bench bench(prepare_counting(1), {.num_threads = 1, .batch_size_max = 4});
-  bench.executor.start(campaign());
-  bench.executor.submit(lease(1, 0, 4));
+  EXPECT_FALSE(bench.executor.usual_batch_time().has_value());
+  bench.executor.submit(lease(0, 4));
   const std::vector<FinishedRun> runs = bench.wait_for(4);
   for (const FinishedRun& run : runs) {
     EXPECT_EQ(run.computed.compute_s, runs[0].computed.compute_s);
   }
+  EXPECT_EQ(std::chrono::duration<double>(*bench.executor.usual_batch_time()).count(),
+            runs[0].computed.compute_s);
 }
 
 // Both threads are inside a batch at the same time, or the second entry never comes.
@@ -162,12 +168,10 @@ TEST(Executor, ComputesABatchOnEachThread) {
     return gate.prepare()(of);
   };
   Bench bench(prepare, {.num_threads = 2, .batch_size_max = 2});
-  bench.executor.start(campaign());
-  bench.executor.submit(lease(1, 0, 3));
-  bench.executor.submit(lease(2, 3, 2));
+  bench.executor.submit(lease(0, 3));
+  bench.executor.submit(lease(3, 2));
   gate.entered.acquire();
   gate.entered.acquire();
-  EXPECT_EQ(bench.executor.open_leases(), (Leases{{1}, {2}}));
   gate.open.release(3);
   Indices indices = indices_of(bench.wait_for(5));
   std::sort(indices.begin(), indices.end());
@@ -175,108 +179,279 @@ TEST(Executor, ComputesABatchOnEachThread) {
   EXPECT_EQ(num_prepared, 1) << "once for both threads";
 }
 
-// Until its results are taken, nobody else speaks for a lease.
-TEST(Executor, ListsALeaseUntilItsLastRunHasBeenTaken) {
+TEST(Executor, TellsWhatIsBeingComputedAndHowFarItIs) {
   Gate gate;
   Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 4});
-  bench.executor.start(campaign());
-  bench.executor.submit(lease(1, 0, 6));
-  bench.executor.submit(lease(2, 6, 1));
+  bench.executor.submit(lease(20, 2));
   gate.entered.acquire();
-  EXPECT_EQ(bench.executor.open_leases(), (Leases{{1}, {2}}));
-  gate.open.release();
+  bench.executor.submit(lease(3, 1));
+  const std::vector<RunningBatch> running = bench.executor.computing();
+  ASSERT_EQ(running.size(), 1U) << "what waits is not being computed";
+  const wire::ComputedBatch expected{first_campaign, {{{20}, 2}}, 1};
+  EXPECT_EQ(running[0].progress, expected);
+  ASSERT_TRUE(running[0].time_left.has_value());
+  EXPECT_GT(*running[0].time_left, Duration::zero());
+  gate.open.release(2);
+  (void)bench.wait_for(3);
+}
+
+// One orbit of ten is done: what is left takes nine times as long as it has taken so far.
+TEST(Executor, ExpectsTheOrbitsToComeToTakeAsLongAsThoseThatAreDone) {
+  Gate gate;
+  Bench bench(gate.prepare());
+  const TimePoint before = std::chrono::steady_clock::now();
+  bench.executor.submit(lease(0, 1));
   gate.entered.acquire();
-  EXPECT_EQ(bench.executor.take_finished().size(), 4U);
-  EXPECT_EQ(bench.executor.open_leases(), (Leases{{1}, {2}}));
+  const Duration left = bench.executor.computing().at(0).time_left.value();
+  EXPECT_LE(left, 9 * (std::chrono::steady_clock::now() - before));
+  const Duration left_later = bench.executor.computing().at(0).time_left.value();
+  EXPECT_GE(left_later, left) << "no orbit was done since";
   gate.open.release();
-  bench.wait_for_change();
-  bench.wait_for_change();
-  EXPECT_EQ(bench.executor.open_leases(), (Leases{{1}, {2}}));
-  EXPECT_EQ(bench.executor.take_finished().size(), 3U);
-  EXPECT_EQ(bench.executor.open_leases(), Leases{});
+  (void)bench.wait_for(1);
+}
+
+TEST(Executor, ComputesARunThatIsToBeAloneInABatchOfItsOwn) {
+  Gate gate;
+  Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 4});
+  bench.executor.submit(lease(0, 1));
+  gate.entered.acquire();
+  wire::RunLease suspect = lease(5, 1);
+  suspect.is_alone = true;
+  bench.executor.submit(lease(1, 1));
+  bench.executor.submit(suspect);
+  bench.executor.submit(lease(2, 1));
+  gate.open.release(3);
+  const std::vector<FinishedRun> runs = bench.wait_for(4);
+  EXPECT_EQ(indices_of(runs), (Indices{0, 1, 2, 5}));
+  const Indices size_of_its_batch{1, 2, 2, 1};
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    EXPECT_EQ(runs[i].computed.result.num_rounds, size_of_its_batch[i]);
+  }
+}
+
+TEST(Executor, DropsOnlyWhatWaits) {
+  Gate gate;
+  Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 2});
+  bench.executor.submit(lease(0, 5));
+  gate.entered.acquire();
+  const std::array wanted{RunRange{{1}, 3}};
+  EXPECT_EQ(bench.executor.drop_waiting(first_campaign, wanted), (std::vector<RunIndex>{{2}, {3}}));
+  EXPECT_TRUE(bench.executor.drop_waiting(second_campaign, wanted).empty());
+  gate.open.release(2);
+  EXPECT_EQ(indices_of(bench.wait_for(3)), (Indices{0, 1, 4}));
+}
+
+TEST(Executor, DropsABatchOnceAndComputesTheRunsAgainIfTheyComeAgain) {
+  Gate gate;
+  Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 2});
+  bench.executor.submit(lease(0, 2));
+  gate.entered.acquire();
+  const std::uint64_t number = bench.executor.computing().at(0).number;
+  EXPECT_TRUE(bench.executor.drop_batch(number));
+  EXPECT_FALSE(bench.executor.drop_batch(number));
+  EXPECT_TRUE(bench.executor.computing().empty());
+  bench.executor.submit(lease(1, 1));
+  gate.open.release(2);
+  EXPECT_EQ(indices_of(bench.wait_for(1)), Indices{1});
+  EXPECT_TRUE(bench.executor.take_finished().empty());
+}
+
+// The batch does not look any more whether it is wanted.
+TEST(Executor, DropsABatchThatIsJustFinishing) {
+  std::counting_semaphore<> entered{0};
+  std::counting_semaphore<> open{0};
+  const Prepare prepare = [&](const Campaign&) -> PreparedCampaign {
+    return {.simulate = [&](std::span<const RunRequest> requests, const std::function<void(int)>&) {
+      entered.release();
+      open.acquire();
+      return results_of(requests);
+    }};
+  };
+  Bench bench(prepare);
+  bench.executor.submit(lease(0, 1));
+  bench.executor.submit(lease(1, 1));
+  entered.acquire();
+  EXPECT_TRUE(bench.executor.drop_batch(bench.executor.computing().at(0).number));
+  open.release(2);
+  EXPECT_EQ(indices_of(bench.wait_for(1)), Indices{1});
 }
 
 TEST(Executor, DropsTheRunsAtHandWhenItAbandons) {
   Gate gate;
   Bench bench(gate.prepare(), {.num_threads = 2, .batch_size_max = 2});
-  bench.executor.start(campaign());
-  bench.executor.submit(lease(1, 0, 5));
+  bench.executor.submit(lease(0, 5));
   gate.entered.acquire();
   gate.entered.acquire();
   bench.executor.abandon();
   gate.open.release(2);
 
-  bench.executor.submit(lease(2, 5, 1));
+  bench.executor.submit(lease(5, 1));
   gate.entered.acquire();
   gate.open.release();
   EXPECT_EQ(indices_of(bench.wait_for(1)), Indices{5});
 }
 
+/// Runs that never end; they look whether they are wanted.
+Prepare prepare_endless(std::counting_semaphore<>& entered) {
+  return [&entered](const Campaign&) -> PreparedCampaign {
+    return {
+        .simulate = [&entered](std::span<const RunRequest>,
+                               const std::function<void(int)>& progress) -> std::vector<RunResult> {
+          entered.release();
+          while (true) progress(1);
+        },
+        .num_orbits = 1};
+  };
+}
+
 TEST(Executor, EndsInTheMiddleOfRuns) {
   std::counting_semaphore<> entered{0};
-  const auto prepare_endless = [&](const Campaign&) -> Simulate {
-    return [&](std::span<const RunRequest>,
-               const std::function<void(int)>& progress) -> std::vector<RunResult> {
-      entered.release();
-      while (true) progress(1);
-    };
-  };
   {
-    Bench bench(prepare_endless, {.num_threads = 2, .batch_size_max = 3});
-    bench.executor.start(campaign());
-    bench.executor.submit(lease(1, 0, 1000));
+    Bench bench(prepare_endless(entered), {.num_threads = 2, .batch_size_max = 3});
+    bench.executor.submit(lease(0, 1000));
     entered.acquire();
     entered.acquire();
   }
   SUCCEED();
 }
 
-TEST(Executor, PreparesANewCampaign) {
-  int num_prepared = 0;
-  Bench bench([&](const Campaign& of) {
+TEST(Executor, EndsInTimeUnlessAThreadHangs) {
+  Gate gate;
+  Bench bench(gate.prepare());
+  bench.executor.submit(lease(0, 1));
+  gate.entered.acquire();
+  EXPECT_FALSE(bench.executor.end_within(std::chrono::milliseconds(1)));
+  gate.open.release();
+  EXPECT_TRUE(bench.executor.end_within(std::chrono::hours(1)));
+  EXPECT_TRUE(bench.executor.take_finished().empty());
+}
+
+/// Yields the campaign's seed as number of draws.
+Prepare prepare_by_seed(std::atomic<int>& num_prepared) {
+  return [&num_prepared](const Campaign& campaign) -> PreparedCampaign {
     ++num_prepared;
-    return prepare_counting(1)(of);
-  });
-  bench.executor.start(campaign());
-  bench.executor.submit(lease(1, 0, 1));
-  (void)bench.wait_for(1);
-  bench.executor.start(campaign());
-  bench.executor.submit(lease(2, 1, 1));
-  EXPECT_EQ(bench.wait_for(1)[0].lease, wire::LeaseId{2});
+    return {.simulate =
+                [seed = campaign.seed](std::span<const RunRequest> requests,
+                                       const std::function<void(int)>&) {
+                  std::vector<RunResult> results = results_of(requests);
+                  for (RunResult& result : results) {
+                    result.num_draws = static_cast<std::uint32_t>(seed);
+                  }
+                  return results;
+                },
+            .num_orbits = 1};
+  };
+}
+
+std::shared_ptr<const Campaign> definition_with(std::uint64_t seed) {
+  Campaign campaign;
+  campaign.seed = seed;
+  return std::make_shared<const Campaign>(campaign);
+}
+
+TEST(Executor, ComputesRunsOfSeveralCampaigns) {
+  std::atomic<int> num_prepared = 0;
+  Bench bench(prepare_by_seed(num_prepared), {.num_threads = 2, .batch_size_max = 4});
+  bench.executor.define(second_campaign, definition_with(22));
+  bench.executor.submit(lease(0, 2));
+  bench.executor.submit(lease(0, 2, second_campaign));
+  bench.executor.submit(lease(2, 2));
+  for (const FinishedRun& run : bench.wait_for(6)) {
+    EXPECT_EQ(run.computed.result.num_draws, run.campaign == second_campaign ? 22U : 1U);
+  }
   EXPECT_EQ(num_prepared, 2);
 }
 
-// What was prepared for the first is never used.
-TEST(Executor, PreparesACampaignThatStartsWhileAnotherIsPrepared) {
+TEST(Executor, LetsRunsOfACampaignWaitUntilItIsDefined) {
+  std::atomic<int> num_prepared = 0;
+  Bench bench(prepare_by_seed(num_prepared));
+  EXPECT_TRUE(bench.executor.is_defined(first_campaign));
+  EXPECT_FALSE(bench.executor.is_defined(second_campaign));
+  bench.executor.submit(lease(4, 1, second_campaign));
+  bench.executor.submit(lease(5, 1));
+  EXPECT_EQ(indices_of(bench.wait_for(1)), Indices{5});
+  bench.executor.define(second_campaign, definition_with(7));
+  EXPECT_EQ(bench.wait_for(1)[0].computed.result.num_draws, 7U);
+}
+
+TEST(Executor, KeepsTheCampaignsThatWereUsedLast) {
+  std::atomic<int> num_prepared = 0;
+  Bench bench(prepare_by_seed(num_prepared),
+              {.num_threads = 1, .batch_size_max = 1, .num_campaigns_max = 2});
+  bench.executor.define(second_campaign, definition_with(2));
+  bench.executor.submit(lease(0, 1, second_campaign));
+  (void)bench.wait_for(1);
+  bench.executor.submit(lease(0, 1));
+  (void)bench.wait_for(1);
+  bench.executor.define({3}, definition_with(3));
+  EXPECT_TRUE(bench.executor.is_defined(first_campaign));
+  EXPECT_FALSE(bench.executor.is_defined(second_campaign));
+}
+
+// A campaign that is at work and one that has runs waiting stay, and the third has room as well.
+TEST(Executor, KeepsCampaignsThatHaveRuns) {
+  Gate gate;
+  Bench bench(gate.prepare(), {.num_threads = 1, .batch_size_max = 1, .num_campaigns_max = 1});
+  bench.executor.submit(lease(0, 1));
+  gate.entered.acquire();
+  bench.executor.define(second_campaign, definition());
+  bench.executor.submit(lease(0, 1, second_campaign));
+  bench.executor.define({3}, definition());
+  EXPECT_TRUE(bench.executor.is_defined(first_campaign));
+  EXPECT_TRUE(bench.executor.is_defined(second_campaign));
+  EXPECT_TRUE(bench.executor.is_defined({3}));
+  gate.open.release(2);
+  (void)bench.wait_for(2);
+}
+
+TEST(Executor, ForgetsACampaignWithItsRunsAndResults) {
+  Gate gate;
+  Bench bench(gate.prepare());
+  bench.executor.submit(lease(0, 3));
+  gate.entered.acquire();
+  gate.open.release();
+  gate.entered.acquire();  // Of the second run: the result of the first is there.
+  bench.executor.forget(first_campaign);
+  EXPECT_FALSE(bench.executor.is_defined(first_campaign));
+  EXPECT_TRUE(bench.executor.computing().empty());
+  EXPECT_TRUE(bench.executor.take_finished().empty());
+  gate.open.release();
+
+  bench.executor.define(second_campaign, definition());
+  bench.executor.submit(lease(9, 1, second_campaign));
+  gate.open.release();
+  bench.wait_for_change();
+  EXPECT_EQ(indices_of(bench.wait_for(1)), Indices{9});
+}
+
+// What was prepared from the first definition is never used.
+TEST(Executor, PreparesACampaignThatIsDefinedAgainWhileItIsPrepared) {
   std::binary_semaphore is_preparing{0};
   std::binary_semaphore go_on{0};
   std::atomic<int> num_prepared = 0;
-  const auto prepare = [&](const Campaign&) -> Simulate {
-    const int number = ++num_prepared;
-    if (number == 1) {
+  const Prepare prepare = [&](const Campaign& campaign) {
+    if (campaign.seed == 1) {
       is_preparing.release();
       go_on.acquire();
     }
-    return [number](std::span<const RunRequest> requests, const std::function<void(int)>&) {
-      std::vector<RunResult> results = results_of(requests);
-      for (RunResult& result : results) result.num_draws = static_cast<std::uint32_t>(number);
-      return results;
-    };
+    return prepare_by_seed(num_prepared)(campaign);
   };
-  Bench bench(prepare, {.num_threads = 2, .batch_size_max = 2});
-  bench.executor.start(campaign());
+  Bench bench(prepare, {.num_threads = 1, .batch_size_max = 2});
+  bench.executor.submit(lease(0, 1));
   is_preparing.acquire();
-  bench.executor.start(campaign());
-  bench.executor.submit(lease(1, 0, 2));
+  bench.executor.forget(first_campaign);
+  bench.executor.define(first_campaign, definition_with(2));
+  bench.executor.submit(lease(1, 2));
   go_on.release();
   for (const FinishedRun& run : bench.wait_for(2)) EXPECT_EQ(run.computed.result.num_draws, 2U);
 }
 
 TEST(Executor, SaysWhyItCannotGoOn) {
-  Bench bench([](const Campaign&) -> Simulate { throw std::runtime_error("out of memory"); },
-              {.num_threads = 3, .batch_size_max = 1});
+  Bench bench(
+      [](const Campaign&) -> PreparedCampaign { throw std::runtime_error("out of memory"); },
+      {.num_threads = 3, .batch_size_max = 1});
   EXPECT_FALSE(bench.executor.failure().has_value());
-  bench.executor.start(campaign());
+  bench.executor.submit(lease(0, 1));
   bench.wait_for_change();
   EXPECT_EQ(bench.executor.failure(), "out of memory");
 }

@@ -1,285 +1,416 @@
 #include "worker/net/conversation.hpp"
 
-#include <gtest/gtest.h>
-
-#include <deque>
-#include <stdexcept>
-#include <utility>
+#include "tests/worker/net/conversation_fixture.hpp"
 
 namespace proofmass::worker {
 namespace {
 
 using namespace std::chrono_literals;
 
-/// An execution that finishes what the test says.
-class FakeExecution final : public Execution {
- public:
-  void start(std::shared_ptr<const Campaign>) override { ++num_starts; }
-  void submit(wire::RunLease lease) override { leases.push_back(std::move(lease)); }
-  void abandon() override {
-    ++num_abandons;
-    leases.clear();
-  }
-  std::vector<FinishedRun> take_finished() override { return std::exchange(finished, {}); }
-  std::vector<wire::LeaseId> open_leases() const override {
-    std::vector<wire::LeaseId> open;
-    for (const auto& lease : leases) open.push_back(lease.lease);
-    return open;
-  }
-  std::uint64_t num_orbits_done() const override { return 11; }
-  std::optional<std::string> failure() const override { return failure_; }
-
-  /// The oldest lease is computed.
-  void finish_lease() {
-    const wire::RunLease lease = leases.front();
-    leases.pop_front();
-    for (std::uint64_t run = lease.runs.first.value; run < lease.runs.end(); ++run) {
-      FinishedRun done{.lease = lease.lease, .attempt = lease.attempt, .computed = {}};
-      done.computed.result.run = {run};
-      finished.push_back(done);
-    }
-  }
-
-  std::deque<wire::RunLease> leases;
-  std::vector<FinishedRun> finished;
-  std::optional<std::string> failure_;
-  int num_starts = 0;
-  int num_abandons = 0;
-};
-
-wire::RunLease lease(std::uint64_t id, std::uint64_t first, std::uint64_t count) {
-  return {.lease = {id}, .runs = {{first}, count}, .attempt = {1}, .table_values = {}};
-}
-
-/// A conversation; each test ends with a check that nothing was sent that it has not named.
-class ConversationTest : public testing::Test {
- protected:
-  template <typename Content>
-  Content take_sent() {
-    if (sent.empty()) throw std::logic_error("nothing was sent");
-    const wire::Message message = sent.front();
-    sent.pop_front();
-    return std::get<Content>(message);
-  }
-
-  void register_here() {
-    (void)take_sent<wire::Hello>();
-    conversation.on_message(welcome, now);
-    (void)take_sent<wire::Heartbeat>();
-    (void)take_sent<wire::Credit>();
-  }
-
-  /// A lease of these runs arrives and is computed; its results have been sent.
-  wire::ResultBatch compute(const wire::RunLease& lent) {
-    conversation.on_message(lent, now);
-    execution.finish_lease();
-    conversation.on_progress(now);
-    return take_sent<wire::ResultBatch>();
-  }
-
-  void expect_ending(Ending::Kind kind, const std::string& reason) {
-    ASSERT_TRUE(conversation.ending().has_value());
-    EXPECT_EQ(conversation.ending()->kind, kind);
-    EXPECT_EQ(conversation.ending()->reason, reason);
-  }
-
-  void TearDown() override { EXPECT_EQ(sent.size(), 0U); }
-
-  const wire::Hello hello{
-      .worker_name = "w", .host = "h", .process_id = 1, .num_slots = 1, .model_version = "m"};
-  wire::Welcome welcome{
-      .worker = {1}, .heartbeat_interval_s = 2.0, .campaign = std::make_shared<const Campaign>()};
-  TimePoint now{};
-  FakeExecution execution;
-  std::deque<wire::Message> sent;
-  Conversation conversation{hello, execution,
-                            [this](const wire::Message& message) { sent.push_back(message); }, now};
-};
+// Registration.
 
 TEST_F(ConversationTest, SaysHelloUntilItIsWelcome) {
-  EXPECT_EQ(take_sent<wire::Hello>().worker_name, "w");
-  conversation.on_tick(now += 900ms);
+  start();
+  const wire::Packet first = take_packet();
+  EXPECT_EQ(std::get<wire::Hello>(first.message).worker_name, "w");
+  EXPECT_EQ(first.header, (wire::Header{own_session, wire::Epoch{}, 1}));
+  tick_after(240ms);
   EXPECT_TRUE(sent.empty());
-  conversation.on_tick(now += 100ms);
+  tick_after(80ms);  // A quarter more is the most that chance adds.
   (void)take_sent<wire::Hello>();
-  conversation.on_message(welcome, now);
-  (void)take_sent<wire::Heartbeat>();
-  EXPECT_EQ(take_sent<wire::Credit>().num_runs_max, wire::runs_per_lease_max);
-  EXPECT_EQ(execution.num_starts, 1);
-  conversation.on_message(welcome, now);  // The answer to the other Hello changes nothing.
-  EXPECT_EQ(execution.num_starts, 1);
+
+  receive(welcome);
+  const wire::Packet heartbeat = take_packet();
+  EXPECT_EQ(heartbeat.header, (wire::Header{own_session, first_epoch, 3}));
+  EXPECT_EQ(std::get<wire::Heartbeat>(heartbeat.message).num_runs_max, wire::runs_per_lease_max);
+  receive(welcome);  // The answer to the other Hello changes nothing.
+  tick_after(1s);
+}
+
+// 0.25 + 0.5 + ... + 32 s take 63.75 s, with chance at most a quarter more; from then on a Hello
+// comes every 32 to 40 s.
+TEST_F(ConversationTest, SaysHelloEverMoreSeldom) {
+  start();
+  for (int i = 0; i < 800; ++i) tick_after(100ms);
+  EXPECT_GE(sent.size(), 8U);
+  EXPECT_LE(sent.size(), 9U);
+  sent.clear();
+  for (int i = 0; i < 4000; ++i) tick_after(100ms);
+  EXPECT_GE(sent.size(), 9U);
+  EXPECT_LE(sent.size(), 13U);
+  sent.clear();
+}
+
+TEST_F(ConversationTest, SaysHelloAtOtherTimesThanOtherWorkers) {
+  std::set<int> ticks_at_second_hello;
+  for (std::uint64_t session = 1; session <= 20; ++session) {
+    std::size_t num_sent = 0;
+    Conversation other(
+        {session}, hello, execution, [&](const wire::Packet&) { ++num_sent; }, now);
+    int num_ticks = 0;
+    while (num_sent < 2) other.on_tick(now + ++num_ticks * 1ms);
+    ticks_at_second_hello.insert(num_ticks);
+  }
+  EXPECT_GT(ticks_at_second_hello.size(), 10U);
 }
 
 // The first Hello is lost if the connection was not there yet.
 TEST_F(ConversationTest, SaysHelloAgainOnceItIsConnected) {
+  start();
   (void)take_sent<wire::Hello>();
-  conversation.on_connected(now += 10ms);
+  now += 10ms;
+  conversation->on_connected(now);
   (void)take_sent<wire::Hello>();
-  conversation.on_tick(now += 990ms);
-  EXPECT_TRUE(sent.empty());
-  conversation.on_message(welcome, now);
-  (void)take_sent<wire::Heartbeat>();
-  (void)take_sent<wire::Credit>();
-  conversation.on_connected(now);
-  EXPECT_TRUE(sent.empty()) << "it is registered";
+  tick_after(100ms);
 }
+
+// Another coordinator may sit at the address now: the sooner it is asked the better.
+TEST_F(ConversationTest, SaysAllItHoldsOnceItIsConnectedAgain) {
+  register_with_campaign();
+  (void)compute(lease(10, 1));
+  conversation->on_connected(now);
+  EXPECT_EQ(take_sent<wire::Heartbeat>().held, held(10, 1));
+  (void)take_sent<wire::ResultBatch>();
+}
+
+TEST_F(ConversationTest, GoesOnComputingWhenItRegistersAgain) {
+  register_with_campaign();
+  (void)compute(lease(10, 1));
+  receive(lease(11, 2));
+  reject_unregistered(wire::Epoch{6});
+  EXPECT_EQ(take_packet().header.epoch, wire::Epoch{});
+  EXPECT_EQ(execution.num_abandons, 0);
+  EXPECT_EQ(execution.waiting.size(), 1U);
+  receive(lease(20, 1));  // Of the registration that is over.
+  EXPECT_EQ(execution.waiting.size(), 1U);
+
+  execution.finish_lease();
+  conversation->on_progress(now);
+  EXPECT_TRUE(sent.empty()) << "nobody would take the results";
+
+  receive(welcome, wire::Epoch{6});
+  const wire::Packet heartbeat = take_packet();
+  EXPECT_EQ(heartbeat.header.epoch, wire::Epoch{6});
+  EXPECT_EQ(std::get<wire::Heartbeat>(heartbeat.message).held, held(10, 3));
+  EXPECT_EQ(take_sent<wire::ResultBatch>().results.size(), 3U);
+}
+
+TEST_F(ConversationTest, SaysHelloOnceIfItIsRejectedTwice) {
+  register_with_campaign();
+  reject_unregistered();
+  reject_unregistered();
+  (void)take_sent<wire::Hello>();
+}
+
+TEST_F(ConversationTest, IgnoresWhatWasMeantForOthers) {
+  register_with_campaign();
+  conversation->on_packet({{{78}, first_epoch, 1}, wire::Stop{}}, now);  // A former session.
+  receive(wire::Stop{}, wire::Epoch{4});                                 // A former coordinator.
+  EXPECT_FALSE(conversation->ending().has_value());
+}
+
+TEST_F(ConversationTest, EndsIfItIsRefused) {
+  start();
+  (void)take_sent<wire::Hello>();
+  receive(wire::Reject{.reason = wire::RejectReason::incompatible, .text = "other model"});
+  expect_ending(Ending::Kind::failed, "refused by the coordinator: other model");
+}
+
+TEST_F(ConversationTest, GivesUpACoordinatorThatIsSilent) {
+  start({.give_up_after = 60s});
+  (void)take_sent<wire::Hello>();
+  now += 10s;
+  receive(welcome);
+  tick_after(59s);
+  EXPECT_FALSE(conversation->ending().has_value());
+  sent.clear();
+  tick_after(1s);
+  expect_ending(Ending::Kind::failed, "coordinator = silent for 60 s (is it running?)");
+}
+
+TEST_F(ConversationTest, SaysWhyItWasNotLetIn) {
+  start({.give_up_after = 60s});
+  conversation->on_refused("the key of this worker is not on its list");
+  tick_after(60s);
+  sent.clear();
+  expect_ending(Ending::Kind::failed,
+                "coordinator = silent for 60 s (the key of this worker is not on its list)");
+}
+
+// Heartbeats.
+
+TEST_F(ConversationTest, ShowsThatItLives) {
+  register_with_campaign();
+  tick_after(1900ms);
+  EXPECT_TRUE(sent.empty());
+  tick_after(100ms);
+  const auto heartbeat = take_sent<wire::Heartbeat>();
+  EXPECT_EQ(heartbeat.num_orbits_done, 11U);
+  EXPECT_TRUE(heartbeat.held.empty());
+}
+
+TEST_F(ConversationTest, SaysAllThatItHolds) {
+  register_with_campaign();
+  (void)compute(lease(10, 2));
+  receive(lease(12, 3));
+  execution.begin_batch();
+  receive(lease(15, 1));
+  receive(lease(20, 1, 2));
+  tick_after(2s);
+  const auto heartbeat = take_sent<wire::Heartbeat>();
+  const std::vector<wire::HeldRuns> expected{{campaign_1, {1}, {{{10}, 6}}},
+                                             {campaign_1, {2}, {{{20}, 1}}}};
+  EXPECT_EQ(heartbeat.held, expected);
+  ASSERT_EQ(heartbeat.computing.size(), 1U);
+  EXPECT_EQ(heartbeat.computing[0], (wire::ComputedBatch{campaign_1, {{{12}, 3}}, 0}));
+}
+
+TEST_F(ConversationTest, SaysSoonWhatItComputesNow) {
+  register_with_campaign();
+  receive(lease(12, 3));
+  execution.begin_batch();
+  tick_after(900ms);
+  EXPECT_TRUE(sent.empty());
+  tick_after(100ms);
+  EXPECT_EQ(take_sent<wire::Heartbeat>().computing.size(), 1U);
+  tick_after(1900ms);
+  EXPECT_TRUE(sent.empty()) << "it computes the same";
+  execution.finish_batch();
+  tick_after(0s);
+  EXPECT_TRUE(take_sent<wire::Heartbeat>().computing.empty());
+}
+
+TEST_F(ConversationTest, CountsUnacknowledgedResultsAgainstItsCredit) {
+  register_with_campaign();
+  (void)compute(lease(0, 96));
+  tick_after(2s);
+  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 4000U);
+}
+
+// Campaigns.
+
+TEST_F(ConversationTest, AsksForACampaignUntilItComes) {
+  start();
+  register_here();
+  receive(lease(0, 1, 1, campaign_2));
+  EXPECT_EQ(execution.waiting.size(), 1U) << "they wait for the definition";
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().campaign, campaign_2);
+  receive(lease(1, 1, 1, campaign_2));
+  tick_after(900ms);
+  EXPECT_TRUE(sent.empty());
+  tick_after(100ms);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().campaign, campaign_2);
+
+  const wire::CampaignDefinition answer{campaign_2, std::make_shared<const Campaign>()};
+  receive(answer);
+  EXPECT_TRUE(execution.is_defined(campaign_2));
+  receive(answer);  // To the other request.
+  receive(lease(2, 1, 1, campaign_2));
+  tick_after(900ms);
+}
+
+TEST_F(ConversationTest, AsksNoMoreForACampaignWithoutRuns) {
+  start();
+  register_here();
+  receive(lease(0, 1));
+  (void)take_sent<wire::CampaignRequest>();
+  receive(wire::Retract{campaign_1, {{{0}, 1}}});
+  (void)take_sent<wire::GiveBack>();
+  tick_after(1500ms);
+  receive(wire::CampaignDefinition{campaign_1, std::make_shared<const Campaign>()});
+  EXPECT_FALSE(execution.is_defined(campaign_1));
+}
+
+TEST_F(ConversationTest, ForgetsACampaign) {
+  register_with_campaign();
+  (void)compute(lease(10, 1));
+  receive(lease(11, 1));
+  receive(lease(5, 1, 1, campaign_2));
+  (void)take_sent<wire::CampaignRequest>();
+  receive(wire::Forget{campaign_1});
+  EXPECT_EQ(execution.forgotten, std::vector{campaign_1});
+  EXPECT_EQ(conversation->num_unacknowledged(), 0U);
+  EXPECT_EQ(conversation->num_unfinished(), 1U);
+}
+
+std::shared_ptr<const Campaign> definition_with_table() {
+  Campaign campaign;
+  campaign.dispersions[0] = {.law = Law::table, .file = "f", .column = "c"};
+  return std::make_shared<const Campaign>(campaign);
+}
+
+TEST_F(ConversationTest, EndsIfALeaseLacksTableValues) {
+  start();
+  register_here();
+  receive(lease(0, 2));
+  (void)take_sent<wire::CampaignRequest>();
+  receive(wire::CampaignDefinition{campaign_1, definition_with_table()});
+  expect_ending(Ending::Kind::failed, "table_values = 1 for each run (must be 0)");
+}
+
+TEST_F(ConversationTest, EndsIfALeaseHasOtherTableValuesThanTheOneBefore) {
+  start();
+  register_here();
+  wire::RunLease two = lease(0, 2);
+  two.table_values = {1.5, 2.5};
+  receive(two);
+  (void)take_sent<wire::CampaignRequest>();
+  receive(wire::CampaignDefinition{campaign_1, definition_with_table()});
+  EXPECT_FALSE(conversation->ending().has_value());
+  receive(lease(2, 1));
+  expect_ending(Ending::Kind::failed, "table_values = 0 for each run (must be 1)");
+}
+
+// Leases.
 
 TEST_F(ConversationTest, HandsALeaseToTheExecutionOnce) {
-  register_here();
-  conversation.on_message(lease(4, 10, 2), now);
-  conversation.on_message(lease(4, 10, 2), now);
-  ASSERT_EQ(execution.leases.size(), 1U);
-  EXPECT_EQ(execution.leases[0].runs, (RunRange{{10}, 2}));
+  register_with_campaign();
+  receive(lease(10, 2));
+  receive(lease(10, 2));
+  ASSERT_EQ(execution.waiting.size(), 1U);
+  EXPECT_EQ(execution.waiting[0].runs, (RunRange{{10}, 2}));
 }
 
-TEST_F(ConversationTest, SendsResultsOfALeaseTogether) {
+// Of runs 0 to 5, run 1 is finished and run 3 waits.
+TEST_F(ConversationTest, TakesFromALeaseWhatItDoesNotHold) {
+  register_with_campaign();
+  (void)compute(lease(1, 1));
+  receive(lease(3, 1));
+  wire::RunLease all = lease(0, 6, 2);
+  all.is_alone = true;
+  receive(all);
+  ASSERT_EQ(execution.waiting.size(), 4U);
+  EXPECT_EQ(execution.waiting[1].runs, (RunRange{{0}, 1}));
+  EXPECT_EQ(execution.waiting[2].runs, (RunRange{{2}, 1}));
+  EXPECT_EQ(execution.waiting[3].runs, (RunRange{{4}, 2}));
+  EXPECT_TRUE(execution.waiting[3].is_alone);
+}
+
+TEST_F(ConversationTest, HandsOverTheTableValuesOfTheRunsThatItTakes) {
+  start();
   register_here();
-  const wire::ResultBatch batch = compute(lease(4, 10, 2));
-  EXPECT_EQ(batch.lease, wire::LeaseId{4});
+  execution.defined.insert(campaign_1);
+  wire::RunLease one = lease(1, 1);
+  one.table_values = {1.0, 1.5};
+  receive(one);
+  wire::RunLease all = lease(0, 3);
+  all.table_values = {0.0, 0.5, 1.0, 1.5, 2.0, 2.5};
+  receive(all);
+  ASSERT_EQ(execution.waiting.size(), 3U);
+  EXPECT_EQ(execution.waiting[1].table_values, (std::vector<double>{0.0, 0.5}));
+  EXPECT_EQ(execution.waiting[2].table_values, (std::vector<double>{2.0, 2.5}));
+}
+
+// The runs were taken from this worker and lent to it again before it said that it has them.
+TEST_F(ConversationTest, NamesTheLargestAttemptUnderWhichItWasLentARun) {
+  register_with_campaign();
+  receive(lease(10, 1, 1));
+  receive(lease(10, 1, 3));
+  receive(lease(10, 1, 2));
+  tick_after(2s);
+  EXPECT_EQ(take_sent<wire::Heartbeat>().held, held(10, 1, 3));
+  execution.finish_lease();
+  conversation->on_progress(now);
+  EXPECT_EQ(take_sent<wire::ResultBatch>().attempt, wire::Attempt{3});
+}
+
+TEST_F(ConversationTest, GivesBackWhatIsNotBeingComputed) {
+  register_with_campaign();
+  receive(lease(0, 2));
+  execution.begin_batch();
+  receive(lease(2, 4, 2));
+  receive(wire::Retract{campaign_1, {{{1}, 2}, {{4}, 10}}});
+  const auto answer = take_sent<wire::GiveBack>();
+  EXPECT_EQ(answer.reason, wire::LossReason::retracted);
+  const std::vector<wire::HeldRuns> expected{{campaign_1, {2}, {{{2}, 1}, {{4}, 2}}}};
+  EXPECT_EQ(answer.runs, expected);
+  EXPECT_EQ(conversation->num_unfinished(), 3U);
+  receive(wire::Retract{campaign_1, {{{1}, 2}, {{4}, 10}}});
+  EXPECT_TRUE(sent.empty()) << "it has none of them";
+}
+
+// Results.
+
+TEST_F(ConversationTest, SendsResultsOfALeaseTogether) {
+  register_with_campaign();
+  const wire::ResultBatch batch = compute(lease(10, 2, 4));
+  EXPECT_EQ(batch.campaign, campaign_1);
+  EXPECT_EQ(batch.attempt, wire::Attempt{4});
   ASSERT_EQ(batch.results.size(), 2U);
   EXPECT_EQ(batch.results[1].result.run, RunIndex{11});
 }
 
 TEST_F(ConversationTest, RepeatsResultsUntilTheyAreAcknowledged) {
-  register_here();
-  (void)compute(lease(4, 10, 2));
-  conversation.on_message(wire::ResultAck{.runs = {{10}}}, now);
-  EXPECT_EQ(conversation.num_unacknowledged(), 1U);
+  register_with_campaign();
+  (void)compute(lease(10, 2));
+  acknowledge({{10}});
+  EXPECT_EQ(conversation->num_unacknowledged(), 1U);
 
-  conversation.on_tick(now += 5s);
+  tick_after(5s);
   const auto again = take_sent<wire::ResultBatch>();
   ASSERT_EQ(again.results.size(), 1U);
   EXPECT_EQ(again.results[0].result.run, RunIndex{11});
-  EXPECT_EQ(take_sent<wire::Heartbeat>().leases, std::vector<wire::LeaseId>{{4}});
-  (void)take_sent<wire::Credit>();
+  EXPECT_EQ(take_sent<wire::Heartbeat>().held, held(11, 1));
 
-  conversation.on_message(wire::ResultAck{.runs = {{11}}}, now);
-  conversation.on_tick(now += 5s);
-  EXPECT_TRUE(take_sent<wire::Heartbeat>().leases.empty());
-  (void)take_sent<wire::Credit>();
+  acknowledge({{11}});
+  tick_after(60s);
+  EXPECT_TRUE(take_sent<wire::Heartbeat>().held.empty());
 }
 
-TEST_F(ConversationTest, CountsUnacknowledgedResultsAgainstItsCredit) {
-  register_here();
-  (void)compute(lease(4, 0, 96));
-  conversation.on_tick(now += 2s);
-  (void)take_sent<wire::Heartbeat>();
-  EXPECT_EQ(take_sent<wire::Credit>().num_runs_max, 4000U);
+// After 5, 10, 20, 40, 60, 60 s.
+TEST_F(ConversationTest, RepeatsResultsEverMoreSeldom) {
+  register_with_campaign();
+  (void)compute(lease(10, 1));
+  std::vector<int> repeated_at_s;
+  for (int time_s = 1; time_s <= 200; ++time_s) {
+    tick_after(1s);
+    while (!sent.empty()) {
+      if (std::holds_alternative<wire::ResultBatch>(take_packet().message)) {
+        repeated_at_s.push_back(time_s);
+      }
+    }
+  }
+  EXPECT_EQ(repeated_at_s, (std::vector<int>{5, 15, 35, 75, 135, 195}));
 }
 
-TEST_F(ConversationTest, ShowsThatItLives) {
-  register_here();
-  conversation.on_tick(now += 1900ms);
-  EXPECT_TRUE(sent.empty());
-  conversation.on_tick(now += 100ms);
-  EXPECT_EQ(take_sent<wire::Heartbeat>().num_orbits_done, 11U);
-  (void)take_sent<wire::Credit>();
+TEST_F(ConversationTest, IgnoresAnAcknowledgementOfAnotherCampaign) {
+  register_with_campaign();
+  (void)compute(lease(10, 1));
+  receive(wire::ResultAck{campaign_2, {{10}}});
+  EXPECT_EQ(conversation->num_unacknowledged(), 1U);
 }
 
-TEST_F(ConversationTest, RegistersAgainAndKeepsItsResults) {
-  register_here();
-  (void)compute(lease(4, 10, 1));
-  conversation.on_message(lease(5, 11, 1), now);
-  conversation.on_message(wire::Reject{.reason = wire::RejectReason::not_registered, .text = ""},
-                          now);
+TEST_F(ConversationTest, DeliversTheResultsOfAFormerProcess) {
+  start();
+  KeptResult result{campaign_2, {3}, {}};
+  result.computed.result.run = {9};
+  conversation->restore({result});
   (void)take_sent<wire::Hello>();
-  EXPECT_EQ(execution.num_abandons, 1);
-  conversation.on_message(lease(6, 12, 1), now);  // Of the registration that is over.
-  EXPECT_TRUE(execution.leases.empty());
-
-  conversation.on_message(welcome, now);
-  EXPECT_EQ(take_sent<wire::ResultBatch>().results[0].result.run, RunIndex{10});
-  (void)take_sent<wire::Heartbeat>();
-  (void)take_sent<wire::Credit>();
-  EXPECT_EQ(execution.num_starts, 1) << "the campaign is the same";
+  receive(welcome);
+  const std::vector<wire::HeldRuns> expected{{campaign_2, {3}, {{{9}, 1}}}};
+  EXPECT_EQ(take_sent<wire::Heartbeat>().held, expected);
+  EXPECT_EQ(take_sent<wire::ResultBatch>().attempt, wire::Attempt{3});
+  EXPECT_EQ(conversation->unacknowledged().at(0).computed.result.run, RunIndex{9});
 }
 
-TEST_F(ConversationTest, SaysHelloOnceIfItIsRejectedTwice) {
-  register_here();
-  const wire::Reject reject{.reason = wire::RejectReason::not_registered, .text = ""};
-  conversation.on_message(reject, now);
-  conversation.on_message(reject, now);
+// A message has room for 4096 results.
+TEST_F(ConversationTest, SendsManyResultsOneMessageATick) {
+  start();
+  std::vector<KeptResult> results(2 * wire::runs_per_lease_max + 1);
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    results[i].campaign = campaign_1;
+    results[i].computed.result.run = {i};
+  }
+  conversation->restore(results);
   (void)take_sent<wire::Hello>();
-}
-
-TEST_F(ConversationTest, EndsIfTheCoordinatorServesAnotherCampaign) {
-  register_here();
-  conversation.on_message(wire::Reject{.reason = wire::RejectReason::not_registered, .text = ""},
-                          now);
-  (void)take_sent<wire::Hello>();
-  Campaign other;
-  other.seed = 2;
-  welcome.campaign = std::make_shared<const Campaign>(other);
-  conversation.on_message(welcome, now);
-  expect_ending(Ending::Kind::failed, "the coordinator serves another campaign now");
-}
-
-TEST_F(ConversationTest, EndsIfItIsRefused) {
-  (void)take_sent<wire::Hello>();
-  conversation.on_message(
-      wire::Reject{.reason = wire::RejectReason::incompatible, .text = "other model"}, now);
-  expect_ending(Ending::Kind::failed, "refused by the coordinator: other model");
-}
-
-TEST_F(ConversationTest, EndsIfTheCoordinatorIsSilentForAMinute) {
-  (void)take_sent<wire::Hello>();
-  conversation.on_message(welcome, now += 10s);
-  sent.clear();
-  conversation.on_tick(now += 59s);
-  EXPECT_FALSE(conversation.ending().has_value());
-  sent.clear();
-  conversation.on_tick(now += 1s);
-  expect_ending(Ending::Kind::failed, "coordinator = silent for 60 s (is it running?)");
-}
-
-TEST_F(ConversationTest, EndsIfALeaseLacksTableValues) {
-  Campaign campaign;
-  campaign.dispersions[0] = {.law = Law::table, .file = "f", .column = "c"};
-  welcome.campaign = std::make_shared<const Campaign>(campaign);
-  register_here();
-  conversation.on_message(lease(1, 0, 2), now);
-  expect_ending(Ending::Kind::failed, "table_values = 0 entries (must be 1 for each run)");
-}
-
-TEST_F(ConversationTest, EndsIfNothingCanBeComputed) {
-  register_here();
-  execution.failure_ = "out of memory";
-  conversation.on_progress(now);
-  (void)take_sent<wire::Bye>();
-  expect_ending(Ending::Kind::failed, "out of memory");
-}
-
-TEST_F(ConversationTest, DropsEverythingWhenToldToStop) {
-  register_here();
-  conversation.on_message(lease(1, 0, 2), now);
-  conversation.on_message(wire::Stop{}, now);
-  EXPECT_TRUE(execution.leases.empty());
-  expect_ending(Ending::Kind::done, "told to stop");
-}
-
-TEST_F(ConversationTest, GivesEverythingBackWhenAskedToStop) {
-  register_here();
-  conversation.on_message(lease(1, 0, 2), now);
-  conversation.on_stop_request();
-  (void)take_sent<wire::Bye>();
-  EXPECT_TRUE(execution.leases.empty());
-  expect_ending(Ending::Kind::done, "asked to stop");
-}
-
-TEST_F(ConversationTest, DeliversWhatItHoldsWhenDrained) {
-  register_here();
-  conversation.on_message(lease(1, 0, 1), now);
-  conversation.on_message(wire::Drain{}, now);
-  EXPECT_EQ(take_sent<wire::Credit>().num_runs_max, 0U);
-  conversation.on_message(lease(2, 1, 1), now);  // Crossed the Drain: not taken.
-  EXPECT_EQ(execution.leases.size(), 1U);
-  execution.finish_lease();
-  conversation.on_progress(now);
-  (void)take_sent<wire::ResultBatch>();
-  EXPECT_FALSE(conversation.ending().has_value());
-  conversation.on_message(wire::ResultAck{.runs = {{0}}}, now);
-  (void)take_sent<wire::Bye>();
-  expect_ending(Ending::Kind::done, "drained");
+  receive(welcome);
+  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
+  EXPECT_EQ(take_sent<wire::ResultBatch>().results.size(), wire::runs_per_lease_max);
+  tick_after(100ms);
+  EXPECT_EQ(take_sent<wire::ResultBatch>().results.size(), wire::runs_per_lease_max);
+  tick_after(100ms);
+  EXPECT_EQ(take_sent<wire::ResultBatch>().results.size(), 1U);
+  tick_after(100ms);
 }
 
 }  // namespace

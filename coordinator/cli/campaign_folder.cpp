@@ -1,0 +1,115 @@
+#include "coordinator/cli/campaign_folder.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "coordinator/cli/campaign_start.hpp"
+#include "coordinator/report/report.hpp"
+#include "core/error.hpp"
+#include "core/simulation/run.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::string_view remedy = "give the campaign another name";
+
+[[noreturn]] void refuse(const std::filesystem::path& directory, std::string_view why) {
+  throw Error(fmt::format("directory = {} ({})", directory.string(), why));
+}
+
+void make_directory(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::filesystem::create_directories(std::filesystem::absolute(directory).parent_path(), error);
+  if (mkdir(directory.c_str(), S_IRWXU) == 0 || std::filesystem::is_directory(directory)) return;
+  refuse(directory, std::strerror(errno));
+}
+
+/// Kept until the process ends, however it does; the file stays and means nothing by itself.
+int lock(const std::filesystem::path& directory) {
+  const std::filesystem::path file = directory / "coordinator.lock";
+  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  if (descriptor < 0) refuse(directory, std::strerror(errno));
+  if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) return descriptor;
+  close(descriptor);
+  refuse(directory, "another coordinator serves it");
+}
+
+ServedCampaign load_file(const std::filesystem::path& file) {
+  Store store = Store::open(file);
+  if (store.model_version() != model_version) {
+    throw Error(fmt::format("{}: model = {} (this program has {})", file.string(),
+                            store.model_version(), model_version));
+  }
+  // Shared with the dispatch and with messages under way.
+  auto definition = std::make_shared<const Campaign>(stored_campaign(store));
+  return {.file = file, .store = std::move(store), .definition = std::move(definition)};
+}
+
+}  // namespace
+
+CampaignFolder::CampaignFolder(std::filesystem::path directory) : directory_(std::move(directory)) {
+  make_directory(directory_);
+  lock_ = lock(directory_);
+}
+
+CampaignFolder::~CampaignFolder() { close(lock_); }
+
+std::vector<ServedCampaign> CampaignFolder::load(
+    const std::function<void(const std::string&)>& warn) const {
+  std::vector<std::filesystem::path> files;
+  for (const auto& item : std::filesystem::directory_iterator(directory_)) {
+    if (item.path().extension() == ".db") files.push_back(item.path());
+  }
+  std::sort(files.begin(), files.end());
+  std::vector<ServedCampaign> campaigns;
+  for (const std::filesystem::path& file : files) {
+    try {
+      ServedCampaign campaign = load_file(file);
+      const bool is_known =
+          std::any_of(campaigns.begin(), campaigns.end(), [&](const ServedCampaign& other) {
+            return other.store.id() == campaign.store.id() ||
+                   other.definition->name == campaign.definition->name;
+          });
+      if (is_known)
+        throw Error(fmt::format("{}: campaign {} is in another file as well", file.string(),
+                                campaign.definition->name));
+      campaigns.push_back(std::move(campaign));
+    } catch (const Error& error) {
+      warn(error.what());
+    }
+  }
+  return campaigns;
+}
+
+ServedCampaign CampaignFolder::open(const Campaign& wanted) {
+  const std::filesystem::path file = file_of(wanted);
+  return {.file = file,
+          .store = open_or_create(wanted, file, remedy),
+          .definition = std::make_shared<const Campaign>(wanted)};
+}
+
+std::shared_ptr<const Campaign> CampaignFolder::extend(Store& store, const Campaign& wanted) {
+  extend_to(store, wanted, file_of(wanted), remedy);
+  return std::make_shared<const Campaign>(wanted);
+}
+
+void CampaignFolder::summarise(
+    const std::filesystem::path& file, const Scenario& scenario,
+    const std::function<void(const std::function<void(Store&)>&)>& write) {
+  const CampaignStatistics statistics = read_statistics(Store::open_read_only(file), scenario);
+  write([&](Store& store) { write_statistics(store, scenario, statistics); });
+}
+
+std::filesystem::path CampaignFolder::file_of(const Campaign& campaign) const {
+  return directory_ / (campaign.name + ".db");
+}
+
+}  // namespace proofmass::coordinator

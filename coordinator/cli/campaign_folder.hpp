@@ -1,0 +1,42 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "coordinator/net/campaign_files.hpp"
+
+namespace proofmass::coordinator {
+
+/// The directory in which a coordinator keeps its campaigns, one file NAME.db each. Nobody else's:
+/// a second coordinator on the directory is refused.
+class CampaignFolder final : public CampaignFiles {
+ public:
+  /// Takes the directory, making it if it is not there, for this user only.
+  /// @throws Error if it cannot be made or written, or if another coordinator has it.
+  explicit CampaignFolder(std::filesystem::path directory);
+  ~CampaignFolder() override;
+  CampaignFolder(const CampaignFolder&) = delete;
+  CampaignFolder& operator=(const CampaignFolder&) = delete;
+
+  /// The campaigns of all files NAME.db, by name.
+  /// @param warn  Told of files that cannot be served, and why: they are left alone.
+  [[nodiscard]] std::vector<ServedCampaign> load(
+      const std::function<void(const std::string&)>& warn) const;
+
+  [[nodiscard]] ServedCampaign open(const Campaign& wanted) override;
+  [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,
+                                                       const Campaign& wanted) override;
+  void summarise(const std::filesystem::path& file, const Scenario& scenario,
+                 const std::function<void(const std::function<void(Store&)>&)>& write) override;
+
+ private:
+  [[nodiscard]] std::filesystem::path file_of(const Campaign& campaign) const;
+
+  std::filesystem::path directory_;
+  int lock_;  ///< Descriptor.
+};
+
+}  // namespace proofmass::coordinator

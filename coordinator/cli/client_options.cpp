@@ -1,0 +1,64 @@
+#include "coordinator/cli/client_options.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+
+#include "coordinator/cli/exit_code.hpp"
+#include "proto/wire/endpoint.hpp"
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr double timeout_s_min = 0.01;
+constexpr double timeout_s_max = 86400.0;
+
+}  // namespace
+
+void add_client_options(CLI::App& command, ClientOptions& options) {
+  ClientConnectionConfig& connection = options.connection;
+  command
+      .add_option("--connect", connection.endpoint,
+                  "The coordinator's address for clients, e.g. tcp://127.0.0.1:5556")
+      ->envname("PROOFMASS_CONNECT_CLIENTS")
+      ->required();
+  command.add_option("--keys", connection.keys, "Directory with client.key and coordinator.pub")
+      ->envname("PROOFMASS_KEYS");
+  command.add_flag("--insecure-plain", connection.is_plain_waived,
+                   "Allow an address beyond this machine without keys");
+  command
+      .add_option_function<double>(
+          "--timeout",
+          [&connection](double timeout_s) {
+            connection.reply_wait = std::chrono::duration<double>(timeout_s);
+          },
+          "Seconds to wait for an answer; 10 by default")
+      ->check(CLI::Range(timeout_s_min, timeout_s_max));
+  command.add_flag_callback(
+      "--json", [&options] { options.format = OutputFormat::json; }, "Print JSON");
+}
+
+void warn_if_plain(const ClientOptions& options) {
+  const ClientConnectionConfig& connection = options.connection;
+  if (connection.keys || wire::is_local(connection.endpoint)) return;
+  fmt::print(stderr,
+             "proofmass: warning: connect = {} (--insecure-plain: anybody on the way can read and "
+             "change what is said)\n",
+             connection.endpoint);
+}
+
+int with_connection(const ClientOptions& options, const std::function<int(const Ask&)>& work) {
+  ClientConnection connection(options.connection);
+  warn_if_plain(options);
+  return work([&](const wire::ClientRequest& request) { return connection.ask(request); });
+}
+
+std::string checked_campaign_name(const std::string& name) {
+  if (wire::is_name(name)) return name;
+  throw UsageError(fmt::format("campaign = \"{}\" (must be 1 to 128 of [A-Za-z0-9._-])", name));
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,210 @@
+#include "coordinator/cli/client_tables.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "coordinator/cli/progress_display.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "proto/wire/client_codec.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using wire::CampaignPhase;
+using wire::CampaignStatus;
+using wire::WorkerStatus;
+
+constexpr std::size_t table_width = 79;
+
+/// A heading and its column; text stands left, numbers right.
+struct Column {
+  std::string_view title;
+  std::size_t width;
+  bool is_text = false;
+};
+
+constexpr std::array<Column, 8> status_columns{{{"campaign", 17, true},
+                                                {"phase", 10, true},
+                                                {"prio", 5},
+                                                {"done", 11},
+                                                {"runs", 11},
+                                                {"%", 5},
+                                                {"runs/s", 8},
+                                                {"time left", 12}}};
+
+constexpr std::array<Column, 8> worker_columns{{{"id", 8},
+                                                {"  worker", 17, true},
+                                                {"host", 14, true},
+                                                {"pid", 8},
+                                                {"slots", 6},
+                                                {"lent", 8},
+                                                {"results", 9},
+                                                {"heard", 9}}};
+
+template <std::size_t N>
+std::string row(const std::array<Column, N>& columns, const std::array<std::string, N>& cells) {
+  std::string text;
+  for (std::size_t i = 0; i < N; ++i) {
+    // A space at least stays between a column and the next.
+    const auto& [title, width, is_text] = columns[i];
+    const std::string cell = shortened(cells[i], width - 1);
+    text += is_text ? left_aligned(cell, width) : right_aligned(cell, width);
+  }
+  text.erase(text.find_last_not_of(' ') + 1);
+  return text + "\n";
+}
+
+template <std::size_t N>
+std::string heading(const std::array<Column, N>& columns) {
+  std::array<std::string, N> titles;
+  for (std::size_t i = 0; i < N; ++i) titles[i] = columns[i].title;
+  return row(columns, titles) + horizontal_rule(table_width) + "\n";
+}
+
+std::string counted(std::uint64_t count, std::string_view thing) {
+  return fmt::format("{} {}{}", count, thing, count == 1 ? "" : "s");
+}
+
+bool is_over(CampaignPhase phase) {
+  return phase == CampaignPhase::finished || phase == CampaignPhase::cancelled;
+}
+
+std::uint64_t percent_done(const CampaignStatus& campaign) {
+  return campaign.num_done * 100 / std::max<std::uint64_t>(1, campaign.num_runs);
+}
+
+std::string time_left(const CampaignStatus& campaign) {
+  const bool is_known = campaign.remaining_s && !is_over(campaign.phase);
+  return is_known ? duration_text(*campaign.remaining_s) : "-";
+}
+
+std::string rate(const CampaignStatus& campaign) {
+  return campaign.rate_hz > 0.0 ? measured_figure(campaign.rate_hz) : "-";
+}
+
+std::string comparison_note(const CampaignStatus& campaign) {
+  const std::string compared =
+      counted(campaign.num_audited, "result") + " compared with a second computation: ";
+  if (campaign.num_mismatches == 0) return compared + "all equal";
+  return compared + fmt::format("{} differ (none may)", campaign.num_mismatches);
+}
+
+/// What is out of the ordinary about a campaign.
+std::vector<std::string> notes_about(const CampaignStatus& campaign) {
+  std::vector<std::string> notes;
+  if (!campaign.storage_failure.empty()) {
+    notes.push_back("nothing can be stored: " + campaign.storage_failure);
+  }
+  if (campaign.num_given_up > 0) {
+    notes.push_back(counted(campaign.num_given_up, "run") + " given up: too many workers crashed");
+  }
+  if (campaign.num_without_estimate > 0) {
+    notes.push_back(counted(campaign.num_without_estimate, "run") + " without an estimate");
+  }
+  if (campaign.num_audited > 0 || campaign.num_mismatches > 0) {
+    notes.push_back(comparison_note(campaign));
+  }
+  return notes;
+}
+
+std::string campaign_row(const CampaignStatus& campaign) {
+  return row<8>(
+      status_columns,
+      {campaign.name, std::string(wire::name_of(campaign.phase)), std::to_string(campaign.priority),
+       std::to_string(campaign.num_done), std::to_string(campaign.num_runs),
+       std::to_string(percent_done(campaign)), rate(campaign), time_left(campaign)});
+}
+
+std::string service_line(const wire::StatusReply& status) {
+  std::uint64_t num_lent = 0;
+  for (const CampaignStatus& campaign : status.campaigns) num_lent += campaign.num_lent;
+  return shortened(fmt::format("Proofmass {}, model {}, up {}", status.version,
+                               status.model_version, duration_text(status.uptime_s)),
+                   table_width) +
+         "\n" +
+         shortened(fmt::format("{} with {}, {} lent", counted(status.num_workers, "worker"),
+                               counted(status.num_slots, "slot"), counted(num_lent, "run")),
+                   table_width) +
+         "\n\n";
+}
+
+/// Seven characters at most.
+std::string count_cell(std::uint64_t count) {
+  constexpr std::uint64_t digits_max = 10'000'000;
+  return count < digits_max ? std::to_string(count) : measured_figure(static_cast<double>(count));
+}
+
+/// In the largest unit: `3 s`, `12 min`, `3 h`, `4 d`.
+std::string ago(double seconds) {
+  constexpr double longest_s = 9999.0 * 86400.0;
+  const auto total = static_cast<std::uint64_t>(std::clamp(seconds, 0.0, longest_s));
+  if (total < 60) return fmt::format("{} s", total);
+  if (total < 3600) return fmt::format("{} min", total / 60);
+  if (total < 86400) return fmt::format("{} h", total / 3600);
+  return fmt::format("{} d", total / 86400);
+}
+
+std::string worker_row(const WorkerStatus& worker) {
+  return row<8>(worker_columns, {count_cell(worker.id.value), "  " + worker.name, worker.host,
+                                 count_cell(worker.process_id), count_cell(worker.num_slots),
+                                 count_cell(worker.num_lent), count_cell(worker.num_results),
+                                 ago(worker.silent_s)});
+}
+
+}  // namespace
+
+std::string shortened(std::string_view text, std::size_t width) {
+  if (text_width(text) <= width) return std::string(text);
+  std::size_t size = 0;
+  // Every byte that continues a UTF-8 character goes with the one before it.
+  for (std::size_t num_characters = 0; size < text.size(); ++size) {
+    const bool continues = (static_cast<unsigned char>(text[size]) & 0xc0) == 0x80;
+    if (!continues && ++num_characters >= width) break;
+  }
+  return std::string(text.substr(0, size)) + "…";
+}
+
+std::string status_table(const wire::StatusReply& status) {
+  std::string text = service_line(status);
+  if (status.campaigns.empty()) return text + "no campaigns\n";
+  text += heading(status_columns);
+  for (const CampaignStatus& campaign : status.campaigns) text += campaign_row(campaign);
+  for (const CampaignStatus& campaign : status.campaigns) {
+    for (const std::string& note : notes_about(campaign)) {
+      text += fmt::format("{}: {}\n", campaign.name, note);
+    }
+  }
+  return text;
+}
+
+std::string workers_table(const wire::WorkersReply& workers) {
+  if (workers.workers.empty()) return "no workers\n";
+  std::string text = heading(worker_columns);
+  for (const WorkerStatus& worker : workers.workers) text += worker_row(worker);
+  for (const WorkerStatus& worker : workers.workers) {
+    if (!worker.is_quarantined) continue;
+    text += fmt::format("{}: in quarantine, is lent nothing: too many crashes on {}\n",
+                        worker.id.value, worker.host);
+  }
+  return text;
+}
+
+std::string campaign_line(const CampaignStatus& campaign) {
+  std::string text =
+      fmt::format("{} {}: {} of {}, {} %", campaign.name, wire::name_of(campaign.phase),
+                  campaign.num_done, counted(campaign.num_runs, "run"), percent_done(campaign));
+  if (!is_over(campaign.phase)) {
+    if (campaign.rate_hz > 0.0) text += fmt::format(", {} runs/s", rate(campaign));
+    if (campaign.remaining_s) text += fmt::format(", {} left", time_left(campaign));
+  }
+  for (const std::string& note : notes_about(campaign)) text += "; " + note;
+  return text;
+}
+
+}  // namespace proofmass::coordinator

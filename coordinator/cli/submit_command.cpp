@@ -1,0 +1,38 @@
+#include "coordinator/cli/submit_command.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "coordinator/cli/client_json.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+
+wire::SubmitRequest submit_request(const SubmitOptions& options) {
+  Campaign campaign = read_campaign(options.campaign_file, options.overrides);
+  if (options.name) {
+    campaign.name = *options.name;
+    try {
+      campaign.validate();
+    } catch (const ConfigError& error) {
+      throw UsageError(error.what());
+    }
+  }
+  return {.campaign = std::move(campaign),
+          .priority = options.priority,
+          .audit_fraction = options.audit_fraction};
+}
+
+int submit_campaign(const SubmitOptions& options) {
+  const wire::SubmitRequest request = submit_request(options);
+  return with_connection(options.client, [&](const Ask& ask) {
+    const auto done = reply_of<wire::DoneReply>(ask, request);
+    const bool is_json = options.client.format == OutputFormat::json;
+    fmt::print("{}", is_json ? done_json("submit", request.campaign.name, done) : done.text + "\n");
+    return exit_done;
+  });
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/client_options.hpp"
+
+namespace proofmass::coordinator {
+
+/// Arguments of `proofmass submit`.
+struct SubmitOptions {
+  ClientOptions client;
+  std::filesystem::path campaign_file;
+  Overrides overrides;
+  std::optional<std::string> name;  ///< By default the one in the file.
+  int priority = 0;                 ///< -100 to 100.
+  double audit_fraction = 0.0;      ///< 0 to 1.
+};
+
+/// The request that the arguments ask for.
+/// @throws CampaignFileError if the file cannot be used; UsageError if the name cannot.
+[[nodiscard]] wire::SubmitRequest submit_request(const SubmitOptions& options);
+
+/// Hands a campaign to a coordinator: a new one, or one that is there and has more runs now.
+/// @return An ExitCode.
+/// @throws As submit_request() and ClientConnection do; Error if the coordinator refuses.
+[[nodiscard]] int submit_campaign(const SubmitOptions& options);
+
+}  // namespace proofmass::coordinator

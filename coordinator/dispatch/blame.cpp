@@ -1,0 +1,198 @@
+#include "coordinator/dispatch/blame.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "core/error.hpp"
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+/// Whether more than one run may be the cause.
+enum class Certainty : std::uint8_t { ambiguous, certain };
+
+/// What the worker computed as it last said, as far as it is still on its leases; if it did not
+/// say, what it begins with.
+RunsByCampaign computed_runs(const State& state, const Worker& worker) {
+  const RunsByCampaign leased = leased_runs(state, worker);
+  RunsByCampaign computed;
+  for (const Progress& progress : worker.computing) {
+    const auto found = leased.find(progress.batch.campaign);
+    if (found == leased.end()) continue;
+    RunSet runs = found->second.overlap(RunSet(progress.batch.ranges));
+    if (!runs.empty()) computed[found->first].add(runs);
+  }
+  if (!computed.empty()) return computed;
+  std::uint64_t num_left = worker.num_slots;
+  for (const LeaseId id : worker.leases) {
+    const Lease& lease = state.leases.at(id);
+    RunSet remaining = lease.remaining;
+    while (num_left > 0 && !remaining.empty()) {
+      const RunRange range = remaining.take_first(num_left);
+      computed[lease.campaign].add(range);
+      num_left -= range.count;
+    }
+  }
+  return computed;
+}
+
+/// Blame from this host means nothing.
+void withdraw(State& state, CampaignId id, const std::string& host) {
+  CampaignState& campaign = state.campaigns.at(id);
+  for (auto next = campaign.suspects.begin(); next != campaign.suspects.end();) {
+    const auto current = next++;
+    const auto crashes = current->second.hosts.find(host);
+    if (crashes == current->second.hosts.end()) continue;
+    current->second.num_crashes -= crashes->second.num_crashes;
+    current->second.hosts.erase(crashes);
+    if (current->second.num_crashes > 0) continue;
+    const auto waiting = campaign.pending_suspects.find(current->first);
+    if (waiting != campaign.pending_suspects.end()) {
+      campaign.pending[waiting->second].add({waiting->first, 1});
+      campaign.pending_suspects.erase(waiting);
+    }
+    campaign.suspects.erase(current);
+  }
+}
+
+void quarantine(State& state, const std::string& host, std::uint32_t num_crashes, Outbox& outbox) {
+  state.quarantined.insert(host);
+  for (const auto& [id, campaign] : state.campaigns) withdraw(state, id, host);
+  outbox.log({.severity = Severity::error,
+              .kind = "host_quarantined",
+              .text = fmt::format("host={} crashes={}", host, num_crashes)});
+}
+
+/// A run that is stored is beyond suspicion; its audit is given up instead, like a run.
+void count_audit_crash(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  const std::uint32_t num_crashes = ++campaign.audit_crashes[run];
+  if (num_crashes < state.config.crashes_per_run_max) return;
+  take_off(state, campaign.audits.at(run), {run, 1});
+  campaign.audit_crashes.erase(run);
+  outbox.log({.severity = Severity::error,
+              .kind = "audit_given_up",
+              .text = fmt::format("run={} crashes={}", run.value, num_crashes),
+              .campaign = id});
+}
+
+/// A run that is suspected already will be tried alone; only then does a crash tell more.
+RunSet blame_runs(CampaignState& campaign, const RunSet& accused, Certainty certainty,
+                  const std::string& host) {
+  RunSet blamed;
+  for (const RunRange& range : accused.ranges()) {
+    for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
+      if (certainty == Certainty::ambiguous && campaign.suspects.contains(run)) continue;
+      Suspicion& suspicion = campaign.suspects[run];
+      Suspicion::OnHost& on_host = suspicion.hosts[host];
+      ++suspicion.num_crashes;
+      ++on_host.num_crashes;
+      if (certainty == Certainty::certain) ++on_host.num_alone;
+      blamed.add({run, 1});
+    }
+  }
+  return blamed;
+}
+
+/// Takes the audits out of the accused runs.
+RunsByCampaign split_audits(const State& state, RunsByCampaign& accused) {
+  RunsByCampaign audits;
+  for (auto& [id, runs] : accused) {
+    for (const auto& [run, lease] : state.campaigns.at(id).audits) {
+      if (runs.remove(run)) audits[id].add({run, 1});
+    }
+  }
+  std::erase_if(accused, [](const auto& item) { return item.second.empty(); });
+  return audits;
+}
+
+RunsByCampaign blame(State& state, WorkerId id, RunsByCampaign accused, Certainty certainty,
+                     Outbox& outbox) {
+  const std::string host = state.workers.at(id).host;
+  if (state.quarantined.contains(host)) return {};
+  const std::uint32_t num_crashes = ++state.hosts.at(host).num_crashes;
+  if (num_crashes >= state.config.crashes_per_host_max) {
+    quarantine(state, host, num_crashes, outbox);
+    return {};
+  }
+  const RunsByCampaign audits = split_audits(state, accused);
+  RunsByCampaign blamed;
+  for (const auto& [campaign, runs] : accused) {
+    blamed[campaign] = blame_runs(state.campaigns.at(campaign), runs, certainty, host);
+  }
+  if (!accused.empty()) return blamed;
+  for (const auto& [campaign, runs] : audits) {
+    for (const RunRange& range : runs.ranges()) {
+      for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
+        count_audit_crash(state, campaign, run, outbox);
+      }
+    }
+  }
+  return blamed;
+}
+
+}  // namespace
+
+RunsByCampaign blame_crash(State& state, WorkerId id, Outbox& outbox) {
+  const Worker& worker = state.workers.at(id);
+  const bool is_certain = worker.num_lent == 1 && worker.unleased.empty();
+  return blame(state, id, computed_runs(state, worker),
+               is_certain ? Certainty::certain : Certainty::ambiguous, outbox);
+}
+
+RunsByCampaign blame_batch(State& state, WorkerId id, const wire::ComputedBatch& batch,
+                           Outbox& outbox) {
+  const RunsByCampaign leased = leased_runs(state, state.workers.at(id));
+  const auto found = leased.find(batch.campaign);
+  RunsByCampaign accused;
+  if (found != leased.end()) {
+    accused[batch.campaign] = found->second.overlap(RunSet(batch.ranges));
+  }
+  const bool is_certain = RunSet(batch.ranges).size() == 1;
+  return blame(state, id, accused, is_certain ? Certainty::certain : Certainty::ambiguous, outbox);
+}
+
+bool is_guilty(const State& state, const Suspicion& suspicion) {
+  std::uint32_t num_credible = suspicion.num_crashes;
+  std::uint32_t num_witnesses = 0;
+  for (const auto& [name, on_host] : suspicion.hosts) {
+    if (on_host.num_alone > 0) ++num_witnesses;
+    const auto host = state.hosts.find(name);
+    const bool is_proven = host != state.hosts.end() && host->second.num_results > 0;
+    if (!is_proven) num_credible -= on_host.num_crashes;
+  }
+  const std::uint32_t crashes_max = state.config.crashes_per_run_max;
+  return num_credible >= crashes_max ||
+         (num_witnesses >= 2 && suspicion.num_crashes >= crashes_max);
+}
+
+void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  const Suspicion suspicion = campaign.suspects.at(run);
+  // The run is the cause: hosts that have shown that they can compute are not.
+  for (const auto& [name, on_host] : suspicion.hosts) {
+    const auto host = state.hosts.find(name);
+    if (host == state.hosts.end() || host->second.num_results == 0) continue;
+    host->second.num_crashes -= std::min(host->second.num_crashes, on_host.num_crashes);
+  }
+  campaign.suspects.erase(run);
+  campaign.given_up.add({run, 1});
+  outbox.give_up(id, run);
+  outbox.log({.severity = Severity::error,
+              .kind = "run_given_up",
+              .text = fmt::format("run={} crashes={}", run.value, suspicion.num_crashes),
+              .campaign = id});
+}
+
+bool may_try(const State& state, const Suspicion& suspicion, const Worker& worker) {
+  if (!suspicion.hosts.contains(worker.host)) return true;
+  return std::none_of(state.hosts.begin(), state.hosts.end(), [&](const auto& item) {
+    const auto& [name, host] = item;
+    return host.num_workers > 0 && !state.quarantined.contains(name) &&
+           !suspicion.hosts.contains(name);
+  });
+}
+
+}  // namespace proofmass::coordinator::detail

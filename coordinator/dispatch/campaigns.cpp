@@ -1,0 +1,157 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "coordinator/dispatch/blame.hpp"
+#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/leases.hpp"
+#include "coordinator/dispatch/lending.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+void send_forget(const State& state, CampaignId id, Outbox& outbox) {
+  for (const auto& [worker, content] : state.workers) {
+    outbox.send(worker, wire::Forget{.campaign = id});
+  }
+}
+
+/// Open runs that were blamed for crashes are suspects again. On which hosts is not known any more,
+/// so that one more crash at least, here, must speak against them.
+void restore_blame(State& state, CampaignId id, const StoredCampaign& stored, RunSet& open,
+                   Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  for (const StoredCampaign::Blamed& blamed : stored.blamed) {
+    if (blamed.num_crashes == 0 || !open.remove(blamed.run)) continue;
+    campaign.suspects[blamed.run].num_crashes =
+        std::clamp(state.config.crashes_per_run_max - 1, 1U, blamed.num_crashes);
+    detail::make_pending(state, id, RunSet(RunRange{blamed.run, 1}), {blamed.attempt.value + 1},
+                         outbox);
+  }
+}
+
+/// Who computed the finished runs is not known any more: any worker may compute them again.
+void restore_audits(CampaignState& campaign, const StoredCampaign& stored) {
+  if (stored.phase == Phase::finished || stored.audit_fraction <= 0.0) return;
+  RunSet left(stored.finished);
+  left.remove(RunSet(stored.compared));
+  RunSet to_audit;
+  for (const RunRange& range : left.ranges()) {
+    for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
+      if (is_audited(stored.definition->seed, run, stored.audit_fraction)) to_audit.add({run, 1});
+    }
+  }
+  constexpr AuditKey unknown{.first_worker = {0}, .attempt = {2}};
+  if (!to_audit.empty()) detail::add_to_audit(campaign, unknown, to_audit);
+}
+
+/// Takes back all leases of a campaign.
+void recall(State& state, CampaignId id, Outbox& outbox) {
+  std::vector<LeaseId> leases;
+  for (const auto& [lease_id, lease] : state.leases) {
+    if (lease.campaign == id) leases.push_back(lease_id);
+  }
+  for (const LeaseId lease : leases) {
+    const auto found = state.leases.find(lease);
+    if (found == state.leases.end()) continue;
+    const RunSet runs = found->second.remaining;
+    detail::lose(state, lease, runs, LossReason::retracted, {}, outbox);
+  }
+}
+
+/// What follows a first lease that ends while copies remain is another first lease.
+void recall_all(State& state, CampaignId id, Outbox& outbox) {
+  const CampaignState& campaign = state.campaigns.at(id);
+  while (!campaign.lent.empty() || !campaign.audits.empty()) recall(state, id, outbox);
+}
+
+}  // namespace
+
+void on_campaign(State& state, CampaignId id, const StoredCampaign& stored, TimePoint now,
+                 Outbox& outbox) {
+  PROOFMASS_EXPECT(!state.campaigns.contains(id));
+  CampaignState& campaign = state.campaigns[id];
+  state.order.push_back(id);
+  campaign.definition = stored.definition;
+  campaign.phase = stored.phase;
+  campaign.priority = stored.priority;
+  campaign.audit_fraction = stored.audit_fraction;
+  campaign.committed = RunSet(stored.finished);
+  campaign.given_up = RunSet(stored.given_up);
+  RunSet open(RunRange{{0}, stored.definition->num_runs});
+  open.remove(campaign.committed);
+  open.remove(campaign.given_up);
+  restore_blame(state, id, stored, open, outbox);
+  detail::make_pending(state, id, std::move(open), {1}, outbox);
+  restore_audits(campaign, stored);
+  if (campaign.phase == Phase::finished && !is_finished(campaign)) campaign.phase = Phase::active;
+  detail::sort_served(state);
+  detail::settle(state, now, outbox);
+}
+
+void on_extended(State& state, CampaignId id, std::shared_ptr<const Campaign> definition,
+                 TimePoint now, Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  const std::uint64_t num_before = campaign.definition->num_runs;
+  PROOFMASS_EXPECT(definition->num_runs > num_before);
+  const RunRange added{{num_before}, definition->num_runs - num_before};
+  campaign.definition = std::move(definition);
+  if (campaign.phase == Phase::finished) campaign.phase = Phase::active;
+  detail::make_pending(state, id, RunSet(added), {1}, outbox);
+  detail::sort_served(state);
+  detail::lend_to_hungry(state, now, outbox);
+}
+
+void on_pause(State& state, CampaignId id, Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  if (campaign.phase != Phase::active) return;
+  campaign.phase = Phase::paused;
+  detail::sort_served(state);
+  detail::RunsByWorker runs;
+  for (auto& [lease_id, lease] : state.leases) {
+    if (lease.campaign != id) continue;
+    lease.is_retracted = true;
+    runs[lease.worker].add(lease.remaining);
+  }
+  for (const auto& [worker, held] : runs) detail::send_retract(worker, id, held, outbox);
+}
+
+void on_resume(State& state, CampaignId id, TimePoint now, Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  if (campaign.phase != Phase::paused && campaign.phase != Phase::cancelled) return;
+  campaign.phase = Phase::active;
+  for (auto& [lease_id, lease] : state.leases) {
+    if (lease.campaign == id) lease.is_retracted = false;
+  }
+  detail::sort_served(state);
+  detail::settle(state, now, outbox);
+}
+
+void on_cancel(State& state, CampaignId id, Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  if (campaign.phase == Phase::cancelled || campaign.phase == Phase::finished) return;
+  campaign.phase = Phase::cancelled;
+  detail::sort_served(state);
+  recall_all(state, id, outbox);
+  send_forget(state, id, outbox);
+}
+
+void on_removed(State& state, CampaignId id, Outbox& outbox) {
+  const CampaignState& campaign = state.campaigns.at(id);
+  PROOFMASS_EXPECT(campaign.delivered.empty());
+  recall_all(state, id, outbox);
+  state.campaigns.erase(id);
+  std::erase(state.order, id);
+  std::erase(state.served, id);
+  for (auto& [worker_id, worker] : state.workers) {
+    worker.run_time_s.erase(id);
+    worker.unleased.erase(id);
+    std::erase_if(worker.computing,
+                  [&](const Progress& progress) { return progress.batch.campaign == id; });
+  }
+  send_forget(state, id, outbox);
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,269 @@
+#include "coordinator/dispatch/leases.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+#include <vector>
+
+#include "coordinator/dispatch/blame.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+Attempt after(Attempt attempt) { return {attempt.value + 1}; }
+
+/// The lease of a copy becomes the first one of the run.
+void promote_copy(State& state, CampaignId id, RunIndex run, LeaseId copy) {
+  const Lease& old = state.leases.at(copy);
+  Lease lease{.campaign = id,
+              .worker = old.worker,
+              .attempt = old.attempt,
+              .known_as = old.known_as,
+              .is_retracted = old.is_retracted,
+              .remaining = RunSet(RunRange{run, 1}),
+              .lent_at = old.lent_at,
+              .audited = {}};
+  take_off(state, copy, {run, 1});
+  (void)open_lease(state, std::move(lease));
+}
+
+/// The workers may go on with it, but not as if it were like any other run.
+void drop_copies(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
+  const std::vector<LeaseId> leases = state.campaigns.at(id).copies.at(run).leases;
+  for (const LeaseId lease : leases) {
+    const WorkerId holder = state.leases.at(lease).worker;
+    Worker& worker = state.workers.at(holder);
+    worker.unleased[id].add({run, 1});
+    worker.clear_at =
+        std::max(worker.clear_at, state.leases.at(lease).lent_at + state.config.arrival_max);
+    take_off(state, lease, {run, 1});
+    send_retract(holder, id, RunSet(RunRange{run, 1}), outbox);
+  }
+}
+
+/// Runs that were taken off their first lease. One with a copy goes on there, unless it is
+/// suspected: then it must be tried alone.
+void reopen(State& state, CampaignId id, RunSet runs, Attempt attempt, Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  for (const RunRange& range : runs.ranges()) {
+    auto next = campaign.copies.lower_bound(range.first);
+    while (next != campaign.copies.end() && next->first.value < range.end()) {
+      const auto [run, copies] = *next;
+      runs.remove(run);
+      const bool is_suspect = campaign.suspects.contains(run);
+      if (is_suspect) drop_copies(state, id, run, outbox);
+      if (is_suspect || copies.leases.empty()) {
+        next = campaign.copies.erase(next);
+        make_pending(state, id, RunSet(RunRange{run, 1}), after(copies.newest), outbox);
+      } else {
+        promote_copy(state, id, run, copies.leases.front());
+        ++next;
+      }
+    }
+  }
+  make_pending(state, id, std::move(runs), after(attempt), outbox);
+}
+
+void record_losses(const Lease& lease, const RunSet& runs, LossReason reason, bool is_blamed,
+                   Outbox& outbox) {
+  for (const RunRange& range : runs.ranges()) {
+    outbox.record({.campaign = lease.campaign,
+                   .runs = range,
+                   .attempt = lease.attempt,
+                   .worker = lease.worker,
+                   .reason = reason,
+                   .is_blamed = is_blamed});
+  }
+}
+
+void log_loss(const Lease& lease, const RunSet& runs, LossReason reason, const RunSet& blamed,
+              Outbox& outbox) {
+  std::string text = fmt::format("worker={} runs={} attempt={} reason={}", lease.worker.value,
+                                 to_text(runs), lease.attempt.value, name_of(reason));
+  if (!blamed.empty()) text += fmt::format(" blamed={}", to_text(blamed));
+  const bool is_wanted = reason == LossReason::retracted;
+  outbox.log({.severity = is_wanted ? Severity::info : Severity::warning,
+              .kind = "runs_lost",
+              .text = std::move(text),
+              .campaign = lease.campaign});
+}
+
+bool remove_from_pending(CampaignState& campaign, RunIndex run) {
+  if (campaign.pending_suspects.erase(run) == 1) return true;
+  for (auto runs = campaign.pending.begin(); runs != campaign.pending.end(); ++runs) {
+    if (!runs->second.remove(run)) continue;
+    if (runs->second.empty()) campaign.pending.erase(runs);
+    return true;
+  }
+  return false;
+}
+
+void take_off_and_tell(State& state, LeaseId lease, RunIndex run, WorkerId by,
+                       RunsByWorker& holders) {
+  const WorkerId worker = state.leases.at(lease).worker;
+  if (worker != by) holders[worker].add({run, 1});
+  take_off(state, lease, {run, 1});
+}
+
+}  // namespace
+
+LeaseId open_lease(State& state, Lease lease) {
+  PROOFMASS_EXPECT(!lease.remaining.empty());
+  const LeaseId id{state.next_lease++};
+  CampaignState& campaign = state.campaigns.at(lease.campaign);
+  for (const RunRange& range : lease.remaining.ranges()) {
+    if (lease.kind == LeaseKind::first) {
+      campaign.lent.add(range, id);
+      continue;
+    }
+    for (std::uint64_t run = range.first.value; run < range.end(); ++run) {
+      if (lease.kind == LeaseKind::audit) {
+        campaign.audits.emplace(RunIndex{run}, id);
+      } else {
+        Copies& copies = campaign.copies[{run}];
+        copies.leases.push_back(id);
+        copies.newest = std::max(copies.newest, lease.attempt);
+      }
+    }
+  }
+  Worker& worker = state.workers.at(lease.worker);
+  worker.num_lent += lease.remaining.size();
+  if (lease.is_alone) worker.num_alone += lease.remaining.size();
+  worker.leases.insert(id);
+  state.leases.emplace(id, std::move(lease));
+  return id;
+}
+
+void take_off(State& state, LeaseId id, RunRange runs) {
+  const auto found = state.leases.find(id);
+  PROOFMASS_EXPECT(found != state.leases.end());
+  Lease& lease = found->second;
+  CampaignState& campaign = state.campaigns.at(lease.campaign);
+  const std::uint64_t size_before = lease.remaining.size();
+  lease.remaining.remove(runs);
+  PROOFMASS_EXPECT(size_before - lease.remaining.size() == runs.count);
+  if (lease.kind == LeaseKind::first) {
+    campaign.lent.remove(runs);
+  } else {
+    for (std::uint64_t run = runs.first.value; run < runs.end(); ++run) {
+      if (lease.kind == LeaseKind::audit) {
+        campaign.audits.erase({run});
+      } else {
+        std::erase(campaign.copies.at({run}).leases, id);
+      }
+    }
+  }
+  Worker& worker = state.workers.at(lease.worker);
+  worker.num_lent -= runs.count;
+  if (lease.is_alone) worker.num_alone -= runs.count;
+  if (!lease.remaining.empty()) return;
+  worker.leases.erase(id);
+  state.leases.erase(found);
+}
+
+void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const RunSet& blamed,
+          Outbox& outbox) {
+  const Lease lease = state.leases.at(id);
+  const RunSet guilty = runs.overlap(blamed);
+  RunSet others = runs;
+  others.remove(guilty);
+  record_losses(lease, guilty, reason, true, outbox);
+  record_losses(lease, others, reason, false, outbox);
+  log_loss(lease, runs, reason, guilty, outbox);
+  for (const RunRange& range : runs.ranges()) take_off(state, id, range);
+  state.hungry.insert(lease.worker);  // It has room for others now.
+  if (lease.kind == LeaseKind::first) reopen(state, lease.campaign, runs, lease.attempt, outbox);
+  if (lease.kind == LeaseKind::audit) {
+    add_to_audit(state.campaigns.at(lease.campaign),
+                 {.first_worker = lease.audited, .attempt = after(lease.attempt)}, runs);
+  }
+}
+
+void make_pending(State& state, CampaignId id, RunSet runs, Attempt attempt, Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  for (const RunRange& range : runs.ranges()) {
+    auto next = campaign.suspects.lower_bound(range.first);
+    while (next != campaign.suspects.end() && next->first.value < range.end()) {
+      const auto current = next++;
+      const RunIndex run = current->first;
+      runs.remove(run);
+      if (is_guilty(state, current->second)) {
+        give_up(state, id, run, outbox);
+      } else {
+        campaign.pending_suspects.emplace(run, attempt);
+      }
+    }
+  }
+  if (!runs.empty()) campaign.pending[attempt].add(runs);
+}
+
+void add_to_audit(CampaignState& campaign, const AuditKey& key, const RunSet& runs) {
+  RunSet& to_audit = campaign.to_audit[key];
+  const std::uint64_t size_before = to_audit.size();
+  to_audit.add(runs);
+  campaign.num_to_audit += to_audit.size() - size_before;
+}
+
+bool close_run(State& state, CampaignId id, RunIndex run, WorkerId by, RunsByWorker& holders) {
+  CampaignState& campaign = state.campaigns.at(id);
+  if (const auto first = campaign.lent.find(run)) {
+    take_off_and_tell(state, *first, run, by, holders);
+    if (const auto found = campaign.copies.find(run); found != campaign.copies.end()) {
+      const std::vector<LeaseId> copies = found->second.leases;
+      for (const LeaseId copy : copies) take_off_and_tell(state, copy, run, by, holders);
+      campaign.copies.erase(run);
+    }
+  } else if (!remove_from_pending(campaign, run) && !campaign.given_up.remove(run)) {
+    return false;
+  }
+  campaign.suspects.erase(run);
+  return true;
+}
+
+RunsByCampaign leased_runs(const State& state, const Worker& worker) {
+  RunsByCampaign runs;
+  for (const LeaseId id : worker.leases) {
+    const Lease& lease = state.leases.at(id);
+    runs[lease.campaign].add(lease.remaining);
+  }
+  return runs;
+}
+
+void send_retract(WorkerId worker, CampaignId campaign, const RunSet& runs, Outbox& outbox) {
+  const std::vector<RunRange> ranges = runs.ranges();
+  for (std::size_t first = 0; first < ranges.size(); first += wire::ranges_per_message_max) {
+    const std::size_t count = std::min(wire::ranges_per_message_max, ranges.size() - first);
+    const auto begin = ranges.begin() + static_cast<std::ptrdiff_t>(first);
+    outbox.send(worker,
+                wire::Retract{.campaign = campaign,
+                              .ranges = {begin, begin + static_cast<std::ptrdiff_t>(count)}});
+  }
+}
+
+void remove_worker(State& state, WorkerId id, LossReason reason, const RunsByCampaign& blamed,
+                   Outbox& outbox) {
+  const std::set<LeaseId> leases = state.workers.at(id).leases;
+  for (const LeaseId lease_id : leases) {
+    // A run that is lost may go on as the worker's own copy; that lease ends below, too.
+    const auto found = state.leases.find(lease_id);
+    if (found == state.leases.end()) continue;
+    const auto guilty = blamed.find(found->second.campaign);
+    const RunSet runs = found->second.remaining;
+    lose(state, lease_id, runs, reason, guilty == blamed.end() ? RunSet() : guilty->second, outbox);
+  }
+  const Worker& worker = state.workers.at(id);
+  PROOFMASS_EXPECT(worker.leases.empty());
+  state.num_slots -= worker.num_slots;
+  const auto host = state.hosts.find(worker.host);
+  --host->second.num_workers;
+  const auto& [num_workers, num_crashes, num_results] = host->second;
+  if (num_workers == 0 && num_crashes == 0 && num_results == 0) state.hosts.erase(host);
+  state.hungry.erase(id);
+  state.awaited.erase(worker.session);
+  state.workers.erase(id);
+}
+
+}  // namespace proofmass::coordinator::detail

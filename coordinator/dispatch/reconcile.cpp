@@ -1,0 +1,179 @@
+#include <algorithm>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "coordinator/dispatch/leases.hpp"
+#include "coordinator/dispatch/lending.hpp"
+#include "coordinator/dispatch/workers.hpp"
+
+// What a heartbeat says against what the coordinator believes. Either may be right: messages are
+// lost on both ways, workers outlive coordinators, and a silent worker's runs are lent again.
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+using HeldByAttempt = std::map<Attempt, RunSet>;
+
+/// More than a worker can hold by the rules, so that one that claims everything gets it not.
+constexpr std::uint64_t num_adopted_max = 2 * wire::runs_per_lease_max;
+
+RunSet all_of(const HeldByAttempt& held) {
+  RunSet all;
+  for (const auto& [attempt, runs] : held) all.add(runs);
+  return all;
+}
+
+/// Runs of one campaign that one worker holds although they are not lent to it.
+struct Adoption {
+  State& state;
+  WorkerId id;
+  CampaignId campaign_id;
+  TimePoint now;
+
+  /// Those of the runs that are pending are lent to the worker from now on.
+  void adopt(Attempt held_as, const RunSet& runs) const {
+    auto& pending = state.campaigns.at(campaign_id).pending;
+    for (auto next = pending.begin(); next != pending.end();) {
+      const Attempt attempt = next->first;
+      const RunSet common = next->second.overlap(runs);
+      if (!has_room_for(common)) {
+        ++next;
+        continue;
+      }
+      next->second.remove(common);
+      next = next->second.empty() ? pending.erase(next) : std::next(next);
+      open(held_as, attempt, common);
+    }
+  }
+
+  /// A suspect that is all that the worker has goes on there. Any other one must be tried alone.
+  /// @return True if the only run is a suspect, and lent to the worker from now on.
+  [[nodiscard]] bool adopt_suspect(const HeldByAttempt& held, const RunSet& rest) const {
+    auto& suspects = state.campaigns.at(campaign_id).pending_suspects;
+    if (rest.size() != 1 || state.workers.at(id).num_lent > 0) return false;
+    const auto found = suspects.find(rest.first());
+    if (found == suspects.end()) return false;
+    const auto held_as = std::find_if(held.begin(), held.end(), [&](const auto& item) {
+      return item.second.contains(found->first);
+    });
+    const Attempt attempt = found->second;
+    suspects.erase(found);
+    open(held_as->first, attempt, rest, true);
+    return true;
+  }
+
+ private:
+  [[nodiscard]] bool has_room_for(const RunSet& runs) const {
+    return !runs.empty() && state.workers.at(id).num_lent + runs.size() <= num_adopted_max;
+  }
+
+  void open(Attempt held_as, Attempt pending_as, const RunSet& runs, bool is_alone = false) const {
+    const bool is_paused = state.campaigns.at(campaign_id).phase == Phase::paused;
+    (void)open_lease(state, {.campaign = campaign_id,
+                             .worker = id,
+                             .attempt = std::max(held_as, pending_as),
+                             .known_as = held_as,
+                             .is_alone = is_alone,
+                             .is_retracted = is_paused,
+                             .remaining = runs,
+                             .lent_at = now,
+                             .audited = {}});
+  }
+};
+
+/// Without those that the worker has delivered: the acknowledgement will come.
+RunSet without_delivered(const CampaignState& campaign, RunSet runs) {
+  for (const RunRange& range : runs.ranges()) {
+    auto next = campaign.delivered.lower_bound(range.first);
+    for (; next != campaign.delivered.end() && next->first.value < range.end(); ++next) {
+      runs.remove(next->first);
+    }
+  }
+  return runs;
+}
+
+/// Adopts what the worker holds and is not lent to anybody, and asks the rest back.
+void settle_surplus(State& state, WorkerId id, CampaignId campaign_id, const HeldByAttempt& held,
+                    TimePoint now, Outbox& outbox) {
+  Worker& worker = state.workers.at(id);
+  const CampaignState& campaign = state.campaigns.at(campaign_id);
+  const RunSet leased = leased_runs(state, worker)[campaign_id];
+  const Adoption adoption{state, id, campaign_id, now};
+  for (const auto& [attempt, runs] : held) {
+    RunSet surplus = runs;
+    surplus.remove(leased);
+    if (!surplus.empty()) adoption.adopt(attempt, surplus);
+  }
+  RunSet rest = all_of(held);
+  rest.remove(leased_runs(state, worker)[campaign_id]);
+  rest = without_delivered(campaign, std::move(rest));
+  RunSet open = rest;
+  open.remove(campaign.committed);
+  if (adoption.adopt_suspect(held, open)) {
+    rest.remove(open);
+    open = {};
+  }
+  if (!rest.empty()) send_retract(id, campaign_id, rest, outbox);
+  if (!open.empty()) worker.unleased[campaign_id] = std::move(open);
+}
+
+/// Runs that the worker was lent long ago and does not hold have not arrived.
+void settle_missing(State& state, WorkerId id, const std::map<CampaignId, RunSet>& held,
+                    TimePoint now, Outbox& outbox) {
+  const std::set<LeaseId> leases = state.workers.at(id).leases;
+  for (const LeaseId lease_id : leases) {
+    const Lease& lease = state.leases.at(lease_id);
+    if (now - lease.lent_at < state.config.arrival_max) continue;
+    RunSet missing = lease.remaining;
+    const auto found = held.find(lease.campaign);
+    if (found != held.end()) missing.remove(found->second);
+    if (!missing.empty()) lose(state, lease_id, missing, LossReason::never_arrived, {}, outbox);
+  }
+}
+
+/// Asks again for what the worker should give back.
+void repeat_retracts(const State& state, WorkerId id, Outbox& outbox) {
+  const Worker& worker = state.workers.at(id);
+  RunsByCampaign runs;
+  for (const LeaseId lease_id : worker.leases) {
+    const Lease& lease = state.leases.at(lease_id);
+    if (lease.is_retracted) runs[lease.campaign].add(lease.remaining);
+  }
+  for (auto& [campaign, waiting] : runs) {
+    for (const Progress& progress : worker.computing) {
+      if (progress.batch.campaign == campaign) waiting.remove(RunSet(progress.batch.ranges));
+    }
+    if (!waiting.empty()) send_retract(id, campaign, waiting, outbox);
+  }
+}
+
+bool is_wanted(const State& state, CampaignId id) {
+  const auto found = state.campaigns.find(id);
+  return found != state.campaigns.end() && found->second.phase != Phase::cancelled &&
+         found->second.phase != Phase::finished;
+}
+
+}  // namespace
+
+void reconcile(State& state, WorkerId id, const wire::Heartbeat& heartbeat, TimePoint now,
+               Outbox& outbox) {
+  std::map<CampaignId, HeldByAttempt> held;
+  std::map<CampaignId, RunSet> all_held;
+  for (const wire::HeldRuns& runs : heartbeat.held) {
+    held[runs.campaign][runs.attempt].add(RunSet(runs.ranges));
+    all_held[runs.campaign].add(RunSet(runs.ranges));
+  }
+  state.workers.at(id).unleased.clear();
+  for (const auto& [campaign, runs] : held) {
+    if (is_wanted(state, campaign)) {
+      settle_surplus(state, id, campaign, runs, now, outbox);
+    } else {
+      outbox.send(id, wire::Forget{.campaign = campaign});
+    }
+  }
+  settle_missing(state, id, all_held, now, outbox);
+  repeat_retracts(state, id, outbox);
+}
+
+}  // namespace proofmass::coordinator::detail

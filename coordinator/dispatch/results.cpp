@@ -1,0 +1,208 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/leases.hpp"
+#include "coordinator/dispatch/lending.hpp"
+#include "coordinator/dispatch/workers.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using RunsToAcknowledge = std::map<WorkerId, std::vector<RunIndex>>;
+
+void add_run_time(double compute_s, double& mean_s) {
+  constexpr double weight = 0.2;          // Of the newest run: the mean spans about the last ten.
+  compute_s = std::max(compute_s, 1e-9);  // 0 means that nothing is known.
+  mean_s = mean_s > 0.0 ? mean_s + weight * (compute_s - mean_s) : compute_s;
+}
+
+void send_acks(const State& state, CampaignId id, const RunsToAcknowledge& runs_by_worker,
+               Outbox& outbox) {
+  for (const auto& [worker, runs] : runs_by_worker) {
+    if (!state.workers.contains(worker)) continue;
+    for (std::size_t first = 0; first < runs.size(); first += wire::runs_per_lease_max) {
+      const auto begin = runs.begin() + static_cast<std::ptrdiff_t>(first);
+      const auto count = std::min<std::size_t>(wire::runs_per_lease_max, runs.size() - first);
+      outbox.send(worker,
+                  wire::ResultAck{.campaign = id,
+                                  .runs = {begin, begin + static_cast<std::ptrdiff_t>(count)}});
+    }
+  }
+}
+
+/// Results of one worker for one campaign, on their way through the dispatch.
+struct Intake {
+  State& state;
+  WorkerId id;
+  CampaignId campaign_id;
+  CampaignState& campaign;
+  Attempt attempt;
+  Outbox& outbox;
+  detail::RunsByWorker holders;   ///< Who else was lent the runs.
+  std::vector<RunIndex> durable;  ///< To be acknowledged at once.
+
+  void take(const wire::ComputedRun& computed) {
+    const RunIndex run = computed.result.run;
+    if (detail::close_run(state, campaign_id, run, id, holders)) {
+      campaign.delivered[run] = {.attempt = attempt, .waiting = {id}};
+      if (!computed.result.has_estimate()) ++campaign.num_without_estimate;
+      outbox.store(arrival(computed));
+      return;
+    }
+    const auto delivered = campaign.delivered.find(run);
+    if (delivered == campaign.delivered.end()) {
+      durable.push_back(run);
+      if (!end_audit(run)) ++campaign.num_duplicates;
+      return compare(computed);
+    }
+    std::vector<WorkerId>& waiting = delivered->second.waiting;
+    // One that waits repeats itself.
+    if (std::find(waiting.begin(), waiting.end(), id) != waiting.end()) return;
+    waiting.push_back(id);
+    ++campaign.num_duplicates;
+    compare(computed);
+  }
+
+ private:
+  [[nodiscard]] Arrival arrival(const wire::ComputedRun& computed) const {
+    return {.campaign = campaign_id, .worker = id, .attempt = attempt, .computed = computed};
+  }
+
+  void compare(const wire::ComputedRun& computed) {
+    ++campaign.num_comparing;
+    outbox.compare(arrival(computed));
+  }
+
+  /// True if the run was on an audit lease of this worker.
+  bool end_audit(RunIndex run) {
+    const auto audit = campaign.audits.find(run);
+    if (audit == campaign.audits.end()) return false;
+    if (state.leases.at(audit->second).worker != id) return false;
+    detail::take_off(state, audit->second, {run, 1});
+    campaign.audit_crashes.erase(run);
+    return true;
+  }
+};
+
+bool is_foreign(const CampaignState& campaign, const wire::ResultBatch& batch) {
+  return std::any_of(batch.results.begin(), batch.results.end(), [&](const auto& computed) {
+    return computed.result.run.value >= campaign.definition->num_runs;
+  });
+}
+
+/// The worker and its host can compute: what they show with every result.
+void count_results(State& state, Worker& worker, CampaignId id, const wire::ResultBatch& batch) {
+  Host& host = state.hosts.at(worker.host);
+  host.num_crashes = 0;
+  host.num_results += batch.results.size();
+  worker.num_results += batch.results.size();
+  CampaignState& campaign = state.campaigns.at(id);
+  double& own_s = worker.run_time_s[id];
+  const auto unleased = worker.unleased.find(id);
+  for (const wire::ComputedRun& computed : batch.results) {
+    add_run_time(computed.compute_s, own_s);
+    add_run_time(computed.compute_s, campaign.run_time_s);
+    if (unleased != worker.unleased.end()) unleased->second.remove(computed.result.run);
+  }
+  if (unleased != worker.unleased.end() && unleased->second.empty()) {
+    worker.unleased.erase(unleased);
+  }
+}
+
+}  // namespace
+
+void on_results(State& state, WorkerId id, const wire::ResultBatch& batch, TimePoint now,
+                Outbox& outbox) {
+  Worker* const worker = detail::heard(state, id, now, outbox);
+  if (worker == nullptr) return;
+  const auto found = state.campaigns.find(batch.campaign);
+  if (found == state.campaigns.end() || found->second.phase == Phase::cancelled) {
+    return outbox.send(id, wire::Forget{.campaign = batch.campaign});
+  }
+  CampaignState& campaign = found->second;
+  if (is_foreign(campaign, batch)) {
+    outbox.send(id, wire::Reject{.reason = wire::RejectReason::malformed,
+                                 .text = "run = beyond the campaign (must be below num_runs)"});
+    return on_gone(state, id, LossReason::protocol, now, outbox);
+  }
+  count_results(state, *worker, batch.campaign, batch);
+  Intake intake{state, id, batch.campaign, campaign, batch.attempt, outbox, {}, {}};
+  for (const wire::ComputedRun& computed : batch.results) intake.take(computed);
+  if (!intake.durable.empty()) {
+    send_acks(state, batch.campaign, {{id, std::move(intake.durable)}}, outbox);
+  }
+  for (const auto& [holder, runs] : intake.holders) {
+    detail::send_retract(holder, batch.campaign, runs, outbox);
+  }
+  detail::lend(state, id, now, outbox);
+}
+
+void on_committed(State& state, CampaignId id, std::span<const RunIndex> runs, TimePoint now,
+                  Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  const bool was_backed_up = detail::is_backed_up(state, campaign);
+  RunsToAcknowledge acknowledged;
+  for (const RunIndex run : runs) {
+    const auto found = campaign.delivered.find(run);
+    PROOFMASS_EXPECT(found != campaign.delivered.end());
+    const auto& [attempt, waiting] = found->second;
+    for (const WorkerId worker : waiting) acknowledged[worker].push_back(run);
+    if (is_audited(campaign.definition->seed, run, campaign.audit_fraction)) {
+      detail::add_to_audit(campaign,
+                           {.first_worker = waiting.front(), .attempt = {attempt.value + 1}},
+                           RunSet(RunRange{run, 1}));
+    }
+    campaign.delivered.erase(found);
+    campaign.committed.add({.first = run, .count = 1});
+  }
+  campaign.num_committed_here += runs.size();
+  send_acks(state, id, acknowledged, outbox);
+  detail::finish_if_done(state, id, outbox);
+  if (was_backed_up || !campaign.to_audit.empty()) detail::lend_to_hungry(state, now, outbox);
+}
+
+void on_compared(State& state, CampaignId id, RunIndex run, WorkerId worker, bool is_equal,
+                 TimePoint, Outbox& outbox) {
+  const auto found = state.campaigns.find(id);
+  if (found == state.campaigns.end()) return;
+  CampaignState& campaign = found->second;
+  PROOFMASS_EXPECT(campaign.num_comparing > 0);
+  --campaign.num_comparing;
+  ++campaign.num_audited;
+  if (!is_equal) {
+    ++campaign.num_mismatches;
+    outbox.log({.severity = Severity::error,
+                .kind = "result_mismatch",
+                .text = fmt::format("run={} worker={}", run.value, worker.value),
+                .campaign = id});
+  }
+  detail::finish_if_done(state, id, outbox);
+}
+
+void on_store_failed(State& state, CampaignId id, const std::string& reason, Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  if (campaign.storage_failure == reason) return;
+  campaign.storage_failure = reason;
+  outbox.log({.severity = Severity::error,
+              .kind = "storage_failed",
+              .text = fmt::format("reason=\"{}\"", reason),
+              .campaign = id});
+}
+
+void on_store_recovered(State& state, CampaignId id, TimePoint now, Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  if (campaign.storage_failure.empty()) return;
+  campaign.storage_failure.clear();
+  outbox.log({.severity = Severity::info,
+              .kind = "storage_recovered",
+              .text = fmt::format("delivered={}", campaign.delivered.size()),
+              .campaign = id});
+  detail::lend_to_hungry(state, now, outbox);
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,183 @@
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "coordinator/dispatch/leases.hpp"
+#include "coordinator/dispatch/lending.hpp"
+#include "coordinator/dispatch/workers.hpp"
+
+// The end of a campaign: nothing is pending, and some workers have nothing to do while others still
+// compute. First the idle ones get what only waits at others, then copies of what takes too long.
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+constexpr std::size_t copies_max = 2;
+
+std::vector<WorkerId> idle_workers(const State& state, TimePoint now) {
+  std::vector<WorkerId> idle;
+  for (const WorkerId id : state.hungry) {
+    const Worker& worker = state.workers.at(id);
+    if (worker.num_lent == 0 && !is_passed_over(state, worker, now)) idle.push_back(id);
+  }
+  return idle;
+}
+
+std::uint64_t room(const Worker& worker) { return std::min(worker.num_slots, worker.num_runs_max); }
+
+/// What the worker does not compute yet, as far as is known.
+RunsByCampaign waiting_runs(const State& state, const Worker& worker) {
+  RunsByCampaign waiting;
+  for (const LeaseId id : worker.leases) {
+    const Lease& lease = state.leases.at(id);
+    const bool is_wanted = lease.kind == LeaseKind::first && !lease.is_alone;
+    if (is_wanted && is_lent(state.campaigns.at(lease.campaign))) {
+      waiting[lease.campaign].add(lease.remaining);
+    }
+  }
+  for (const Progress& progress : worker.computing) {
+    const auto found = waiting.find(progress.batch.campaign);
+    if (found != waiting.end()) found->second.remove(RunSet(progress.batch.ranges));
+  }
+  return waiting;
+}
+
+/// Asks a worker that has more than its slots can hold for the rest of it, at most `count_max`
+/// runs.
+/// @return How many runs it was asked for.
+std::uint64_t retract_from(State& state, WorkerId id, std::uint64_t count_max, TimePoint now,
+                           Outbox& outbox) {
+  Worker& worker = state.workers.at(id);
+  if (worker.num_lent <= worker.num_slots) return 0;
+  std::uint64_t num_left = std::min<std::uint64_t>(count_max, worker.num_lent - worker.num_slots);
+  const std::uint64_t num_before = num_left;
+  for (auto& [campaign, waiting] : waiting_runs(state, worker)) {
+    const std::uint64_t count = std::min(num_left, waiting.size());
+    if (count == 0) continue;
+    send_retract(id, campaign, waiting.take_last(count), outbox);
+    num_left -= count;
+  }
+  if (num_left < num_before) worker.retracted_at = now;
+  return num_before - num_left;
+}
+
+/// True if the worker answers, and has had the time to.
+bool may_be_asked(const State& state, const Worker& worker, TimePoint now) {
+  return now - worker.heard_at < state.config.suspect_after &&
+         now - worker.retracted_at >= state.config.heartbeat_interval;
+}
+
+std::uint64_t retract(State& state, std::uint64_t count_max, TimePoint now, Outbox& outbox) {
+  std::uint64_t num_asked = 0;
+  for (const auto& [id, worker] : state.workers) {
+    if (num_asked >= count_max) break;
+    if (!may_be_asked(state, worker, now)) continue;
+    num_asked += retract_from(state, id, count_max - num_asked, now, outbox);
+  }
+  return num_asked;
+}
+
+/// True if the lease takes far longer than it usually would, or its worker may be gone.
+bool is_overdue(const State& state, const Lease& lease, TimePoint now) {
+  const Worker& worker = state.workers.at(lease.worker);
+  if (now - worker.heard_at >= state.config.suspect_after) return true;
+  const double run_time_s = state.campaigns.at(lease.campaign).run_time_s;
+  if (run_time_s <= 0.0) return false;
+  const double usual_s = std::max(run_time_s, state.config.lease_work_s);
+  return std::chrono::duration<double>(now - lease.lent_at).count() > 2.0 * usual_s;
+}
+
+/// Copies for one idle worker.
+class Copying {
+ public:
+  Copying(State& state, WorkerId id, TimePoint now)
+      : state_(state), id_(id), now_(now), num_left_(room(state.workers.at(id))) {}
+
+  /// Takes what there is room for of the runs of a lease.
+  void take_from(const Lease& lease) {
+    if (num_left_ == 0 || lease.worker == id_) return;
+    const auto& [copies, suspects] = std::tie(state_.campaigns.at(lease.campaign).copies,
+                                              state_.campaigns.at(lease.campaign).suspects);
+    for (const RunRange& range : lease.remaining.ranges()) {
+      for (RunIndex run = range.first; run.value < range.end() && num_left_ > 0; ++run.value) {
+        const auto found = copies.find(run);
+        if (suspects.contains(run) || (found != copies.end() && !may_copy(found->second))) continue;
+        const Attempt newest = found == copies.end() ? lease.attempt : found->second.newest;
+        runs_[{lease.campaign, {newest.value + 1}}].add({run, 1});
+        --num_left_;
+      }
+    }
+  }
+
+  void lend(Outbox& outbox) {
+    for (auto& [key, runs] : runs_) {
+      const auto& [campaign, attempt] = key;
+      const LeaseId lease = open_lease(state_, {.campaign = campaign,
+                                                .worker = id_,
+                                                .attempt = attempt,
+                                                .known_as = attempt,
+                                                .kind = LeaseKind::copy,
+                                                .remaining = std::move(runs),
+                                                .lent_at = now_,
+                                                .audited = {}});
+      send_lease(state_, lease, outbox);
+    }
+    if (!runs_.empty()) detail::lend(state_, id_, now_, outbox);
+  }
+
+ private:
+  [[nodiscard]] bool may_copy(const Copies& copies) const {
+    return copies.leases.size() < copies_max &&
+           std::none_of(copies.leases.begin(), copies.leases.end(),
+                        [&](LeaseId lease) { return state_.leases.at(lease).worker == id_; });
+  }
+
+  State& state_;
+  WorkerId id_;
+  TimePoint now_;
+  std::uint64_t num_left_;
+  std::map<std::pair<CampaignId, Attempt>, RunSet> runs_;
+};
+
+void copy(State& state, const std::vector<WorkerId>& idle, TimePoint now, Outbox& outbox) {
+  std::vector<LeaseId> overdue;
+  for (const auto& [id, lease] : state.leases) {
+    const bool is_wanted = lease.kind == LeaseKind::first && !lease.is_alone;
+    if (is_wanted && is_lent(state.campaigns.at(lease.campaign)) && is_overdue(state, lease, now)) {
+      overdue.push_back(id);
+    }
+  }
+  if (overdue.empty()) return;
+  for (const WorkerId id : idle) {
+    Copying copying(state, id, now);
+    for (const LeaseId lease : overdue) copying.take_from(state.leases.at(lease));
+    copying.lend(outbox);
+  }
+}
+
+/// Then workers are idle although this is not the end.
+bool waits_for_a_store(const State& state) {
+  return std::any_of(state.served.begin(), state.served.end(),
+                     [&](CampaignId id) { return is_backed_up(state, state.campaigns.at(id)); });
+}
+
+}  // namespace
+
+void share_tail(State& state, TimePoint now, Outbox& outbox) {
+  if (!state.is_lending || is_reattaching(state, now) || waits_for_a_store(state)) return;
+  std::vector<WorkerId> idle = idle_workers(state, now);
+  if (idle.empty()) return;
+  std::uint64_t num_wanted = 0;
+  for (const WorkerId id : idle) num_wanted += room(state.workers.at(id));
+  std::uint64_t num_coming = retract(state, num_wanted, now, outbox);
+  while (!idle.empty() && num_coming > 0) {
+    num_coming -= std::min(num_coming, room(state.workers.at(idle.back())));
+    idle.pop_back();
+  }
+  copy(state, idle, now, outbox);
+}
+
+}  // namespace proofmass::coordinator::detail

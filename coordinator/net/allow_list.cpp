@@ -1,0 +1,136 @@
+#include "coordinator/net/allow_list.hpp"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <utility>
+
+#include "core/error.hpp"
+#include "proto/link/key_files.hpp"
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t file_size_max = std::size_t{16} << 20;
+constexpr std::chrono::seconds look_interval(1);
+/// The clock of a file system is coarse: a file may change twice with the same time.
+constexpr std::chrono::nanoseconds settled_after = std::chrono::milliseconds(100);
+
+[[noreturn]] void refuse(const std::filesystem::path& file, std::string_view rule) {
+  throw Error(fmt::format("allow-list = {} ({})", file.string(), rule));
+}
+
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+std::string_view take_word(std::string_view& line) {
+  const auto begin = std::ranges::find_if_not(line, is_blank);
+  const auto end = std::find_if(begin, line.end(), is_blank);
+  const std::string_view word(begin, end);
+  line = std::string_view(end, line.end());
+  return word;
+}
+
+/// Adds what one line says.
+/// @return Which rule it breaks; empty if none.
+std::string_view read_line(std::string_view line, AllowedKeys& keys) {
+  const std::string_view key = take_word(line);
+  if (key.empty() || key.front() == '#') return {};
+  const std::string_view name = take_word(line);
+  if (!wire::PublicKey::parse(key)) return "must begin with a public key of 40 characters";
+  if (!wire::is_name(name)) return "must have a name of [A-Za-z0-9._-] after the key";
+  if (!take_word(line).empty()) return "must be KEY NAME";
+  if (!keys.emplace(key, name).second) return "names a key a second time";
+  if (keys.size() > allowed_keys_max) return "is one key too many";
+  return {};
+}
+
+std::string read_file(const std::filesystem::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) refuse(file, std::strerror(errno));
+  if (!S_ISREG(status.st_mode)) refuse(file, "must be a regular file");
+  if ((status.st_mode & 022) != 0) {
+    refuse(file, fmt::format("mode {:04o}; must be writable by its owner alone: chmod go-w",
+                             status.st_mode & 07777));
+  }
+  if (static_cast<std::size_t>(status.st_size) > file_size_max) refuse(file, "is too large");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) refuse(file, std::strerror(errno));
+  std::string text(static_cast<std::size_t>(status.st_size), '\0');
+  stream.read(text.data(), status.st_size);
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  return text;
+}
+
+AllowedKeys read_allow_list(const std::filesystem::path& file) {
+  return parse_allow_list(read_file(file), file);
+}
+
+}  // namespace
+
+AllowedKeys parse_allow_list(std::string_view text, const std::filesystem::path& file) {
+  AllowedKeys keys;
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view rule = read_line(text.substr(0, end), keys);
+    if (!rule.empty()) {
+      throw Error(fmt::format("{} line = {} ({})", file.string(), number, rule));
+    }
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return keys;
+}
+
+AllowList::AllowList(std::filesystem::path file) : file_(std::move(file)) {
+  const Stamp stamp = stamp_of(file_);
+  names_ = read_allow_list(file_);
+  if (is_settled(stamp)) stamp_ = stamp;
+}
+
+std::optional<std::string> AllowList::refresh() {
+  // Taken before the file is read: a change in between is seen the next time.
+  const Stamp stamp = stamp_of(file_);
+  if (stamp == stamp_) return std::nullopt;
+  stamp_ = is_settled(stamp) ? std::optional(stamp) : std::nullopt;
+  try {
+    names_ = read_allow_list(file_);
+    reported_.clear();
+    return std::nullopt;
+  } catch (const Error& error) {
+    if (reported_ == error.what()) return std::nullopt;
+    reported_ = error.what();
+    return reported_;
+  }
+}
+
+std::optional<std::string> AllowList::refresh_if_due(TimePoint now) {
+  if (looked_at_ && now - *looked_at_ < look_interval) return std::nullopt;
+  looked_at_ = now;
+  return refresh();
+}
+
+const std::string* AllowList::name_of(std::string_view public_key) const {
+  const auto found = names_.find(public_key);
+  return found == names_.end() ? nullptr : &found->second;
+}
+
+AllowList::Stamp AllowList::stamp_of(const std::filesystem::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return {.error = errno};
+  constexpr std::int64_t ns_per_s = 1'000'000'000;
+  return {.changed_ns = status.st_ctim.tv_sec * ns_per_s + status.st_ctim.tv_nsec,
+          .size = status.st_size,
+          .inode = status.st_ino};
+}
+
+bool AllowList::is_settled(const Stamp& stamp) {
+  if (stamp.error != 0) return true;
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return now - std::chrono::nanoseconds(stamp.changed_ns) > settled_after;
+}
+
+}  // namespace proofmass::coordinator

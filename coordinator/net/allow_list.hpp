@@ -1,0 +1,68 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace proofmass::coordinator {
+
+inline constexpr std::size_t allowed_keys_max = 65536;
+
+/// Names by public key.
+using AllowedKeys = std::map<std::string, std::string, std::less<>>;
+
+/// The keys in the text of an allow-list: one line `KEY NAME` each; empty lines and lines that
+/// begin with `#` say nothing.
+///
+/// @param file  For messages.
+/// @throws Error reading `FILE line = NUMBER (rule)`. What the line says is not repeated, because
+///         somebody may have put a secret there.
+[[nodiscard]] AllowedKeys parse_allow_list(std::string_view text,
+                                           const std::filesystem::path& file);
+
+/// The keys that may enter by one door, from a file that may change at any time: a line that is
+/// removed is a key revoked.
+class AllowList {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  /// @throws Error if the file cannot be read, can be written by others than its owner, or says
+  ///         something else than keys and names.
+  explicit AllowList(std::filesystem::path file);
+
+  /// Reads the file again if it changed. A file that is wrong or gone leaves the list as it was.
+  /// @return What is wrong, once.
+  [[nodiscard]] std::optional<std::string> refresh();
+
+  /// As refresh(), but at most once a second.
+  [[nodiscard]] std::optional<std::string> refresh_if_due(TimePoint now);
+
+  /// Name of the key's owner; null if the key is not on the list.
+  [[nodiscard]] const std::string* name_of(std::string_view public_key) const;
+
+ private:
+  /// What tells one state of the file from another.
+  struct Stamp {
+    std::int64_t changed_ns = 0;
+    std::int64_t size = 0;
+    std::uint64_t inode = 0;
+    int error = 0;  ///< errno if there is no file.
+
+    bool operator==(const Stamp&) const = default;
+  };
+  [[nodiscard]] static Stamp stamp_of(const std::filesystem::path& file);
+  [[nodiscard]] static bool is_settled(const Stamp& stamp);
+
+  std::filesystem::path file_;
+  std::optional<Stamp> stamp_;  ///< None if the file must be read again in any case.
+  std::string reported_;
+  std::optional<TimePoint> looked_at_;
+  AllowedKeys names_;
+};
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "coordinator/dispatch/outbox.hpp"
+#include "proto/link/security.hpp"
+
+namespace zmq {
+class context_t;
+}  // namespace zmq
+
+namespace proofmass::coordinator {
+
+/// Decides who may connect, by the ZAP protocol [ZeroMQ RFC 27]: a worker whose key is in
+/// authorized_workers, at the workers' address; a client likewise. Part of a service's loop, not a
+/// thread: a handshake is answered when the loop comes round.
+///
+/// The user id of an admitted peer is its public key: `message.gets("User-Id")` gives it with each
+/// message, and is_allowed() says whether it may still speak.
+class Authenticator {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  /// Must be made before any socket of the context is bound.
+  ///
+  /// @param directory  With authorized_workers and authorized_clients.
+  /// @param log        Refusals, and lists that cannot be read.
+  /// @throws Error if a list cannot be read, or if the context has an authenticator.
+  Authenticator(zmq::context_t& context, const std::filesystem::path& directory,
+                std::function<void(Event)> log);
+  ~Authenticator();
+  Authenticator(const Authenticator&) = delete;
+  Authenticator& operator=(const Authenticator&) = delete;
+
+  /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t; then call serve().
+  [[nodiscard]] void* handle() const;
+
+  /// Logs peers that do not get as far as showing a key to this socket.
+  ///
+  /// @param router  Handle of a ROUTER of the same context, which outlives this object.
+  void watch(wire::Domain domain, void* router);
+
+  /// Answers all handshakes that wait; never waits itself.
+  void serve(TimePoint now);
+
+  /// True if the key is on the domain's list, which is read again when it changed, once a second at
+  /// most. To be asked at every message: a revoked key keeps its connection otherwise.
+  [[nodiscard]] bool is_allowed(wire::Domain domain, std::string_view public_key, TimePoint now);
+
+  /// Name of the key's owner as in the list; empty if it is not on it.
+  [[nodiscard]] std::string name_of(wire::Domain domain, std::string_view public_key) const;
+
+ private:
+  class Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,134 @@
+#include "coordinator/net/client_connection.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <zmq.hpp>
+
+#include "core/error.hpp"
+#include "proto/link/connection_monitor.hpp"
+#include "proto/link/socket.hpp"
+#include "proto/wire/client_codec.hpp"
+#include "proto/wire/endpoint.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+wire::ClientSecurity security_of(const ClientConnectionConfig& config) {
+  const auto protection = config.keys              ? wire::Protection::keys
+                          : config.is_plain_waived ? wire::Protection::waived
+                                                   : wire::Protection::none;
+  wire::check_endpoint("connect", config.endpoint, wire::EndpointUse::connect, protection);
+  if (!config.keys) return {};
+  return wire::read_client_security(*config.keys, wire::KeyRole::client);
+}
+
+}  // namespace
+
+class ClientConnection::Parts {
+ public:
+  explicit Parts(const ClientConnectionConfig& config)
+      : config_(config),
+        security_(security_of(config)),
+        dealer_(wire::make_dealer(context_, security_)),
+        monitor_(context_, dealer_, config.endpoint, security_, Clock::now()) {}
+
+  wire::ClientReply ask(const wire::ClientRequest& request) {
+    const std::string bytes = wire::encode(wire::RequestPacket{++request_id_, request});
+    const auto deadline = Clock::now() + std::chrono::ceil<milliseconds>(config_.reply_wait);
+    bool is_sent = false;
+    for (;;) {
+      check_admission();
+      is_sent = monitor_.is_connected() && (is_sent || send(bytes));
+      if (auto reply = receive()) return *std::move(reply);
+      const auto left = std::chrono::ceil<milliseconds>(deadline - Clock::now());
+      if (left <= milliseconds(0)) fail_late();
+      wait(std::min(left, is_sent || !monitor_.is_connected() ? turn_max : send_pause));
+    }
+  }
+
+ private:
+  static constexpr milliseconds turn_max{500};
+  static constexpr milliseconds send_pause{5};  ///< A connection is ready soon after it is there.
+
+  [[noreturn]] void fail(std::string_view reason) const {
+    throw Error(fmt::format("connect = {} ({})", config_.endpoint, reason));
+  }
+
+  [[noreturn]] void fail_late() const {
+    const double waited_s = config_.reply_wait.count();
+    if (monitor_.is_connected()) fail(fmt::format("no answer within {:.3g} s", waited_s));
+    fail(fmt::format("nobody there; waited {:.3g} s", waited_s));
+  }
+
+  void check_admission() {
+    monitor_.update(Clock::now());
+    if (const auto refusal = monitor_.take_refusal()) throw Error(*refusal);
+  }
+
+  bool send(const std::string& bytes) {
+    return dealer_.send(zmq::buffer(bytes), zmq::send_flags::dontwait).has_value();
+  }
+
+  /// The reply to the last request, if it is there.
+  std::optional<wire::ClientReply> receive() {
+    zmq::message_t message;
+    while (dealer_.recv(message, zmq::recv_flags::dontwait)) {
+      auto decoded = wire::decode_reply(message.to_string_view());
+      if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) fail_foreign(*error);
+      auto& packet = std::get<wire::ReplyPacket>(decoded);
+      // The answer to an earlier request may come after its time.
+      const bool is_late = packet.id != 0 && packet.id < request_id_;
+      if (is_late) continue;
+      if (packet.id > request_id_) fail("answers what was not asked");
+      return std::move(packet.reply);
+    }
+    return std::nullopt;
+  }
+
+  [[noreturn]] void fail_foreign(const wire::DecodeError& error) const {
+    if (error.fault == wire::DecodeFault::wrong_version) {
+      fail("the coordinator is of another version: " + error.text);
+    }
+    fail("is it the coordinator's address for clients? " + error.text);
+  }
+
+  void wait(milliseconds duration_max) {
+    std::array<zmq::pollitem_t, 2> items{
+        zmq::pollitem_t{dealer_.handle(), 0, ZMQ_POLLIN, 0},
+        zmq::pollitem_t{monitor_.handle(), 0, ZMQ_POLLIN, 0},
+    };
+    try {
+      zmq::poll(items, duration_max);
+    } catch (const zmq::error_t& error) {
+      if (error.num() != EINTR) throw;
+    }
+  }
+
+  ClientConnectionConfig config_;
+  wire::ClientSecurity security_;
+  zmq::context_t context_;
+  zmq::socket_t dealer_;
+  wire::ConnectionMonitor monitor_;
+  std::uint64_t request_id_ = 0;
+};
+
+ClientConnection::ClientConnection(const ClientConnectionConfig& config)
+    : parts_(std::make_unique<Parts>(config)) {}
+
+ClientConnection::~ClientConnection() = default;
+
+wire::ClientReply ClientConnection::ask(const wire::ClientRequest& request) {
+  return parts_->ask(request);
+}
+
+}  // namespace proofmass::coordinator

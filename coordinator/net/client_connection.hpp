@@ -1,0 +1,46 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "proto/wire/client_messages.hpp"
+
+namespace proofmass::coordinator {
+
+/// Settings of a ClientConnection.
+struct ClientConnectionConfig {
+  std::string endpoint;                       ///< Where the coordinator serves clients.
+  std::optional<std::filesystem::path> keys;  ///< With client.key and coordinator.pub.
+  bool is_plain_waived = false;               ///< No keys beyond this machine: the user knows it.
+  std::chrono::duration<double> reply_wait = std::chrono::seconds(10);  ///< Per request; > 0.
+};
+
+/// A client's connection to a coordinator: one request at a time.
+class ClientConnection {
+ public:
+  /// Connects in the background.
+  ///
+  /// @throws InvalidArgument reading `connect = endpoint (rule)`; Error if keys cannot be read.
+  explicit ClientConnection(const ClientConnectionConfig& config);
+  ~ClientConnection();
+  ClientConnection(const ClientConnection&) = delete;
+  ClientConnection& operator=(const ClientConnection&) = delete;
+
+  /// Sends a request and waits for its reply. The request is sent again when the connection was
+  /// lost meanwhile, so the coordinator may carry it out twice; each leads to the same end as once.
+  ///
+  /// @return The reply, which may be that the request is refused.
+  /// @throws Error reading `connect = endpoint (reason)` if nobody is there, the coordinator lets
+  ///         this client not in, or it does not answer in time or in the same words;
+  ///         InvalidArgument if the request is too large.
+  [[nodiscard]] wire::ClientReply ask(const wire::ClientRequest& request);
+
+ private:
+  class Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "proto/wire/messages.hpp"
+
+namespace proofmass::coordinator {
+
+/// Where a message came from, as the transport has it.
+struct Address {
+  std::string routing_id;  ///< Of the connection; another one after each reconnection.
+  std::string key;         ///< Public key in Z85; empty on a connection without keys.
+  /// For people: `10.0.0.7`, or `localhost:UID:GID:PID` on a Unix domain socket; may be empty.
+  std::string host;
+};
+
+/// `address=10.0.0.7 key=...`, for logs.
+[[nodiscard]] std::string to_text(const Address& address);
+
+/// Who is who: session (of a worker process), its number in the dispatch, and the connection that
+/// it was last heard on.
+class Peers {
+ public:
+  /// Limits of what is kept about peers.
+  struct Limits {
+    std::size_t peers_max = 65536;
+    std::size_t closed_out_max = 65536;
+  };
+
+  Peers() = default;
+  explicit Peers(Limits limits) : limits_(limits) {}
+
+  /// The worker of a session, which is reached at this address from now on; a new one if the
+  /// session has not been seen.
+  ///
+  /// @param sequence  Of the message: one from a connection that was left changes no address.
+  /// @return Nothing if the session belongs to another key, or the connection to another session.
+  [[nodiscard]] std::optional<wire::WorkerId> meet(wire::SessionId session, std::uint64_t sequence,
+                                                   const Address& address);
+
+  /// The worker of a connection.
+  [[nodiscard]] std::optional<wire::WorkerId> worker_at(const std::string& routing_id) const;
+
+  /// Null if the peer has been forgotten.
+  [[nodiscard]] const Address* address_of(wire::WorkerId worker) const;
+
+  /// Nothing if the peer has been forgotten.
+  [[nodiscard]] std::optional<wire::SessionId> session_of(wire::WorkerId worker) const;
+  [[nodiscard]] std::optional<wire::WorkerId> worker_of(wire::SessionId session) const;
+
+  /// All whose addresses are known.
+  [[nodiscard]] std::vector<wire::WorkerId> workers() const;
+
+  /// What the next message to a known worker must say: session and ascending number.
+  /// @pre address_of(worker) is not null.
+  [[nodiscard]] wire::Header next_header(wire::WorkerId worker, wire::Epoch epoch);
+
+  void forget(wire::WorkerId worker);
+
+  /// Nothing more is heard from a connection.
+  void close_out(const std::string& routing_id);
+  [[nodiscard]] bool is_closed_out(const std::string& routing_id) const;
+
+  /// Forgets strangers, once there are too many peers.
+  void limit(const std::function<bool(wire::WorkerId)>& is_registered);
+
+ private:
+  struct Peer {
+    wire::SessionId session;
+    Address address;
+    std::uint64_t newest_sequence = 0;  ///< Of what was heard.
+    std::uint64_t num_sent = 0;
+  };
+
+  Limits limits_;
+  std::uint64_t next_ = 1;
+  std::map<wire::WorkerId, Peer> peers_;
+  std::unordered_map<std::uint64_t, wire::WorkerId> by_session_;
+  std::unordered_map<std::string, wire::WorkerId> by_routing_id_;
+  std::set<std::string> closed_out_;
+};
+
+}  // namespace proofmass::coordinator

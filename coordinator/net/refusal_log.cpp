@@ -1,0 +1,51 @@
+#include "coordinator/net/refusal_log.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::chrono::minutes period(1);
+constexpr std::size_t lines_per_period_max = 20;
+
+/// ZeroMQ writes an IPv4 address in the form of IPv6 if its socket has both.
+std::string_view plain(std::string_view address) {
+  constexpr std::string_view mapped = "::ffff:";
+  const bool is_mapped = address.starts_with(mapped) && address.find('.') != std::string_view::npos;
+  return is_mapped ? address.substr(mapped.size()) : address;
+}
+
+std::string_view or_none(std::string_view text) { return text.empty() ? "none" : text; }
+
+}  // namespace
+
+RefusalLog::RefusalLog(std::function<void(Event)> log) : log_(std::move(log)) {}
+
+void RefusalLog::refused(const Refusal& refusal, TimePoint now) {
+  if (lines_.empty() || now - began_at_ >= period) begin_minute(now);
+  std::string line =
+      fmt::format("domain={} address={} key={} reason=\"{}\"", or_none(refusal.domain),
+                  or_none(plain(refusal.address)), or_none(refusal.public_key), refusal.reason);
+  if (lines_.contains(line)) return;
+  if (lines_.size() >= lines_per_period_max) {
+    ++num_left_out_;
+    return;
+  }
+  lines_.insert(line);
+  log_({.severity = Severity::warning, .kind = "peer_refused", .text = std::move(line)});
+}
+
+void RefusalLog::begin_minute(TimePoint now) {
+  if (num_left_out_ > 0) {
+    log_({.severity = Severity::warning,
+          .kind = "peers_refused",
+          .text = fmt::format("count={} without a line each", num_left_out_)});
+  }
+  num_left_out_ = 0;
+  lines_.clear();
+  began_at_ = now;
+}
+
+}  // namespace proofmass::coordinator

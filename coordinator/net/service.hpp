@@ -1,0 +1,102 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "coordinator/dispatch/outbox.hpp"
+#include "coordinator/dispatch/state.hpp"
+#include "coordinator/net/campaign_files.hpp"
+#include "coordinator/store/store_writer.hpp"
+#include "proto/link/faults.hpp"
+#include "proto/wire/client_messages.hpp"
+
+namespace proofmass::coordinator {
+
+/// How a service is asked to end; set by signal handlers.
+enum class StopRequest : std::uint8_t {
+  none,
+  drain,  ///< When the runs that workers hold are stored, or the time for that is over.
+  now,    ///< With what has been delivered.
+};
+
+/// When a service ends that nobody asks to.
+enum class ServiceEnd : std::uint8_t {
+  never,
+  when_done,  ///< Every campaign is finished or cancelled.
+};
+
+/// Settings of a service.
+struct ServiceConfig {
+  std::string workers_endpoint;                 ///< Where workers connect; the port may be `*`.
+  std::optional<std::string> clients_endpoint;  ///< Where clients do, if any.
+  /// With coordinator.key and the lists of authorized keys; without, whoever reaches the addresses
+  /// is served.
+  std::optional<std::filesystem::path> keys;
+  bool is_plain_waived = false;  ///< No keys beyond this machine: the user knows it.
+  ServiceEnd end = ServiceEnd::never;
+  GivenUpRuns given_up = GivenUpRuns::keep;
+  Duration drain_max = std::chrono::seconds(120);  ///< Then a drain becomes a stop.
+  CampaignFiles* files = nullptr;  ///< Outlives the service; null if nothing can be submitted.
+  std::string version;             ///< Of the program, for people.
+  DispatchConfig dispatch;
+  WriterConfig writer;
+  std::optional<wire::FaultPlan> faults;  ///< On the workers' messages; for tests of this program.
+};
+
+/// Told of all that happens, in the service's thread.
+using Log = std::function<void(const Event&)>;
+
+/// A coordinator: lends the runs of its campaigns to the workers that connect, stores their results
+/// and answers clients. One thread serves all sockets; another writes to the campaign files.
+class Service {
+ public:
+  /// Binds the sockets and begins to serve the campaigns.
+  ///
+  /// @throws InvalidArgument if an endpoint is not acceptable; Error if it cannot be bound, keys
+  ///         cannot be read, or two campaigns have one name; StoreError.
+  Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log);
+  ~Service();
+  Service(const Service&) = delete;
+  Service& operator=(const Service&) = delete;
+
+  /// The addresses to connect to, with the ports that were chosen.
+  [[nodiscard]] std::string workers_endpoint() const;
+  [[nodiscard]] std::string clients_endpoint() const;  ///< Empty if there are no clients.
+
+  /// Serves until it ends by itself or is asked to; then workers have been told to end, and all
+  /// that was delivered is stored, if it can be.
+  ///
+  /// @param on_turn  Called many times a second; may call the other functions, may throw.
+  void run(const std::atomic<StopRequest>& stop, const std::function<void()>& on_turn);
+
+  /// The campaigns, in the order in which they came.
+  [[nodiscard]] std::vector<wire::CampaignStatus> campaigns() const;
+  /// True if every campaign is finished or cancelled.
+  [[nodiscard]] bool is_done() const;
+
+  /// Number of the worker with this process on this machine; nothing if it is not registered.
+  [[nodiscard]] std::optional<WorkerId> worker_of(std::uint64_t process_id) const;
+  [[nodiscard]] std::string runs_held_text(WorkerId worker) const;  ///< For people.
+  /// True if runs are not lent to workers of that host any more: too many crashed there.
+  [[nodiscard]] bool is_quarantined(const std::string& host) const;
+
+  /// The worker's process is known to have ended: its runs are lent again at once.
+  void worker_ended(WorkerId worker, LossReason reason);
+
+  /// Ends the service of all campaigns and gives their files back. The last call.
+  [[nodiscard]] std::vector<ServedCampaign> close();
+
+ private:
+  class Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace proofmass::coordinator

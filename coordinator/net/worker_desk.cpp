@@ -1,0 +1,161 @@
+#include "coordinator/net/worker_desk.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+#include <variant>
+
+#include "coordinator/dispatch/dispatch.hpp"
+#include "core/error.hpp"
+#include "proto/link/faults.hpp"
+#include "proto/wire/codec.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using wire::KillPoint;
+using wire::RejectReason;
+
+/// Calls the dispatch's function for a message of a worker.
+struct Handler {
+  State& state;
+  WorkerId worker;
+  const wire::Header& header;
+  TimePoint now;
+  Outbox& outbox;
+
+  void operator()(const wire::Hello& hello) const {
+    on_hello(state, worker, header.session, hello, now, outbox);
+  }
+  void operator()(const wire::Heartbeat& heartbeat) const {
+    on_heartbeat(state, worker, heartbeat, header.sequence, now, outbox);
+  }
+  void operator()(const wire::ResultBatch& batch) const {
+    wire::kill_point(KillPoint::after_receive);
+    on_results(state, worker, batch, now, outbox);
+  }
+  void operator()(const wire::GiveBack& give_back) const {
+    on_give_back(state, worker, give_back, now, outbox);
+  }
+  void operator()(const wire::CampaignRequest& request) const {
+    on_campaign_request(state, worker, request, now, outbox);
+  }
+  void operator()(const wire::Bye& bye) const { on_bye(state, worker, bye, now, outbox); }
+  template <typename Other>
+  void operator()(const Other&) const {
+    PROOFMASS_EXPECT(false);  // decode() lets nothing else pass.
+  }
+};
+
+template <typename Kind>
+bool is_a(const wire::Message& message) {
+  return std::holds_alternative<Kind>(message);
+}
+
+std::string revoked_text(const Address& address) {
+  return fmt::format("key = {} (is not authorized any more)", address.key);
+}
+
+bool is_of_a_worker(const wire::Message& message) {
+  return is_a<wire::Hello>(message) || is_a<wire::Heartbeat>(message) ||
+         is_a<wire::ResultBatch>(message) || is_a<wire::GiveBack>(message) ||
+         is_a<wire::CampaignRequest>(message) || is_a<wire::Bye>(message);
+}
+
+}  // namespace
+
+WorkerDesk::WorkerDesk(State& state, wire::Epoch epoch, Surroundings surroundings)
+    : state_(state), epoch_(epoch), surroundings_(std::move(surroundings)) {}
+
+void WorkerDesk::receive(const Incoming& message, TimePoint now, Outbox& outbox) {
+  if (peers_.is_closed_out(message.from.routing_id)) return;
+  if (!surroundings_.is_allowed(message.from.key, now)) {
+    return close_out(message.from, RejectReason::revoked, revoked_text(message.from), now, outbox);
+  }
+  const std::optional<wire::Packet> packet = decode(message, now, outbox);
+  if (!packet) return;
+  const wire::Header& header = packet->header;
+  const auto worker = peers_.meet(header.session, header.sequence, message.from);
+  if (!worker) {
+    return close_out(
+        message.from, RejectReason::malformed,
+        fmt::format("session = {} (must be one connection's and one key's)", header.session.value),
+        now, outbox);
+  }
+  if (header.epoch != epoch_ && !is_a<wire::Hello>(packet->message)) {
+    return reject_unregistered(*worker, outbox);
+  }
+  if (const auto* const bye = std::get_if<wire::Bye>(&packet->message)) {
+    surroundings_.on_leaving(*worker, bye->reason);
+  }
+  std::visit(Handler{state_, *worker, header, now, outbox}, packet->message);
+}
+
+std::optional<wire::Packet> WorkerDesk::decode(const Incoming& message, TimePoint now,
+                                               Outbox& outbox) {
+  if (message.frames.size() != 1) {
+    close_out(message.from, RejectReason::malformed,
+              fmt::format("message = {} frames (must be one)", message.frames.size()), now, outbox);
+    return std::nullopt;
+  }
+  auto decoded = wire::decode(message.frames.front());
+  if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
+    const bool is_other_version = error->fault == wire::DecodeFault::wrong_version;
+    close_out(message.from, is_other_version ? RejectReason::incompatible : RejectReason::malformed,
+              error->text, now, outbox);
+    return std::nullopt;
+  }
+  auto& packet = std::get<wire::Packet>(decoded);
+  if (!is_of_a_worker(packet.message)) {
+    close_out(message.from, RejectReason::malformed,
+              "message = one of a coordinator (must be one of a worker)", now, outbox);
+    return std::nullopt;
+  }
+  return std::move(packet);
+}
+
+void WorkerDesk::close_out(const Address& from, RejectReason reason, const std::string& text,
+                           TimePoint now, Outbox& outbox) {
+  outbox.log({.severity = Severity::warning,
+              .kind = "peer_closed_out",
+              .text = fmt::format("{} reason=\"{}\"", to_text(from), text)});
+  const wire::Reject reject{.reason = reason, .text = text};
+  const auto worker = peers_.worker_at(from.routing_id);
+  if (worker) {
+    send(*worker, reject);
+    surroundings_.on_leaving(*worker, LossReason::protocol);
+    on_gone(state_, *worker, LossReason::protocol, now, outbox);
+    peers_.forget(*worker);
+  } else {
+    // A session is not known: whoever reads this takes any for its own.
+    send_packet(from,
+                {.header = {.session = {1}, .epoch = epoch_, .sequence = 1}, .message = reject});
+  }
+  peers_.close_out(from.routing_id);
+}
+
+void WorkerDesk::send(WorkerId worker, wire::Message message) {
+  const Address* const address = peers_.address_of(worker);
+  if (address == nullptr) return;
+  const bool is_lease = is_a<wire::RunLease>(message);
+  const bool is_acknowledgement = is_a<wire::ResultAck>(message);
+  send_packet(*address,
+              {.header = peers_.next_header(worker, epoch_), .message = std::move(message)});
+  if (is_lease) wire::kill_point(KillPoint::after_lend);
+  if (is_acknowledgement) wire::kill_point(KillPoint::after_acknowledge);
+}
+
+void WorkerDesk::send_packet(const Address& to, const wire::Packet& packet) {
+  if (!surroundings_.transmit(to.routing_id, wire::encode(packet))) ++num_unsent_;
+}
+
+void WorkerDesk::review(TimePoint now, Outbox& outbox) {
+  for (const WorkerId worker : peers_.workers()) {
+    const Address address = *peers_.address_of(worker);
+    if (surroundings_.is_allowed(address.key, now)) continue;
+    close_out(address, RejectReason::revoked, revoked_text(address), now, outbox);
+  }
+  peers_.limit([&](WorkerId worker) { return state_.workers.contains(worker); });
+}
+
+}  // namespace proofmass::coordinator

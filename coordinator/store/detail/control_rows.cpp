@@ -1,0 +1,116 @@
+#include "coordinator/store/detail/control_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <map>
+#include <set>
+#include <string>
+
+#include "coordinator/store/detail/worker_rows.hpp"
+#include "coordinator/store/store_error.hpp"
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+// By the value of CampaignPhase, from 1.
+constexpr std::array<std::string_view, 4> phase_names{"active", "paused", "finished", "cancelled"};
+
+std::string_view name_of(wire::CampaignPhase phase) {
+  return phase_names.at(static_cast<std::size_t>(phase) - 1);
+}
+
+// The schema allows no other names.
+wire::CampaignPhase phase_of(std::string_view name) {
+  const auto found = std::find(phase_names.begin(), phase_names.end(), name);
+  PROOFMASS_EXPECT(found != phase_names.end());
+  return static_cast<wire::CampaignPhase>(found - phase_names.begin() + 1);
+}
+
+/// Whether a row of a table whose primary key is run_index has the run.
+class RunLookup {
+ public:
+  RunLookup(const Database& database, std::string_view table)
+      : select_(database.prepare(fmt::format("SELECT 1 FROM {} WHERE run_index = ?", table))) {}
+
+  [[nodiscard]] bool contains(std::uint64_t run) {
+    select_.bind_all(run);
+    const bool is_there = select_.step();
+    if (is_there) select_.finish();
+    return is_there;
+  }
+
+ private:
+  Statement select_;
+};
+
+}  // namespace
+
+CampaignControl read_control(const Database& database) {
+  Statement select = database.prepare("SELECT phase, priority, audit_fraction FROM campaign");
+  PROOFMASS_EXPECT(select.step());
+  return {.phase = phase_of(select.text(0)),
+          .priority = static_cast<int>(select.integer(1)),
+          .audit_fraction = select.real(2)};
+}
+
+void write_control(const Database& database, const CampaignControl& control) {
+  database.prepare("UPDATE campaign SET phase = ?, priority = ?, audit_fraction = ?")
+      .run(name_of(control.phase), std::int64_t{control.priority}, control.audit_fraction);
+}
+
+std::vector<RunRange> read_given_up_runs(const Database& database) {
+  Statement select = database.prepare("SELECT run_index FROM run_failure ORDER BY run_index");
+  std::vector<RunRange> ranges;
+  while (select.step()) append_run(ranges, RunIndex{select.count(0)});
+  return ranges;
+}
+
+std::vector<BlamedRun> read_blamed_runs(const Database& database) {
+  RunLookup results(database, "run_result");
+  RunLookup failures(database, "run_failure");
+  Statement select =
+      database.prepare("SELECT first_run, num_runs, attempt FROM attempt WHERE is_blamed");
+  std::map<RunIndex, BlamedRun> blamed;
+  while (select.step()) {
+    const std::uint64_t first = select.count(0);
+    for (std::uint64_t run = first; run < first + select.count(1); ++run) {
+      if (results.contains(run) || failures.contains(run)) continue;
+      BlamedRun& entry = blamed[RunIndex{run}];
+      entry.run = RunIndex{run};
+      ++entry.num_crashes;
+      entry.attempt =
+          std::max(entry.attempt, wire::Attempt{static_cast<std::uint32_t>(select.count(2))});
+    }
+  }
+  std::vector<BlamedRun> runs;
+  for (const auto& [run, entry] : blamed) runs.push_back(entry);
+  return runs;
+}
+
+void insert_start(const Database& database, const CoordinatorStart& start) {
+  database
+      .prepare(
+          "INSERT INTO coordinator_start (epoch, host, process_id, version) VALUES (?, ?, ?, ?)")
+      .run(hexadecimal(start.epoch.value), start.host, start.process_id, start.version);
+}
+
+void end_start(const Database& database, wire::Epoch epoch) {
+  database
+      .prepare(
+          "UPDATE coordinator_start SET ended_utc = strftime('%Y-%m-%dT%H:%M:%fZ', 'now') "
+          "WHERE epoch = ?")
+      .run(hexadecimal(epoch.value));
+}
+
+void append_run(std::vector<RunRange>& ranges, RunIndex run) {
+  if (!ranges.empty() && ranges.back().end() == run.value) {
+    ++ranges.back().count;
+  } else {
+    ranges.push_back({.first = run, .count = 1});
+  }
+}
+
+}  // namespace proofmass::coordinator::detail

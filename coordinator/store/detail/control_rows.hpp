@@ -1,0 +1,26 @@
+#pragma once
+
+#include <vector>
+
+#include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/records.hpp"
+
+namespace proofmass::coordinator::detail {
+
+/// How the campaign is served: columns of `campaign`.
+[[nodiscard]] CampaignControl read_control(const Database& database);
+void write_control(const Database& database, const CampaignControl& control);
+
+/// Runs without a result that are given up, ascending; neighbours are one range.
+[[nodiscard]] std::vector<RunRange> read_given_up_runs(const Database& database);
+
+/// Runs that were blamed for losses and are neither finished nor given up, ascending.
+[[nodiscard]] std::vector<BlamedRun> read_blamed_runs(const Database& database);
+
+void insert_start(const Database& database, const CoordinatorStart& start);
+void end_start(const Database& database, wire::Epoch epoch);
+
+/// Appends to ranges that end before the run.
+void append_run(std::vector<RunRange>& ranges, RunIndex run);
+
+}  // namespace proofmass::coordinator::detail

@@ -1,0 +1,116 @@
+#include "coordinator/store/detail/entry_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <ctime>
+#include <utility>
+#include <variant>
+
+#include "coordinator/store/detail/control_rows.hpp"
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+constexpr std::uint64_t event_text_size_max = 2000;
+constexpr std::int64_t num_events_max = 10'000;
+
+// What differed once stays, whatever the worker says of the run later.
+constexpr std::string_view insert_audit_sql =
+    "INSERT INTO audit VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET"
+    " is_equal = excluded.is_equal, second_digest = excluded.second_digest,"
+    " compared_unix_s = excluded.compared_unix_s WHERE is_equal";
+
+// The rows of `attempt` that were blamed on run ?1; the columns are as in the index.
+constexpr std::string_view insert_failure_sql =
+    "WITH blamed AS (SELECT attempt_id, reason FROM attempt"
+    " WHERE is_blamed AND first_run <= ?1 AND first_run + num_runs > ?1) "
+    "INSERT INTO run_failure (run_index, reason, num_attempts)"
+    " SELECT ?1, coalesce((SELECT reason FROM blamed ORDER BY attempt_id DESC LIMIT 1), 'crashed'),"
+    " (SELECT count(*) FROM blamed)"
+    " WHERE NOT EXISTS (SELECT 1 FROM run_result WHERE run_index = ?1) ON CONFLICT DO NOTHING";
+
+}  // namespace
+
+EntryRows::EntryRows(const Database& database)
+    : database_(database),
+      results_(database),
+      workers_(database),
+      insert_delivery_(database.prepare("INSERT INTO delivery VALUES (?, ?, ?, ?, ?)")),
+      delete_failure_(database.prepare("DELETE FROM run_failure WHERE run_index = ?")),
+      insert_audit_(database.prepare(insert_audit_sql)),
+      insert_attempt_(database.prepare(
+          "INSERT INTO attempt (first_run, num_runs, attempt, worker, reason, is_blamed,"
+          " lost_unix_s) VALUES (?, ?, ?, ?, ?, ?, ?)")),
+      trim_attempts_(
+          database.prepare("DELETE FROM attempt WHERE attempt_id <= last_insert_rowid() - ?")),
+      insert_event_(database.prepare("INSERT INTO event (kind, text) VALUES (?, substr(?, 1, ?))")),
+      trim_events_(
+          database.prepare("DELETE FROM event WHERE event_id <= last_insert_rowid() - ?")) {}
+
+CommitSummary EntryRows::write(std::span<const Entry> entries) {
+  now_unix_s_ = static_cast<std::int64_t>(std::time(nullptr));
+  for (const Entry& entry : entries) {
+    std::visit([this](const auto& kind) { write_entry(kind); }, entry);
+  }
+  workers_.write_counts(now_unix_s_);
+  return std::exchange(summary_, {});
+}
+
+void EntryRows::write_entry(const Delivery& delivery) {
+  if (!results_.insert(delivery.result)) {
+    ++summary_.num_duplicate;
+    compare(delivery);
+    return;
+  }
+  const std::int64_t worker = workers_.key_of(delivery.worker);
+  insert_delivery_.run(delivery.result.run.value, worker, delivery.attempt.value,
+                       delivery.compute_s, now_unix_s_);
+  delete_failure_.run(delivery.result.run.value);
+  workers_.count_result(worker, delivery.compute_s);
+  ++summary_.num_new;
+}
+
+void EntryRows::write_entry(const SecondDelivery& second) { compare(second.delivery); }
+
+void EntryRows::compare(const Delivery& delivery) {
+  const RunIndex run = delivery.result.run;
+  const RunResult stored = results_.read(run);
+  const bool is_equal = are_equal(delivery.result, stored);
+  insert_audit_.run(run.value, workers_.key_of(delivery.worker), std::int64_t{is_equal},
+                    hexadecimal(digest(stored)), hexadecimal(digest(delivery.result)), now_unix_s_);
+  summary_.comparisons.push_back({.run = run, .worker = delivery.worker, .is_equal = is_equal});
+  if (!is_equal) report_contradiction(delivery);
+}
+
+void EntryRows::report_contradiction(const Delivery& delivery) {
+  ++summary_.num_contradicting;
+  write_entry(
+      EventEntry{.kind = "contradicting_result",
+                 .text = fmt::format("run={} worker={} session={} attempt={}",
+                                     delivery.result.run.value, workers_.name_of(delivery.worker),
+                                     hexadecimal(delivery.worker.value), delivery.attempt.value)});
+}
+
+void EntryRows::write_entry(const LostRuns& lost) {
+  insert_attempt_.run(lost.runs.first.value, lost.runs.count, lost.attempt.value,
+                      workers_.key_of(lost.worker), stored_name(lost.reason),
+                      std::int64_t{lost.is_blamed}, now_unix_s_);
+  trim_attempts_.run(num_attempts_max);
+  if (database_.last_row() != num_attempts_max + 1) return;
+  write_entry(
+      EventEntry{.kind = "attempt_history_full",
+                 .text = fmt::format("rows={} (older ones are dropped)", num_attempts_max)});
+}
+
+void EntryRows::write_entry(const GivenUpRun& given_up) {
+  database_.prepare(insert_failure_sql).run(given_up.run.value);
+}
+
+void EntryRows::write_entry(const EventEntry& event) {
+  insert_event_.run(event.kind, event.text, event_text_size_max);
+  trim_events_.run(num_events_max);
+}
+
+void EntryRows::write_entry(const CampaignControl& control) { write_control(database_, control); }
+
+}  // namespace proofmass::coordinator::detail

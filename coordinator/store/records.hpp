@@ -1,0 +1,114 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/campaign/identifiers.hpp"
+#include "core/campaign/run_result.hpp"
+#include "proto/wire/client_messages.hpp"
+#include "proto/wire/messages.hpp"
+
+namespace proofmass::coordinator {
+
+// What goes into a campaign file, and what comes back when a coordinator starts.
+
+/// A result and where it comes from.
+struct Delivery {
+  RunResult result;
+  wire::SessionId worker;
+  wire::Attempt attempt;   ///< Under which the run was computed.
+  double compute_s = 0.0;  ///< Time that the worker spent on the run.
+};
+
+/// A second result of a run that is stored: to be compared, and not to be kept.
+struct SecondDelivery {
+  Delivery delivery;
+};
+
+/// Runs that came back without a result.
+struct LostRuns {
+  RunRange runs;
+  wire::Attempt attempt;
+  wire::SessionId worker;
+  wire::LossReason reason = wire::LossReason::silent;
+  bool is_blamed = false;  ///< It counts against these runs.
+};
+
+/// A run that crashed too many workers. A result that comes later all the same takes its place.
+struct GivenUpRun {
+  RunIndex run;
+};
+
+/// A line of the campaign's log.
+struct EventEntry {
+  std::string kind;  ///< What happened, in one word: `coordinator_started`.
+  std::string text;  ///< Details; what is beyond 2,000 characters is cut.
+};
+
+/// A worker process that is registered. Registering again changes nothing but the missing end.
+struct WorkerJoined {
+  wire::SessionId session;
+  std::string name;
+  std::string host;
+  std::uint64_t process_id = 0;
+  std::uint32_t num_slots = 1;
+};
+
+/// A worker that is registered no more.
+struct WorkerEnded {
+  wire::SessionId session;
+  wire::LossReason reason = wire::LossReason::silent;
+};
+
+/// How a campaign is to be served; kept for the next coordinator.
+struct CampaignControl {
+  wire::CampaignPhase phase = wire::CampaignPhase::active;
+  int priority = 0;             ///< -100 to 100; runs of a higher one are lent first.
+  double audit_fraction = 0.0;  ///< Of the runs, computed a second time; 0 to 1.
+
+  bool operator==(const CampaignControl&) const = default;
+};
+
+/// One thing to be written to a campaign file.
+using Entry = std::variant<Delivery, SecondDelivery, LostRuns, GivenUpRun, EventEntry, WorkerJoined,
+                           WorkerEnded, CampaignControl>;
+
+/// A coordinator process that begins to serve a campaign.
+struct CoordinatorStart {
+  wire::Epoch epoch;
+  std::string host;
+  std::uint64_t process_id = 0;
+  std::string version;  ///< Of the program.
+};
+
+/// A run without a result that was computed when workers crashed.
+struct BlamedRun {
+  RunIndex run;
+  std::uint32_t num_crashes = 0;
+  wire::Attempt attempt;  ///< The largest under which it was lost so.
+
+  bool operator==(const BlamedRun&) const = default;
+};
+
+/// What came of comparing a second result with the stored one.
+struct Comparison {
+  RunIndex run;
+  wire::SessionId worker;  ///< Who delivered the second result.
+  bool is_equal = false;   ///< Every bit that means something.
+
+  bool operator==(const Comparison&) const = default;
+};
+
+/// What became of the deliveries of one commit.
+struct CommitSummary {
+  std::uint64_t num_new = 0;
+  std::uint64_t num_duplicate = 0;  ///< Runs that were there already; nothing was changed.
+  /// Duplicates whose result is not the stored one: some worker computes wrongly.
+  std::uint64_t num_contradicting = 0;
+  /// Of each duplicate and of each SecondDelivery, in order.
+  std::vector<Comparison> comparisons;
+};
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,364 @@
+#include "coordinator/store/store_writer.hpp"
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <future>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "coordinator/store/detail/waiting_entries.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+
+using detail::TimePoint;
+
+namespace {
+
+// Entries of one transaction: enough that its cost is shared, few enough that the first of them
+// does not wait long for the last.
+constexpr std::size_t entries_per_commit_max = 8192;
+
+/// One open file. The thread alone uses `store` and `writing`, without the lock.
+struct OpenFile {
+  Store store;
+  detail::WaitingEntries waiting;
+  std::vector<Entry> writing;         // Taken from `waiting`; not empty if the last attempt failed.
+  std::optional<TimePoint> retry_at;  // If the last attempt failed.
+};
+
+/// Something that the caller waits for, after all that was handed over for its file.
+struct Request {
+  wire::CampaignId campaign;  // 0: all files.
+  std::function<void()> action;
+  std::promise<void> done;
+};
+
+using Files = std::map<wire::CampaignId, OpenFile>;
+
+/// When the file wants to be written to; nothing if nothing waits.
+std::optional<TimePoint> due_time(const OpenFile& file, const WriterConfig& config) {
+  if (file.retry_at) return file.retry_at;
+  const std::optional<TimePoint> since = file.waiting.waiting_since();
+  if (!since) return std::nullopt;
+  if (file.waiting.num_results() >= config.commit_runs_max) return since;
+  return *since + config.commit_after;
+}
+
+std::vector<RunIndex> delivered_runs(const std::vector<Entry>& entries) {
+  std::vector<RunIndex> runs;
+  for (const Entry& entry : entries) {
+    if (const auto* delivery = std::get_if<Delivery>(&entry)) runs.push_back(delivery->result.run);
+  }
+  return runs;
+}
+
+/// What came of one attempt to write.
+struct Attempted {
+  CommitSummary summary;
+  std::optional<std::string> failure;
+};
+
+Attempted try_to_write(Store& store, const std::vector<Entry>& entries) {
+  try {
+    return {.summary = store.write(entries), .failure = std::nullopt};
+  } catch (const std::exception& error) {
+    return {.summary = {}, .failure = error.what()};
+  }
+}
+
+}  // namespace
+
+struct StoreWriter::Parts {
+  Parts(std::function<void()> wake_caller, const WriterConfig& writer_config)
+      : config(writer_config), wake(std::move(wake_caller)), thread([this] { run(); }) {}
+
+  // Called by the service.
+  OpenFile& file(wire::CampaignId campaign);
+  void add(wire::CampaignId campaign, Entry entry);
+  void add_to_all(const Entry& entry);
+  void wait_for(wire::CampaignId campaign, std::function<void()> action);
+
+  // The thread.
+  using Lock = std::unique_lock<std::mutex>;
+  void run();
+  void serve_request(Lock& lock);
+  void write_due(Lock& lock);
+  void write_all(wire::CampaignId campaign, Lock& lock);
+  bool write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock);
+  void finish_write(wire::CampaignId campaign, OpenFile& file, Attempted attempted);
+  [[nodiscard]] std::optional<TimePoint> next_due_time() const;
+  [[nodiscard]] std::vector<wire::CampaignId> ids() const;
+
+  const WriterConfig config;
+  const std::function<void()> wake;
+
+  std::mutex mutex;  // Guards all that follows; see OpenFile for what it does not.
+  std::condition_variable changed;
+  Files files;
+  std::map<wire::SessionId, WorkerJoined> registered;
+  std::deque<Request> requests;
+  std::vector<Completion> completions;
+  bool is_ending = false;
+
+  std::thread thread;  // Begins when all else is there.
+};
+
+OpenFile& StoreWriter::Parts::file(wire::CampaignId campaign) {
+  const auto found = files.find(campaign);
+  PROOFMASS_EXPECT(found != files.end());
+  return found->second;
+}
+
+void StoreWriter::Parts::add(wire::CampaignId campaign, Entry entry) {
+  const TimePoint now = std::chrono::steady_clock::now();
+  bool is_sooner = false;
+  {
+    const std::lock_guard lock(mutex);
+    OpenFile& open_file = file(campaign);
+    const std::optional<TimePoint> due_before = due_time(open_file, config);
+    open_file.waiting.add(std::move(entry), now);
+    is_sooner = due_time(open_file, config) != due_before;
+  }
+  if (is_sooner) changed.notify_one();  // Otherwise the thread would wake for every result.
+}
+
+/// @pre The lock is held.
+void StoreWriter::Parts::add_to_all(const Entry& entry) {
+  const TimePoint now = std::chrono::steady_clock::now();
+  for (auto& [campaign, file] : files) file.waiting.add(entry, now);
+}
+
+void StoreWriter::Parts::wait_for(wire::CampaignId campaign, std::function<void()> action) {
+  Request request{.campaign = campaign, .action = std::move(action), .done = {}};
+  std::future<void> done = request.done.get_future();
+  {
+    const std::lock_guard lock(mutex);
+    requests.push_back(std::move(request));
+  }
+  changed.notify_one();
+  done.get();
+}
+
+void StoreWriter::Parts::run() {
+  Lock lock(mutex);
+  while (!is_ending || !requests.empty()) {
+    if (!requests.empty()) {
+      serve_request(lock);
+      continue;
+    }
+    const std::optional<TimePoint> due = next_due_time();
+    if (due && *due <= std::chrono::steady_clock::now()) {
+      write_due(lock);
+    } else if (due) {
+      changed.wait_until(lock, *due);
+    } else {
+      changed.wait(lock);
+    }
+  }
+  for (const wire::CampaignId campaign : ids()) write_all(campaign, lock);
+}
+
+void StoreWriter::Parts::serve_request(Lock& lock) {
+  Request request = std::move(requests.front());
+  requests.pop_front();
+  const bool is_for_all = request.campaign == wire::CampaignId{};
+  for (const wire::CampaignId campaign : is_for_all ? ids() : std::vector{request.campaign}) {
+    write_all(campaign, lock);
+  }
+  lock.unlock();
+  try {
+    request.action();
+    request.done.set_value();
+  } catch (...) {
+    request.done.set_exception(std::current_exception());
+  }
+  lock.lock();
+}
+
+void StoreWriter::Parts::write_due(Lock& lock) {
+  const TimePoint now = std::chrono::steady_clock::now();
+  for (const wire::CampaignId campaign : ids()) {
+    const std::optional<TimePoint> due = due_time(file(campaign), config);
+    if (due && *due <= now) write_some(campaign, entries_per_commit_max, lock);
+  }
+}
+
+/// Writes all that waits now, until something fails; not what is added meanwhile.
+void StoreWriter::Parts::write_all(wire::CampaignId campaign, Lock& lock) {
+  std::size_t num_left = file(campaign).waiting.size();
+  bool is_written = file(campaign).writing.empty() || write_some(campaign, 0, lock);
+  while (is_written && num_left > 0) {
+    const std::size_t num_entries = std::min(num_left, entries_per_commit_max);
+    is_written = write_some(campaign, num_entries, lock);
+    num_left -= num_entries;
+  }
+}
+
+/// Tries to write what failed before or, if nothing did, up to `num_max` more entries. The file
+/// stays: only the thread itself removes one.
+bool StoreWriter::Parts::write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock) {
+  OpenFile& open_file = file(campaign);
+  if (open_file.writing.empty()) {
+    open_file.waiting.take(num_max, open_file.writing, std::chrono::steady_clock::now());
+  }
+  lock.unlock();
+  Attempted attempted = try_to_write(open_file.store, open_file.writing);
+  const bool is_written = !attempted.failure;
+  lock.lock();
+  const std::size_t num_before = completions.size();
+  finish_write(campaign, open_file, std::move(attempted));
+  const bool has_news = completions.size() > num_before;
+  lock.unlock();
+  if (has_news) wake();
+  lock.lock();
+  return is_written;
+}
+
+void StoreWriter::Parts::finish_write(wire::CampaignId campaign, OpenFile& open_file,
+                                      Attempted attempted) {
+  const bool has_failed_before = open_file.retry_at.has_value();
+  if (attempted.failure) {
+    open_file.retry_at = std::chrono::steady_clock::now() + config.retry_after;
+    if (has_failed_before) return;
+    completions.emplace_back(StoreFailed{.campaign = campaign, .text = *attempted.failure});
+    return;
+  }
+  open_file.retry_at.reset();
+  std::vector<RunIndex> runs = delivered_runs(open_file.writing);
+  open_file.writing.clear();
+  if (!runs.empty()) {
+    completions.emplace_back(Committed{.campaign = campaign, .runs = std::move(runs)});
+  }
+  for (const Comparison& comparison : attempted.summary.comparisons) {
+    completions.emplace_back(Compared{.campaign = campaign, .comparison = comparison});
+  }
+  if (has_failed_before) completions.emplace_back(StoreRecovered{.campaign = campaign});
+}
+
+std::optional<TimePoint> StoreWriter::Parts::next_due_time() const {
+  std::optional<TimePoint> next;
+  for (const auto& [campaign, file] : files) {
+    const std::optional<TimePoint> due = due_time(file, config);
+    if (due && (!next || *due < *next)) next = due;
+  }
+  return next;
+}
+
+std::vector<wire::CampaignId> StoreWriter::Parts::ids() const {
+  std::vector<wire::CampaignId> ids;
+  for (const auto& [campaign, file] : files) ids.push_back(campaign);
+  return ids;
+}
+
+StoreWriter::StoreWriter(std::function<void()> wake, const WriterConfig& config)
+    : parts_(std::make_unique<Parts>(std::move(wake), config)) {}
+
+StoreWriter::~StoreWriter() {
+  {
+    const std::lock_guard lock(parts_->mutex);
+    parts_->is_ending = true;
+  }
+  parts_->changed.notify_one();
+  parts_->thread.join();
+}
+
+void StoreWriter::open(wire::CampaignId campaign, Store store) {
+  const TimePoint now = std::chrono::steady_clock::now();
+  {
+    const std::lock_guard lock(parts_->mutex);
+    OpenFile file{.store = std::move(store),
+                  .waiting = detail::WaitingEntries(parts_->config.num_records_max),
+                  .writing = {},
+                  .retry_at = std::nullopt};
+    for (const auto& [session, worker] : parts_->registered) file.waiting.add(worker, now);
+    const bool is_new = parts_->files.emplace(campaign, std::move(file)).second;
+    PROOFMASS_EXPECT(is_new);
+  }
+  parts_->changed.notify_one();
+}
+
+Store StoreWriter::close(wire::CampaignId campaign) {
+  std::optional<Store> store;
+  parts_->wait_for(campaign, [&] {
+    const std::lock_guard lock(parts_->mutex);
+    store = std::move(parts_->file(campaign).store);
+    parts_->files.erase(campaign);
+  });
+  return std::move(*store);
+}
+
+void StoreWriter::access(wire::CampaignId campaign, const std::function<void(Store&)>& action) {
+  parts_->wait_for(campaign, [&] {
+    std::unique_lock lock(parts_->mutex);
+    Store& store = parts_->file(campaign).store;
+    lock.unlock();
+    action(store);
+  });
+}
+
+void StoreWriter::deliver(wire::CampaignId campaign, Delivery delivery) {
+  parts_->add(campaign, std::move(delivery));
+}
+
+void StoreWriter::compare(wire::CampaignId campaign, Delivery delivery) {
+  parts_->add(campaign, SecondDelivery{.delivery = std::move(delivery)});
+}
+
+void StoreWriter::record_loss(wire::CampaignId campaign, const LostRuns& lost) {
+  parts_->add(campaign, lost);
+}
+
+void StoreWriter::give_up(wire::CampaignId campaign, RunIndex run) {
+  parts_->add(campaign, GivenUpRun{.run = run});
+}
+
+void StoreWriter::record_event(wire::CampaignId campaign, EventEntry event) {
+  if (campaign != wire::CampaignId{}) {
+    parts_->add(campaign, std::move(event));
+    return;
+  }
+  {
+    const std::lock_guard lock(parts_->mutex);
+    parts_->add_to_all(event);
+  }
+  parts_->changed.notify_one();
+}
+
+void StoreWriter::record_worker_joined(const WorkerJoined& worker) {
+  {
+    const std::lock_guard lock(parts_->mutex);
+    parts_->registered.insert_or_assign(worker.session, worker);
+    parts_->add_to_all(worker);
+  }
+  parts_->changed.notify_one();
+}
+
+void StoreWriter::record_worker_ended(const WorkerEnded& ended) {
+  {
+    const std::lock_guard lock(parts_->mutex);
+    parts_->registered.erase(ended.session);
+    parts_->add_to_all(ended);
+  }
+  parts_->changed.notify_one();
+}
+
+void StoreWriter::set_control(wire::CampaignId campaign, const CampaignControl& control) {
+  parts_->add(campaign, control);
+}
+
+std::vector<Completion> StoreWriter::take_completions() {
+  const std::lock_guard lock(parts_->mutex);
+  return std::exchange(parts_->completions, {});
+}
+
+void StoreWriter::flush() {
+  parts_->wait_for(wire::CampaignId{}, [] {});
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,103 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "coordinator/store/records.hpp"
+#include "coordinator/store/store.hpp"
+#include "proto/wire/messages.hpp"
+
+namespace proofmass::coordinator {
+
+/// Settings of a StoreWriter.
+struct WriterConfig {
+  std::size_t commit_runs_max = 256;  ///< Results for which a commit waits ...
+  std::chrono::steady_clock::duration commit_after = std::chrono::milliseconds(50);  ///< ... or so.
+  std::chrono::steady_clock::duration retry_after = std::chrono::seconds(5);  ///< After a failure.
+  /// Entries other than results that wait for one file, at most; further ones are counted and
+  /// dropped.
+  std::size_t num_records_max = 100'000;
+};
+
+/// These results are durable. Each result that was delivered is named once.
+struct Committed {
+  wire::CampaignId campaign;
+  std::vector<RunIndex> runs;
+};
+
+/// A second result was compared with the stored one.
+struct Compared {
+  wire::CampaignId campaign;
+  Comparison comparison;
+};
+
+/// Nothing can be written to this file for now. All that was handed over is kept, and tried again
+/// each `retry_after`; said once until StoreRecovered.
+struct StoreFailed {
+  wire::CampaignId campaign;
+  std::string text;  ///< `campaign file = path (the disk is full; ...)`.
+};
+
+/// All is well again, and what was waiting is written.
+struct StoreRecovered {
+  wire::CampaignId campaign;
+};
+
+using Completion = std::variant<Committed, Compared, StoreFailed, StoreRecovered>;
+
+/// Writes to campaign files, in a thread of its own: a service never waits for a disk.
+///
+/// What is handed over is written in that order, many entries in one durable transaction. The
+/// functions may be called from any thread, and return at once unless they say otherwise. The
+/// number of results that wait has no limit here: it is that of the runs that are lent.
+class StoreWriter {
+ public:
+  /// @param wake  Called in the writer's thread when there are new completions. Must not throw.
+  explicit StoreWriter(std::function<void()> wake, const WriterConfig& config = {});
+  /// Writes what can be written at once, and closes all files. What cannot is lost; nobody was told
+  /// that it is durable.
+  ~StoreWriter();
+  StoreWriter(const StoreWriter&) = delete;
+  StoreWriter& operator=(const StoreWriter&) = delete;
+
+  /// Takes over a file, and writes to it which workers are registered.
+  /// @pre No campaign has this id.
+  void open(wire::CampaignId campaign, Store store);
+  /// Gives a file back; waits for one attempt to write what was handed over. What that could not
+  /// write is dropped.
+  Store close(wire::CampaignId campaign);
+  /// Lets `action` use the file in the writer's thread, after all that was handed over before has
+  /// been tried; waits for it, and throws what it throws. For what is rare: more runs, statistics.
+  void access(wire::CampaignId campaign, const std::function<void(Store&)>& action);
+
+  /// Stores a result: leads to Committed with its run.
+  void deliver(wire::CampaignId campaign, Delivery delivery);
+  /// Compares a second result of a run: leads to Compared.
+  /// @pre A result of this run is stored, or was handed to deliver().
+  void compare(wire::CampaignId campaign, Delivery delivery);
+
+  void record_loss(wire::CampaignId campaign, const LostRuns& lost);
+  void give_up(wire::CampaignId campaign, RunIndex run);
+  /// @param campaign  0 for all that are open.
+  void record_event(wire::CampaignId campaign, EventEntry event);
+  /// To all files, also those opened later.
+  void record_worker_joined(const WorkerJoined& worker);
+  void record_worker_ended(const WorkerEnded& ended);
+  void set_control(wire::CampaignId campaign, const CampaignControl& control);
+
+  /// What happened since the last call, in order.
+  [[nodiscard]] std::vector<Completion> take_completions();
+  /// Waits until all that was handed over has been tried, also where the last attempt failed.
+  void flush();
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace proofmass::coordinator

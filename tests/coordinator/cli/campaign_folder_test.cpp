@@ -1,0 +1,142 @@
+#include "coordinator/cli/campaign_folder.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "coordinator/cli/exit_code.hpp"
+#include "tests/coordinator/cli/temporary_directory.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+Campaign campaign_of(const std::string& name, std::uint64_t num_runs = 10) {
+  Campaign campaign;
+  campaign.name = name;
+  campaign.num_runs = num_runs;
+  return campaign;
+}
+
+class CampaignFolderTest : public testing::Test {
+ protected:
+  /// Names of the campaigns that are loaded.
+  std::vector<std::string> loaded(const CampaignFolder& folder) {
+    std::vector<std::string> names;
+    const auto warn = [this](const std::string& what) { warnings.push_back(what); };
+    for (const ServedCampaign& campaign : folder.load(warn)) {
+      names.push_back(campaign.definition->name);
+    }
+    return names;
+  }
+
+  test::TemporaryDirectory directory;
+  std::vector<std::string> warnings;
+};
+
+TEST_F(CampaignFolderTest, IsMadeForThisUserOnly) {
+  const CampaignFolder folder(directory / "deep/served");
+  const auto permissions = std::filesystem::status(directory / "deep/served").permissions();
+  EXPECT_EQ(permissions, std::filesystem::perms::owner_all);
+}
+
+TEST_F(CampaignFolderTest, HasOneCoordinator) {
+  const CampaignFolder folder(directory / "served");
+  try {
+    const CampaignFolder second(directory / "served");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.what(), "directory = " + (directory / "served").string() +
+                                " (another coordinator serves it)");
+  }
+}
+
+TEST_F(CampaignFolderTest, MayHaveAnotherCoordinatorAfterTheFirst) {
+  { const CampaignFolder folder(directory / "served"); }
+  EXPECT_NO_THROW(CampaignFolder(directory / "served"));
+}
+
+TEST_F(CampaignFolderTest, SaysWhyItCannotBeMade) {
+  std::ofstream(directory / "file") << "no directory";
+  try {
+    const CampaignFolder folder(directory / "file");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.what(), "directory = " + (directory / "file").string() + " (File exists)");
+  }
+}
+
+TEST_F(CampaignFolderTest, KeepsEachCampaignInAFileOfItsName) {
+  CampaignFolder folder(directory / "served");
+  EXPECT_EQ(folder.open(campaign_of("b")).file, directory / "served/b.db");
+  (void)folder.open(campaign_of("a"));
+  EXPECT_THAT(loaded(folder), ElementsAre("a", "b"));
+  EXPECT_THAT(warnings, IsEmpty());
+}
+
+TEST_F(CampaignFolderTest, LeavesAloneWhatItCannotServe) {
+  CampaignFolder folder(directory / "served");
+  (void)folder.open(campaign_of("a"));
+  std::ofstream(directory / "served/b.db") << "something else";
+  std::ofstream(directory / "served/notes.txt") << "something else";
+  EXPECT_THAT(loaded(folder), ElementsAre("a"));
+  EXPECT_THAT(warnings, ElementsAre(HasSubstr("b.db")));
+  EXPECT_TRUE(std::filesystem::exists(directory / "served/b.db"));
+}
+
+TEST_F(CampaignFolderTest, ServesOneOfTwoCopies) {
+  CampaignFolder folder(directory / "served");
+  (void)folder.open(campaign_of("a"));
+  std::filesystem::copy_file(directory / "served/a.db", directory / "served/b.db");
+  EXPECT_THAT(loaded(folder), ElementsAre("a"));
+  EXPECT_THAT(warnings, ElementsAre((directory / "served/b.db").string() +
+                                    ": campaign a is in another file as well"));
+}
+
+TEST_F(CampaignFolderTest, OpensACampaignAgainAndExtendsIt) {
+  CampaignFolder folder(directory / "served");
+  (void)folder.open(campaign_of("a", 10));
+  ServedCampaign campaign = folder.open(campaign_of("a", 11));
+  EXPECT_EQ(campaign.store.num_runs(), 11U);
+  EXPECT_EQ(folder.extend(campaign.store, campaign_of("a", 12))->num_runs, 12U);
+  EXPECT_EQ(campaign.store.num_runs(), 12U);
+}
+
+TEST_F(CampaignFolderTest, SaysHowTheCampaignInAFileDiffers) {
+  CampaignFolder folder(directory / "served");
+  (void)folder.open(campaign_of("a"));
+  Campaign other = campaign_of("a");
+  other.seed = 2;
+  try {
+    (void)folder.open(other);
+    FAIL();
+  } catch (const UsageError& error) {
+    EXPECT_EQ(error.what(), (directory / "served/a.db").string() +
+                                " holds another campaign:\n"
+                                "  seed: 1 in the database, 2 asked for\n"
+                                "give the campaign another name");
+  }
+}
+
+TEST_F(CampaignFolderTest, BringsStatisticsUpToDateBesideTheWriter) {
+  CampaignFolder folder(directory / "served");
+  ServedCampaign campaign = folder.open(campaign_of("a", 1));
+  Delivery delivery{.result = {}, .worker = {1}, .attempt = {1}};
+  const std::vector<Entry> entries{
+      WorkerJoined{.session = {1}, .name = "w", .host = "h", .process_id = 1}, delivery};
+  (void)campaign.store.write(entries);
+  int num_writes = 0;
+  folder.summarise(campaign.file, campaign.definition->scenario,
+                   [&](const std::function<void(Store&)>& action) {
+                     ++num_writes;
+                     action(campaign.store);
+                   });
+  EXPECT_EQ(num_writes, 1);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

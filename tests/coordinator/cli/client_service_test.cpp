@@ -1,0 +1,156 @@
+// The clients' commands against a service, over real sockets, with keys and without.
+
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <fstream>
+#include <functional>
+#include <string>
+
+#include "coordinator/cli/client_options.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/keygen_command.hpp"
+#include "coordinator/cli/submit_command.hpp"
+#include "tests/coordinator/net/service_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::HasSubstr;
+using wire::CampaignPhase;
+using wire::ControlAction;
+
+class ClientCommands : public test::ServiceTest {
+ protected:
+  ClientCommands() { config.clients_endpoint = "tcp://127.0.0.1:*"; }
+
+  void use_keys() {
+    testing::internal::CaptureStdout();
+    (void)make_keys({.directory = directory / "keys", .worker = {}, .client = {}});
+    (void)testing::internal::GetCapturedStdout();
+    config.keys = directory / "keys";
+  }
+
+  ClientOptions options() const {
+    ClientOptions options;
+    options.connection = {.endpoint = service->clients_endpoint(),
+                          .keys = config.keys,
+                          .is_plain_waived = false,
+                          .reply_wait = std::chrono::seconds(20)};
+    return options;
+  }
+
+  /// Submits, asks, pauses, resumes and cancels one campaign.
+  void control_a_campaign() {
+    start({});
+    (void)with_connection(options(), [](const Ask& ask) {
+      const auto control = [&](ControlAction action) {
+        return reply_of<wire::DoneReply>(ask, wire::ControlRequest{action, "new"}).text;
+      };
+      const auto phase = [&] {
+        const auto status = reply_of<wire::StatusReply>(ask, wire::StatusRequest{});
+        return status.campaigns.at(0).phase;
+      };
+      const wire::SubmitRequest submit{
+          .campaign = test::campaign_of("new", 5), .priority = 3, .audit_fraction = 0.5};
+      EXPECT_THAT(reply_of<wire::DoneReply>(ask, submit).text, HasSubstr("campaign new"));
+      EXPECT_EQ(phase(), CampaignPhase::active);
+      EXPECT_THAT(control(ControlAction::pause), HasSubstr("campaign new"));
+      EXPECT_EQ(phase(), CampaignPhase::paused);
+      (void)control(ControlAction::resume);
+      EXPECT_EQ(phase(), CampaignPhase::active);
+      (void)control(ControlAction::cancel);
+      EXPECT_EQ(phase(), CampaignPhase::cancelled);
+      EXPECT_TRUE(reply_of<wire::WorkersReply>(ask, wire::WorkersRequest{}).workers.empty());
+      return exit_done;
+    });
+  }
+};
+
+std::string error_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST_F(ClientCommands, ControlACampaign) { control_a_campaign(); }
+
+TEST_F(ClientCommands, ControlACampaignWithKeys) {
+  use_keys();
+  control_a_campaign();
+}
+
+TEST_F(ClientCommands, PrintWhatTheCoordinatorSays) {
+  start({});
+  std::ofstream(directory / "mine.toml") << "[campaign]\nname = \"mine\"\nruns = 7\n";
+  SubmitOptions submit;
+  submit.client = options();
+  submit.campaign_file = directory / "mine.toml";
+  testing::internal::CaptureStdout();
+  EXPECT_EQ(submit_campaign(submit), exit_done);
+  EXPECT_EQ(testing::internal::GetCapturedStdout(),
+            "campaign mine: active, 7 runs, 0 of them done\n");
+}
+
+TEST_F(ClientCommands, FailInTheCoordinatorsWords) {
+  start({});
+  const std::string error = error_of([&] {
+    (void)with_connection(options(), [](const Ask& ask) {
+      (void)reply_of<wire::DoneReply>(ask, wire::ControlRequest{ControlAction::pause, "other"});
+      return exit_done;
+    });
+  });
+  EXPECT_THAT(error, HasSubstr("campaign = other"));
+}
+
+TEST_F(ClientCommands, AreRefusedWithoutAKey) {
+  use_keys();
+  start({});
+  ClientOptions without = options();
+  without.connection.keys.reset();
+  const std::string error = error_of([&] {
+    (void)with_connection(without, [](const Ask& ask) {
+      (void)ask(wire::StatusRequest{});
+      return exit_done;
+    });
+  });
+  EXPECT_THAT(error, HasSubstr("--keys"));
+}
+
+TEST_F(ClientCommands, AreRefusedWithAKeyThatIsNotOnTheList) {
+  use_keys();
+  start({});
+  std::ofstream(directory / "keys" / "authorized_clients", std::ios::trunc) << "# nobody\n";
+  std::string error;
+  // The coordinator looks at the list once a second.
+  for (int i = 0; i < 1000 && error.find("refused") == std::string::npos; ++i) {
+    error = error_of([&] {
+      (void)with_connection(options(), [](const Ask& ask) {
+        (void)ask(wire::StatusRequest{});
+        return exit_done;
+      });
+    });
+  }
+  EXPECT_THAT(error, HasSubstr("refused"));
+  EXPECT_THAT(error, HasSubstr("authorized_clients"));
+}
+
+TEST_F(ClientCommands, AreToldThatAnAddressIsForWorkers) {
+  start({});
+  ClientOptions wrong = options();
+  wrong.connection.endpoint = service->workers_endpoint();
+  wrong.connection.reply_wait = std::chrono::seconds(2);
+  const std::string error = error_of([&] {
+    (void)with_connection(wrong, [](const Ask& ask) {
+      (void)ask(wire::StatusRequest{});
+      return exit_done;
+    });
+  });
+  EXPECT_THAT(error, HasSubstr("connect = " + wrong.connection.endpoint));
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,171 @@
+#include "coordinator/cli/client_tables.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <sstream>
+
+#include "coordinator/report/text_cells.hpp"
+#include "core/campaign/identifiers.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+wire::CampaignStatus campaign(const std::string& name, std::uint64_t num_done) {
+  wire::CampaignStatus status;
+  status.name = name;
+  status.num_runs = 100;
+  status.num_done = num_done;
+  return status;
+}
+
+wire::StatusReply status_of(const std::vector<wire::CampaignStatus>& campaigns) {
+  return {.version = "0.1.0",
+          .model_version = "hardy2013-2",
+          .uptime_s = 12000.0,
+          .num_workers = 12,
+          .num_slots = 48,
+          .campaigns = campaigns};
+}
+
+wire::WorkerStatus worker(std::uint64_t id, const std::string& name) {
+  wire::WorkerStatus status;
+  status.id = {id};
+  status.name = name;
+  status.host = fmt::format("n{}", id);
+  status.process_id = 4711;
+  status.num_slots = 4;
+  status.num_lent = 64;
+  status.num_results = 1234;
+  status.silent_s = 2.9;
+  return status;
+}
+
+void expect_width_at_most(const std::string& text, std::size_t width) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(text_width(line), width) << line;
+}
+
+TEST(StatusTable, ShowsCampaignsAndWhatIsOutOfTheOrdinary) {
+  wire::CampaignStatus first = campaign("hardy2013", 42);
+  first.rate_hz = 12.34;
+  first.remaining_s = 200.0;
+  first.num_lent = 16;
+  wire::CampaignStatus second = campaign("second-order", 97);
+  second.phase = wire::CampaignPhase::paused;
+  second.priority = -5;
+  second.num_given_up = 1;
+  second.num_without_estimate = 2;
+  second.num_audited = 10;
+  second.num_mismatches = 3;
+  EXPECT_EQ(status_table(status_of({first, second})),
+            R"(Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min
+12 workers with 48 slots, 16 runs lent
+
+campaign         phase      prio       done       runs    %  runs/s   time left
+───────────────────────────────────────────────────────────────────────────────
+hardy2013        active        0         42        100   42    12.3  3 min 20 s
+second-order     paused       -5         97        100   97       -           -
+second-order: 1 run given up: too many workers crashed
+second-order: 2 runs without an estimate
+second-order: 10 results compared with a second computation: 3 differ (none may)
+)");
+}
+
+TEST(StatusTable, SaysThatThereIsNoCampaign) {
+  EXPECT_EQ(status_table(status_of({})),
+            "Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min\n"
+            "12 workers with 48 slots, 0 runs lent\n\nno campaigns\n");
+}
+
+TEST(StatusTable, SaysWhyNothingCanBeStored) {
+  wire::CampaignStatus status = campaign("a", 0);
+  status.storage_failure = "a.db: disk full";
+  EXPECT_NE(status_table(status_of({status})).find("\na: nothing can be stored: a.db: disk full\n"),
+            std::string::npos);
+}
+
+TEST(StatusTable, ShowsNoTimeLeftOfACampaignThatIsOver) {
+  wire::CampaignStatus status = campaign("a", 100);
+  status.phase = wire::CampaignPhase::finished;
+  status.remaining_s = 0.0;
+  EXPECT_NE(status_table(status_of({status})).find("100  100       -           -\n"),
+            std::string::npos);
+}
+
+TEST(StatusTable, KeepsALongNameApartFromTheNextColumn) {
+  const std::string text = status_table(status_of({campaign(std::string(128, 'x'), 1)}));
+  EXPECT_NE(text.find("\nxxxxxxxxxxxxxxx… active "), std::string::npos) << text;
+}
+
+TEST(StatusTable, HasAtMost79Columns) {
+  wire::CampaignStatus wide = campaign(std::string(128, 'x'), num_runs_max);
+  wide.phase = wire::CampaignPhase::cancelled;
+  wide.priority = -100;
+  wide.num_runs = num_runs_max;
+  for (const double number : {1e-12, 1.0, 59.0 * 60.0 + 59.0, 1e300}) {
+    wide.rate_hz = number;
+    wide.remaining_s = number;
+    wire::StatusReply status = status_of({wide});
+    status.version = std::string(128, 'v');
+    status.num_slots = std::numeric_limits<std::uint64_t>::max();
+    expect_width_at_most(status_table(status), 79);
+  }
+}
+
+TEST(WorkersTable, ShowsWorkersAndWhoIsInQuarantine) {
+  wire::WorkerStatus second = worker(1234, "local-2");
+  second.silent_s = 3.0 * 3600.0;
+  second.is_quarantined = true;
+  EXPECT_EQ(workers_table({.workers = {worker(7, "local-1"), second}}),
+            R"(      id  worker         host               pid slots    lent  results    heard
+───────────────────────────────────────────────────────────────────────────────
+       7  local-1        n7                4711     4      64     1234      2 s
+    1234  local-2        n1234             4711     4      64     1234      3 h
+1234: in quarantine, is lent nothing: too many crashes on n1234
+)");
+}
+
+TEST(WorkersTable, SaysThatThereIsNoWorker) { EXPECT_EQ(workers_table({}), "no workers\n"); }
+
+TEST(WorkersTable, HasAtMost79Columns) {
+  constexpr auto most = std::numeric_limits<std::uint64_t>::max();
+  wire::WorkerStatus wide = worker(most, std::string(128, 'x'));
+  wide.host = std::string(128, 'y');
+  wide.process_id = wide.num_slots = wide.num_lent = wide.num_results = most;
+  wide.silent_s = 1e300;
+  expect_width_at_most(workers_table({.workers = {wide}}), 79);
+}
+
+TEST(CampaignLine, SaysHowFarItIsAndHowFast) {
+  wire::CampaignStatus status = campaign("hardy2013", 42);
+  EXPECT_EQ(campaign_line(status), "hardy2013 active: 42 of 100 runs, 42 %");
+  status.rate_hz = 0.5;
+  status.remaining_s = 116.0;
+  EXPECT_EQ(campaign_line(status),
+            "hardy2013 active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left");
+  status.num_audited = 1;
+  status.num_given_up = 2;
+  EXPECT_EQ(campaign_line(status),
+            "hardy2013 active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left; 2 runs given "
+            "up: too many workers crashed; 1 result compared with a second computation: all equal");
+}
+
+TEST(CampaignLine, OfOneThatIsOverHasNoRate) {
+  wire::CampaignStatus status = campaign("a", 100);
+  status.phase = wire::CampaignPhase::finished;
+  status.rate_hz = 0.5;
+  status.remaining_s = 0.0;
+  EXPECT_EQ(campaign_line(status), "a finished: 100 of 100 runs, 100 %");
+}
+
+TEST(ShortenedText, EndsWithAMarkIfSomethingIsMissing) {
+  EXPECT_EQ(shortened("abcde", 5), "abcde");
+  EXPECT_EQ(shortened("abcdef", 5), "abcd…");
+  EXPECT_EQ(shortened("─────", 3), "──…");
+  EXPECT_EQ(shortened("ab", 1), "…");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

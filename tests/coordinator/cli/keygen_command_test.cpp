@@ -1,0 +1,153 @@
+#include "coordinator/cli/keygen_command.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <set>
+#include <string>
+
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/net/allow_list.hpp"
+#include "proto/link/security.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using test::mode_of;
+using test::refusal_of;
+using test::ScratchDirectory;
+using test::text_of;
+using wire::KeyRole;
+
+// The output of a command, and its exit code at the end.
+std::string output_of(const KeygenOptions& options) {
+  ::testing::internal::CaptureStdout();
+  const int exit_code = make_keys(options);
+  return ::testing::internal::GetCapturedStdout() + std::to_string(exit_code);
+}
+
+class Keygen : public ::testing::Test {
+ protected:
+  void make_whole_set() { (void)output_of({.directory = directory_, .worker = {}, .client = {}}); }
+  void add_worker(const std::string& name) {
+    (void)output_of({.directory = directory_, .worker = name, .client = {}});
+  }
+
+  [[nodiscard]] std::string refusal(const KeygenOptions& options) const {
+    return refusal_of([&] { (void)make_keys(options); });
+  }
+
+  ScratchDirectory scratch_;
+  std::filesystem::path directory_ = scratch_ / "keys";
+};
+
+TEST_F(Keygen, MakesAllThatACoordinatorItsWorkersAndClientsNeed) {
+  make_whole_set();
+  const auto server = wire::read_server_security(directory_, wire::Domain::workers);
+  const auto worker = wire::read_client_security(directory_, KeyRole::worker);
+  const auto client = wire::read_client_security(directory_, KeyRole::client);
+  EXPECT_EQ(worker.identity->coordinator, server.keys->public_key);
+  EXPECT_EQ(client.identity->coordinator, server.keys->public_key);
+
+  const AllowList workers(directory_ / "authorized_workers");
+  const AllowList clients(directory_ / "authorized_clients");
+  ASSERT_NE(workers.name_of(worker.identity->keys.public_key.text()), nullptr);
+  EXPECT_EQ(*workers.name_of(worker.identity->keys.public_key.text()), "worker");
+  EXPECT_EQ(workers.name_of(client.identity->keys.public_key.text()), nullptr);
+  ASSERT_NE(clients.name_of(client.identity->keys.public_key.text()), nullptr);
+  EXPECT_EQ(clients.name_of(worker.identity->keys.public_key.text()), nullptr);
+}
+
+TEST_F(Keygen, KeepsSecretsToTheirOwner) {
+  const mode_t before = ::umask(0);
+  make_whole_set();
+  ::umask(before);
+  EXPECT_EQ(mode_of(directory_), 0700u);
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(directory_)) {
+    const bool is_secret = entry.path().extension() == ".key";
+    EXPECT_EQ(mode_of(entry.path()), is_secret ? 0600u : 0644u) << entry.path();
+    names.insert(entry.path().filename().string());
+  }
+  EXPECT_EQ(names, (std::set<std::string>{"coordinator.key", "coordinator.pub", "worker.key",
+                                          "worker.pub", "client.key", "client.pub",
+                                          "authorized_workers", "authorized_clients"}));
+}
+
+TEST_F(Keygen, SaysWhatToCopyWhereAndNoSecret) {
+  const std::string output = output_of({.directory = directory_, .worker = {}, .client = {}});
+  const std::string path = directory_.string();
+  EXPECT_EQ(output,
+            "wrote " + path + "\nThe coordinator keeps it: proofmass-coordinator --keys " + path +
+                "\nIt admits the keys in authorized_workers and authorized_clients.\n"
+                "A host of workers (proofmass-worker --keys) needs a directory with two files, "
+                "readable by its user alone:\n  " +
+                path + "/worker.key\n  " + path +
+                "/coordinator.pub\n"
+                "A person who submits and watches (proofmass --keys) needs a directory with two "
+                "files, readable by its user alone:\n  " +
+                path + "/client.key\n  " + path + "/coordinator.pub\n0");
+}
+
+TEST_F(Keygen, ReplacesNothing) {
+  make_whole_set();
+  const std::string before = text_of(directory_ / "coordinator.key");
+  const std::string tail = " (exists; keys are never replaced)";
+  EXPECT_EQ(refusal({.directory = directory_, .worker = {}, .client = {}}),
+            "key file = " + (directory_ / "coordinator.key").string() + tail);
+  EXPECT_EQ(text_of(directory_ / "coordinator.key"), before);
+
+  std::filesystem::remove(directory_ / "coordinator.key");
+  EXPECT_EQ(refusal({.directory = directory_, .worker = {}, .client = {}}),
+            "key file = " + (directory_ / "coordinator.pub").string() + tail);
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "coordinator.key"));
+}
+
+TEST_F(Keygen, AddsAPairAndItsLine) {
+  make_whole_set();
+  const std::string output =
+      output_of({.directory = directory_, .worker = "cluster-2", .client = {}});
+  EXPECT_NE(output.find((directory_ / "cluster-2.key").string() + "  as worker.key\n"),
+            std::string::npos)
+      << output;
+  const auto pair = wire::read_key_pair(directory_ / "cluster-2.key", KeyRole::worker);
+  const AllowList workers(directory_ / "authorized_workers");
+  ASSERT_NE(workers.name_of(pair.public_key.text()), nullptr);
+  EXPECT_EQ(*workers.name_of(pair.public_key.text()), "cluster-2");
+  const auto first = wire::read_public_key(directory_ / "worker.pub", KeyRole::worker);
+  EXPECT_NE(workers.name_of(first.text()), nullptr);
+}
+
+TEST_F(Keygen, AddsToAListThatAPersonHasEdited) {
+  make_whole_set();
+  test::write_text(directory_ / "authorized_clients", "# mine alone", 0644);
+  (void)output_of({.directory = directory_, .worker = {}, .client = "anna"});
+  const std::string key = wire::read_public_key(directory_ / "anna.pub", KeyRole::client).text();
+  EXPECT_EQ(text_of(directory_ / "authorized_clients"), "# mine alone\n" + key + " anna\n");
+}
+
+TEST_F(Keygen, RefusesAPairThatMakesNoSense) {
+  const KeygenOptions worker{.directory = directory_, .worker = "w2", .client = {}};
+  EXPECT_EQ(refusal(worker), "allow-list = " + (directory_ / "authorized_workers").string() +
+                                 " (No such file or directory; `proofmass keygen DIR` makes one)");
+  make_whole_set();
+  add_worker("w2");
+  EXPECT_EQ(refusal(worker),
+            "--worker = w2 (is in " + (directory_ / "authorized_workers").string() + " already)");
+  EXPECT_EQ(
+      refusal({.directory = directory_, .worker = {}, .client = "w2"}),
+      "key file = " + (directory_ / "w2.key").string() + " (exists; keys are never replaced)");
+  EXPECT_EQ(refusal({.directory = directory_, .worker = "../x", .client = {}}),
+            "--worker = ../x (must be 1 to 128 of [A-Za-z0-9._-])");
+}
+
+TEST_F(Keygen, RefusesADirectoryThatCannotBeMade) {
+  const std::filesystem::path file = scratch_ / "file";
+  test::write_text(file, "", 0644);
+  EXPECT_EQ(refusal({.directory = file / "keys", .worker = {}, .client = {}}),
+            "key directory = " + (file / "keys").string() + " (Not a directory)");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,117 @@
+#include "coordinator/cli/watch_display.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace proofmass::coordinator {
+namespace {
+
+wire::StatusReply status_of(const std::string& name, std::uint64_t num_done) {
+  wire::CampaignStatus campaign;
+  campaign.name = name;
+  campaign.num_runs = 100;
+  campaign.num_done = num_done;
+  return {.version = "v",
+          .model_version = "m",
+          .uptime_s = 1.0,
+          .num_workers = 1,
+          .num_slots = 1,
+          .campaigns = {campaign}};
+}
+
+/// What a display writes.
+template <typename Use>
+std::string output_of(WatchMode mode, Use use) {
+  std::FILE* const file = std::tmpfile();
+  WatchDisplay display(mode, file);
+  use(display);
+  std::rewind(file);
+  std::string text;
+  for (int c = std::fgetc(file); c != EOF; c = std::fgetc(file)) text += static_cast<char>(c);
+  std::fclose(file);
+  return text;
+}
+
+TEST(Drawing, TakesThePlaceOfTheOneBefore) {
+  const Drawing first = drawn_over(0, "a\nb\n", {});
+  EXPECT_EQ(first.text, "a\033[K\nb\033[K\n\033[J");
+  EXPECT_EQ(first.num_lines, 2U);
+  const Drawing second = drawn_over(first.num_lines, "c\n", {});
+  EXPECT_EQ(second.text, "\033[2Ac\033[K\n\033[J");
+  EXPECT_EQ(second.num_lines, 1U);
+}
+
+// A line that wraps, or one that scrolls the others away, would make the next drawing miss its
+// place.
+TEST(Drawing, FitsOnTheScreen) {
+  const Drawing drawing = drawn_over(0, "abcdef\nb\nc\nd\n", {.columns = 4, .rows = 3});
+  EXPECT_EQ(drawing.text, "abc…\033[K\nb\033[K\n\033[J");
+  EXPECT_EQ(drawing.num_lines, 2U);
+}
+
+TEST(Drawing, NeedsNoEndOfTheLastLine) {
+  EXPECT_EQ(drawn_over(0, "a", {}).text, "a\033[K\n\033[J");
+}
+
+TEST(ScreenSize, IsTheUsualOneWhereThereIsNoTerminal) {
+  std::FILE* const file = std::tmpfile();
+  const ScreenSize size = screen_size_of(file);
+  std::fclose(file);
+  EXPECT_EQ(size.columns, 80U);
+  EXPECT_EQ(size.rows, 24U);
+}
+
+TEST(WatchDisplay, WritesALineEveryTenPercent) {
+  const std::string text = output_of(WatchMode::lines, [](WatchDisplay& display) {
+    for (std::uint64_t i = 0; i <= 30; ++i) display.update(status_of("a", i));
+  });
+  EXPECT_EQ(text,
+            "a active: 0 of 100 runs, 0 %\n"
+            "a active: 10 of 100 runs, 10 %\n"
+            "a active: 20 of 100 runs, 20 %\n"
+            "a active: 30 of 100 runs, 30 %\n");
+}
+
+TEST(WatchDisplay, WritesALineWhenSomethingHappens) {
+  const std::string text = output_of(WatchMode::lines, [](WatchDisplay& display) {
+    wire::StatusReply status = status_of("a", 1);
+    for (int i = 0; i < 2; ++i) display.update(status);
+    status.campaigns[0].phase = wire::CampaignPhase::paused;
+    for (int i = 0; i < 2; ++i) display.update(status);
+    status.campaigns[0].num_given_up = 1;
+    for (int i = 0; i < 2; ++i) display.update(status);
+    status.campaigns[0].num_mismatches = 1;
+    for (int i = 0; i < 2; ++i) display.update(status);
+    status.campaigns[0].storage_failure = "disk full";
+    for (int i = 0; i < 2; ++i) display.update(status);
+  });
+  EXPECT_EQ(std::ranges::count(text, '\n'), 5);
+}
+
+TEST(WatchDisplay, KeepsCampaignsApart) {
+  const std::string text = output_of(WatchMode::lines, [](WatchDisplay& display) {
+    wire::StatusReply status = status_of("a", 1);
+    status.campaigns.push_back(status_of("b", 2).campaigns[0]);
+    for (int i = 0; i < 3; ++i) display.update(status);
+  });
+  EXPECT_EQ(text, "a active: 1 of 100 runs, 1 %\nb active: 2 of 100 runs, 2 %\n");
+}
+
+TEST(WatchDisplay, DrawsTheTableAgain) {
+  const std::string text = output_of(WatchMode::screen, [](WatchDisplay& display) {
+    for (int i = 0; i < 2; ++i) display.update(status_of("a", 1));
+  });
+  EXPECT_EQ(text.find("\033[6A"), text.find("\033[J") + 3);
+}
+
+TEST(WatchDisplay, WritesAnObjectALine) {
+  const std::string text = output_of(WatchMode::json, [](WatchDisplay& display) {
+    for (int i = 0; i < 3; ++i) display.update(status_of("a", 1));
+  });
+  EXPECT_EQ(std::ranges::count(text, '\n'), 3);
+  EXPECT_TRUE(text.starts_with(R"({"version":"v",)"));
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,140 @@
+// Runs that are computed a second time, by another worker, and compared.
+
+#include <cmath>
+
+#include "tests/coordinator/dispatch/dispatch_fixture.hpp"
+
+namespace proofmass::test {
+namespace {
+
+using coordinator::is_audited;
+
+class AuditTest : public DispatchFixture {
+ protected:
+  void SetUp() override {
+    begin();
+    add_campaign(one, 1, 0, 1.0);
+    add_worker(first);
+    outbox.forget();
+  }
+};
+
+TEST(Audit, ChoosesAFractionOfRunsAlwaysTheSame) {
+  constexpr std::uint64_t num_runs = 100'000;
+  for (const double fraction : {0.0, 0.01, 0.5, 1.0}) {
+    std::uint64_t count = 0;
+    for (RunIndex run; run.value < num_runs; ++run.value) {
+      const bool is_chosen = is_audited(7, run, fraction);
+      EXPECT_EQ(is_chosen, is_audited(7, run, fraction));
+      if (is_chosen) ++count;
+    }
+    // A binomial count: within five standard deviations.
+    const double expected = fraction * num_runs;
+    EXPECT_NEAR(static_cast<double>(count), expected, 5.0 * std::sqrt(expected * (1.0 - fraction)));
+  }
+}
+
+TEST(Audit, ChoosesOtherRunsUnderAnotherSeed) {
+  int num_different = 0;
+  for (RunIndex run; run.value < 1000; ++run.value) {
+    if (is_audited(1, run, 0.5) != is_audited(2, run, 0.5)) ++num_different;
+  }
+  EXPECT_NEAR(num_different, 500, 80);
+}
+
+TEST_F(AuditTest, GoesToAnotherWorker) {
+  add_worker(second);
+  outbox.forget();
+  deliver(first, one, {0});
+  commit(one);
+  (void)outbox.take_sent<wire::ResultAck>(first);
+  const auto lease = outbox.take_sent<wire::RunLease>(second);
+  EXPECT_EQ(lease.runs, (RunRange{{0}, 1}));
+  EXPECT_EQ(lease.attempt, Attempt{2});
+  EXPECT_FALSE(is_finished(campaign(one)));
+
+  deliver(second, one, {0}, 2);
+  EXPECT_EQ(outbox.take_sent<wire::ResultAck>(second).runs, Runs{{0}});
+  EXPECT_EQ(outbox.take_compared(), Runs{{0}});
+  EXPECT_TRUE(state.leases.empty());
+  EXPECT_FALSE(is_finished(campaign(one)));
+  EXPECT_FALSE(is_quiet(state));
+  EXPECT_EQ(campaign(one).num_duplicates, 0U);
+
+  on_compared(state, one, {0}, second, true, now, outbox);
+  EXPECT_TRUE(is_finished(campaign(one)));
+  EXPECT_TRUE(is_quiet(state));
+  outbox.forget();
+}
+
+TEST_F(AuditTest, WaitsForAnotherWorkerThatIsBusy) {
+  add_worker(second);
+  heartbeat(second, {}, {}, 0);
+  outbox.forget();
+  deliver(first, one, {0});
+  commit(one);
+  (void)outbox.take_sent<wire::ResultAck>(first);
+  outbox.expect_nothing_more();
+  heartbeat(second);
+  (void)outbox.take_sent<wire::RunLease>(second);
+}
+
+TEST_F(AuditTest, GoesToTheSameWorkerIfThereIsNoOther) {
+  deliver(first, one, {0});
+  commit(one);
+  (void)outbox.take_sent<wire::ResultAck>(first);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).attempt, Attempt{2});
+}
+
+TEST_F(AuditTest, ThatIsLostIsLentAgain) {
+  add_worker(second);
+  complete(first, one, {0});
+  on_bye(state, second, {}, now, outbox);
+  outbox.forget();
+  add_worker(third);
+  EXPECT_EQ(state.workers.at(third).num_lent + state.workers.at(first).num_lent, 1U);
+  EXPECT_EQ(campaign(one).audits.size(), 1U);
+  EXPECT_EQ(state.leases.at(campaign(one).audits.at({0})).attempt, Attempt{3});
+  outbox.forget();
+}
+
+TEST_F(AuditTest, ThatCrashesEveryWorkerIsGivenUp) {
+  add_worker(second);
+  complete(first, one, {0});
+  Strings events;
+  for (int i = 0; i < 8 && !campaign(one).audits.empty(); ++i) {
+    const WorkerId id = state.leases.at(campaign(one).audits.at({0})).worker;
+    state.hosts.at("host").num_crashes = 0;
+    crash(id);
+    events = outbox.take_events();
+    outbox.forget();
+    add_worker(id);
+    outbox.forget();
+  }
+  EXPECT_TRUE(campaign(one).suspects.empty());
+  EXPECT_TRUE(is_finished(campaign(one)));
+  EXPECT_EQ(events.at(1), "audit_given_up run=0 crashes=3");
+}
+
+TEST_F(AuditTest, OfWhatWasStoredBeforeTheRestartIsDoneByAnybody) {
+  StoredCampaign stored = stored_campaign(3);
+  stored.audit_fraction = 1.0;
+  stored.finished = {{{0}, 3}};
+  stored.compared = {{{1}, 1}};
+  on_campaign(state, two, stored, now, outbox);
+  EXPECT_EQ(campaign(two).audits.size() + campaign(two).num_to_audit, 2U);
+  EXPECT_FALSE(campaign(two).audits.contains({1}));
+  outbox.forget();
+}
+
+TEST_F(AuditTest, OfAFinishedCampaignIsNotDoneAgain) {
+  StoredCampaign stored = stored_campaign(3);
+  stored.audit_fraction = 1.0;
+  stored.phase = coordinator::Phase::finished;
+  stored.finished = {{{0}, 3}};
+  on_campaign(state, two, stored, now, outbox);
+  EXPECT_TRUE(is_finished(campaign(two)));
+}
+
+}  // namespace
+}  // namespace proofmass::test

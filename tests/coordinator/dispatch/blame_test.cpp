@@ -1,0 +1,357 @@
+// What counts against a run or a host, and what follows.
+
+#include "tests/coordinator/dispatch/dispatch_fixture.hpp"
+
+namespace proofmass::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+class BlameTest : public DispatchFixture {
+ protected:
+  void SetUp() override { begin(); }
+
+  std::vector<RunIndex> suspects() {
+    std::vector<RunIndex> runs;
+    for (const auto& [run, suspicion] : campaign(one).suspects) runs.push_back(run);
+    return runs;
+  }
+
+  static wire::ComputedBatch batch(RunRange runs, std::uint32_t num_orbits_done = 0) {
+    return {.campaign = one, .ranges = {runs}, .num_orbits_done = num_orbits_done};
+  }
+
+  /// A worker on a host that has shown that it can compute.
+  void add_proven_worker(WorkerId id, std::uint32_t num_slots, const std::string& host) {
+    add_worker(id, num_slots, host);
+    state.hosts.at(host).num_results = 1;
+    outbox.forget();
+  }
+
+  /// The worker of this number has a successor, which is lent something; what, nobody looks.
+  void replace(WorkerId id, std::uint32_t num_slots = 1, const std::string& host = "host") {
+    outbox.forget();
+    add_worker(id, num_slots, host);
+    outbox.forget();
+  }
+};
+
+TEST_F(BlameTest, ACrashCountsAgainstWhatWasComputed) {
+  add_campaign(one, 10);
+  add_worker(first, 4);
+  heartbeat(first, {held(one, {{0}, 4})}, {batch({{1}, 2})});
+  outbox.forget();
+  on_gone(state, first, LossReason::out_of_memory, now, outbox);
+  EXPECT_EQ(suspects(), (Runs{{1}, {2}}));
+  EXPECT_EQ(outbox.take_events(),
+            (Strings{"worker_gone worker=1 name=w reason=out_of_memory orbits=0",
+                     "runs_lost worker=1 runs=0..3 attempt=1 reason=out_of_memory blamed=1..2"}));
+  const auto losses = outbox.take_losses();
+  ASSERT_EQ(losses.size(), 3U);
+  EXPECT_EQ(losses[0].runs, (RunRange{{1}, 2}));
+  EXPECT_TRUE(losses[0].is_blamed);
+  EXPECT_FALSE(losses[1].is_blamed || losses[2].is_blamed);
+}
+
+TEST_F(BlameTest, WithoutAHeartbeatTheFirstSlotsWereComputed) {
+  add_campaign(one, 100);
+  add_worker(first, 2);
+  complete(first, one, {0});
+  ASSERT_EQ(runs_held_text(state, first), "1..4");
+  crash(first);
+  EXPECT_EQ(suspects(), (Runs{{1}, {2}}));
+  outbox.forget();
+}
+
+TEST_F(BlameTest, OtherLossesCountAgainstNothing) {
+  for (const LossReason reason : {LossReason::silent, LossReason::protocol, LossReason::failed}) {
+    const CampaignId id{500 + static_cast<std::uint64_t>(reason)};
+    add_campaign(id, 1);
+    add_worker(first);
+    on_gone(state, first, reason, now, outbox);
+    EXPECT_TRUE(campaign(id).suspects.empty());
+    on_cancel(state, id, outbox);
+  }
+  outbox.forget();
+}
+
+TEST_F(BlameTest, ACrashIsKnownFromTheNextProcess) {
+  add_campaign(one, 1);
+  add_worker(first);
+  outbox.forget();
+  wire::Hello successor = hello();
+  successor.former = wire::FormerSession{session_of(first), LossReason::crashed, 11};
+  on_hello(state, second, session_of(second), successor, now, outbox);
+  EXPECT_EQ(suspects(), Runs{{0}});
+  EXPECT_FALSE(state.workers.contains(first));
+  outbox.forget();
+}
+
+TEST_F(BlameTest, ASuspectIsLentAloneAfterAllOthers) {
+  add_campaign(one, 6);
+  add_worker(first, 2);
+  outbox.forget();
+  crash(first);
+  ASSERT_EQ(suspects(), (Runs{{0}, {1}}));
+  outbox.forget();
+
+  add_worker(second, 4);
+  const auto others = outbox.take_sent<wire::RunLease>(second);
+  EXPECT_EQ(others.runs, (RunRange{{2}, 4}));
+  EXPECT_FALSE(others.is_alone);
+  deliver(second, one, {2, 3, 4});
+  EXPECT_EQ(outbox.num_sent(), 0U) << "a suspect waits until the worker is idle";
+  deliver(second, one, {5});
+  const auto suspect = outbox.take_sent<wire::RunLease>(second);
+  EXPECT_EQ(suspect.runs, (RunRange{{0}, 1}));
+  EXPECT_TRUE(suspect.is_alone);
+  EXPECT_EQ(suspect.attempt, Attempt{2});
+  add_campaign(two, 1);
+  EXPECT_EQ(outbox.num_sent(), 0U) << "a worker with a suspect has nothing else";
+  outbox.forget();
+}
+
+TEST_F(BlameTest, ASuspectThatFinishesIsInnocent) {
+  add_campaign(one, 1);
+  add_worker(first);
+  crash(first);
+  replace(first);
+  deliver(first, one, {0});
+  EXPECT_TRUE(campaign(one).suspects.empty());
+  outbox.forget();
+}
+
+TEST_F(BlameTest, ARunThatCrashesThreeTimesIsGivenUp) {
+  add_campaign(one, 2);
+  add_proven_worker(first, 1, "host");
+  for (int i = 0; i < 2; ++i) {
+    crash(first);
+    EXPECT_TRUE(campaign(one).given_up.empty());
+    replace(first);
+    if (i == 0) complete(first, one, {1});
+  }
+  crash(first);
+  EXPECT_EQ(outbox.take_given_up(), Runs{{0}});
+  EXPECT_TRUE(is_finished(campaign(one)));
+  EXPECT_EQ(state.hosts.at("host").num_crashes, 0U) << "the run was the cause";
+  const Strings events = outbox.take_events();
+  EXPECT_EQ(events.at(2), "run_given_up run=0 crashes=3");
+  EXPECT_EQ(events.at(3),
+            "campaign_finished runs=2 given_up=1 duplicates=0 compared=0 mismatches=0");
+  outbox.forget();
+}
+
+TEST_F(BlameTest, OnlyACrashAloneTellsAgainstASuspect) {
+  add_campaign(one, 3);
+  add_worker(first, 3);
+  const auto count = [&](std::uint64_t run) {
+    const auto& suspicion = campaign(one).suspects.at({run});
+    return std::pair(suspicion.num_crashes, suspicion.hosts.at("host").num_alone);
+  };
+  crash(first);
+  for (const std::uint64_t run : {0U, 1U, 2U}) EXPECT_EQ(count(run), std::pair(1U, 0U));
+  replace(first, 3);
+  ASSERT_EQ(runs_held_text(state, first), "0");
+
+  // It turns out to hold a run that was lent to another worker: that may be the cause as well.
+  add_worker(second, 3);
+  ASSERT_EQ(runs_held_text(state, second), "1");
+  heartbeat(first, {held(one, {{0}, 2}, 2)});
+  crash(first);
+  EXPECT_EQ(count(0), std::pair(1U, 0U));
+
+  crash(second);
+  EXPECT_EQ(count(1), std::pair(2U, 1U));
+  EXPECT_EQ(count(2), std::pair(1U, 0U));
+  outbox.forget();
+}
+
+TEST_F(BlameTest, ASuspectIsTriedOnAnotherHost) {
+  add_campaign(one, 1);
+  add_worker(first, 1, "bad");
+  crash(first);
+  outbox.forget();
+  add_worker(second, 1, "good");
+  (void)outbox.take_sent<wire::RunLease>(second);
+  heartbeat(second, {held(one, {{0}, 1}, 2)}, {}, 0);  // Takes nothing more now.
+  on_give_back(state, second, {.runs = {held(one, {{0}, 1}, 2)}}, now, outbox);
+  outbox.forget();
+  ASSERT_EQ(campaign(one).pending_suspects.size(), 1U);
+  add_worker(first, 1, "bad");
+  EXPECT_EQ(outbox.num_sent(), 0U);
+  outbox.forget();
+}
+
+TEST_F(BlameTest, ASuspectIsTriedAgainOnTheOnlyHost) {
+  add_campaign(one, 1);
+  add_worker(first, 1, "only");
+  crash(first);
+  outbox.forget();
+  add_worker(second, 1, "only");
+  EXPECT_TRUE(outbox.take_sent<wire::RunLease>(second).is_alone);
+}
+
+TEST_F(BlameTest, FiveCrashesInARowQuarantineAHostAndItsBlameIsWithdrawn) {
+  add_campaign(one, 100);
+  for (int i = 0; i < 4; ++i) {
+    add_worker(first, 2, "bad");
+    crash(first);
+  }
+  ASSERT_EQ(suspects().size(), 8U);
+  outbox.forget();
+  add_worker(first, 2, "bad");
+  outbox.forget();
+  crash(first);
+  EXPECT_TRUE(suspects().empty());
+  EXPECT_TRUE(campaign(one).pending_suspects.empty());
+  EXPECT_TRUE(state.quarantined.contains("bad"));
+  EXPECT_EQ(outbox.take_events(),
+            (Strings{"worker_gone worker=1 name=w reason=crashed orbits=0",
+                     "host_quarantined host=bad crashes=5",
+                     "runs_lost worker=1 runs=8..9 attempt=1 reason=crashed"}));
+  EXPECT_FALSE(outbox.take_losses().at(0).is_blamed);
+
+  on_hello(state, second, session_of(second), hello(1, "bad"), now, outbox);
+  const auto reject = outbox.take_sent<wire::Reject>(second);
+  EXPECT_EQ(reject.reason, wire::RejectReason::quarantined);
+  EXPECT_EQ(reject.text, "host = bad (too much crashed there)");
+  (void)outbox.take_events();
+}
+
+TEST_F(BlameTest, AWorkerOnAQuarantinedHostIsLentNothingButMayDeliver) {
+  add_campaign(one, 3);
+  add_worker(first);
+  state.quarantined.insert("host");
+  outbox.forget();
+  deliver(first, one, {0});
+  EXPECT_EQ(outbox.take_stored(), Runs{{0}});
+  heartbeat(first);
+  EXPECT_TRUE(state.leases.empty());
+}
+
+TEST_F(BlameTest, AResultEndsARowOfCrashes) {
+  add_campaign(one, 100);
+  for (int i = 0; i < 8; ++i) {
+    add_worker(first);
+    if (i == 4) complete(first, one, {50});
+    crash(first);
+    outbox.forget();
+  }
+  EXPECT_TRUE(state.quarantined.empty());
+  EXPECT_EQ(state.hosts.at("host").num_crashes, 4U);
+}
+
+// A host on which nothing has ever finished is as likely the cause as the run.
+TEST_F(BlameTest, ARunIsNotGivenUpOnTheWordOfOneUnprovenHost) {
+  add_campaign(one, 1);
+  for (int i = 0; i < 4; ++i) {
+    add_worker(first);
+    crash(first);
+    outbox.forget();
+  }
+  EXPECT_TRUE(campaign(one).given_up.empty());
+  add_worker(second, 1, "other");
+  outbox.forget();
+  crash(second);  // Alone, and elsewhere.
+  EXPECT_EQ(outbox.take_given_up(), Runs{{0}});
+  outbox.forget();
+}
+
+TEST_F(BlameTest, ABatchThatComesNoFurtherIsHung) {
+  add_campaign(one, 10);
+  add_worker(first, 4);
+  campaign(one).orbit_time_s = 0.1;
+  for (std::uint32_t i = 0; i <= 12; ++i, now += 5s) {
+    heartbeat(first, {held(one, {{0}, 4})}, {batch({{0}, 2}, 7), batch({{2}, 2}, 50 * i)});
+    outbox.forget();
+    if (i == 12) break;
+    on_tick(state, now, outbox);
+    ASSERT_TRUE(state.workers.contains(first)) << i;
+  }
+  on_tick(state, now, outbox);  // A minute without an orbit.
+  (void)outbox.take_sent<wire::Stop>(first);
+  EXPECT_EQ(suspects(), (Runs{{0}, {1}}));
+  EXPECT_EQ(outbox.take_events().at(0),
+            "worker_gone worker=1 name=w reason=hung runs=0..1 orbits=7");
+  EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::hung);
+  outbox.forget();
+}
+
+TEST_F(BlameTest, ASlowCampaignIsNotHung) {
+  add_campaign(one, 10);
+  add_worker(first);
+  campaign(one).orbit_time_s = 10.0;  // Then 500 s are allowed.
+  for (int i = 0; i < 99; ++i) {
+    heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1})});
+    on_tick(state, now, outbox);
+    outbox.forget();
+    now += 5s;
+  }
+  EXPECT_TRUE(state.workers.contains(first));
+}
+
+TEST_F(BlameTest, AProcessThatWasStoppedForAWhileIsNotHung) {
+  add_campaign(one, 10);
+  add_worker(first);
+  campaign(one).orbit_time_s = 0.1;
+  heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
+  now += 59s;
+  heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
+  now += 5s;
+  heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
+  on_tick(state, now, outbox);
+  EXPECT_TRUE(state.workers.contains(first));
+  outbox.forget();
+}
+
+TEST_F(BlameTest, OfAWorkerThatIsSilentNothingIsKnown) {
+  add_campaign(one, 10);
+  add_worker(first);
+  campaign(one).orbit_time_s = 0.1;
+  for (int i = 0; i < 10; ++i, now += 5s) {
+    heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
+  }
+  now += 20s;
+  on_tick(state, now, outbox);
+  EXPECT_TRUE(state.workers.contains(first));
+  outbox.forget();
+}
+
+TEST_F(BlameTest, TheTimeOfAnOrbitIsLearnedFromHeartbeats) {
+  add_campaign(one, 10);
+  add_worker(first);
+  outbox.forget();
+  heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
+  now += 5s;
+  heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 15)});
+  EXPECT_DOUBLE_EQ(campaign(one).orbit_time_s, 0.5);
+}
+
+TEST_F(BlameTest, BlameOutlivesTheCoordinator) {
+  StoredCampaign stored = stored_campaign(3);
+  stored.finished = {{{1}, 2}};
+  stored.blamed = {{.run = {0}, .num_crashes = 7, .attempt = {4}},
+                   {.run = {1}, .num_crashes = 1, .attempt = {1}}};
+  on_campaign(state, one, stored, now, outbox);
+  EXPECT_EQ(suspects(), Runs{{0}});
+  EXPECT_EQ(campaign(one).suspects.at({0}).num_crashes, 2U) << "one more crash is needed";
+  add_worker(first);
+  const auto lease = outbox.take_sent<wire::RunLease>(first);
+  EXPECT_TRUE(lease.is_alone);
+  EXPECT_EQ(lease.attempt, Attempt{5});
+}
+
+TEST_F(BlameTest, ASuspectThatIsAllAWorkerHoldsGoesOnThere) {
+  StoredCampaign stored = stored_campaign(2);
+  stored.finished = {{{1}, 1}};
+  stored.blamed = {{.run = {0}, .num_crashes = 1, .attempt = {1}}};
+  on_campaign(state, one, stored, now, outbox);
+  on_hello(state, first, session_of(first), hello(), now, outbox);
+  outbox.forget();
+  heartbeat(first, {held(one, {{0}, 1}, 2)});
+  EXPECT_TRUE(state.leases.at(*campaign(one).lent.find({0})).is_alone);
+  EXPECT_EQ(state.workers.at(first).num_alone, 1U);
+}
+
+}  // namespace
+}  // namespace proofmass::test

@@ -1,0 +1,187 @@
+// Several campaigns: what is lent first, what is paused, cancelled and extended.
+
+#include "tests/coordinator/dispatch/dispatch_fixture.hpp"
+
+namespace proofmass::test {
+namespace {
+
+using coordinator::Phase;
+using Ranges = std::vector<RunRange>;
+
+class CampaignTest : public DispatchFixture {
+ protected:
+  void SetUp() override { begin(); }
+};
+
+TEST_F(CampaignTest, OfHigherPriorityIsLentFirst) {
+  add_campaign(one, 1);
+  add_campaign(two, 1, 5);
+  add_worker(first);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).campaign, two);
+  deliver(first, two, {0});
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).campaign, one);
+  outbox.forget();
+}
+
+TEST_F(CampaignTest, TheOlderOfEqualPriorityIsLentFirst) {
+  add_campaign(two, 1);
+  add_campaign(one, 1);
+  add_worker(first);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).campaign, two);
+}
+
+TEST_F(CampaignTest, WorkersThatWaitAreLentItsRunsAtOnce) {
+  add_worker(first);
+  add_campaign(one, 1);
+  (void)outbox.take_sent<wire::RunLease>(first);
+}
+
+TEST_F(CampaignTest, OnlyWhatIsNotFinishedIsLent) {
+  StoredCampaign stored = stored_campaign(10);
+  stored.finished = {{{0}, 4}, {{5}, 4}};
+  stored.given_up = {{{9}, 1}};
+  on_campaign(state, one, stored, now, outbox);
+  add_worker(first, 4);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{4}, 1}));
+}
+
+TEST_F(CampaignTest, ThatIsDoneIsFinishedAtOnce) {
+  StoredCampaign stored = stored_campaign(2);
+  stored.finished = {{{0}, 1}};
+  stored.given_up = {{{1}, 1}};
+  on_campaign(state, one, stored, now, outbox);
+  EXPECT_EQ(campaign(one).phase, Phase::finished);
+  (void)outbox.take_events();
+}
+
+TEST_F(CampaignTest, ThatIsPausedIsNotLentAndAskedBack) {
+  add_campaign(one, 10);
+  add_worker(first, 2);
+  outbox.forget();
+  on_pause(state, one, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{0}, 2}}));
+  on_pause(state, one, outbox);
+  outbox.expect_nothing_more();
+
+  // The one that is computed is not asked back again.
+  heartbeat(first, {held(one, {{0}, 2})}, {{.campaign = one, .ranges = {{{0}, 1}}}});
+  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{1}, 1}}));
+  on_give_back(state, first, {.runs = {held(one, {{1}, 1})}}, now, outbox);
+  EXPECT_EQ(outbox.num_sent(), 0U);
+  deliver(first, one, {0});
+  EXPECT_EQ(outbox.take_stored(), Runs{{0}});
+  EXPECT_EQ(outbox.num_sent(), 0U);
+
+  outbox.forget();
+  on_resume(state, one, now, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{1}, 1}));
+  outbox.forget();
+}
+
+TEST_F(CampaignTest, ThatIsPausedIsAskedBackFromAWorkerThatOutlivedTheCoordinator) {
+  add_campaign(one, 3);
+  on_pause(state, one, outbox);
+  add_worker(first);
+  heartbeat(first, {held(one, {{0}, 2})});
+  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{0}, 2}}));
+  EXPECT_EQ(state.workers.at(first).num_lent, 2U);
+}
+
+TEST_F(CampaignTest, ThatIsResumedIsNotAskedBackAnyMore) {
+  add_campaign(one, 2);
+  add_worker(first, 2);
+  on_pause(state, one, outbox);
+  on_resume(state, one, now, outbox);
+  outbox.forget();
+  heartbeat(first, {held(one, {{0}, 2})});
+}
+
+TEST_F(CampaignTest, ThatIsPausedLetsOthersGoOn) {
+  add_campaign(one, 10, 5);
+  add_campaign(two, 10);
+  add_worker(first);
+  on_pause(state, one, outbox);
+  outbox.forget();
+  on_give_back(state, first, {.runs = {held(one, {{0}, 1})}}, now, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).campaign, two);
+  outbox.forget();
+}
+
+TEST_F(CampaignTest, ThatIsPausedIsFinishedByItsLastResults) {
+  add_campaign(one, 1);
+  add_worker(first);
+  on_pause(state, one, outbox);
+  outbox.forget();
+  deliver(first, one, {0});
+  commit(one);
+  EXPECT_EQ(campaign(one).phase, Phase::finished);
+  outbox.forget();
+}
+
+TEST_F(CampaignTest, ThatIsCancelledIsForgotten) {
+  add_campaign(one, 10);
+  add_worker(first, 2);
+  outbox.forget();
+  on_cancel(state, one, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, one);
+  EXPECT_TRUE(state.leases.empty());
+  outbox.forget();
+  deliver(first, one, {0});
+  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, one);
+  on_campaign_request(state, first, {.campaign = one}, now, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, one);
+  on_cancel(state, one, outbox);
+}
+
+TEST_F(CampaignTest, ThatIsCancelledKeepsWhatWasDelivered) {
+  add_campaign(one, 10);
+  add_worker(first);
+  outbox.forget();
+  deliver(first, one, {0});
+  on_cancel(state, one, outbox);
+  EXPECT_FALSE(is_quiet(state));
+  on_committed(state, one, outbox.take_stored(), now, outbox);
+  EXPECT_TRUE(campaign(one).committed.contains({0}));
+  EXPECT_TRUE(is_quiet(state));
+  EXPECT_EQ(campaign(one).phase, Phase::cancelled);
+  outbox.forget();
+}
+
+TEST_F(CampaignTest, ThatWasCancelledGoesOnUnderAHigherAttempt) {
+  add_campaign(one, 1);
+  add_worker(first);
+  on_cancel(state, one, outbox);
+  outbox.forget();
+  on_resume(state, one, now, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).attempt, Attempt{2});
+}
+
+TEST_F(CampaignTest, ThatIsExtendedGoesOn) {
+  add_campaign(one, 1);
+  add_worker(first);
+  complete(first, one, {0});
+  ASSERT_EQ(campaign(one).phase, Phase::finished);
+  on_extended(state, one, stored_campaign(3).definition, now, outbox);
+  EXPECT_EQ(campaign(one).phase, Phase::active);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{1}, 1}));
+}
+
+TEST_F(CampaignTest, ThatIsRemovedLeavesNothing) {
+  add_campaign(one, 10);
+  add_worker(first);
+  outbox.forget();
+  on_removed(state, one, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, one);
+  EXPECT_TRUE(state.campaigns.empty());
+  EXPECT_TRUE(state.leases.empty());
+  outbox.forget();
+  on_compared(state, one, {0}, first, true, now, outbox);  // It was under way.
+}
+
+TEST_F(CampaignTest, ABillionRunsCostNothing) {
+  add_campaign(one, num_runs_max);
+  EXPECT_EQ(campaign(one).pending.at({1}).num_ranges(), 1U);
+}
+
+}  // namespace
+}  // namespace proofmass::test

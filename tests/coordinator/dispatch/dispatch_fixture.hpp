@@ -1,0 +1,141 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "coordinator/dispatch/dispatch.hpp"
+#include "core/simulation/run.hpp"
+#include "tests/coordinator/dispatch/recording_outbox.hpp"
+
+namespace proofmass::test {
+
+using coordinator::CampaignState;
+using coordinator::LeaseId;
+using coordinator::StoredCampaign;
+using coordinator::TimePoint;
+using Strings = std::vector<std::string>;
+using Runs = std::vector<RunIndex>;
+using wire::Attempt;
+using wire::CampaignId;
+using wire::LossReason;
+using wire::SessionId;
+using wire::WorkerId;
+
+/// A dispatch, two campaigns' names and some workers'. Each test ends with a check of the state and
+/// that nothing was sent, stored or logged that the test has not named.
+class DispatchFixture : public testing::Test {
+ protected:
+  static constexpr WorkerId first{1};
+  static constexpr WorkerId second{2};
+  static constexpr WorkerId third{3};
+  static constexpr CampaignId one{101};
+  static constexpr CampaignId two{102};
+
+  void begin(std::set<SessionId> awaited = {}) {
+    state = coordinator::initial_state(config, std::move(awaited), now);
+  }
+
+  static StoredCampaign stored_campaign(std::uint64_t num_runs) {
+    Campaign campaign;
+    campaign.num_runs = num_runs;
+    return {.definition = std::make_shared<const Campaign>(campaign),
+            .finished = {},
+            .given_up = {},
+            .blamed = {}};
+  }
+
+  /// A campaign of which nothing is known yet.
+  void add_campaign(CampaignId id, std::uint64_t num_runs, int priority = 0,
+                    double audit_fraction = 0.0) {
+    StoredCampaign stored = stored_campaign(num_runs);
+    stored.priority = priority;
+    stored.audit_fraction = audit_fraction;
+    on_campaign(state, id, stored, now, outbox);
+  }
+
+  static SessionId session_of(WorkerId id) { return {1000 + id.value}; }
+
+  static wire::Hello hello(std::uint32_t num_slots = 1, const std::string& host = "host") {
+    return {.worker_name = "w",
+            .host = host,
+            .process_id = 100,
+            .num_slots = num_slots,
+            .model_version = std::string(model_version),
+            .build = "test",
+            .former = {}};
+  }
+
+  /// A worker that is registered and takes what it is lent.
+  void add_worker(WorkerId id, std::uint32_t num_slots = 1, const std::string& host = "host") {
+    on_hello(state, id, session_of(id), hello(num_slots, host), now, outbox);
+    outbox.drop_sent<wire::Welcome>(id);
+    (void)outbox.take_events();
+    heartbeat(id);
+  }
+
+  /// Its acknowledgement is taken; what else follows is not.
+  void heartbeat(WorkerId id, std::vector<wire::HeldRuns> held = {},
+                 std::vector<wire::ComputedBatch> computing = {},
+                 std::uint32_t num_runs_max = 4096) {
+    on_heartbeat(state, id,
+                 {.num_runs_max = num_runs_max,
+                  .num_orbits_done = 0,
+                  .held = std::move(held),
+                  .computing = std::move(computing)},
+                 ++sequence, now, outbox);
+    outbox.drop_sent<wire::HeartbeatAck>(id);
+  }
+
+  static wire::HeldRuns held(CampaignId id, RunRange runs, std::uint32_t attempt = 1) {
+    return {.campaign = id, .attempt = {attempt}, .ranges = {runs}};
+  }
+
+  /// So long that no more than two rounds are lent.
+  static wire::ComputedRun computed(std::uint64_t run, RunStatus status = RunStatus::completed) {
+    wire::ComputedRun result;
+    result.result.run = {run};
+    result.result.status = status;
+    result.compute_s = 1000.0;
+    return result;
+  }
+
+  void deliver(WorkerId id, CampaignId campaign, const std::vector<std::uint64_t>& runs,
+               std::uint32_t attempt = 1) {
+    wire::ResultBatch batch{.campaign = campaign, .attempt = {attempt}, .results = {}};
+    for (const std::uint64_t run : runs) batch.results.push_back(computed(run));
+    on_results(state, id, batch, now, outbox);
+  }
+
+  /// All runs that were handed to the store become durable.
+  void commit(CampaignId id) { on_committed(state, id, outbox.take_stored(), now, outbox); }
+
+  /// The runs are computed, stored and acknowledged; nobody looks.
+  void complete(WorkerId id, CampaignId campaign, const std::vector<std::uint64_t>& runs) {
+    deliver(id, campaign, runs);
+    commit(campaign);
+    outbox.forget();
+  }
+
+  /// The worker's process ends by a signal.
+  void crash(WorkerId id) { on_gone(state, id, LossReason::crashed, now, outbox); }
+
+  CampaignState& campaign(CampaignId id) { return state.campaigns.at(id); }
+
+  void TearDown() override {
+    outbox.expect_nothing_more();
+    check_invariants(state);
+  }
+
+  coordinator::DispatchConfig config;
+  coordinator::State state;
+  RecordingOutbox outbox;
+  TimePoint now{};
+  std::uint64_t sequence = 0;
+};
+
+}  // namespace proofmass::test

@@ -1,0 +1,184 @@
+// Heartbeats make both sides agree about what a worker holds.
+
+#include "tests/coordinator/dispatch/dispatch_fixture.hpp"
+
+namespace proofmass::test {
+namespace {
+
+using namespace std::chrono_literals;
+using Ranges = std::vector<RunRange>;
+
+class ReconcileTest : public DispatchFixture {
+ protected:
+  /// The first worker has been lent run 0 of three.
+  void lend_one() {
+    begin();
+    add_campaign(one, 3);
+    add_worker(first);
+    outbox.forget();
+  }
+};
+
+TEST_F(ReconcileTest, ALeaseThatNeverArrivedIsLentAgain) {
+  lend_one();
+  now += 11s;
+  heartbeat(first);  // The lease may be under way.
+  outbox.expect_nothing_more();
+
+  now += 1s;
+  heartbeat(first);
+  EXPECT_EQ(outbox.take_events(),
+            Strings{"runs_lost worker=1 runs=0 attempt=1 reason=never_arrived"});
+  EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::never_arrived);
+  const auto again = outbox.take_sent<wire::RunLease>(first);
+  EXPECT_EQ(again.runs, (RunRange{{0}, 1}));
+  EXPECT_EQ(again.attempt, Attempt{2});
+}
+
+TEST_F(ReconcileTest, ALeaseThatIsHeldStays) {
+  lend_one();
+  now += 1h;
+  heartbeat(first, {held(one, {{0}, 1})});
+  EXPECT_EQ(state.leases.size(), 1U);
+}
+
+TEST_F(ReconcileTest, AnOpenRunThatAWorkerHoldsIsLentToIt) {
+  lend_one();
+  heartbeat(first, {held(one, {{0}, 3}, 4)});
+  outbox.expect_nothing_more();  // It has them: no message is needed.
+  EXPECT_EQ(state.workers.at(first).num_lent, 3U);
+  const auto& adopted = state.leases.at(*campaign(one).lent.find({2}));
+  EXPECT_EQ(adopted.attempt, Attempt{4});
+  EXPECT_EQ(adopted.known_as, Attempt{4});
+}
+
+// The attempt only grows, but the worker will name the runs by the one that it knows.
+TEST_F(ReconcileTest, AnAdoptedRunIsGivenBackUnderTheAttemptThatTheWorkerKnows) {
+  lend_one();
+  now += 60s;
+  on_tick(state, now, outbox);  // Run 0 is pending for its second attempt.
+  add_campaign(two, 1);
+  outbox.forget();
+  on_hello(state, first, session_of(first), hello(), now, outbox);
+  outbox.forget();
+  heartbeat(first, {held(one, {{0}, 1}, 1)}, {}, 1);
+  EXPECT_EQ(state.leases.at(*campaign(one).lent.find({0})).attempt, Attempt{2});
+
+  on_give_back(state, first, {.reason = LossReason::walltime, .runs = {held(one, {{0}, 1}, 2)}},
+               now, outbox);
+  outbox.expect_nothing_more();
+  on_give_back(state, first, {.reason = LossReason::walltime, .runs = {held(one, {{0}, 1}, 1)}},
+               now, outbox);
+  EXPECT_EQ(outbox.take_losses().at(0).attempt, Attempt{2});
+  outbox.forget();
+}
+
+TEST_F(ReconcileTest, NobodyIsLentMoreThanAWorkerCanHoldBecauseItSaysSo) {
+  begin();
+  add_campaign(one, 1'000'000);
+  add_worker(first);
+  outbox.forget();
+  heartbeat(first, {held(one, {{0}, 1'000'000})});
+  EXPECT_EQ(state.workers.at(first).num_lent, 1U);
+  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{1}, 999'999}}));
+}
+
+TEST_F(ReconcileTest, ARunThatIsLentToAnotherWorkerIsAskedBack) {
+  lend_one();
+  add_worker(second);
+  outbox.forget();
+  heartbeat(second, {held(one, {{0}, 2})});
+  EXPECT_EQ(outbox.take_sent<wire::Retract>(second).ranges, (Ranges{{{0}, 1}}));
+  EXPECT_TRUE(state.workers.at(second).unleased.at(one).contains({0}));
+  on_give_back(state, second, {.runs = {held(one, {{0}, 1})}}, now, outbox);
+  EXPECT_TRUE(state.workers.at(second).unleased.empty());
+}
+
+TEST_F(ReconcileTest, AStoredRunThatStillWaitsIsAskedBack) {
+  lend_one();
+  complete(first, one, {0});
+  heartbeat(first, {held(one, {{0}, 3})});
+  EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{0}, 1}}));
+}
+
+TEST_F(ReconcileTest, ADeliveredRunNeedsNothing) {
+  lend_one();
+  deliver(first, one, {0});
+  outbox.forget();
+  heartbeat(first, {held(one, {{0}, 3})});
+}
+
+TEST_F(ReconcileTest, ACampaignThatIsNotServedIsForgotten) {
+  lend_one();
+  heartbeat(first, {held(one, {{0}, 1}), held(two, {{0}, 5})});
+  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, two);
+}
+
+TEST_F(ReconcileTest, RunsThatAreGivenBackAreLentAgain) {
+  lend_one();
+  on_give_back(state, first, {.reason = LossReason::preempted, .runs = {held(one, {{0}, 1})}}, now,
+               outbox);
+  EXPECT_EQ(outbox.take_events(), Strings{"runs_lost worker=1 runs=0 attempt=1 reason=preempted"});
+  EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::preempted);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).attempt, Attempt{2});
+}
+
+// A message that was long under way must not take back what has been lent anew since.
+TEST_F(ReconcileTest, AGiveBackOfAnOlderAttemptIsIgnored) {
+  lend_one();
+  on_give_back(state, first, {.runs = {held(one, {{0}, 1})}}, now, outbox);
+  outbox.forget();
+  on_give_back(state, first, {.runs = {held(one, {{0}, 1})}}, now, outbox);
+  EXPECT_TRUE(campaign(one).lent.find({0}).has_value());
+}
+
+TEST_F(ReconcileTest, AfterARestartNothingIsLentUntilAllHaveSaidWhatTheyHold) {
+  begin({session_of(first), session_of(second)});
+  add_campaign(one, 3);
+  add_worker(first);
+  add_worker(third);
+  outbox.expect_nothing_more();
+  on_hello(state, second, session_of(second), hello(), now, outbox);
+  outbox.forget();
+  heartbeat(second, {held(one, {{0}, 1})});
+  EXPECT_EQ(state.leases.at(*campaign(one).lent.find({0})).worker, second);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{1}, 1}));
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(third).runs, (RunRange{{2}, 1}));
+}
+
+TEST_F(ReconcileTest, AfterARestartNothingIsLentBeforeTheWaitIsOver) {
+  begin({session_of(second)});
+  add_campaign(one, 3);
+  add_worker(first);
+  now += 14s;
+  on_tick(state, now, outbox);
+  outbox.expect_nothing_more();
+  now += 1s;
+  heartbeat(first);
+  (void)outbox.take_sent<wire::RunLease>(first);
+}
+
+TEST_F(ReconcileTest, AfterARestartOneThatCrashedMeanwhileIsNotAwaited) {
+  begin({session_of(second)});
+  add_campaign(one, 3);
+  wire::Hello successor = hello();
+  successor.former = wire::FormerSession{session_of(second), LossReason::crashed, 11};
+  on_hello(state, first, session_of(first), successor, now, outbox);
+  outbox.forget();
+  heartbeat(first);
+  (void)outbox.take_sent<wire::RunLease>(first);
+}
+
+// What was finished before the restart is not computed again.
+TEST_F(ReconcileTest, AfterARestartAResultIsTakenAtOnce) {
+  begin({session_of(first)});
+  add_campaign(one, 1);
+  on_hello(state, first, session_of(first), hello(), now, outbox);
+  outbox.forget();
+  deliver(first, one, {0}, 3);
+  EXPECT_EQ(outbox.stored().at(0).attempt, Attempt{3});
+  EXPECT_EQ(outbox.take_stored(), Runs{{0}});
+}
+
+}  // namespace
+}  // namespace proofmass::test

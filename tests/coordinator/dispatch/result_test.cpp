@@ -1,0 +1,159 @@
+// Results: stored once, acknowledged when durable.
+
+#include "tests/coordinator/dispatch/dispatch_fixture.hpp"
+
+namespace proofmass::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+class ResultTest : public DispatchFixture {
+ protected:
+  void SetUp() override {
+    begin();
+    add_campaign(one, 10);
+    add_worker(first);
+    outbox.forget();
+  }
+};
+
+TEST_F(ResultTest, IsAcknowledgedAfterTheCommitAndNotBefore) {
+  deliver(first, one, {0});
+  ASSERT_EQ(outbox.stored().size(), 1U);
+  EXPECT_EQ(outbox.stored()[0].campaign, one);
+  EXPECT_EQ(outbox.stored()[0].worker, first);
+  EXPECT_EQ(outbox.stored()[0].attempt, Attempt{1});
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{1}, 2}));
+  EXPECT_EQ(outbox.num_sent(), 0U);
+
+  commit(one);
+  const auto ack = outbox.take_sent<wire::ResultAck>(first);
+  EXPECT_EQ(ack.campaign, one);
+  EXPECT_EQ(ack.runs, Runs{{0}});
+}
+
+TEST_F(ResultTest, RepeatedBeforeTheCommitIsOneThatWaits) {
+  deliver(first, one, {0});
+  (void)outbox.take_sent<wire::RunLease>(first);
+  deliver(first, one, {0});
+  commit(one);
+  EXPECT_EQ(outbox.take_sent<wire::ResultAck>(first).runs, Runs{{0}});
+  EXPECT_EQ(campaign(one).num_duplicates, 0U);
+}
+
+TEST_F(ResultTest, RepeatedAfterTheCommitIsAcknowledgedAtOnceAndCompared) {
+  complete(first, one, {0});
+  deliver(first, one, {0});
+  EXPECT_EQ(outbox.take_sent<wire::ResultAck>(first).runs, Runs{{0}});
+  EXPECT_EQ(outbox.take_compared(), Runs{{0}});
+  EXPECT_EQ(campaign(one).num_duplicates, 1U);
+  EXPECT_EQ(campaign(one).num_comparing, 1U);
+  on_compared(state, one, {0}, first, true, now, outbox);
+  EXPECT_EQ(campaign(one).num_audited, 1U);
+}
+
+TEST_F(ResultTest, OfAnotherWorkerWaitsForTheSameCommitAndIsCompared) {
+  add_worker(second);
+  outbox.forget();
+  deliver(first, one, {0});
+  outbox.forget();
+  deliver(second, one, {0});
+  EXPECT_EQ(outbox.take_compared(), Runs{{0}});
+  outbox.forget();
+  on_committed(state, one, Runs{{0}}, now, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::ResultAck>(first).runs, Runs{{0}});
+  EXPECT_EQ(outbox.take_sent<wire::ResultAck>(second).runs, Runs{{0}});
+}
+
+TEST_F(ResultTest, ThatDiffersFromTheStoredOneIsReported) {
+  complete(first, one, {0});
+  deliver(first, one, {0});
+  outbox.forget();
+  on_compared(state, one, {0}, first, false, now, outbox);
+  EXPECT_EQ(campaign(one).num_mismatches, 1U);
+  EXPECT_EQ(outbox.take_events(), Strings{"result_mismatch run=0 worker=1"});
+}
+
+TEST_F(ResultTest, OfARunThatIsLentToAnotherIsTakenAndTheOtherOneAskedBack) {
+  add_worker(second);
+  outbox.forget();
+  deliver(first, one, {1});  // Lent to the second.
+  EXPECT_EQ(outbox.take_stored(), Runs{{1}});
+  EXPECT_EQ(outbox.take_sent<wire::Retract>(second).ranges, (std::vector<RunRange>{{{1}, 1}}));
+  EXPECT_EQ(state.workers.at(second).num_lent, 0U);
+  outbox.forget();
+}
+
+TEST_F(ResultTest, OfARunThatIsPendingIsTaken) {
+  deliver(first, one, {7});
+  EXPECT_EQ(outbox.take_stored(), Runs{{7}});
+  outbox.forget();
+}
+
+TEST_F(ResultTest, OfARunThatWasGivenUpIsTaken) {
+  StoredCampaign stored = stored_campaign(2);
+  stored.given_up = {{{0}, 1}};
+  on_campaign(state, two, stored, now, outbox);
+  deliver(first, two, {0});
+  EXPECT_EQ(outbox.take_stored(), Runs{{0}});
+  EXPECT_TRUE(campaign(two).given_up.empty());
+  outbox.forget();
+}
+
+TEST_F(ResultTest, OfAnUnknownCampaignIsForgotten) {
+  deliver(first, two, {0});
+  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, two);
+}
+
+TEST_F(ResultTest, BeyondTheCampaignEndsTheWorker) {
+  deliver(first, one, {0, 10});
+  const auto reject = outbox.take_sent<wire::Reject>(first);
+  EXPECT_EQ(reject.reason, wire::RejectReason::malformed);
+  EXPECT_EQ(reject.text, "run = beyond the campaign (must be below num_runs)");
+  EXPECT_TRUE(state.workers.empty());
+  EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::protocol);
+  (void)outbox.take_events();
+}
+
+TEST_F(ResultTest, WithoutAnEstimateIsCounted) {
+  on_results(state, first,
+             {.campaign = one,
+              .attempt = {1},
+              .results = {computed(0, RunStatus::no_draw), computed(1, RunStatus::not_converged),
+                          computed(2, RunStatus::not_finite)}},
+             now, outbox);
+  EXPECT_EQ(campaign(one).num_without_estimate, 2U);
+  EXPECT_EQ(outbox.take_stored().size(), 3U);
+  outbox.forget();
+}
+
+TEST_F(ResultTest, LastOneEndsTheCampaignAndWorkersForgetIt) {
+  complete(first, one, {0, 1, 2, 3, 4, 5, 6, 7, 8});
+  deliver(first, one, {9});
+  EXPECT_FALSE(is_finished(campaign(one)));
+  commit(one);
+  EXPECT_TRUE(is_finished(campaign(one)));
+  EXPECT_EQ(campaign(one).phase, coordinator::Phase::finished);
+  (void)outbox.take_sent<wire::ResultAck>(first);
+  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, one);
+  EXPECT_EQ(outbox.take_events(),
+            Strings{"campaign_finished runs=10 given_up=0 duplicates=0 compared=0 mismatches=0"});
+}
+
+TEST_F(ResultTest, ThatCannotBeStoredStopsTheLendingUntilItIs) {
+  on_store_failed(state, one, "no space", outbox);
+  on_store_failed(state, one, "no space", outbox);
+  EXPECT_EQ(outbox.take_events(), Strings{"storage_failed reason=\"no space\""});
+  deliver(first, one, {0});
+  ASSERT_EQ(outbox.take_stored(), Runs{{0}});
+  outbox.expect_nothing_more();  // Neither an acknowledgement nor a lease.
+
+  on_committed(state, one, Runs{{0}}, now, outbox);
+  (void)outbox.take_sent<wire::ResultAck>(first);
+  on_store_recovered(state, one, now, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{1}, 2}));
+  EXPECT_EQ(outbox.take_events(), Strings{"storage_recovered delivered=0"});
+}
+
+}  // namespace
+}  // namespace proofmass::test

@@ -1,0 +1,275 @@
+// Workers that come, say that they live, and go.
+
+#include "tests/coordinator/dispatch/dispatch_fixture.hpp"
+
+namespace proofmass::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+class WorkerTest : public DispatchFixture {
+ protected:
+  void refuse(const wire::Hello& said, wire::RejectReason reason, const std::string& text) {
+    on_hello(state, second, session_of(second), said, now, outbox);
+    const auto reject = outbox.take_sent<wire::Reject>(second);
+    EXPECT_EQ(reject.reason, reason);
+    EXPECT_EQ(reject.text, text);
+    EXPECT_EQ(outbox.take_events(), Strings{"worker_refused name=w " + text});
+    EXPECT_FALSE(state.workers.contains(second));
+  }
+};
+
+TEST_F(WorkerTest, IsWelcomed) {
+  begin();
+  on_hello(state, first, session_of(first), hello(3), now, outbox);
+  const auto welcome = outbox.take_sent<wire::Welcome>(first);
+  EXPECT_EQ(welcome.worker, first);
+  EXPECT_EQ(welcome.heartbeat_interval_s, 5.0);
+  EXPECT_EQ(outbox.take_events(),
+            Strings{"worker_registered worker=1 name=w host=host pid=100 slots=3"});
+  EXPECT_EQ(state.num_slots, 3U);
+}
+
+TEST_F(WorkerTest, IsAnsweredAgainAndKeepsItsLeases) {
+  begin();
+  add_campaign(one, 10);
+  add_worker(first);
+  (void)outbox.take_sent<wire::RunLease>(first);
+  on_hello(state, first, session_of(first), hello(), now, outbox);
+  (void)outbox.take_sent<wire::Welcome>(first);
+  EXPECT_EQ(state.leases.size(), 1U);
+  EXPECT_EQ(state.num_slots, 1U);
+}
+
+TEST_F(WorkerTest, IsRefusedWithAnotherModel) {
+  begin();
+  wire::Hello other = hello();
+  other.model_version = "older";
+  refuse(other, wire::RejectReason::incompatible,
+         "model_version = older (must be " + std::string(model_version) + ", the coordinator's)");
+}
+
+TEST_F(WorkerTest, IsRefusedIfItComputesOtherBits) {
+  config.reference_digest = 0xabcdef;
+  begin();
+  refuse(hello(), wire::RejectReason::incompatible,
+         "reference_digest = 0000000000000000 (must be 0000000000abcdef, the coordinator's)");
+}
+
+TEST_F(WorkerTest, IsRefusedBeyondTheNumberThatIsServed) {
+  config.num_workers_max = 1;
+  begin();
+  add_worker(first);
+  refuse(hello(), wire::RejectReason::full, "number of workers = 1 (no more are served)");
+}
+
+TEST_F(WorkerTest, IsNotAnsweredIfTooManySayHello) {
+  config.hellos_per_s_max = 2.0;
+  begin();
+  for (int i = 0; i < 5; ++i) {
+    on_hello(state, first, session_of(first), hello(), now, outbox);
+  }
+  (void)outbox.take_sent<wire::Welcome>(first);
+  (void)outbox.take_sent<wire::Welcome>(first);
+  (void)outbox.take_events();
+  outbox.expect_nothing_more();
+  now += 500ms;
+  on_hello(state, first, session_of(first), hello(), now, outbox);
+  (void)outbox.take_sent<wire::Welcome>(first);
+}
+
+TEST_F(WorkerTest, IsToldToRegisterIfItIsAStranger) {
+  begin();
+  add_campaign(one, 1);
+  const auto expect_reject = [&] {
+    const auto reject = outbox.take_sent<wire::Reject>(first);
+    EXPECT_EQ(reject.reason, wire::RejectReason::not_registered);
+    EXPECT_EQ(reject.text, "this worker is not registered");
+    outbox.expect_nothing_more();
+  };
+  on_heartbeat(state, first, {.num_runs_max = 1, .held = {}, .computing = {}}, 1, now, outbox);
+  expect_reject();
+  deliver(first, one, {0});
+  expect_reject();
+  on_give_back(state, first, {.runs = {held(one, {{0}, 1})}}, now, outbox);
+  expect_reject();
+  on_campaign_request(state, first, {.campaign = one}, now, outbox);
+  expect_reject();
+  reject_unregistered(first, outbox);
+  expect_reject();
+  on_bye(state, first, {}, now, outbox);
+  crash(first);
+}
+
+TEST_F(WorkerTest, IsGivenTheDefinitionsThatItAsksFor) {
+  begin();
+  add_campaign(one, 1);
+  add_worker(first);
+  outbox.forget();
+  on_campaign_request(state, first, {.campaign = one}, now, outbox);
+  const auto definition = outbox.take_sent<wire::CampaignDefinition>(first);
+  EXPECT_EQ(definition.campaign, one);
+  EXPECT_EQ(definition.definition, campaign(one).definition);
+  on_campaign_request(state, first, {.campaign = two}, now, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, two);
+}
+
+TEST_F(WorkerTest, IsLentNothingBeforeItHasSaidWhatItHolds) {
+  begin();
+  add_campaign(one, 1);
+  on_hello(state, first, session_of(first), hello(), now, outbox);
+  (void)outbox.take_sent<wire::Welcome>(first);
+  (void)outbox.take_events();
+  on_tick(state, now, outbox);
+  outbox.expect_nothing_more();
+  heartbeat(first);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 1}));
+}
+
+TEST_F(WorkerTest, AnOlderHeartbeatChangesNothing) {
+  begin();
+  add_campaign(one, 1);
+  add_worker(first);
+  outbox.forget();
+  now += 1h;
+  on_heartbeat(state, first, {.num_runs_max = 0, .held = {}, .computing = {}}, sequence, now,
+               outbox);
+  (void)outbox.take_sent<wire::HeartbeatAck>(first);
+  EXPECT_EQ(state.workers.at(first).num_runs_max, 4096U);
+  EXPECT_EQ(state.leases.size(), 1U);
+}
+
+TEST_F(WorkerTest, ThatIsSilentLosesItsRunsWhichAreLentAgainUnderAHigherAttempt) {
+  begin();
+  add_campaign(one, 1);
+  add_worker(first);
+  (void)outbox.take_sent<wire::RunLease>(first);
+  now += 59s;
+  on_tick(state, now, outbox);
+  outbox.expect_nothing_more();
+
+  now += 1s;
+  on_tick(state, now, outbox);
+  EXPECT_FALSE(state.workers.contains(first));
+  outbox.forget();
+  add_worker(second);
+  const auto lease = outbox.take_sent<wire::RunLease>(second);
+  EXPECT_EQ(lease.runs, (RunRange{{0}, 1}));
+  EXPECT_EQ(lease.attempt, Attempt{2});
+}
+
+TEST_F(WorkerTest, ALossIsRecordedAndLogged) {
+  begin();
+  add_campaign(one, 1);
+  add_worker(first);
+  outbox.forget();
+  now += 60s;
+  on_tick(state, now, outbox);
+  EXPECT_EQ(outbox.take_events(), (Strings{"worker_gone worker=1 name=w reason=silent orbits=0",
+                                           "runs_lost worker=1 runs=0 attempt=1 reason=silent"}));
+  const auto losses = outbox.take_losses();
+  ASSERT_EQ(losses.size(), 1U);
+  EXPECT_EQ(losses[0].campaign, one);
+  EXPECT_EQ(losses[0].runs, (RunRange{{0}, 1}));
+  EXPECT_EQ(losses[0].attempt, Attempt{1});
+  EXPECT_EQ(losses[0].worker, first);
+  EXPECT_EQ(losses[0].reason, LossReason::silent);
+  EXPECT_FALSE(losses[0].is_blamed);
+}
+
+TEST_F(WorkerTest, AnyMessageIsASignOfLife) {
+  begin();
+  add_campaign(one, 1);
+  add_worker(first);
+  outbox.forget();
+  for (int i = 0; i < 3; ++i) {
+    now += 50s;
+    on_campaign_request(state, first, {.campaign = one}, now, outbox);
+    (void)outbox.take_sent<wire::CampaignDefinition>(first);
+    on_tick(state, now, outbox);
+  }
+}
+
+TEST_F(WorkerTest, ThatIsSuspectIsLentNothing) {
+  begin();
+  add_worker(first);
+  now += 15s;
+  add_campaign(one, 1);
+  on_tick(state, now, outbox);
+  outbox.expect_nothing_more();
+  heartbeat(first);
+  (void)outbox.take_sent<wire::RunLease>(first);
+}
+
+TEST_F(WorkerTest, ThatLeavesHasItsRunsLentToOthers) {
+  begin();
+  add_campaign(one, 1);
+  add_worker(first);
+  outbox.forget();
+  add_worker(second);
+  on_bye(state, first, {.reason = LossReason::walltime}, now, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).attempt, Attempt{2});
+  EXPECT_EQ(outbox.take_events(), (Strings{"worker_left worker=1 name=w reason=walltime",
+                                           "runs_lost worker=1 runs=0 attempt=1 reason=walltime"}));
+  EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::walltime);
+}
+
+TEST_F(WorkerTest, WhatADeadProcessHeldIsKnown) {
+  begin();
+  add_campaign(one, 3);
+  add_worker(first, 2);
+  outbox.forget();
+  EXPECT_EQ(runs_held_text(state, first), "0..1");
+  EXPECT_EQ(runs_held_text(state, second), "none");
+  add_campaign(two, 1);
+  EXPECT_EQ(runs_held_text(state, first), "hardy2013:0..1");
+  on_gone(state, first, LossReason::protocol, now, outbox);
+  EXPECT_EQ(runs_held_text(state, first), "none");
+  outbox.forget();
+}
+
+TEST_F(WorkerTest, DrainsUntilWhatItHoldsIsStored) {
+  begin();
+  add_campaign(one, 5);
+  add_worker(first);
+  outbox.forget();
+  on_drain(state, outbox);
+  (void)outbox.take_sent<wire::Drain>(first);
+  heartbeat(first, {held(one, {{0}, 1})});
+  (void)outbox.take_sent<wire::Drain>(first);  // The first may have been lost.
+  EXPECT_FALSE(is_quiet(state));
+  deliver(first, one, {0});
+  EXPECT_FALSE(is_quiet(state));
+  commit(one);
+  (void)outbox.take_sent<wire::ResultAck>(first);
+  EXPECT_TRUE(is_quiet(state));
+  EXPECT_FALSE(is_finished(campaign(one)));
+}
+
+TEST_F(WorkerTest, MayRegisterToDeliverWhileTheServiceDrains) {
+  begin();
+  add_campaign(one, 5);
+  on_drain(state, outbox);
+  on_hello(state, first, session_of(first), hello(), now, outbox);
+  (void)outbox.take_sent<wire::Welcome>(first);
+  (void)outbox.take_sent<wire::Drain>(first);
+  (void)outbox.take_events();
+  deliver(first, one, {3});
+  EXPECT_EQ(outbox.take_stored(), Runs{{3}});
+}
+
+TEST_F(WorkerTest, IsToldToStopAgainAndAgain) {
+  begin();
+  add_campaign(one, 5);
+  add_worker(first);
+  outbox.forget();
+  on_stop(state, outbox);
+  (void)outbox.take_sent<wire::Stop>(first);
+  heartbeat(first);
+  (void)outbox.take_sent<wire::Stop>(first);
+  on_hello(state, second, session_of(second), hello(), now, outbox);
+  (void)outbox.take_sent<wire::Stop>(second);
+}
+
+}  // namespace
+}  // namespace proofmass::test

@@ -1,0 +1,162 @@
+#include "coordinator/net/allow_list.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <chrono>
+#include <string>
+
+#include "core/error.hpp"
+#include "proto/link/key_files.hpp"
+#include "proto/link/whole_file.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using std::chrono::milliseconds;
+using test::refusal_of;
+using test::ScratchDirectory;
+using test::write_text;
+
+std::string new_key() { return wire::make_key_pair().public_key.text(); }
+
+std::string parsing(const std::string& text) {
+  return refusal_of([&] { (void)parse_allow_list(text, "keys"); });
+}
+
+TEST(AllowListText, HasAKeyAndANameInEachLine) {
+  const std::string one = new_key();
+  const std::string two = new_key();
+  const AllowedKeys keys = parse_allow_list("# workers\n\n" + one + " worker-1\n  " + two +
+                                                "\tcluster.7 \r\n   \n#" + new_key() + " revoked\n",
+                                            "keys");
+  EXPECT_EQ(keys, (AllowedKeys{{one, "worker-1"}, {two, "cluster.7"}}));
+  EXPECT_EQ(parse_allow_list(one + " last", "keys").size(), 1u);
+  EXPECT_TRUE(parse_allow_list("", "keys").empty());
+}
+
+TEST(AllowListText, SaysWhichLineIsWrongAndNotWhatItSays) {
+  const std::string key = new_key();
+  const std::string fine = key + " a\n";
+  EXPECT_EQ(parsing(fine + "\nkey b\n"),
+            "keys line = 3 (must begin with a public key of 40 characters)");
+  EXPECT_EQ(parsing("secret " + key + "\n"),
+            "keys line = 1 (must begin with a public key of 40 characters)");
+  for (const std::string name : {"", "a/b", "ü", "a\"b"}) {
+    EXPECT_EQ(parsing(key + " " + name + "\n"),
+              "keys line = 1 (must have a name of [A-Za-z0-9._-] after the key)");
+  }
+  EXPECT_EQ(parsing(key + " a b\n"), "keys line = 1 (must be KEY NAME)");
+  EXPECT_EQ(parsing(fine + key + " b\n"), "keys line = 2 (names a key a second time)");
+}
+
+TEST(AllowListText, HasALimit) {
+  std::string text;
+  // Any 32 bytes are a public key; digits make distinct ones without 65537 key generations.
+  const auto line = [](std::size_t i) {
+    std::string number = std::to_string(i);
+    return std::string(40 - number.size(), '0') + number + " a\n";
+  };
+  for (std::size_t i = 0; i < allowed_keys_max; ++i) text += line(i);
+  EXPECT_EQ(parse_allow_list(text, "keys").size(), allowed_keys_max);
+  EXPECT_EQ(parsing(text + line(allowed_keys_max)), "keys line = 65537 (is one key too many)");
+}
+
+class AllowListFile : public ::testing::Test {
+ protected:
+  void write(const std::string& text) {
+    wire::write_whole_file("list", file_, text, 0644, wire::IfExists::replace);
+  }
+
+  ScratchDirectory directory_;
+  std::filesystem::path file_ = directory_ / "authorized_workers";
+  std::string one_ = new_key();
+  std::string two_ = new_key();
+};
+
+TEST_F(AllowListFile, NamesTheOwnersOfKeys) {
+  write(one_ + " worker-1\n");
+  const AllowList list(file_);
+  ASSERT_NE(list.name_of(one_), nullptr);
+  EXPECT_EQ(*list.name_of(one_), "worker-1");
+  EXPECT_EQ(list.name_of(two_), nullptr);
+  EXPECT_EQ(list.name_of(""), nullptr);
+}
+
+TEST_F(AllowListFile, ChangesAreSeen) {
+  write(one_ + " a\n");
+  AllowList list(file_);
+  write(two_ + " a\n");
+  EXPECT_FALSE(list.refresh());
+  EXPECT_EQ(list.name_of(one_), nullptr);
+  EXPECT_NE(list.name_of(two_), nullptr);
+}
+
+// An editor that writes in place, twice within one tick of the file system's clock.
+TEST_F(AllowListFile, ChangesOfTheSameSizeInPlaceAreSeen) {
+  for (int i = 0; i < 50; ++i) {
+    write_text(file_, one_ + " a\n", 0644);
+    AllowList list(file_);
+    write_text(file_, two_ + " a\n", 0644);
+    EXPECT_FALSE(list.refresh());
+    EXPECT_EQ(list.name_of(one_), nullptr);
+  }
+}
+
+TEST_F(AllowListFile, ThatIsWrongOrGoneLeavesTheListStanding) {
+  write(one_ + " a\n");
+  AllowList list(file_);
+
+  write("nonsense\n");
+  EXPECT_EQ(list.refresh().value_or(""),
+            file_.string() + " line = 1 (must begin with a public key of 40 characters)");
+  EXPECT_FALSE(list.refresh());  // Once.
+  EXPECT_NE(list.name_of(one_), nullptr);
+
+  std::filesystem::remove(file_);
+  EXPECT_EQ(list.refresh().value_or(""),
+            "allow-list = " + file_.string() + " (No such file or directory)");
+  EXPECT_FALSE(list.refresh());
+  EXPECT_NE(list.name_of(one_), nullptr);
+
+  write(two_ + " a\n");
+  EXPECT_FALSE(list.refresh());
+  EXPECT_EQ(list.name_of(one_), nullptr);
+
+  write("nonsense\n");
+  EXPECT_TRUE(list.refresh());  // Again, as it was right in between.
+}
+
+TEST_F(AllowListFile, IsLookedAtOnceASecond) {
+  write(one_ + " a\n");
+  AllowList list(file_);
+  AllowList::TimePoint now{};
+  EXPECT_FALSE(list.refresh_if_due(now));
+  write("");
+  EXPECT_FALSE(list.refresh_if_due(now + milliseconds(999)));
+  EXPECT_NE(list.name_of(one_), nullptr);
+  EXPECT_FALSE(list.refresh_if_due(now + milliseconds(1000)));
+  EXPECT_EQ(list.name_of(one_), nullptr);
+}
+
+TEST_F(AllowListFile, ThatCannotBeTrustedIsRefused) {
+  const auto opening = [&](const std::filesystem::path& file) {
+    return refusal_of([&] { const AllowList list(file); });
+  };
+  EXPECT_EQ(opening(file_), "allow-list = " + file_.string() + " (No such file or directory)");
+  EXPECT_EQ(opening(directory_.path()),
+            "allow-list = " + directory_.path().string() + " (must be a regular file)");
+  write(one_ + " a\n");
+  for (const auto& [mode, text] : {std::pair{0664, "0664"}, {0646, "0646"}}) {
+    ::chmod(file_.c_str(), static_cast<mode_t>(mode));
+    EXPECT_EQ(opening(file_), "allow-list = " + file_.string() + " (mode " + text +
+                                  "; must be writable by its owner alone: chmod go-w)");
+  }
+  ::chmod(file_.c_str(), 0644);
+  std::filesystem::resize_file(file_, (std::uintmax_t{16} << 20) + 1);
+  EXPECT_EQ(opening(file_), "allow-list = " + file_.string() + " (is too large)");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,285 @@
+#include "coordinator/net/authenticator.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+#include <zmq.hpp>
+
+#include "core/error.hpp"
+#include "proto/link/connection_monitor.hpp"
+#include "proto/link/key_files.hpp"
+#include "proto/link/socket.hpp"
+#include "proto/link/whole_file.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using wire::ClientSecurity;
+using wire::Domain;
+using wire::KeyPair;
+using wire::KeyRole;
+using Clock = std::chrono::steady_clock;
+
+// A worker's or client's end, in a context of its own as if in another process.
+struct Peer {
+  Peer(const std::string& endpoint, const ClientSecurity& security)
+      : dealer(wire::make_dealer(context, security)),
+        monitor(context, dealer, endpoint, security, Clock::time_point{}) {}
+
+  zmq::context_t context;
+  zmq::socket_t dealer;
+  wire::ConnectionMonitor monitor;
+};
+
+// Both doors of a coordinator, with a clock that the test turns.
+class AuthenticatorTest : public ::testing::Test {
+ protected:
+  AuthenticatorTest() {
+    write_lists(worker_.public_key.text() + " worker\n", client_.public_key.text() + " client\n");
+    authenticator_ = std::make_unique<Authenticator>(
+        context_, directory_.path(), [this](Event event) { events_.push_back(std::move(event)); });
+    for (const Domain domain : {Domain::workers, Domain::clients}) {
+      routers_.emplace(domain, wire::make_router(context_, "bind", "tcp://127.0.0.1:*",
+                                                 {.domain = domain, .keys = coordinator_}));
+      authenticator_->watch(domain, routers_.at(domain).handle());
+    }
+  }
+
+  void write_lists(const std::string& workers, const std::string& clients) {
+    wire::write_whole_file("list", directory_ / "authorized_workers", workers, 0644,
+                           wire::IfExists::replace);
+    wire::write_whole_file("list", directory_ / "authorized_clients", clients, 0644,
+                           wire::IfExists::replace);
+  }
+
+  [[nodiscard]] std::string endpoint(Domain domain) const {
+    return routers_.at(domain).get(zmq::sockopt::last_endpoint);
+  }
+
+  [[nodiscard]] ClientSecurity identity(KeyRole role, const KeyPair& keys) const {
+    return {.identity = wire::CurveIdentity{
+                .role = role, .keys = keys, .coordinator = coordinator_.public_key}};
+  }
+
+  // Lets both ends do what they have to until `is_enough`, or 20 s have passed.
+  bool until(Peer& peer, const std::function<bool()>& is_enough) {
+    const auto deadline = Clock::now() + std::chrono::seconds(20);
+    while (!is_enough()) {
+      if (Clock::now() > deadline) return false;
+      std::vector<zmq::pollitem_t> items{{authenticator_->handle(), 0, ZMQ_POLLIN, 0},
+                                         {peer.monitor.handle(), 0, ZMQ_POLLIN, 0},
+                                         {routers_.at(Domain::workers).handle(), 0, ZMQ_POLLIN, 0},
+                                         {routers_.at(Domain::clients).handle(), 0, ZMQ_POLLIN, 0}};
+      zmq::poll(items, std::chrono::milliseconds(20));
+      authenticator_->serve(now_);
+      peer.monitor.update(now_);
+    }
+    return true;
+  }
+
+  // What the peer is told about being refused, once the coordinator has logged it as well.
+  std::string refusal(Peer& peer) {
+    std::optional<std::string> text;
+    until(peer, [&] {
+      if (!text) text = peer.monitor.take_refusal();
+      return peer.monitor.is_connected() || (text && !events_.empty());
+    });
+    return peer.monitor.is_connected() ? "connected" : text.value_or("nothing");
+  }
+
+  // Takes the next message at a door and says whose it is; empty if none comes.
+  std::string user_of_next(Peer& peer, Domain domain) {
+    zmq::message_t id;
+    zmq::message_t frame;
+    zmq::socket_t& router = routers_.at(domain);
+    until(peer, [&] { return router.recv(id, zmq::recv_flags::dontwait).has_value(); });
+    if (!router.recv(frame, zmq::recv_flags::dontwait)) return "";
+    const char* const user = zmq_msg_gets(frame.handle(), "User-Id");
+    return user == nullptr ? "nobody" : user;
+  }
+
+  // What is logged of one refusal but the address, which is this host's.
+  [[nodiscard]] std::string logged() const {
+    return events_.empty() ? "nothing" : events_.front().text;
+  }
+
+  test::ScratchDirectory directory_;
+  KeyPair coordinator_ = wire::make_key_pair();
+  KeyPair worker_ = wire::make_key_pair();
+  KeyPair client_ = wire::make_key_pair();
+  KeyPair stranger_ = wire::make_key_pair();
+  std::vector<Event> events_;
+  Clock::time_point now_{};
+  zmq::context_t context_;
+  std::unique_ptr<Authenticator> authenticator_;
+  std::map<Domain, zmq::socket_t> routers_;
+};
+
+std::string key_refusal(const KeyPair& keys, const std::string& endpoint, const std::string& role) {
+  return "key = " + keys.public_key.text() + " (refused by the coordinator at " + endpoint +
+         ": must be in its authorized_" + role + "s, and this its address for " + role + "s)";
+}
+
+std::string key_log(const std::string& domain, const KeyPair& keys, const std::string& reason) {
+  return "domain=" + domain + " address=127.0.0.1 key=" + keys.public_key.text() + " reason=\"" +
+         reason + "\"";
+}
+
+TEST_F(AuthenticatorTest, AdmitsListedKeysAndNamesThemWithEachMessage) {
+  for (const auto& [domain, role, keys] : {std::tuple{Domain::workers, KeyRole::worker, worker_},
+                                           {Domain::clients, KeyRole::client, client_}}) {
+    Peer peer(endpoint(domain), identity(role, keys));
+    ASSERT_TRUE(until(peer, [&] { return peer.monitor.is_connected(); }));
+    peer.dealer.send(zmq::str_buffer("hello"), zmq::send_flags::dontwait);
+    EXPECT_EQ(user_of_next(peer, domain), keys.public_key.text());
+    EXPECT_EQ(authenticator_->name_of(domain, keys.public_key.text()), to_text(role));
+  }
+  EXPECT_TRUE(events_.empty()) << logged();
+}
+
+TEST_F(AuthenticatorTest, RefusesAnUnknownKeyAndBothEndsKnowWhy) {
+  Peer peer(endpoint(Domain::workers), identity(KeyRole::worker, stranger_));
+  EXPECT_EQ(refusal(peer), key_refusal(stranger_, endpoint(Domain::workers), "worker"));
+  EXPECT_EQ(logged(), key_log("workers", stranger_, "unknown key"));
+}
+
+TEST_F(AuthenticatorTest, RefusesAWorkerAtTheClientsDoor) {
+  Peer peer(endpoint(Domain::clients), identity(KeyRole::worker, worker_));
+  EXPECT_EQ(refusal(peer), key_refusal(worker_, endpoint(Domain::clients), "worker"));
+  EXPECT_EQ(logged(), key_log("clients", worker_, "key of a worker"));
+}
+
+TEST_F(AuthenticatorTest, RefusesAClientAtTheWorkersDoor) {
+  Peer peer(endpoint(Domain::workers), identity(KeyRole::client, client_));
+  EXPECT_EQ(refusal(peer), key_refusal(client_, endpoint(Domain::workers), "client"));
+  EXPECT_EQ(logged(), key_log("workers", client_, "key of a client"));
+}
+
+TEST_F(AuthenticatorTest, RefusesAPlainPeer) {
+  Peer peer(endpoint(Domain::workers), {});
+  const std::string told = refusal(peer);
+  EXPECT_TRUE(told.starts_with("coordinator = " + endpoint(Domain::workers) + " (")) << told;
+  const std::string who = "domain=workers address=none key=none ";
+  // Whichever end notices first breaks off.
+  EXPECT_TRUE(logged() == who + "reason=\"without a key\"" ||
+              logged() == who + "reason=\"ends during the handshake, as one without a key does\"")
+      << logged();
+}
+
+TEST_F(AuthenticatorTest, RefusesWhoTrustsAnotherCoordinator) {
+  ClientSecurity security = identity(KeyRole::worker, worker_);
+  security.identity->coordinator = stranger_.public_key;
+  Peer peer(endpoint(Domain::workers), security);
+  EXPECT_EQ(refusal(peer), "coordinator = " + endpoint(Domain::workers) +
+                               " (breaks the connection off: it has another key than "
+                               "coordinator.pub, or none, or is no coordinator)");
+  EXPECT_EQ(logged(),
+            "domain=workers address=none key=none reason=\"trusts the key of another "
+            "coordinator\"");
+}
+
+TEST_F(AuthenticatorTest, AdmitsAKeyThatIsListedLater) {
+  Peer peer(endpoint(Domain::workers), identity(KeyRole::worker, stranger_));
+  ASSERT_NE(refusal(peer), "connected");
+  write_lists(stranger_.public_key.text() + " late\n", "");
+  now_ += std::chrono::seconds(1);
+  EXPECT_TRUE(until(peer, [&] { return peer.monitor.is_connected(); }));
+}
+
+TEST_F(AuthenticatorTest, RevokedKeyMaySpeakNoMoreThoughItsConnectionStands) {
+  Peer peer(endpoint(Domain::workers), identity(KeyRole::worker, worker_));
+  ASSERT_TRUE(until(peer, [&] { return peer.monitor.is_connected(); }));
+  const std::string key = worker_.public_key.text();
+  EXPECT_TRUE(authenticator_->is_allowed(Domain::workers, key, now_));
+  EXPECT_FALSE(authenticator_->is_allowed(Domain::clients, key, now_));
+
+  write_lists("#" + key + " worker\n", "");
+  now_ += std::chrono::seconds(1);
+
+  EXPECT_FALSE(authenticator_->is_allowed(Domain::workers, key, now_));
+  EXPECT_EQ(authenticator_->name_of(Domain::workers, key), "");
+  peer.dealer.send(zmq::str_buffer("still here"), zmq::send_flags::dontwait);
+  EXPECT_EQ(user_of_next(peer, Domain::workers), key);
+
+  Peer again(endpoint(Domain::workers), identity(KeyRole::worker, worker_));
+  EXPECT_EQ(refusal(again), key_refusal(worker_, endpoint(Domain::workers), "worker"));
+}
+
+TEST_F(AuthenticatorTest, MessageWithoutAUserIsNotAllowed) {
+  EXPECT_FALSE(authenticator_->is_allowed(Domain::workers, "", now_));
+}
+
+TEST_F(AuthenticatorTest, ListThatCannotBeReadIsLoggedAndTheOldOneStands) {
+  write_lists("nonsense\n", "");
+  EXPECT_TRUE(authenticator_->is_allowed(Domain::workers, worker_.public_key.text(), now_));
+  ASSERT_EQ(events_.size(), 1u);
+  EXPECT_EQ(events_[0].kind, "allow_list_unreadable");
+  EXPECT_EQ(events_[0].severity, Severity::error);
+  EXPECT_EQ(events_[0].text,
+            (directory_ / "authorized_workers").string() +
+                " line = 1 (must begin with a public key of 40 characters); the list before it "
+                "stands");
+}
+
+TEST_F(AuthenticatorTest, RefusesThatWhichIsNoQuestion) {
+  zmq::socket_t asker(context_, zmq::socket_type::req);
+  asker.connect("inproc://zeromq.zap.01");
+  const auto ask = [&](const std::vector<std::string>& frames) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      asker.send(zmq::buffer(frames[i]),
+                 i + 1 < frames.size() ? zmq::send_flags::sndmore : zmq::send_flags::none);
+    }
+    // A reply comes through the context's own threads.
+    zmq::pollitem_t item{authenticator_->handle(), 0, ZMQ_POLLIN, 0};
+    zmq::poll(&item, 1, std::chrono::seconds(20));
+    authenticator_->serve(now_);
+    std::vector<std::string> reply;
+    zmq::message_t frame;
+    do {
+      if (!asker.recv(frame)) break;
+      reply.push_back(frame.to_string());
+    } while (frame.more());
+    return reply;
+  };
+  using Frames = std::vector<std::string>;
+  const Frames malformed{"1.0", "", "500", "malformed", "", ""};
+  EXPECT_EQ(ask({"x"}), malformed);
+  EXPECT_EQ(ask({"2.0", "7", "workers", "a", "", "CURVE", std::string(32, 'k')}),
+            (Frames{"1.0", "7", "500", "malformed", "", ""}));
+  const Frames refused{"1.0", "7", "400", "key not authorized", "", ""};
+  EXPECT_EQ(ask({"1.0", "7", "workers", "a", "", "CURVE", std::string(31, 'k')}), refused);
+  EXPECT_EQ(ask({"1.0", "7", "workers", "a", "", "CURVE"}), refused);
+  EXPECT_EQ(ask({"1.0", "7", "workers", "a", "", "NULL"}), refused);
+  EXPECT_EQ(ask({"1.0", "7", "workers", "a", "", "PLAIN", "user", "password"}), refused);
+  EXPECT_EQ(ask({"1.0", "7", "kitchen", "a", "", "CURVE", std::string(32, 'k')}), refused);
+  EXPECT_EQ(ask(Frames(100, "1.0")), (Frames{"1.0", "1.0", "400", "key not authorized", "", ""}));
+}
+
+TEST(Authenticator, NeedsBothLists) {
+  const test::ScratchDirectory directory;
+  zmq::context_t context;
+  EXPECT_EQ(
+      test::refusal_of([&] { const Authenticator x(context, directory.path(), [](Event) {}); }),
+      "allow-list = " + (directory / "authorized_workers").string() +
+          " (No such file or directory)");
+}
+
+TEST(Authenticator, IsOneInAContext) {
+  const test::ScratchDirectory directory;
+  test::write_text(directory / "authorized_workers", "", 0644);
+  test::write_text(directory / "authorized_clients", "", 0644);
+  zmq::context_t context;
+  const auto make = [&] { return Authenticator(context, directory.path(), [](Event) {}); };
+  const Authenticator first = make();
+  EXPECT_EQ(test::refusal_of([&] { const Authenticator second = make(); }),
+            "authenticator = inproc://zeromq.zap.01 (Address already in use)");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,174 @@
+// Peers that break the rules, or may not be here at all: over real sockets.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "proto/link/key_files.hpp"
+#include "proto/link/security.hpp"
+#include "tests/coordinator/net/service_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using test::PlayingWorker;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class ServiceStrangers : public test::ServiceTest {
+ protected:
+  /// The others are served as if nothing had happened.
+  void expect_service() {
+    PlayingWorker good(endpoint.address(), 2001);
+    EXPECT_EQ(good.borrow().runs.count, 1U);
+  }
+};
+
+TEST_F(ServiceStrangers, AreClosedOutIfTheySendGarbage) {
+  start({test::campaign_of("a", 10)});
+  PlayingWorker bad(endpoint.address());
+  (void)bad.borrow();
+  bad.send_frames({"garbage"});
+  const auto reject = bad.receive<wire::Reject>();
+  EXPECT_EQ(reject.reason, wire::RejectReason::malformed);
+  EXPECT_EQ(reject.text, "message = 7 bytes (must be an envelope)");
+  EXPECT_THAT(wait_for_event("peer_closed_out"),
+              AllOf(HasSubstr(fmt::format(":{} key=none ", getpid())),
+                    HasSubstr("reason=\"message = 7 bytes (must be an envelope)\"")));
+  bad.say_hello();  // Not listened to any more.
+  expect_service();
+  in_service([&] { EXPECT_FALSE(service->worker_of(1001)); });
+}
+
+TEST_F(ServiceStrangers, AreClosedOutIfTheySendSeveralFrames) {
+  start({test::campaign_of("a", 1)});
+  PlayingWorker bad(endpoint.address());
+  bad.send_frames({"a", "b"});
+  EXPECT_EQ(bad.receive<wire::Reject>().text, "message = 2 frames (must be one)");
+  expect_service();
+}
+
+TEST_F(ServiceStrangers, AreClosedOutIfTheySayWhatACoordinatorSays) {
+  start({test::campaign_of("a", 1)});
+  PlayingWorker bad(endpoint.address());
+  bad.send(wire::Stop{});
+  EXPECT_EQ(bad.receive<wire::Reject>().text,
+            "message = one of a coordinator (must be one of a worker)");
+  expect_service();
+}
+
+TEST_F(ServiceStrangers, AreClosedOutIfAMessageIsCutShort) {
+  start({test::campaign_of("a", 1)});
+  PlayingWorker bad(endpoint.address());
+  const std::string bytes =
+      wire::encode({.header = bad.next_header(), .message = wire::Bye{LossReason::drained}});
+  bad.send_frames({bytes.substr(0, bytes.size() - 1)});
+  EXPECT_EQ(bad.receive<wire::Reject>().reason, wire::RejectReason::malformed);
+  expect_service();
+}
+
+TEST_F(ServiceStrangers, CannotSendMoreThanAMessageMayHave) {
+  config.workers_endpoint = "tcp://127.0.0.1:*";
+  start({test::campaign_of("a", 1)});
+  PlayingWorker bad(service->workers_endpoint());
+  (void)bad.register_here();
+  bad.send_frames({std::string(wire::message_size_max + 1, 'x')});  // The socket cuts it off.
+  PlayingWorker good(service->workers_endpoint(), 2001);
+  EXPECT_EQ(good.borrow().runs.count, 1U);
+  // It is free to come back and behave.
+  EXPECT_EQ(bad.register_here().worker, WorkerId{1});
+}
+
+TEST_F(ServiceStrangers, AreClosedOutIfTheyUseTwoSessionsOnOneConnection) {
+  start({test::campaign_of("a", 1)});
+  PlayingWorker bad(endpoint.address());
+  (void)bad.register_here();
+  wire::Header header = bad.next_header();
+  header.session = {4711};
+  bad.send_frames({wire::encode({.header = header, .message = wire::Bye{LossReason::drained}})});
+  EXPECT_EQ(bad.receive<wire::Reject>().text,
+            "session = 4711 (must be one connection's and one key's)");
+}
+
+TEST_F(ServiceStrangers, OfAnotherVersionAreToldSo) {
+  start({test::campaign_of("a", 1)});
+  PlayingWorker old(endpoint.address());
+  std::string bytes =
+      wire::encode({.header = old.next_header(), .message = wire::Bye{LossReason::drained}});
+  bytes[1] = 99;  // The version is the first field of the envelope.
+  old.send_frames({bytes});
+  const auto reject = old.receive<wire::Reject>();
+  EXPECT_EQ(reject.reason, wire::RejectReason::incompatible);
+  EXPECT_THAT(reject.text, StartsWith("protocol_version = 99 (must be "));
+  expect_service();
+}
+
+/// A coordinator with keys, on loopback.
+class ServiceKeys : public test::ServiceTest {
+ protected:
+  ServiceKeys() : keys(directory / "keys") {
+    std::filesystem::create_directory(keys);
+    coordinator_keys = wire::make_key_pair();
+    wire::write_key_pair(keys, wire::coordinator_key_name, wire::KeyRole::coordinator,
+                         *coordinator_keys);
+    config.workers_endpoint = "tcp://127.0.0.1:*";
+    config.keys = keys;
+  }
+
+  void authorize(std::string_view list, const std::vector<wire::KeyPair>& pairs) const {
+    std::ofstream file(keys / list);
+    for (const wire::KeyPair& pair : pairs) file << pair.public_key.text() << " somebody\n";
+  }
+
+  [[nodiscard]] wire::ClientSecurity security_of(const wire::KeyPair& pair) const {
+    return {.identity =
+                wire::CurveIdentity{.keys = pair, .coordinator = coordinator_keys->public_key}};
+  }
+
+  std::filesystem::path keys;
+  std::optional<wire::KeyPair> coordinator_keys;
+};
+
+TEST_F(ServiceKeys, ThatAreRevokedEndTheirSessions) {
+  const wire::KeyPair revoked = wire::make_key_pair();
+  const wire::KeyPair kept = wire::make_key_pair();
+  authorize(wire::authorized_workers_name, {revoked, kept});
+  authorize(wire::authorized_clients_name, {});
+  start({test::campaign_of("a", 10)});
+  PlayingWorker first(service->workers_endpoint(), 1001, security_of(revoked));
+  (void)first.borrow();
+  PlayingWorker second(service->workers_endpoint(), 1002, security_of(kept));
+  const wire::RunLease lease = second.borrow();
+
+  authorize(wire::authorized_workers_name, {kept});
+  const auto reject = first.receive<wire::Reject>();
+  EXPECT_EQ(reject.reason, wire::RejectReason::revoked);
+  EXPECT_EQ(reject.text, "key = " + revoked.public_key.text() + " (is not authorized any more)");
+  EXPECT_THAT(wait_for_event("peer_closed_out"),
+              HasSubstr("address=127.0.0.1 key=" + revoked.public_key.text()));
+  in_service([&] { EXPECT_FALSE(service->worker_of(1001)); });
+  second.deliver(lease);
+  EXPECT_EQ(second.receive<wire::ResultAck>().runs.size(), lease.runs.count);
+}
+
+TEST_F(ServiceKeys, CannotTakeASessionThatAnotherKeyHas) {
+  const wire::KeyPair owner = wire::make_key_pair();
+  const wire::KeyPair thief = wire::make_key_pair();
+  authorize(wire::authorized_workers_name, {owner, thief});
+  authorize(wire::authorized_clients_name, {});
+  start({test::campaign_of("a", 10)});
+  PlayingWorker first(service->workers_endpoint(), 1001, security_of(owner));
+  const wire::RunLease lease = first.borrow();
+  PlayingWorker second(service->workers_endpoint(), 1001, security_of(thief));
+  second.say_hello();
+  EXPECT_EQ(second.receive<wire::Reject>().text,
+            "session = 1001 (must be one connection's and one key's)");
+  first.deliver(lease);
+  EXPECT_EQ(first.receive<wire::ResultAck>().runs.size(), lease.runs.count);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,268 @@
+// The service over real sockets, with workers that the test plays itself.
+
+#include "coordinator/net/service.hpp"
+
+#include <gmock/gmock.h>
+
+#include "coordinator/dispatch/dispatch.hpp"
+#include "tests/coordinator/net/service_fixture.hpp"
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using test::PlayingWorker;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class ServiceWorkers : public test::ServiceTest {};
+
+TEST_F(ServiceWorkers, ComputeEveryRunOfACampaignAndAreStopped) {
+  config.end = ServiceEnd::when_done;
+  start({test::campaign_of("a", 1000)});
+  PlayingWorker(endpoint.address()).work();
+  wait_for_end();
+  EXPECT_EQ(num_stored("a"), 1000U);
+}
+
+TEST_F(ServiceWorkers, AreServedAtAPortOnLoopback) {
+  config.workers_endpoint = "tcp://127.0.0.1:*";
+  start({test::campaign_of("a", 2)});
+  EXPECT_THAT(service->workers_endpoint(), StartsWith("tcp://127.0.0.1:"));
+  EXPECT_EQ(PlayingWorker(service->workers_endpoint()).borrow().runs.first, RunIndex{0});
+}
+
+TEST_F(ServiceWorkers, AreLentOnlyWhatIsMissing) {
+  start({test::campaign_of("a", 3)});
+  {
+    PlayingWorker worker(endpoint.address());
+    const wire::RunLease lease = worker.borrow();
+    EXPECT_EQ(lease.runs, (RunRange{{0}, 1}));
+    worker.deliver(lease);
+    EXPECT_THAT(worker.receive<wire::ResultAck>().runs, ElementsAre(RunIndex{0}));
+  }
+  end(StopRequest::now);
+  start({test::campaign_of("a", 3)});
+  EXPECT_EQ(PlayingWorker(endpoint.address(), 1002).borrow().runs.first, RunIndex{1});
+}
+
+TEST_F(ServiceWorkers, HearTheEpochOfEachCoordinator) {
+  start({test::campaign_of("a", 3)});
+  PlayingWorker worker(endpoint.address());
+  (void)worker.register_here();
+  const wire::Epoch first = worker.epoch;
+  end(StopRequest::now);
+  start({test::campaign_of("a", 3)});
+  (void)worker.register_here();
+  EXPECT_NE(first.value, 0U);
+  EXPECT_NE(worker.epoch, first);
+}
+
+TEST_F(ServiceWorkers, AreToldToRegisterIfTheyMeanAnotherCoordinator) {
+  start({test::campaign_of("a", 3)});
+  PlayingWorker worker(endpoint.address());
+  (void)worker.register_here();
+  const wire::Epoch ours = worker.epoch;
+  worker.epoch = {ours.value + 1};
+  worker.want(1);
+  EXPECT_EQ(worker.receive<wire::Reject>().reason, wire::RejectReason::not_registered);
+  worker.epoch = ours;
+  worker.want(1);
+  EXPECT_EQ(worker.receive<wire::RunLease>().runs.count, 1U);
+}
+
+TEST_F(ServiceWorkers, AreToldToRegisterIfTheyDidNot) {
+  start({test::campaign_of("a", 3)});
+  PlayingWorker worker(endpoint.address());
+  worker.want(1);
+  EXPECT_EQ(worker.receive<wire::Reject>().reason, wire::RejectReason::not_registered);
+}
+
+TEST_F(ServiceWorkers, KeepTheirRunsOnANewConnection) {
+  start({test::campaign_of("a", 1)});
+  PlayingWorker worker(endpoint.address());
+  const wire::RunLease lease = worker.borrow();
+  worker.reconnect();
+  EXPECT_TRUE(worker.is_lent_nothing({PlayingWorker::held(lease)}));
+  worker.deliver(lease);
+  EXPECT_THAT(worker.receive<wire::ResultAck>().runs, ElementsAre(RunIndex{0}));
+  in_service([&] { EXPECT_EQ(service->campaigns().front().num_duplicates, 0U); });
+}
+
+TEST_F(ServiceWorkers, AreEachLentRunsOfTheirOwn) {
+  start({test::campaign_of("a", 10)});
+  PlayingWorker first(endpoint.address(), 1001);
+  PlayingWorker second(endpoint.address(), 1002);
+  const wire::RunLease lease = first.borrow();
+  EXPECT_EQ(lease.runs.first, RunIndex{0});
+  EXPECT_EQ(second.borrow().runs.first.value, lease.runs.end());
+  EXPECT_EQ(first.register_here().worker, WorkerId{1});
+  EXPECT_EQ(second.register_here().worker, WorkerId{2});
+}
+
+TEST_F(ServiceWorkers, ThatAreNotHeardAnyMoreAreReplacedWhenTheirProcessEnded) {
+  start({test::campaign_of("a", 1)});
+  (void)PlayingWorker(endpoint.address(), 1001).borrow();
+  in_service([&] {
+    EXPECT_FALSE(service->worker_of(1002));
+    const auto worker = service->worker_of(1001);
+    ASSERT_TRUE(worker);
+    EXPECT_THAT(service->runs_held_text(*worker), HasSubstr("0"));
+    service->worker_ended(*worker, LossReason::crashed);
+  });
+  const wire::RunLease lease = PlayingWorker(endpoint.address(), 1002).borrow();
+  EXPECT_EQ(lease.runs, (RunRange{{0}, 1}));
+  EXPECT_EQ(lease.attempt, wire::Attempt{2});
+}
+
+TEST_F(ServiceWorkers, AreWaitedForByTheCoordinatorAfterOneThatWasKilled) {
+  start({test::campaign_of("a", 1)});
+  PlayingWorker faithful(endpoint.address(), 1001);
+  const wire::RunLease lease = faithful.borrow();
+  kill();
+
+  config.dispatch.reattach_wait = std::chrono::hours(1);
+  start({test::campaign_of("a", 1)});
+  PlayingWorker other(endpoint.address(), 1002);
+  (void)other.register_here();
+  EXPECT_TRUE(other.is_lent_nothing());
+  (void)faithful.register_here();
+  faithful.want(1, {PlayingWorker::held(lease)});
+  faithful.deliver(lease);
+  EXPECT_THAT(faithful.receive<wire::ResultAck>().runs, ElementsAre(RunIndex{0}));
+}
+
+TEST_F(ServiceWorkers, AreNotWaitedForAfterACoordinatorThatEndedInOrder) {
+  start({test::campaign_of("a", 1)});
+  (void)PlayingWorker(endpoint.address(), 1001).borrow();
+  end(StopRequest::now);
+  config.dispatch.reattach_wait = std::chrono::hours(1);
+  start({test::campaign_of("a", 1)});
+  EXPECT_EQ(PlayingWorker(endpoint.address(), 1002).borrow().runs.count, 1U);
+}
+
+TEST_F(ServiceWorkers, DeliverWhatTheyHoldWhenDrained) {
+  start({test::campaign_of("a", 5)});
+  PlayingWorker worker(endpoint.address());
+  const wire::RunLease lease = worker.borrow();
+  stop = StopRequest::drain;
+  (void)worker.receive<wire::Drain>();
+  worker.deliver(lease);
+  EXPECT_EQ(worker.receive<wire::ResultAck>().runs.size(), lease.runs.count);
+  worker.send(wire::Bye{.reason = LossReason::drained});
+  wait_for_end();
+  EXPECT_EQ(num_stored("a"), lease.runs.count);
+}
+
+TEST_F(ServiceWorkers, HaveSoMuchTimeAndNoMoreWhenDrained) {
+  config.drain_max = Duration::zero();
+  start({test::campaign_of("a", 5)});
+  PlayingWorker worker(endpoint.address());
+  (void)worker.borrow();
+  stop = StopRequest::drain;
+  (void)worker.receive<wire::Stop>();
+  wait_for_end();
+}
+
+TEST_F(ServiceWorkers, AreLentRunsThatWereGivenUpIfThatIsAskedFor) {
+  {
+    ServedCampaign campaign = files.open(test::campaign_of("a", 1));
+    const Entry given_up = GivenUpRun{.run = {0}};
+    (void)campaign.store.write({&given_up, 1});
+  }
+  config.given_up = GivenUpRuns::retry;
+  start({test::campaign_of("a", 1)});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)worker.receive<wire::ResultAck>();
+  in_service([&] { EXPECT_TRUE(service->is_done()); });
+}
+
+TEST_F(ServiceWorkers, AreNotLentRunsThatWereGivenUp) {
+  {
+    ServedCampaign campaign = files.open(test::campaign_of("a", 1));
+    const Entry given_up = GivenUpRun{.run = {0}};
+    (void)campaign.store.write({&given_up, 1});
+  }
+  start({test::campaign_of("a", 1)});
+  in_service([&] {
+    EXPECT_TRUE(service->is_done());
+    EXPECT_EQ(service->campaigns().front().num_given_up, 1U);
+  });
+}
+
+class ServiceStorage : public test::ServiceTest {};
+
+// Nothing is acknowledged, nothing lost; all goes on when the disk has room again.
+TEST_F(ServiceStorage, FailsAndRecovers) {
+  config.writer.retry_after = std::chrono::milliseconds(10);
+  start({test::campaign_of("a", 1)});
+  PlayingWorker worker(endpoint.address());
+  const wire::RunLease lease = worker.borrow();
+  {
+    const test::FileSizeLimit limit(1);
+    worker.deliver(lease);
+    (void)wait_for_event("storage_failed");
+    in_service([&] {
+      EXPECT_THAT(service->campaigns().front().storage_failure, HasSubstr("a.db"));
+      EXPECT_EQ(service->campaigns().front().num_done, 0U);
+    });
+  }
+  EXPECT_THAT(worker.receive<wire::ResultAck>().runs, ElementsAre(RunIndex{0}));
+  (void)wait_for_event("storage_recovered");
+  in_service([&] { EXPECT_EQ(service->campaigns().front().storage_failure, ""); });
+  end(StopRequest::now);
+  EXPECT_EQ(num_stored("a"), 1U);
+}
+
+class ServiceStart : public test::ServiceTest {
+ protected:
+  std::string refusal() {
+    try {
+      start({});
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "started";
+  }
+};
+
+TEST_F(ServiceStart, RefusesAnAddressThatOthersCanReachUnlessTheUserInsists) {
+  config.workers_endpoint = "tcp://0.0.0.0:*";
+  EXPECT_THAT(refusal(), StartsWith("bind = tcp://0.0.0.0:* ("));
+  config.workers_endpoint = endpoint.address();
+  config.clients_endpoint = "tcp://0.0.0.0:*";
+  EXPECT_THAT(refusal(), StartsWith("bind-clients = tcp://0.0.0.0:* ("));
+  config.is_plain_waived = true;
+  EXPECT_EQ(refusal(), "started");
+}
+
+TEST_F(ServiceStart, SaysThatAnAddressIsTaken) {
+  config.workers_endpoint = "tcp://127.0.0.1:*";
+  start({});
+  config.workers_endpoint = service->workers_endpoint();
+  try {
+    (void)Service({}, config, [](const Event&) {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.what(), "bind = " + config.workers_endpoint + " (Address already in use)");
+  }
+}
+
+TEST_F(ServiceStart, RefusesTwoCampaignsOfOneName) {
+  std::vector<ServedCampaign> campaigns;
+  campaigns.push_back(files.open(test::campaign_of("a", 1)));
+  campaigns.push_back(files.open(test::campaign_of("b", 1)));
+  campaigns.back().definition = campaigns.front().definition;
+  try {
+    (void)Service(std::move(campaigns), config, [](const Event&) {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.what(), "campaign = a in " + (directory / "b.db").string() +
+                                " (is served already, from another file)");
+  }
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

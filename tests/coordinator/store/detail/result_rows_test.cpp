@@ -1,0 +1,56 @@
+#include "coordinator/store/detail/result_rows.hpp"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <set>
+
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+RunResult known_result(RunStatus status) {
+  RunResult result{.run = RunIndex{7}, .status = status, .num_draws = 2, .num_rounds = 3};
+  result.truth = {1.0, -0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-300};
+  result.estimate.fill(2.0);
+  return result;
+}
+
+// The expected digests are those of an FNV-1a written in Python over the packed numbers.
+TEST(ResultDigest, IsFnv1aOfAllThatMeansSomething) {
+  EXPECT_EQ(digest(known_result(RunStatus::completed)), 0xe4a0593635d4e6e6u);
+  EXPECT_EQ(digest(known_result(RunStatus::not_finite)), 0x0a65db6f5187caccu);
+  EXPECT_EQ(digest(known_result(RunStatus::no_draw)), 0x560ac63e54f38b87u);
+}
+
+TEST(ResultDigest, DoesNotDependOnTheSignOfAZeroOrOnWhatMeansNothing) {
+  RunResult result = known_result(RunStatus::not_finite);
+  result.truth[3] = -0.0;
+  result.estimate.fill(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(digest(result), digest(known_result(RunStatus::not_finite)));
+  EXPECT_TRUE(are_equal(result, known_result(RunStatus::not_finite)));
+}
+
+TEST(ResultDigest, DependsOnEveryNumber) {
+  const RunResult known = known_result(RunStatus::completed);
+  std::vector<RunResult> changed(4, known);
+  changed[0].run.value = 8;
+  changed[1].status = RunStatus::not_converged;
+  changed[2].num_draws = 3;
+  changed[3].num_rounds = 2;
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    changed.insert(changed.end(), 2, known);
+    changed.back().truth[i] += 1.0;
+    changed[changed.size() - 2].estimate[i] += 1.0;
+  }
+  std::set<std::uint64_t> digests{digest(known)};
+  for (const RunResult& result : changed) {
+    digests.insert(digest(result));
+    EXPECT_FALSE(are_equal(result, known));
+  }
+  EXPECT_EQ(digests.size(), 1 + changed.size());
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator::detail

@@ -1,0 +1,202 @@
+#include "coordinator/store/store_writer.hpp"
+
+#include <gmock/gmock.h>
+
+#include "coordinator/store/detail/database.hpp"
+#include "tests/coordinator/store/writer_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using detail::Access;
+using detail::Database;
+using test::campaign_of;
+using test::delivery_of;
+using test::patient_config;
+using test::results_in;
+using test::worker_1;
+using test::wrong_delivery_of;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+using StoreWriterTest = test::WriterTest;
+
+TEST_F(StoreWriterTest, NamesResultsOnceTheyAreStored) {
+  StoreWriter& writer = start();
+  writer.open(id, create());
+  for (const std::uint64_t run : {4u, 2u, 3u}) writer.deliver(id, delivery_of(run));
+  EXPECT_THAT(take_completions(), IsEmpty());
+  writer.flush();
+  EXPECT_THAT(take_completions(), ElementsAre("committed 4 2 3"));
+  EXPECT_EQ(results_in(Store::open_read_only(file())).size(), 3u);
+  writer.flush();
+  EXPECT_THAT(take_completions(), IsEmpty());
+}
+
+TEST_F(StoreWriterTest, CommitsAsSoonAsEnoughResultsWait) {
+  WriterConfig config = patient_config();
+  config.commit_runs_max = 3;
+  StoreWriter& writer = start(config);
+  writer.open(id, create());
+  for (std::uint64_t run = 0; run < 3; ++run) writer.deliver(id, delivery_of(run));
+  wait_for("committed 0 1 2");
+}
+
+TEST_F(StoreWriterTest, CommitsAFewResultsAfterAWhile) {
+  WriterConfig config = patient_config();
+  config.commit_after = std::chrono::milliseconds(1);
+  StoreWriter& writer = start(config);
+  writer.open(id, create());
+  writer.deliver(id, delivery_of(7));
+  wait_for("committed 7");
+}
+
+TEST_F(StoreWriterTest, WritesMoreThanFitsIntoOneTransaction) {
+  constexpr std::uint64_t num_runs = 20'000;
+  StoreWriter& writer = start();
+  writer.open(id, create(num_runs));
+  for (std::uint64_t run = 0; run < num_runs; ++run) writer.deliver(id, delivery_of(run));
+  writer.flush();
+  std::uint64_t next = 0;
+  for (const Completion& completion : writer.take_completions()) {
+    for (const RunIndex run : std::get<Committed>(completion).runs) EXPECT_EQ(run.value, next++);
+  }
+  EXPECT_EQ(next, num_runs);
+}
+
+TEST_F(StoreWriterTest, ComparesWithWhatWasDeliveredJustBefore) {
+  StoreWriter& writer = start();
+  writer.open(id, create());
+  writer.deliver(id, delivery_of(1));
+  writer.compare(id, delivery_of(1));
+  writer.compare(id, wrong_delivery_of(1));
+  writer.flush();
+  EXPECT_THAT(take_completions(),
+              ElementsAre("committed 1", "compared 1 equal", "compared 1 different"));
+}
+
+TEST_F(StoreWriterTest, WritesEveryKindOfRecord) {
+  StoreWriter& writer = start();
+  writer.open(id, create());
+  writer.record_worker_joined(worker_1());
+  writer.record_loss(id, {.runs = {RunIndex{3}, 1},
+                          .attempt = {1},
+                          .worker = test::session_1,
+                          .reason = wire::LossReason::crashed,
+                          .is_blamed = true});
+  writer.record_loss(id, {.runs = {RunIndex{4}, 1},
+                          .attempt = {1},
+                          .worker = test::session_1,
+                          .reason = wire::LossReason::crashed,
+                          .is_blamed = true});
+  writer.give_up(id, RunIndex{4});
+  writer.record_event(id, {.kind = "note", .text = "text"});
+  writer.set_control(id, {.phase = wire::CampaignPhase::paused, .priority = 3});
+  const Store store = writer.close(id);
+
+  EXPECT_THAT(store.attached_sessions(), ElementsAre(test::session_1));
+  EXPECT_THAT(store.blamed_runs(), ElementsAre(BlamedRun{RunIndex{3}, 1, {1}}));
+  EXPECT_THAT(store.given_up_runs(), ElementsAre(RunRange{RunIndex{4}, 1}));
+  EXPECT_EQ(store.control().phase, wire::CampaignPhase::paused);
+  EXPECT_EQ(Database(file(), Access::read_only).text("SELECT kind || text FROM event"), "notetext");
+  EXPECT_THAT(take_completions(), IsEmpty());
+}
+
+TEST_F(StoreWriterTest, TellsFilesOpenedLaterWhoIsRegistered) {
+  StoreWriter& writer = start();
+  writer.record_worker_joined(worker_1());
+  writer.record_worker_joined({.session = {2}, .name = "gone", .host = "node-2"});
+  writer.record_worker_ended({.session = {2}, .reason = wire::LossReason::drained});
+  writer.open(id, create());
+  EXPECT_THAT(writer.close(id).attached_sessions(), ElementsAre(test::session_1));
+}
+
+TEST_F(StoreWriterTest, KeepsSeveralCampaignsApart) {
+  constexpr wire::CampaignId other{2};
+  StoreWriter& writer = start();
+  writer.open(id, create());
+  writer.open(other, Store::create(directory() / "other.db", campaign_of(100), ""));
+  writer.deliver(id, delivery_of(1));
+  writer.deliver(other, delivery_of(2));
+  writer.record_event(other, {.kind = "one", .text = ""});
+  writer.record_event({}, {.kind = "all", .text = ""});
+  writer.flush();
+  EXPECT_THAT(take_completions(), ElementsAre("committed 1", "committed 2"));
+  const std::string kinds = "SELECT group_concat(kind) FROM event";
+  EXPECT_EQ(Database(file(), Access::read_only).text(kinds), "all");
+  EXPECT_EQ(Database(directory() / "other.db", Access::read_only).text(kinds), "one,all");
+}
+
+TEST_F(StoreWriterTest, GivesTheFileBackWithAllThatWasHandedOver) {
+  StoreWriter& writer = start();
+  writer.open(id, create());
+  writer.deliver(id, delivery_of(5));
+  {
+    Store store = writer.close(id);
+    EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{5}, 1}));
+    writer.open(id, std::move(store));
+  }
+  writer.deliver(id, delivery_of(6));
+  writer.flush();
+  EXPECT_THAT(take_completions(), ElementsAre("committed 5", "committed 6"));
+}
+
+TEST_F(StoreWriterTest, LetsOthersUseTheFileAfterAllThatWasHandedOver) {
+  StoreWriter& writer = start();
+  writer.open(id, create(100));
+  writer.deliver(id, delivery_of(99));
+  writer.access(id, [](Store& store) {
+    EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{99}, 1}));
+    store.extend(campaign_of(200), "");
+  });
+  writer.deliver(id, delivery_of(199));
+  EXPECT_EQ(test::store_error_of([&] {
+              writer.access(id, [](Store& store) { store.extend(campaign_of(150), ""); });
+            }),
+            "campaign.runs = 150 (must be at least 200, as in the campaign file)");
+  EXPECT_THAT(take_completions(), ElementsAre("committed 99", "committed 199"));
+}
+
+TEST_F(StoreWriterTest, WritesWhatWaitsWhenItEnds) {
+  start().open(id, create());
+  StoreWriter& writer = start();  // The file of the first one is free.
+  writer.open(id, Store::open(file()));
+  for (std::uint64_t run = 0; run < 50; ++run) writer.deliver(id, delivery_of(run));
+  end();
+  EXPECT_EQ(results_in(Store::open(file())).size(), 50u);
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+}
+
+// All that the parent is told of was named by a completion before the process was killed.
+TEST_F(StoreWriterTest, NamesNothingThatAKilledProcessLoses) {
+  std::array<int, 2> channel{};
+  ASSERT_EQ(::pipe(channel.data()), 0);
+  test::run_and_kill([&] {
+    WriterConfig config = patient_config();
+    config.commit_runs_max = 10;
+    StoreWriter& writer = start(config);
+    writer.open(id, create(2000));
+    for (std::uint64_t run = 0; run < 2000; ++run) writer.deliver(id, delivery_of(run));
+    for (std::uint64_t num_told = 0; num_told < 500;) {
+      for (const Completion& completion : writer.take_completions()) {
+        for (const RunIndex run : std::get<Committed>(completion).runs) {
+          if (::write(channel[1], &run, sizeof run) != sizeof run) ::_exit(1);
+          ++num_told;
+        }
+      }
+    }
+  });
+  ::close(channel[1]);
+  const Store store = Store::open(file());
+  ASSERT_EQ(store.finished_runs().size(), 1u);
+  const std::uint64_t num_stored = store.finished_runs()[0].count;
+  std::uint64_t num_told = 0;
+  for (RunIndex run; ::read(channel[0], &run, sizeof run) == sizeof run; ++num_told) {
+    EXPECT_LT(run.value, num_stored);
+  }
+  ::close(channel[0]);
+  EXPECT_GE(num_told, 500u);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <sstream>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "coordinator/store/store_writer.hpp"
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::test {
+
+/// Nothing is written, or tried again, because time passes.
+inline coordinator::WriterConfig patient_config() {
+  return {.commit_runs_max = 1'000'000,
+          .commit_after = std::chrono::hours(1),
+          .retry_after = std::chrono::hours(1)};
+}
+
+/// As in the texts of WriterTest.
+inline std::string committed(const std::vector<std::uint64_t>& runs) {
+  std::ostringstream text;
+  text << "committed";
+  for (const std::uint64_t run : runs) text << ' ' << run;
+  return text.str();
+}
+
+/// A writer, and all its completions in order as text: `committed 3 4 5`, `compared 3 equal`,
+/// `failed why`, `recovered`.
+class WriterTest : public StoreTest {
+ protected:
+  static constexpr wire::CampaignId id{1};
+
+  coordinator::StoreWriter& start(const coordinator::WriterConfig& config = patient_config()) {
+    writer_ = std::make_unique<coordinator::StoreWriter>([this] { on_wake(); }, config);
+    return *writer_;
+  }
+  /// Ends the writer.
+  void end() { writer_.reset(); }
+
+  [[nodiscard]] coordinator::Store create(std::uint64_t num_runs = 100) const {
+    return coordinator::Store::create(file(), campaign_of(num_runs), "");
+  }
+
+  [[nodiscard]] std::vector<std::string> take_completions() {
+    std::vector<std::string> texts;
+    for (const coordinator::Completion& completion : writer_->take_completions()) {
+      texts.push_back(std::visit([](const auto& kind) { return text_of(kind); }, completion));
+    }
+    return texts;
+  }
+
+  /// Waits for completions until one of them is `text`; returns all. A minute means: never.
+  std::vector<std::string> wait_for(const std::string& text) {
+    std::vector<std::string> all;
+    while (std::find(all.begin(), all.end(), text) == all.end()) {
+      {
+        std::unique_lock lock(mutex_);
+        if (!woken_.wait_for(lock, std::chrono::minutes(1), [this] { return is_woken_; })) {
+          ADD_FAILURE() << "no completion " << text;
+          return all;
+        }
+        is_woken_ = false;
+      }
+      const std::vector<std::string> texts = take_completions();
+      all.insert(all.end(), texts.begin(), texts.end());
+    }
+    return all;
+  }
+
+ private:
+  void on_wake() {
+    {
+      const std::lock_guard lock(mutex_);
+      is_woken_ = true;
+    }
+    woken_.notify_one();
+  }
+
+  static std::string text_of(const coordinator::Committed& completion) {
+    std::vector<std::uint64_t> numbers;
+    for (const RunIndex run : completion.runs) numbers.push_back(run.value);
+    return test::committed(numbers);
+  }
+  static std::string text_of(const coordinator::Compared& compared) {
+    return "compared " + std::to_string(compared.comparison.run.value) +
+           (compared.comparison.is_equal ? " equal" : " different");
+  }
+  static std::string text_of(const coordinator::StoreFailed& failed) {
+    return "failed " + failed.text;
+  }
+  static std::string text_of(const coordinator::StoreRecovered&) { return "recovered"; }
+
+  std::mutex mutex_;
+  std::condition_variable woken_;
+  bool is_woken_ = false;
+  std::unique_ptr<coordinator::StoreWriter> writer_;
+};
+
+}  // namespace proofmass::test

@@ -1,0 +1,146 @@
+// Workers that have to end, campaigns that are paused or cancelled, and runs that crash or never
+// end.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <string>
+
+#include "tests/system/fault_fixture.hpp"
+
+namespace proofmass::test {
+namespace {
+
+class ControlledCampaign : public FaultTest {
+ protected:
+  void SetUp() override {
+    FaultTest::SetUp();
+    write_null_campaign(1600);
+  }
+};
+
+class WorkerEnd : public ControlledCampaign {
+ protected:
+  /// What a worker was lent and did not finish, but for what it was asked to give back.
+  [[nodiscard]] std::string reasons_of_losses() const {
+    return stored_text(file_of("null"),
+                       "SELECT group_concat(DISTINCT reason) FROM attempt "
+                       "WHERE reason <> 'retracted'");
+  }
+  [[nodiscard]] std::string end_of(const std::string& worker) const {
+    return stored_text(file_of("null"),
+                       "SELECT end_reason FROM worker WHERE name = '" + worker + "'");
+  }
+};
+
+// It stops early enough to finish and deliver what it computes, whose time it knows.
+TEST_F(WorkerEnd, ComesBeforeTheWalltime) {
+  const auto walltime_end = std::chrono::steady_clock::now() + std::chrono::seconds(12);
+  Process coordinator = this->coordinator("coordinator", {"null.toml", "--exit-when-done"});
+  Process limited = null_worker("limited", {"--max-walltime", "12", "--run-time", "0.1"});
+  EXPECT_EQ(limited.wait(), 0) << errors_of("limited");
+  EXPECT_LT(std::chrono::steady_clock::now(), walltime_end);
+  ASSERT_LT(num_done("null"), num_null_runs);
+  wait_until("end in the file", [&] { return end_of("limited") == "walltime"; });
+  EXPECT_EQ(stored_text(file_of("null"), "SELECT count(*) FROM delivery"),
+            stored_text(file_of("null"), "SELECT num_results FROM worker WHERE name = 'limited'"));
+  Process other = null_worker("other");
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+  EXPECT_EQ(other.wait(), 0) << errors_of("other");
+  EXPECT_EQ(reasons_of_losses(), "walltime");
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
+TEST_F(WorkerEnd, BySigtermLosesNothing) {
+  Process coordinator = this->coordinator("coordinator", {"null.toml", "--exit-when-done"});
+  Process asked = null_worker("asked", {"--run-time", "0.1"});
+  wait_for_done("null", 1);
+  asked.signal(SIGTERM);
+  EXPECT_EQ(asked.wait(), 0) << errors_of("asked");
+  ASSERT_LT(num_done("null"), num_null_runs);
+  Process other = null_worker("other");
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+  EXPECT_EQ(other.wait(), 0) << errors_of("other");
+  EXPECT_EQ(end_of("asked"), "preempted");
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
+using CampaignControl = ControlledCampaign;
+
+// While it is paused, the worker computes another one.
+TEST_F(CampaignControl, PausesAndResumes) {
+  write_campaign("other", 500);
+  const Process coordinator = this->coordinator("coordinator", {"null.toml"});
+  const Process worker = null_worker("worker");
+  wait_for_done("null", 1);
+  (void)told({"pause", "null"});
+  wait_until("last lent run", [&] { return status_of("null").at("num_lent") == 0; });
+  EXPECT_EQ(status_of("null").at("phase"), "paused");
+  (void)told({"submit", "other.toml"});
+  wait_for_done("other", 1);  // What was delivered before has been stored by then.
+  const std::size_t num_done_before = num_done("null");
+  ASSERT_LT(num_done_before, num_null_runs);
+  wait_for_done("other", 500);
+  EXPECT_EQ(num_done("null"), num_done_before);
+  (void)told({"resume", "null"});
+  wait_for_done("null", num_null_runs);
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
+TEST_F(CampaignControl, CancelsAndGoesOn) {
+  const Process coordinator = this->coordinator("coordinator", {"null.toml"});
+  const Process worker = null_worker("worker");
+  wait_for_done("null", 1);
+  Process watch =
+      start_behind({}, "watch", "proofmass", {"watch", "null", "--connect", clients_endpoint});
+  wait_until("watching", [&] { return read_file(path("watch.out")) != ""; });
+  (void)told({"cancel", "null"});
+  EXPECT_EQ(watch.wait(), 1);
+  const nlohmann::json cancelled = status_of("null");
+  EXPECT_EQ(cancelled.at("phase"), "cancelled");
+  EXPECT_EQ(cancelled.at("num_lent"), 0);
+  ASSERT_LT(cancelled.at("num_done"), num_null_runs);
+  (void)told({"resume", "null"});
+  wait_for_done("null", num_null_runs);
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
+/// One run does harm to whoever computes it.
+class HarmfulRun : public ControlledCampaign {
+ protected:
+  static constexpr std::int64_t harmful = 1234;
+
+  /// The campaign ends without that run, and all others are what they should be.
+  void expect_all_others(const std::string& option) const {
+    Process coordinator =
+        this->coordinator("coordinator", {"null.toml", "--exit-when-done", "--time-scale", "0.05"});
+    const Arguments further{option, std::to_string(harmful)};
+    const Process one = null_worker("one", further);
+    const Process two = null_worker("two", further);
+    EXPECT_EQ(coordinator.wait(), 1) << errors_of("coordinator");
+    EXPECT_EQ(
+        num_log_lines("coordinator", "run_given_up run=" + std::to_string(harmful) + " crashes=3"),
+        1U)
+        << errors_of("coordinator");
+    EXPECT_EQ(stored_text(file_of("null"), "SELECT group_concat(run_index) FROM run_failure"),
+              std::to_string(harmful));
+    (void)undisturbed_digest("null");
+    auto runs = stored_runs(path("undisturbed/null.db"));
+    runs.erase(harmful);
+    EXPECT_EQ(stored_runs(file_of("null")), runs);
+  }
+};
+
+TEST_F(HarmfulRun, ThatCrashesIsGivenUpAfterThreeCrashes) {
+  expect_all_others("--poison");
+  EXPECT_TRUE(contains(errors_of("coordinator"), "reason=crashed"));
+}
+
+TEST_F(HarmfulRun, ThatHangsIsGivenUpAfterThreeWorkers) {
+  expect_all_others("--hang");
+  EXPECT_TRUE(contains(errors_of("coordinator"), "reason=hung"));
+}
+
+}  // namespace
+}  // namespace proofmass::test

@@ -1,0 +1,124 @@
+// Campaign files that somebody else uses or has spoilt.
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+
+#include "tests/system/fault_fixture.hpp"
+
+namespace proofmass::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class CampaignFiles : public FaultTest {
+ protected:
+  void SetUp() override {
+    FaultTest::SetUp();
+    write_null_campaign(1000);
+  }
+
+  /// Finishes the campaign and ends.
+  void serve_undisturbed() const {
+    Process coordinator = this->coordinator("first", {"null.toml", "--exit-when-done"});
+    const Process worker = null_worker("worker", {"--run-time", "0"});
+    EXPECT_EQ(coordinator.wait(), 0) << errors_of("first");
+  }
+
+  /// What a coordinator on another directory says, which has nothing to serve there.
+  [[nodiscard]] std::string log_of_another(const std::string& name) const {
+    const Process coordinator =
+        start_behind({}, name, "proofmass-coordinator",
+                     {"--directory", name, "--bind", "ipc://" + path("other").string()});
+    wait_for_log(name, "coordinator_started");
+    EXPECT_TRUE(contains(errors_of(name), "campaigns=0")) << errors_of(name);
+    return errors_of(name);
+  }
+
+  /// Copies the campaign's file and writes over part of it.
+  void damage_copy(const std::string& name, std::streamoff at, const std::string& bytes) const {
+    fs::copy_file(file_of("null"), file_of(name));
+    std::fstream(file_of(name), std::ios::in | std::ios::out | std::ios::binary).seekp(at) << bytes;
+  }
+  void cut_copy(const std::string& name, std::uintmax_t size) const {
+    fs::copy_file(file_of("null"), file_of(name));
+    fs::resize_file(file_of(name), size);
+  }
+};
+
+TEST_F(CampaignFiles, HaveOneWriterByWhateverName) {
+  const Process coordinator = this->coordinator("coordinator", {"null.toml"});
+  const Process worker = null_worker("worker");
+  wait_for_done("null", 1);
+  const std::string held_by =
+      "served/null.db.lock (held by process " + std::to_string(coordinator.id()) + " on ";
+
+  Process run(directory / "", "run", programs + "/proofmass",
+              {"run", "null.toml", "--db", "served/null.db"});
+  EXPECT_EQ(run.wait(), 1);
+  EXPECT_TRUE(contains(errors_of("run"), held_by)) << errors_of("run");
+
+  fs::create_directory(path("second"));
+  fs::create_symlink(file_of("null"), path("second/null.db"));
+  EXPECT_TRUE(contains(log_of_another("second"), held_by));
+  fs::create_directory(path("third"));
+  fs::create_hard_link(file_of("null"), path("third/null.db"));
+  EXPECT_TRUE(contains(log_of_another("third"),
+                       "third/null.db (has 2 names (hard links), must have one; make copies"));
+
+  wait_for_log("coordinator", "campaign_finished");
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
+TEST_F(CampaignFiles, ThatCannotBeServedAreNamedAndLeftAlone) {
+  serve_undisturbed();
+  const std::string digest_before = digest("null");
+  const std::map<std::string, std::string> reasons{
+      {"newer", "is newer than this program: its user_version is 99, the newest known one "},
+      {"foreign", "is not a Proofmass campaign: its application_id is 0, not "},
+      {"damaged", "is damaged: "},
+      {"torn", "is damaged: "},
+      {"short", "is damaged: "},
+      {"empty", "is not a Proofmass campaign: its application_id is 0, not "},
+      {"text", "is not an SQLite database"}};
+  damage_copy("newer", 60, {'\0', '\0', '\0', 99});  // Bytes of a database's header, [SQLite].
+  damage_copy("foreign", 68, {'\0', '\0', '\0', 0});
+  damage_copy("damaged", 65536, std::string(65536, 'x'));
+  cut_copy("torn", fs::file_size(file_of("null")) - 5000);
+  cut_copy("short", 1000);
+  std::ofstream(file_of("empty"));
+  std::ofstream(file_of("text")) << "Notes.\n";
+  std::map<std::string, std::string> bytes;
+  for (const auto& [name, reason] : reasons) bytes[name] = read_file(file_of(name));
+
+  const Process coordinator = this->coordinator("second", {});
+  wait_for_log("second", "coordinator_started");
+  for (const auto& [name, reason] : reasons) {
+    EXPECT_EQ(num_log_lines("second", "campaign_not_served reason=\"campaign file = served/" +
+                                          name + ".db (" + reason),
+              1U)
+        << name << "\n"
+        << errors_of("second");
+    EXPECT_EQ(read_file(file_of(name)), bytes.at(name)) << name;
+  }
+  EXPECT_EQ(status_of("null").at("phase"), "finished");
+  EXPECT_EQ(digest("null"), digest_before);
+}
+
+// The file that is damaged is the one that is asked for: nothing takes its place.
+TEST_F(CampaignFiles, ThatAreDamagedAreNotReplaced) {
+  serve_undisturbed();
+  fs::resize_file(file_of("null"), 5000);
+  Process coordinator = this->coordinator("second", {"null.toml"});
+  EXPECT_EQ(coordinator.wait(), 1);
+  EXPECT_TRUE(contains(errors_of("second"),
+                       "proofmass: error: campaign file = served/null.db (is damaged: "))
+      << errors_of("second");
+  EXPECT_EQ(fs::file_size(file_of("null")), 5000U);
+}
+
+}  // namespace
+}  // namespace proofmass::test

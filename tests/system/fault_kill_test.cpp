@@ -1,0 +1,130 @@
+// Processes that are killed or stopped at any time.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <random>
+#include <string>
+
+#include "tests/system/fault_fixture.hpp"
+
+namespace proofmass::test {
+namespace {
+
+class RandomFaults : public FaultTest, public testing::WithParamInterface<unsigned> {
+ protected:
+  RandomFaults() : draw_(GetParam()) {}
+
+  [[nodiscard]] std::size_t draw(std::size_t count) { return draw_() % count; }
+
+  /// Lets the campaign go on for a while, as long as nothing but the seed tells.
+  void go_on() {
+    using std::chrono::steady_clock;
+    wait_for_done("null", num_done("null") + 1 + draw(300));
+    const auto end = steady_clock::now() + std::chrono::milliseconds(draw(40));
+    wait_until("later", [&] { return steady_clock::now() >= end; });
+  }
+
+  [[nodiscard]] Process null_coordinator(int number, const Arguments& further = {}) const {
+    Arguments arguments{"null.toml", "--exit-when-done"};
+    arguments.insert(arguments.end(), further.begin(), further.end());
+    return coordinator("coordinator-" + std::to_string(number), arguments);
+  }
+
+  [[nodiscard]] std::unique_ptr<Process> next_worker() {
+    return std::unique_ptr<Process>(
+        new Process(null_worker("worker-" + std::to_string(num_workers_++), {"--no-supervisor"})));
+  }
+
+ private:
+  std::mt19937 draw_;
+  int num_workers_ = 0;
+};
+
+// The workers outlive it with all that they hold: not a run is lent twice.
+TEST_P(RandomFaults, KillTheCoordinator) {
+  constexpr int num_kills = 6;
+  Processes workers;
+  for (int i = 0; i < 3; ++i) workers.push_back(next_worker());
+  for (int i = 0; i < num_kills; ++i) {
+    Process coordinator = null_coordinator(i);
+    go_on();
+    coordinator.signal(SIGKILL);
+    ASSERT_EQ(coordinator.wait(), -SIGKILL) << errors_of("coordinator-" + std::to_string(i));
+  }
+  ASSERT_LT(num_done("null"), num_null_runs);
+  Process coordinator = null_coordinator(num_kills);
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator-" + std::to_string(num_kills));
+  for (const auto& worker : workers) EXPECT_EQ(worker->wait(), 0);
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+  const auto file = file_of("null");
+  EXPECT_EQ(stored_text(file, "SELECT count(*) FROM attempt WHERE reason <> 'retracted'"), "0");
+  EXPECT_EQ(stored_text(file, "SELECT count(*) FROM coordinator_start WHERE ended_utc IS NULL"),
+            std::to_string(num_kills));
+}
+
+TEST_P(RandomFaults, KillWorkers) {
+  Process coordinator = null_coordinator(0, {"--time-scale", "0.02"});
+  Processes workers;
+  for (int i = 0; i < 3; ++i) workers.push_back(next_worker());
+  for (int i = 0; i < 8; ++i) {
+    go_on();
+    const std::size_t victim = draw(workers.size());
+    workers[victim]->signal(SIGKILL);
+    EXPECT_EQ(workers[victim]->wait(), -SIGKILL);
+    workers[victim] = next_worker();
+  }
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator-0");
+  EXPECT_GT(num_log_lines("coordinator-0", "reason=silent"), 0U);
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
+TEST_P(RandomFaults, KillEverything) {
+  constexpr int num_kills = 4;
+  Processes workers;
+  for (int i = 0; i < 3; ++i) workers.push_back(next_worker());
+  for (int i = 0; i < num_kills; ++i) {
+    Process coordinator = null_coordinator(i, {"--time-scale", "0.05"});
+    go_on();
+    const std::size_t victim = draw(workers.size());
+    workers[victim]->signal(SIGKILL);
+    workers[victim] = next_worker();
+    go_on();
+    coordinator.signal(SIGKILL);
+    ASSERT_EQ(coordinator.wait(), -SIGKILL) << errors_of("coordinator-" + std::to_string(i));
+  }
+  Process coordinator = null_coordinator(num_kills, {"--time-scale", "0.05"});
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator-" + std::to_string(num_kills));
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Seed, RandomFaults, testing::Values(1U, 2U, 3U),
+                         [](const auto& seed) { return std::to_string(seed.param); });
+
+using StoppedWorker = FaultTest;
+
+// What it was computing is computed by another, stored, and compared when it comes at last.
+TEST_F(StoppedWorker, DeliversLateResultsThatAreCompared) {
+  const Process coordinator =
+      this->coordinator("coordinator", {"null.toml", "--time-scale", "0.02"});
+  const Process slow = null_worker("slow", {"--no-supervisor", "--run-time", "0.5"});
+  wait_for_log("coordinator", "name=slow");
+  const Process quick = null_worker("quick");
+  wait_until("runs at both workers", [&] {
+    return stored_text(file_of("null"), "SELECT count(*) FROM worker WHERE num_results > 0") == "2";
+  });
+  slow.signal(SIGSTOP);
+  wait_for_log("coordinator", "name=slow reason=silent");
+  // Lost runs go first, so these are all of them and some more.
+  wait_for_done("null", num_done("null") + 300);
+  ASSERT_LT(num_done("null"), num_null_runs);
+  slow.signal(SIGCONT);
+  wait_until("late results", [&] { return status_of("null").at("num_duplicates") > 0; });
+  wait_for_log("coordinator", "campaign_finished");
+  EXPECT_EQ(status_of("null").at("num_mismatches"), 0);
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
+}  // namespace
+}  // namespace proofmass::test

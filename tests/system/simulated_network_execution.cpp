@@ -1,0 +1,137 @@
+#include "tests/system/simulated_network_execution.hpp"
+
+#include <algorithm>
+
+namespace proofmass::test {
+namespace {
+
+constexpr std::uint32_t num_orbits = 3;  // Of a run.
+
+bool is_in(std::span<const RunRange> ranges, RunIndex run) {
+  return std::any_of(ranges.begin(), ranges.end(), [&](const RunRange& range) {
+    return run >= range.first && run.value < range.end();
+  });
+}
+
+std::vector<RunRange> ranges_of(const std::vector<RunKey>& runs) {
+  std::vector<RunRange> ranges;
+  for (const auto& [campaign, run] : runs) {
+    if (!ranges.empty() && ranges.back().end() == run.value) {
+      ++ranges.back().count;
+    } else {
+      ranges.push_back({run, 1});
+    }
+  }
+  return ranges;
+}
+
+}  // namespace
+
+PlayedExecution::PlayedExecution(const Poison& poison, std::size_t num_threads,
+                                 std::size_t num_lanes)
+    : poison_(poison), num_threads_(num_threads), num_lanes_(num_lanes) {}
+
+void PlayedExecution::define(wire::CampaignId campaign, std::shared_ptr<const Campaign>) {
+  defined_.insert(campaign);
+}
+
+void PlayedExecution::submit(wire::RunLease lease) {
+  for (RunIndex run = lease.runs.first; run.value < lease.runs.end(); ++run.value) {
+    waiting_.push_back({{lease.campaign, run}, lease.is_alone});
+  }
+}
+
+std::vector<RunIndex> PlayedExecution::drop_waiting(wire::CampaignId campaign,
+                                                    std::span<const RunRange> ranges) {
+  std::vector<RunIndex> dropped;
+  std::erase_if(waiting_, [&](const WaitingRun& waiting) {
+    const auto& [run_campaign, run] = waiting.run;
+    if (run_campaign != campaign || !is_in(ranges, run)) return false;
+    dropped.push_back(run);
+    return true;
+  });
+  std::sort(dropped.begin(), dropped.end());
+  return dropped;
+}
+
+bool PlayedExecution::drop_batch(std::uint64_t number) {
+  return std::erase_if(batches_, [&](const Batch& batch) { return batch.number == number; }) > 0;
+}
+
+void PlayedExecution::forget(wire::CampaignId campaign) {
+  std::erase_if(waiting_, [&](const WaitingRun& run) { return run.run.first == campaign; });
+  std::erase_if(batches_, [&](const Batch& batch) { return batch.runs[0].first == campaign; });
+  std::erase_if(finished_, [&](const auto& finished) { return finished.campaign == campaign; });
+  defined_.erase(campaign);
+}
+
+void PlayedExecution::abandon() {
+  waiting_.clear();
+  batches_.clear();
+}
+
+std::vector<worker::RunningBatch> PlayedExecution::computing() const {
+  std::vector<worker::RunningBatch> computing;
+  for (const Batch& batch : batches_) {
+    computing.push_back({.number = batch.number,
+                         .progress = {.campaign = batch.runs[0].first,
+                                      .ranges = ranges_of(batch.runs),
+                                      .num_orbits_done = batch.num_orbits_done},
+                         .time_left = std::nullopt});
+  }
+  return computing;
+}
+
+std::optional<PlayedExecution::Batch> PlayedExecution::next_batch() {
+  Batch batch{.number = next_batch_, .runs = {}};
+  for (auto next = waiting_.begin(); next != waiting_.end() && batch.runs.size() < num_lanes_;) {
+    const bool is_first = batch.runs.empty();
+    const bool fits = is_first ? defined_.contains(next->run.first)
+                               : !next->is_alone && next->run.first == batch.runs[0].first;
+    if (!fits) {
+      ++next;
+      continue;
+    }
+    const bool is_alone = next->is_alone;
+    batch.runs.push_back(next->run);
+    next = waiting_.erase(next);
+    if (is_alone) break;
+  }
+  if (batch.runs.empty()) return std::nullopt;
+  std::sort(batch.runs.begin(), batch.runs.end());
+  ++next_batch_;
+  return batch;
+}
+
+PlayedExecution::Outcome PlayedExecution::advance() {
+  const auto is_any_of = [](const Batch& batch, const std::set<RunKey>& runs) {
+    return std::any_of(batch.runs.begin(), batch.runs.end(),
+                       [&](const RunKey& run) { return runs.contains(run); });
+  };
+  Outcome outcome = Outcome::nothing;
+  for (auto batch = batches_.begin(); batch != batches_.end();) {
+    if (is_any_of(*batch, poison_.crashing)) return Outcome::crashed;
+    if (!is_any_of(*batch, poison_.hanging)) {
+      ++batch->num_orbits_done;
+      num_orbits_done_ += batch->runs.size();
+    }
+    if (batch->num_orbits_done < num_orbits) {
+      ++batch;
+      continue;
+    }
+    for (const auto& [campaign, run] : batch->runs) {
+      wire::ComputedRun computed{.result = {.run = run}, .compute_s = 0.7};
+      finished_.push_back({.campaign = campaign, .computed = computed});
+    }
+    outcome = Outcome::finished;
+    batch = batches_.erase(batch);
+  }
+  while (batches_.size() < num_threads_) {
+    auto batch = next_batch();
+    if (!batch) break;
+    batches_.push_back(*std::move(batch));
+  }
+  return outcome;
+}
+
+}  // namespace proofmass::test

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "worker/execution/execution.hpp"
+
+namespace proofmass::test {
+
+/// A run of one of several campaigns.
+using RunKey = std::pair<wire::CampaignId, RunIndex>;
+
+/// Runs that do not end as they should, whoever computes them.
+struct Poison {
+  std::set<RunKey> crashing;
+  std::set<RunKey> hanging;
+};
+
+/// Computes runs in simulated time: in batches, some at a time, orbit by orbit.
+class PlayedExecution final : public worker::Execution {
+ public:
+  /// @param poison  Outlives this object.
+  PlayedExecution(const Poison& poison, std::size_t num_threads, std::size_t num_lanes);
+
+  bool is_defined(wire::CampaignId campaign) const override { return defined_.contains(campaign); }
+  void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) override;
+  void submit(wire::RunLease lease) override;
+  std::vector<RunIndex> drop_waiting(wire::CampaignId campaign,
+                                     std::span<const RunRange> ranges) override;
+  bool drop_batch(std::uint64_t number) override;
+  void forget(wire::CampaignId campaign) override;
+  void abandon() override;
+  std::vector<worker::FinishedRun> take_finished() override { return std::exchange(finished_, {}); }
+  std::vector<worker::RunningBatch> computing() const override;
+  std::optional<worker::Duration> usual_batch_time() const override { return std::nullopt; }
+  std::uint64_t num_orbits_done() const override { return num_orbits_done_; }
+  std::optional<std::string> failure() const override { return std::nullopt; }
+
+  /// What an advance comes to.
+  enum class Outcome : std::uint8_t { nothing, finished, crashed };
+
+  /// Begins batches, or lets each of those that have begun do an orbit.
+  Outcome advance();
+  [[nodiscard]] bool is_computing() const { return !batches_.empty(); }
+
+ private:
+  struct WaitingRun {
+    RunKey run;
+    bool is_alone = false;
+  };
+  struct Batch {
+    std::uint64_t number = 0;
+    std::vector<RunKey> runs;
+    std::uint32_t num_orbits_done = 0;
+  };
+
+  [[nodiscard]] std::optional<Batch> next_batch();
+
+  const Poison& poison_;
+  std::size_t num_threads_;
+  std::size_t num_lanes_;
+  std::set<wire::CampaignId> defined_;
+  std::deque<WaitingRun> waiting_;
+  std::vector<Batch> batches_;
+  std::vector<worker::FinishedRun> finished_;
+  std::uint64_t next_batch_ = 1;
+  std::uint64_t num_orbits_done_ = 0;
+};
+
+}  // namespace proofmass::test

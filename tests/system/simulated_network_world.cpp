@@ -1,0 +1,311 @@
+#include "tests/system/simulated_network_world.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <tuple>
+#include <utility>
+
+#include "core/simulation/run.hpp"
+
+namespace proofmass::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// From then on nothing bad happens, but for poison: a campaign must come to its end.
+constexpr Duration calm_after = 300s;
+constexpr Duration deadline = 2h;  // Of simulated time.
+constexpr double never_s = 1e9;
+
+constexpr wire::CampaignId urgent{11};
+constexpr wire::CampaignId other{7};
+
+}  // namespace
+
+World::World(std::uint64_t seed)
+    : random_(seed), coordinator_(agenda_, random_, [this](const wire::Packet& packet) {
+        transmit(packet.header.session, [this, packet] { arrive(packet); });
+      }) {
+  draw_weather();
+  add_campaigns();
+  const std::size_t num_machines = 2 + random_.below(3);
+  for (std::size_t i = 0; i < num_machines; ++i) {
+    machines_.push_back({.host = fmt::format("h{}", next_host_++),
+                         .num_threads = 1 + random_.below(2),
+                         .num_lanes = 1 + random_.below(4),
+                         .is_bad = weather_.has_bad_machine && i == 0});
+    agenda_.add(random_.duration(3.0), [this, i] { start_process(i, std::nullopt); });
+  }
+  coordinator_.start();
+  tick_coordinator();
+  plan();
+}
+
+void World::draw_weather() {
+  const auto sometimes = [&](double probability, double min_s, double max_s) {
+    return random_.happens(probability) ? min_s + random_.uniform(max_s - min_s) : never_s;
+  };
+  weather_ = {.loss = random_.happens(0.7) ? random_.uniform(0.25) : 0.0,
+              .repetition = random_.happens(0.6) ? random_.uniform(0.2) : 0.0,
+              .delay_s_max = random_.uniform(2.5),
+              .death_s = sometimes(0.5, 20.0, 100.0),
+              .cut_s = sometimes(0.4, 20.0, 100.0),
+              .stall_s = sometimes(0.3, 20.0, 100.0),
+              .leave_s = sometimes(0.3, 20.0, 100.0),
+              .restart_s = sometimes(0.5, 20.0, 150.0),
+              .blackout_s = sometimes(0.3, 30.0, 150.0),
+              .failure_s = sometimes(0.3, 20.0, 100.0),
+              .pause_s = sometimes(0.3, 10.0, 60.0),
+              .cancel_s = sometimes(0.15, 20.0, 100.0),
+              .has_bad_machine = random_.happens(0.1),
+              .has_accident = random_.happens(0.3)};
+  if (weather_.has_bad_machine) weather_.has_accident = false;  // Together they look like poison.
+}
+
+void World::add_campaigns() {
+  for (const auto& [id, num_runs, priority] :
+       {std::tuple(other, 24U, 0), std::tuple(urgent, 12U, 5)}) {
+    Campaign campaign;
+    campaign.num_runs = num_runs;
+    campaign.seed = random_.number();
+    coordinator::StoredCampaign stored{.definition = std::make_shared<const Campaign>(campaign),
+                                       .priority = priority,
+                                       .finished = {},
+                                       .given_up = {},
+                                       .blamed = {}};
+    constexpr std::array fractions{0.0, 0.0, 0.3, 1.0};
+    stored.audit_fraction = fractions.at(random_.below(fractions.size()));
+    coordinator_.add_file(id, stored);
+    add_poison(id, num_runs);
+  }
+}
+
+void World::add_poison(wire::CampaignId id, std::uint64_t num_runs) {
+  while (random_.happens(0.2)) poison_.crashing.insert({id, {random_.below(num_runs)}});
+  while (random_.happens(0.1)) poison_.hanging.insert({id, {random_.below(num_runs)}});
+}
+
+void World::plan() {
+  repeat(weather_.restart_s, [this] { restart_coordinator(); });
+  repeat(weather_.blackout_s, [this] { blackout_until_ = agenda_.now() + random_.duration(50.0); });
+  for (const wire::CampaignId id : {urgent, other}) {
+    repeat(weather_.pause_s, [this, id] { coordinator_.pause_or_resume(id); });
+    repeat(weather_.cancel_s, [this, id] { coordinator_.cancel_or_resume(id); });
+    repeat(weather_.failure_s, [this, id] {
+      coordinator_.fail_storage(id);
+      agenda_.add(random_.duration(40.0), [this, id] { coordinator_.recover_storage(id); });
+    });
+  }
+}
+
+void World::repeat(double mean_s, const std::function<void()>& what) {
+  if (mean_s >= never_s) return;
+  agenda_.add(random_.duration(2.0 * mean_s), [this, mean_s, what] {
+    if (is_calm()) return;
+    what();
+    repeat(mean_s, what);
+  });
+}
+
+void World::repeat_for(wire::SessionId session, double mean_s,
+                       const std::function<void(Process&)>& what) {
+  if (mean_s >= never_s) return;
+  agenda_.add(random_.duration(2.0 * mean_s), [this, session, mean_s, what] {
+    Process* const process = find(session);
+    if (process == nullptr || is_calm()) return;
+    what(*process);
+    repeat_for(session, mean_s, what);
+  });
+}
+
+bool World::is_calm() const { return agenda_.now() - TimePoint{} >= calm_after; }
+
+World::Process* World::find(wire::SessionId session) {
+  const auto found = processes_.find(session);
+  return found == processes_.end() ? nullptr : &found->second;
+}
+
+void World::run() {
+  while (!coordinator_.is_done() && agenda_.now() < TimePoint{} + deadline) agenda_.step();
+  ASSERT_TRUE(coordinator_.is_done()) << "not finished in two hours";
+}
+
+void World::check_end() {
+  for (const auto& [id, file] : coordinator_.files()) {
+    const Campaign& campaign = *file.stored.definition;
+    for (RunIndex run; run.value < campaign.num_runs; ++run.value) {
+      const auto commits = file.num_commits.find(run);
+      const bool is_committed = commits != file.num_commits.end();
+      const bool is_poison =
+          poison_.crashing.contains({id, run}) || poison_.hanging.contains({id, run});
+      EXPECT_NE(is_committed, is_poison) << "campaign " << id.value << " run " << run.value;
+      if (!is_committed) {
+        EXPECT_TRUE(coordinator_.state().campaigns.at(id).given_up.contains(run)) << run.value;
+        ++incidents_.num_given_up;
+        continue;
+      }
+      EXPECT_EQ(commits->second, 1) << "campaign " << id.value << " run " << run.value;
+      const bool is_to_be_audited =
+          coordinator::is_audited(campaign.seed, run, file.stored.audit_fraction);
+      EXPECT_TRUE(!is_to_be_audited || file.compared.contains(run) ||
+                  file.audits_given_up.contains(run))
+          << "not audited: campaign " << id.value << " run " << run.value;
+    }
+    incidents_.num_compared += file.compared.size();
+  }
+  EXPECT_TRUE(coordinator_.state().leases.empty());
+}
+
+// The network.
+
+void World::transmit(wire::SessionId session, const std::function<void()>& arrive) {
+  const Process* const process = find(session);
+  const bool is_cut = process != nullptr && agenda_.now() < process->cut_until;
+  if (is_cut || agenda_.now() < blackout_until_) return;
+  const bool is_bad = !is_calm();
+  if (!is_bad || !random_.happens(weather_.loss)) {
+    agenda_.add(random_.duration(weather_.delay_s_max), arrive);
+  }
+  if (is_bad && random_.happens(weather_.repetition)) {
+    agenda_.add(random_.duration(weather_.delay_s_max), arrive);
+  }
+}
+
+void World::arrive(const wire::Packet& packet) {
+  const wire::SessionId session = packet.header.session;
+  Process* const process = find(session);
+  if (process == nullptr) return;
+  if (agenda_.now() < process->stalled_until) {
+    agenda_.add(process->stalled_until - agenda_.now(), [this, packet] { arrive(packet); });
+    return;
+  }
+  process->conversation->on_packet(packet, agenda_.now());
+  end_if_over(session);
+}
+
+void World::tick_coordinator() {
+  if (is_calm()) {
+    if (!coordinator_.is_running()) coordinator_.start();
+    coordinator_.resume_all();
+  }
+  coordinator_.tick();
+  agenda_.add(1s, [this] { tick_coordinator(); });
+}
+
+void World::restart_coordinator() {
+  if (!coordinator_.is_running()) return;
+  ++incidents_.num_restarts;
+  coordinator_.kill();
+  agenda_.add(random_.duration(20.0), [this] {
+    if (!coordinator_.is_running()) coordinator_.start();
+  });
+}
+
+// Workers' processes.
+
+void World::start_process(std::size_t machine, std::optional<wire::FormerSession> former) {
+  const wire::SessionId session{random_.number()};
+  const Machine& on = machines_.at(machine);
+  const wire::Hello hello{.worker_name = "w",
+                          .host = on.host,
+                          .process_id = 1,
+                          .num_slots = static_cast<std::uint32_t>(on.num_threads * on.num_lanes),
+                          .model_version = std::string(model_version),
+                          .build = "test",
+                          .former = former};
+  worker::ConversationConfig config;
+  config.hello_delay_max = 8s;
+  config.resend_after_max = 20s;
+  config.drain_time = 20s;
+  Process& process = processes_[session];
+  process.machine = machine;
+  process.execution = std::make_unique<PlayedExecution>(poison_, on.num_threads, on.num_lanes);
+  const auto send = [this](const wire::Packet& packet) {
+    transmit(packet.header.session, [this, packet] { coordinator_.receive(packet); });
+  };
+  process.conversation = std::make_unique<worker::Conversation>(session, hello, *process.execution,
+                                                                send, agenda_.now(), config);
+  tick_process(session);
+  compute(session);
+  plan_process(session);
+}
+
+void World::plan_process(wire::SessionId session) {
+  repeat_for(session, weather_.death_s, [this, session](Process&) {
+    ++incidents_.num_deaths;
+    replace(session);
+  });
+  repeat_for(session, weather_.cut_s, [this](Process& process) {
+    process.cut_until = agenda_.now() + random_.duration(60.0);
+  });
+  repeat_for(session, weather_.stall_s, [this](Process& process) {
+    process.stalled_until = agenda_.now() + random_.duration(60.0);
+  });
+  repeat_for(session, weather_.leave_s, [this, session](Process& process) {
+    process.conversation->on_drain_request(agenda_.now());
+    end_if_over(session);
+  });
+}
+
+void World::tick_process(wire::SessionId session) {
+  Process* const process = find(session);
+  if (process == nullptr) return;
+  if (agenda_.now() >= process->stalled_until) {
+    process->conversation->on_tick(agenda_.now());
+    end_if_over(session);
+  }
+  agenda_.add(500ms, [this, session] { tick_process(session); });
+}
+
+void World::compute(wire::SessionId session) {
+  Process* const process = find(session);
+  if (process == nullptr) return;
+  if (agenda_.now() >= process->stalled_until) {
+    const bool is_bad = machines_.at(process->machine).is_bad;
+    const auto outcome = process->execution->advance();
+    const bool is_accident = weather_.has_accident && !is_calm() && random_.happens(0.02);
+    if (outcome == PlayedExecution::Outcome::crashed ||
+        (process->execution->is_computing() && (is_bad || is_accident))) {
+      if (is_accident) weather_.has_accident = false;
+      return crash(session);
+    }
+    if (outcome == PlayedExecution::Outcome::finished) {
+      process->conversation->on_progress(agenda_.now());
+      end_if_over(session);
+    }
+  }
+  agenda_.add(50ms + random_.duration(1.0), [this, session] { compute(session); });
+}
+
+/// Mostly there is a supervisor that sees it and starts the next process at once.
+void World::crash(wire::SessionId session) {
+  ++incidents_.num_crashes;
+  if (!random_.happens(0.9)) return replace(session);
+  const std::size_t machine = processes_.at(session).machine;
+  processes_.erase(session);
+  const wire::FormerSession former{session, wire::LossReason::crashed, 11};
+  agenda_.add(random_.duration(3.0), [this, machine, former] { start_process(machine, former); });
+}
+
+void World::replace(wire::SessionId session) {
+  const std::size_t machine = processes_.at(session).machine;
+  processes_.erase(session);
+  agenda_.add(random_.duration(10.0), [this, machine] { start_process(machine, std::nullopt); });
+}
+
+/// A host that the coordinator does not want is exchanged for another one.
+void World::end_if_over(wire::SessionId session) {
+  const Process& process = processes_.at(session);
+  const auto ending = process.conversation->ending();
+  if (!ending) return;
+  if (ending->kind == worker::Ending::Kind::failed) {
+    EXPECT_NE(ending->reason.find("too much crashed there"), std::string::npos) << ending->reason;
+    machines_.at(process.machine).host = fmt::format("h{}", next_host_++);
+    machines_.at(process.machine).is_bad = false;
+  }
+  replace(session);
+}
+
+}  // namespace proofmass::test

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/system/simulated_network_coordinator.hpp"
+#include "tests/system/simulated_network_execution.hpp"
+#include "tests/system/simulated_network_time.hpp"
+#include "worker/net/conversation.hpp"
+
+namespace proofmass::test {
+
+/// How bad a world is; drawn from its seed. Times are mean times between events.
+struct Weather {
+  double loss = 0.0;        ///< Probability that a message is lost.
+  double repetition = 0.0;  ///< Probability that it arrives twice.
+  double delay_s_max = 0.0;
+  double death_s = 0.0;     ///< Of a worker's process.
+  double cut_s = 0.0;       ///< Of its connection.
+  double stall_s = 0.0;     ///< Of the whole process: it is stopped, and goes on later.
+  double leave_s = 0.0;     ///< It is asked to end.
+  double restart_s = 0.0;   ///< Of the coordinator.
+  double blackout_s = 0.0;  ///< Of all connections.
+  double failure_s = 0.0;   ///< Of the storage of a campaign.
+  double pause_s = 0.0;
+  double cancel_s = 0.0;
+  bool has_bad_machine = false;  ///< One on which every batch crashes.
+  bool has_accident = false;     ///< One crash for no reason of ours.
+};
+
+/// What happened in a world, so that a test can tell that worlds are bad enough.
+struct Incidents {
+  std::uint64_t num_deaths = 0;
+  std::uint64_t num_crashes = 0;
+  std::uint64_t num_restarts = 0;
+  std::uint64_t num_given_up = 0;
+  std::uint64_t num_compared = 0;
+};
+
+/// A coordinator and its workers under a simulated network and clock. Dispatch and conversation are
+/// the real ones; only what computes, what stores and what supervises is played.
+class World {
+ public:
+  explicit World(std::uint64_t seed);
+
+  /// Until all campaigns are finished; fails the test if that takes for ever.
+  void run();
+  /// Fails the test if anything was lost, repeated or left.
+  void check_end();
+
+  [[nodiscard]] const Incidents& incidents() const { return incidents_; }
+  [[nodiscard]] const PlayedCoordinator& coordinator() const { return coordinator_; }
+
+ private:
+  /// A computer with a supervisor that starts a worker's process again when it has ended.
+  struct Machine {
+    std::string host;
+    std::size_t num_threads = 1;
+    std::size_t num_lanes = 1;
+    bool is_bad = false;
+  };
+  struct Process {
+    std::size_t machine = 0;
+    std::unique_ptr<PlayedExecution> execution;
+    std::unique_ptr<worker::Conversation> conversation;
+    TimePoint cut_until{};
+    TimePoint stalled_until{};
+  };
+
+  void draw_weather();
+  void add_campaigns();
+  void add_poison(wire::CampaignId id, std::uint64_t num_runs);
+  void plan();
+  /// Makes it happen again and again, until the weather is calm.
+  void repeat(double mean_s, const std::function<void()>& what);
+  /// The same while a process lives.
+  void repeat_for(wire::SessionId session, double mean_s,
+                  const std::function<void(Process&)>& what);
+  [[nodiscard]] bool is_calm() const;
+  [[nodiscard]] Process* find(wire::SessionId session);
+
+  void start_process(std::size_t machine, std::optional<wire::FormerSession> former);
+  void plan_process(wire::SessionId session);
+  void tick_process(wire::SessionId session);
+  void compute(wire::SessionId session);
+  void crash(wire::SessionId session);
+  void replace(wire::SessionId session);
+  void end_if_over(wire::SessionId session);
+
+  void transmit(wire::SessionId session, const std::function<void()>& arrive);
+  void arrive(const wire::Packet& packet);
+  void tick_coordinator();
+  void restart_coordinator();
+
+  Randomness random_;
+  Weather weather_;
+  Agenda agenda_;
+  Poison poison_;
+  PlayedCoordinator coordinator_;
+  std::vector<Machine> machines_;
+  std::map<wire::SessionId, Process> processes_;
+  TimePoint blackout_until_{};
+  std::uint64_t next_host_ = 0;
+  Incidents incidents_;
+};
+
+}  // namespace proofmass::test

@@ -1,0 +1,234 @@
+#include "tests/worker/net/conversation_fixture.hpp"
+
+// How a conversation ends.
+
+namespace proofmass::worker {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST_F(ConversationTest, EndsIfNothingCanBeComputed) {
+  register_with_campaign();
+  receive(lease(0, 1));
+  receive(lease(1, 1));
+  execution.finish_lease();
+  execution.failure_text = "out of memory";
+  conversation->on_progress(now);
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::failed);
+  expect_ending(Ending::Kind::failed, "out of memory");
+  EXPECT_EQ(conversation->unacknowledged().size(), 1U) << "what was finished can be kept";
+}
+
+TEST_F(ConversationTest, DropsEverythingWhenToldToStop) {
+  register_with_campaign();
+  receive(lease(0, 2));
+  receive(wire::Stop{});
+  EXPECT_EQ(execution.num_abandons, 1);
+  expect_ending(Ending::Kind::done, "told to stop");
+}
+
+TEST_F(ConversationTest, DeliversWhatItHoldsWhenDrainedByTheCoordinator) {
+  register_with_campaign();
+  receive(lease(0, 1));
+  receive(wire::Drain{});
+  const auto heartbeat = take_sent<wire::Heartbeat>();
+  EXPECT_EQ(heartbeat.num_runs_max, 0U);
+  EXPECT_EQ(heartbeat.held, held(0, 1));
+  receive(wire::Drain{});
+  execution.finish_lease();
+  conversation->on_progress(now);
+  (void)take_sent<wire::ResultBatch>();
+  EXPECT_FALSE(conversation->ending().has_value());
+  acknowledge({{0}});
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::drained);
+  expect_ending(Ending::Kind::done, "drained");
+}
+
+// The lease crossed the Drain. Its first run is here already and is not given back.
+TEST_F(ConversationTest, GivesBackALeaseThatComesTooLate) {
+  register_with_campaign();
+  receive(lease(0, 1));
+  receive(wire::Drain{});
+  (void)take_sent<wire::Heartbeat>();
+  receive(lease(0, 3));
+  const auto answer = take_sent<wire::GiveBack>();
+  EXPECT_EQ(answer.reason, wire::LossReason::drained);
+  EXPECT_EQ(answer.runs, held(1, 2));
+  EXPECT_EQ(execution.waiting.size(), 1U);
+  receive(lease(0, 1));
+}
+
+TEST_F(ConversationTest, GivesBackWhatHasNotBegunWhenAskedToEnd) {
+  register_with_campaign();
+  receive(lease(0, 2));
+  execution.begin_batch();
+  receive(lease(2, 3));
+  conversation->on_drain_request(now);
+  const auto heartbeat = take_sent<wire::Heartbeat>();
+  EXPECT_EQ(heartbeat.num_runs_max, 0U) << "before it gives back, or the runs would come again";
+  EXPECT_EQ(heartbeat.held, held(0, 5));
+  const auto given_back = take_sent<wire::GiveBack>();
+  EXPECT_EQ(given_back.reason, wire::LossReason::preempted);
+  EXPECT_EQ(given_back.runs, held(2, 3));
+
+  conversation->on_drain_request(now);
+  execution.finish_batch();
+  conversation->on_progress(now);
+  (void)take_sent<wire::ResultBatch>();
+  EXPECT_FALSE(conversation->ending().has_value()) << "the results are not acknowledged";
+  acknowledge({{0}, {1}});
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  expect_ending(Ending::Kind::done, "nothing left to do");
+}
+
+TEST_F(ConversationTest, GivesBackRunsOfEachCampaign) {
+  register_with_campaign();
+  execution.defined.insert(campaign_2);
+  receive(lease(2, 1));
+  receive(lease(7, 1, 1, campaign_2));
+  receive(lease(3, 1));
+  conversation->on_drain_request(now);
+  (void)take_sent<wire::Heartbeat>();
+  EXPECT_EQ(take_sent<wire::GiveBack>().runs, held(2, 2));
+  EXPECT_EQ(take_sent<wire::GiveBack>().runs.at(0).campaign, campaign_2);
+  (void)take_sent<wire::Bye>();
+  expect_ending(Ending::Kind::done, "nothing left to do");
+}
+
+TEST_F(ConversationTest, EndsAtOnceIfItHoldsNothing) {
+  start();
+  (void)take_sent<wire::Hello>();
+  conversation->on_drain_request(now);
+  EXPECT_TRUE(sent.empty()) << "nobody knows it";
+  expect_ending(Ending::Kind::done, "nothing left to do");
+}
+
+TEST_F(ConversationTest, LeavesAtOnceWhenAskedAgain) {
+  register_with_campaign();
+  receive(lease(0, 2));
+  execution.begin_batch();
+  conversation->on_drain_request(now);
+  (void)take_sent<wire::Heartbeat>();
+  conversation->on_abandon_request();
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  EXPECT_EQ(execution.num_abandons, 1);
+  expect_ending(Ending::Kind::done, "asked to end at once");
+}
+
+// 20 s are there, 5 of them for the delivery: a batch that takes 16 s more is given back, one that
+// takes 14 s and one whose pace is not known are not.
+TEST_F(ConversationTest, GivesBackBatchesThatDoNotFitIntoTheTime) {
+  register_with_campaign({.drain_time = 20s});
+  for (std::uint64_t run = 0; run < 3; ++run) {
+    receive(lease(run, 1));
+    execution.begin_batch();
+  }
+  execution.batches[0].time_left = 14s;
+  execution.batches[1].time_left = 16s;
+  conversation->on_drain_request(now);
+  (void)take_sent<wire::Heartbeat>();
+  tick_after(0s);
+  const auto given_back = take_sent<wire::GiveBack>();
+  EXPECT_EQ(given_back.reason, wire::LossReason::preempted);
+  EXPECT_EQ(given_back.runs, held(1, 1));
+  EXPECT_EQ(execution.batches.size(), 2U);
+
+  execution.batches[0].time_left = 0s;
+  tick_after(15s);
+  EXPECT_EQ(take_sent<wire::GiveBack>().runs, held(0, 1));
+  EXPECT_EQ(take_sent<wire::GiveBack>().runs, held(2, 1));
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  expect_ending(Ending::Kind::done, "nothing left to do");
+}
+
+TEST_F(ConversationTest, EndsWhenTheDrainTakesTooLong) {
+  register_with_campaign({.drain_time = 20s});
+  (void)compute(lease(0, 2));
+  conversation->on_drain_request(now);
+  sent.clear();
+  tick_after(19s);
+  sent.clear();
+  tick_after(1s);
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  expect_ending(Ending::Kind::done, "out of time with 2 results not acknowledged");
+}
+
+// A coordinator that is gone while the worker drains may come back: the results wait for it.
+TEST_F(ConversationTest, DeliversToANewCoordinatorWhileItDrains) {
+  register_with_campaign();
+  (void)compute(lease(0, 1));
+  conversation->on_drain_request(now);
+  (void)take_sent<wire::Heartbeat>();
+  reject_unregistered(wire::Epoch{6});
+  (void)take_sent<wire::Hello>();
+  receive(welcome, wire::Epoch{6});
+  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
+  (void)take_sent<wire::ResultBatch>();
+  receive(wire::ResultAck{campaign_1, {{0}}}, wire::Epoch{6});
+  (void)take_sent<wire::Bye>();
+  expect_ending(Ending::Kind::done, "nothing left to do");
+}
+
+// What is given back while nobody knows the worker is not in the heartbeat of the next Welcome.
+TEST_F(ConversationTest, GivesBackByNotNamingRunsIfItIsNotRegistered) {
+  register_with_campaign();
+  (void)compute(lease(0, 1));
+  receive(lease(1, 5));
+  reject_unregistered(wire::Epoch{6});
+  (void)take_sent<wire::Hello>();
+  conversation->on_drain_request(now);
+  EXPECT_TRUE(sent.empty());
+  receive(welcome, wire::Epoch{6});
+  EXPECT_EQ(take_sent<wire::Heartbeat>().held, held(0, 1));
+  (void)take_sent<wire::ResultBatch>();
+}
+
+// Batches take 60 s: with half of that to spare and twice 5 s to deliver and to end, it is time
+// 100 s before the walltime is over.
+TEST_F(ConversationTest, DrainsInTimeBeforeItsWalltimeIsOver) {
+  register_with_campaign({.walltime_end = now + 1000s});
+  execution.batch_time = 60s;
+  receive(lease(0, 1));
+  execution.begin_batch();
+  receive(lease(1, 1));
+  tick_after(899s);
+  EXPECT_FALSE(conversation->is_leaving());
+  sent.clear();
+  tick_after(1s);
+  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
+  const auto given_back = take_sent<wire::GiveBack>();
+  EXPECT_EQ(given_back.reason, wire::LossReason::walltime);
+  EXPECT_EQ(given_back.runs, held(1, 1));
+  execution.finish_batch();
+  conversation->on_progress(now);
+  (void)take_sent<wire::ResultBatch>();
+  acknowledge({{0}});
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::walltime);
+}
+
+TEST_F(ConversationTest, EndsBeforeItsWalltimeIsOver) {
+  register_with_campaign({.walltime_end = now + 100s});
+  receive(lease(0, 1));
+  execution.begin_batch();
+  tick_after(90s);
+  (void)take_sent<wire::Heartbeat>();
+  EXPECT_EQ(take_sent<wire::GiveBack>().reason, wire::LossReason::walltime);
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::walltime);
+  expect_ending(Ending::Kind::done, "nothing left to do");
+}
+
+// Told to deliver all that it holds, however long that takes; but its time is not endless.
+TEST_F(ConversationTest, HeedsItsWalltimeAlsoWhenDrainedByTheCoordinator) {
+  register_with_campaign({.walltime_end = now + 100s});
+  receive(lease(0, 1));
+  receive(wire::Drain{});
+  sent.clear();
+  tick_after(90s);
+  (void)take_sent<wire::Heartbeat>();
+  EXPECT_EQ(take_sent<wire::GiveBack>().reason, wire::LossReason::walltime);
+  (void)take_sent<wire::Bye>();
+  expect_ending(Ending::Kind::done, "nothing left to do");
+}
+
+}  // namespace
+}  // namespace proofmass::worker

@@ -1,0 +1,189 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <deque>
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "worker/execution/run_ranges.hpp"
+#include "worker/net/conversation.hpp"
+
+namespace proofmass::worker {
+
+/// An execution that computes when the test says so.
+class FakeExecution final : public Execution {
+ public:
+  bool is_defined(wire::CampaignId campaign) const override { return defined.contains(campaign); }
+  void define(wire::CampaignId campaign, std::shared_ptr<const Campaign>) override {
+    EXPECT_TRUE(defined.insert(campaign).second);
+  }
+  void submit(wire::RunLease lease) override { waiting.push_back(std::move(lease)); }
+  std::vector<RunIndex> drop_waiting(wire::CampaignId campaign,
+                                     std::span<const RunRange> ranges) override {
+    std::vector<RunIndex> dropped;
+    for (const wire::RunLease& lease : std::exchange(waiting, {})) {
+      for (const RunIndex run : indices_of(std::array{lease.runs})) {
+        const auto has_run = [&](const RunRange& range) {
+          return range.first <= run && run.value < range.end();
+        };
+        if (lease.campaign == campaign && std::ranges::any_of(ranges, has_run)) {
+          dropped.push_back(run);
+        } else {
+          waiting.push_back({lease.campaign, {run, 1}, lease.attempt, lease.is_alone, {}});
+        }
+      }
+    }
+    std::ranges::sort(dropped);
+    return dropped;
+  }
+  bool drop_batch(std::uint64_t number) override {
+    return std::erase_if(batches, [&](const auto& batch) { return batch.number == number; }) > 0;
+  }
+  void forget(wire::CampaignId campaign) override {
+    defined.erase(campaign);
+    forgotten.push_back(campaign);
+  }
+  void abandon() override { ++num_abandons; }
+  std::vector<FinishedRun> take_finished() override { return std::exchange(finished, {}); }
+  std::vector<RunningBatch> computing() const override { return batches; }
+  std::optional<Duration> usual_batch_time() const override { return batch_time; }
+  std::uint64_t num_orbits_done() const override { return 11; }
+  std::optional<std::string> failure() const override { return failure_text; }
+
+  /// The oldest lease becomes a batch.
+  void begin_batch() {
+    const wire::RunLease lease = take_oldest();
+    batches.push_back({.number = batches.size() + 1,
+                       .progress = {lease.campaign, {lease.runs}, 0},
+                       .time_left = std::nullopt});
+  }
+  /// The oldest lease is computed.
+  void finish_lease() {
+    const wire::RunLease lease = take_oldest();
+    finish(lease.campaign, {lease.runs});
+  }
+  /// The oldest batch is.
+  void finish_batch() {
+    const RunningBatch batch = batches.front();
+    batches.erase(batches.begin());
+    finish(batch.progress.campaign, batch.progress.ranges);
+  }
+
+  std::set<wire::CampaignId> defined;
+  std::vector<wire::CampaignId> forgotten;
+  std::deque<wire::RunLease> waiting;
+  std::vector<RunningBatch> batches;
+  std::vector<FinishedRun> finished;
+  std::optional<Duration> batch_time;
+  std::optional<std::string> failure_text;
+  int num_abandons = 0;
+
+ private:
+  wire::RunLease take_oldest() {
+    const wire::RunLease lease = waiting.front();
+    waiting.pop_front();
+    return lease;
+  }
+  void finish(wire::CampaignId campaign, const std::vector<RunRange>& ranges) {
+    for (const RunIndex run : indices_of(ranges)) {
+      FinishedRun done{.campaign = campaign, .computed = {}};
+      done.computed.result.run = run;
+      finished.push_back(done);
+    }
+  }
+};
+
+constexpr wire::SessionId own_session{77};
+constexpr wire::Epoch first_epoch{5};
+constexpr wire::CampaignId campaign_1{1};
+constexpr wire::CampaignId campaign_2{2};
+
+inline wire::RunLease lease(std::uint64_t first, std::uint64_t count, std::uint32_t attempt = 1,
+                            wire::CampaignId campaign = campaign_1) {
+  return {.campaign = campaign, .runs = {{first}, count}, .attempt = {attempt}, .table_values = {}};
+}
+
+inline std::vector<wire::HeldRuns> held(std::uint64_t first, std::uint64_t count,
+                                        std::uint32_t attempt = 1) {
+  return {{campaign_1, {attempt}, {{{first}, count}}}};
+}
+
+/// A conversation; each test ends with a check that nothing was sent that it has not named.
+class ConversationTest : public testing::Test {
+ protected:
+  wire::Packet take_packet() {
+    if (sent.empty()) throw std::logic_error("nothing was sent");
+    wire::Packet packet = sent.front();
+    sent.pop_front();
+    return packet;
+  }
+  template <typename Content>
+  Content take_sent() {
+    return std::get<Content>(take_packet().message);
+  }
+
+  void receive(wire::Message message, wire::Epoch epoch = first_epoch) {
+    conversation->on_packet({{own_session, epoch, ++num_received}, std::move(message)}, now);
+  }
+  void reject_unregistered(wire::Epoch epoch = first_epoch) {
+    receive(wire::Reject{.reason = wire::RejectReason::not_registered, .text = ""}, epoch);
+  }
+  void tick_after(Duration time) { conversation->on_tick(now += time); }
+
+  void start(const ConversationConfig& config = {}) {
+    conversation.emplace(
+        own_session, hello, execution,
+        [this](const wire::Packet& packet) { sent.push_back(packet); }, now, config);
+  }
+  void register_here() {
+    (void)take_sent<wire::Hello>();
+    receive(welcome);
+    (void)take_sent<wire::Heartbeat>();
+  }
+  /// Registered, and knows the first campaign.
+  void register_with_campaign(const ConversationConfig& config = {}) {
+    start(config);
+    register_here();
+    execution.defined.insert(campaign_1);
+  }
+  /// A lease of these runs arrives and is computed; its results have been sent.
+  wire::ResultBatch compute(const wire::RunLease& lent) {
+    receive(lent);
+    execution.finish_lease();
+    conversation->on_progress(now);
+    return take_sent<wire::ResultBatch>();
+  }
+  void acknowledge(std::vector<RunIndex> runs) { receive(wire::ResultAck{campaign_1, runs}); }
+
+  void expect_ending(Ending::Kind kind, const std::string& reason) {
+    ASSERT_TRUE(conversation->ending().has_value());
+    EXPECT_EQ(conversation->ending()->kind, kind);
+    EXPECT_EQ(conversation->ending()->reason, reason);
+  }
+
+  void TearDown() override {
+    EXPECT_TRUE(sent.empty()) << "first of kind " << sent.front().message.index();
+  }
+
+  const wire::Hello hello{.worker_name = "w",
+                          .host = "h",
+                          .process_id = 1,
+                          .num_slots = 1,
+                          .model_version = "m",
+                          .build = "b",
+                          .former = {}};
+  const wire::Welcome welcome{.worker = {1}, .heartbeat_interval_s = 2.0};
+  TimePoint now = TimePoint{} + std::chrono::hours(1);
+  FakeExecution execution;
+  std::deque<wire::Packet> sent;
+  std::uint64_t num_received = 0;
+  std::optional<Conversation> conversation;
+};
+
+}  // namespace proofmass::worker

@@ -1,0 +1,208 @@
+#include "worker/net/serve.hpp"
+
+#include <gtest/gtest.h>
+#include <pthread.h>
+#include <signal.h>
+
+#include <future>
+#include <thread>
+#include <zmq.hpp>
+
+#include "core/error.hpp"
+#include "proto/wire/codec.hpp"
+#include "tests/worker/temporary_directory.hpp"
+#include "worker/execution/executor.hpp"
+
+namespace proofmass::worker {
+namespace {
+
+constexpr wire::SessionId session{99};
+constexpr wire::Epoch epoch{3};
+constexpr wire::CampaignId campaign{1};
+constexpr int patience_ms = 60'000;
+
+/// A coordinator of a few lines: it sends what the test says and hands out what comes.
+class Coordinator {
+ public:
+  explicit Coordinator(const std::string& endpoint) : socket_(context_, zmq::socket_type::router) {
+    socket_.set(zmq::sockopt::rcvtimeo, patience_ms);
+    socket_.bind(endpoint);
+  }
+
+  /// The next message of this kind; others are passed over.
+  template <typename Content>
+  Content receive() {
+    while (true) {
+      zmq::message_t peer;
+      zmq::message_t frame;
+      if (!socket_.recv(peer) || !socket_.recv(frame)) throw std::runtime_error("nothing came");
+      peer_ = peer.to_string();
+      const auto decoded = wire::decode(frame.to_string_view());
+      const auto& packet = std::get<wire::Packet>(decoded);
+      EXPECT_EQ(packet.header.session, session);
+      if (const auto* const content = std::get_if<Content>(&packet.message)) return *content;
+    }
+  }
+  void send(wire::Message message) {
+    send_bytes(wire::encode({{session, epoch, ++num_sent_}, std::move(message)}));
+  }
+  void send_bytes(const std::string& bytes) {
+    socket_.send(zmq::buffer(peer_), zmq::send_flags::sndmore);
+    socket_.send(zmq::buffer(bytes));
+  }
+  /// The worker registers, asks for the campaign and delivers the first two runs.
+  wire::ResultBatch have_two_runs_computed() {
+    (void)receive<wire::Hello>();
+    send(wire::Welcome{.worker = {1}, .heartbeat_interval_s = 1.0});
+    (void)receive<wire::Heartbeat>();
+    send(
+        wire::RunLease{.campaign = campaign, .runs = {{0}, 2}, .attempt = {1}, .table_values = {}});
+    (void)receive<wire::CampaignRequest>();
+    send(wire::CampaignDefinition{campaign, std::make_shared<const Campaign>()});
+    return receive<wire::ResultBatch>();
+  }
+
+ private:
+  zmq::context_t context_;
+  zmq::socket_t socket_;
+  std::string peer_;
+  std::uint64_t num_sent_ = 0;
+};
+
+PreparedCampaign prepare(const Campaign&) {
+  return {.simulate =
+              [](std::span<const RunRequest> requests, const std::function<void(int)>& progress) {
+                progress(1);
+                std::vector<RunResult> results;
+                for (const RunRequest& request : requests) results.push_back({.run = request.run});
+                return results;
+              },
+          .num_orbits = 1};
+}
+
+class ServeTest : public testing::Test {
+ protected:
+  ServeTest() {
+    config.endpoint = "ipc://" + (directory / "socket").string();
+    config.session = session;
+    config.hello = {.worker_name = "w",
+                    .host = "h",
+                    .process_id = 1,
+                    .num_slots = 1,
+                    .model_version = "m",
+                    .build = "b",
+                    .former = {}};
+  }
+
+  /// Serves in a thread of its own, which gets its signals.
+  std::future<Ending> start_worker() {
+    std::promise<pthread_t> thread;
+    worker_thread = thread.get_future();
+    return std::async(std::launch::async, [this, promise = std::move(thread)]() mutable {
+      StopSignals signals(config.signals);
+      promise.set_value(pthread_self());
+      const Wake progress;
+      Executor executor(prepare, [&] { progress.notify(); },
+                        {.num_threads = 1, .batch_size_max = 2});
+      return serve(config, executor, progress, signals);
+    });
+  }
+
+  TemporaryDirectory directory;
+  ServeConfig config;
+  std::future<pthread_t> worker_thread;
+};
+
+TEST_F(ServeTest, ComputesForACoordinatorUntilItIsDrained) {
+  Coordinator coordinator(config.endpoint);
+  std::future<Ending> ending = start_worker();
+  EXPECT_EQ(coordinator.have_two_runs_computed().results.size(), 2U);
+  coordinator.send(wire::ResultAck{campaign, {{0}, {1}}});
+  coordinator.send(wire::Drain{});
+  EXPECT_EQ(coordinator.receive<wire::Bye>().reason, wire::LossReason::drained);
+  const Ending end = ending.get();
+  EXPECT_EQ(end.kind, Ending::Kind::done);
+  EXPECT_EQ(end.reason, "drained");
+}
+
+TEST_F(ServeTest, DrainsAtASignal) {
+  Coordinator coordinator(config.endpoint);
+  std::future<Ending> ending = start_worker();
+  (void)coordinator.have_two_runs_computed();
+  pthread_kill(worker_thread.get(), SIGTERM);
+  EXPECT_EQ(coordinator.receive<wire::Heartbeat>().held.size(), 1U) << "not acknowledged yet";
+  coordinator.send(wire::ResultAck{campaign, {{0}, {1}}});
+  EXPECT_EQ(coordinator.receive<wire::Bye>().reason, wire::LossReason::preempted);
+  EXPECT_EQ(ending.get().reason, "nothing left to do");
+}
+
+TEST_F(ServeTest, IsNotDisturbedByRubbish) {
+  Coordinator coordinator(config.endpoint);
+  std::future<Ending> ending = start_worker();
+  (void)coordinator.receive<wire::Hello>();
+  coordinator.send_bytes("rubbish");
+  coordinator.send(wire::Stop{});  // Of no coordinator that the worker has registered with.
+  coordinator.send(wire::Reject{.reason = wire::RejectReason::revoked, .text = "enough"});
+  EXPECT_EQ(ending.get().reason, "refused by the coordinator: enough");
+}
+
+TEST_F(ServeTest, KeepsResultsForTheNextWorkerInItsSpool) {
+  config.spool = directory / "spool";
+  Coordinator coordinator(config.endpoint);
+  std::future<Ending> first = start_worker();
+  (void)coordinator.have_two_runs_computed();
+  coordinator.send(wire::ResultAck{campaign, {{0}}});
+  coordinator.send(wire::Stop{});
+  EXPECT_EQ(first.get().reason, "told to stop");
+  EXPECT_TRUE(std::filesystem::exists(*config.spool));
+
+  std::future<Ending> second = start_worker();
+  (void)coordinator.receive<wire::Hello>();
+  coordinator.send(wire::Welcome{.worker = {2}, .heartbeat_interval_s = 1.0});
+  const auto batch = coordinator.receive<wire::ResultBatch>();
+  ASSERT_EQ(batch.results.size(), 1U);
+  EXPECT_EQ(batch.results[0].result.run, RunIndex{1});
+  coordinator.send(wire::ResultAck{campaign, {{1}}});
+  coordinator.send(wire::Drain{});
+  EXPECT_EQ(second.get().reason, "drained");
+  EXPECT_FALSE(std::filesystem::exists(*config.spool));
+}
+
+TEST_F(ServeTest, SaysWhyTheSpoolCannotBeUsed) {
+  config.spool = directory / "missing" / "spool";
+  std::future<Ending> ending = start_worker();
+  try {
+    (void)ending.get();
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "spool = " + config.spool->string() + " (No such file or directory)");
+  }
+}
+
+// Every other message is lost, both ways.
+TEST_F(ServeTest, DeliversAlthoughMessagesAreLost) {
+  config.faults = wire::FaultPlan::parse("seed=1,drop=0.5");
+  config.conversation.resend_after = std::chrono::milliseconds(50);
+  Coordinator coordinator(config.endpoint);
+  std::future<Ending> ending = start_worker();
+  (void)coordinator.receive<wire::Hello>();
+  for (int i = 0; i < 20; ++i) {
+    coordinator.send(wire::Welcome{.worker = {1}, .heartbeat_interval_s = 0.01});
+  }
+  (void)coordinator.receive<wire::Heartbeat>();
+  for (int i = 0; i < 20; ++i) {
+    coordinator.send(
+        wire::RunLease{.campaign = campaign, .runs = {{0}, 1}, .attempt = {1}, .table_values = {}});
+  }
+  (void)coordinator.receive<wire::CampaignRequest>();
+  for (int i = 0; i < 20; ++i) {
+    coordinator.send(wire::CampaignDefinition{campaign, std::make_shared<const Campaign>()});
+  }
+  EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 1U);
+  for (int i = 0; i < 20; ++i) coordinator.send(wire::Stop{});
+  EXPECT_EQ(ending.get().reason, "told to stop");
+}
+
+}  // namespace
+}  // namespace proofmass::worker

@@ -1,0 +1,139 @@
+#include "worker/options.hpp"
+
+#include <gtest/gtest.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <fstream>
+
+#include "core/error.hpp"
+#include "tests/worker/temporary_directory.hpp"
+
+namespace proofmass::worker {
+namespace {
+
+using namespace std::chrono_literals;
+
+Options parsed(std::vector<std::string> arguments) {
+  Options options;
+  CLI::App app("worker");
+  add_options(app, options);
+  std::reverse(arguments.begin(), arguments.end());  // As CLI11 wants them.
+  app.parse(arguments);
+  return options;
+}
+
+std::string error_of(const std::vector<std::string>& arguments) {
+  try {
+    (void)parsed(arguments);
+  } catch (const CLI::ParseError& error) {
+    return error.what();
+  } catch (const InvalidArgument& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(WorkerOptions, HaveDefaults) {
+  const Options options = parsed({"--connect", "ipc:///tmp/a"});
+  EXPECT_EQ(options.endpoint, "ipc:///tmp/a");
+  EXPECT_EQ(options.drain_time, 100s);
+  EXPECT_FALSE(options.walltime_max.has_value());
+  EXPECT_FALSE(options.give_up_after.has_value());
+  EXPECT_FALSE(options.keys.has_value());
+  EXPECT_GE(options.num_threads, 1U);
+  EXPECT_EQ(options.log_format, LogFormat::text);
+  EXPECT_TRUE(options.is_supervised);
+}
+
+TEST(WorkerOptions, ComeFromArguments) {
+  const Options options =
+      parsed({"--connect",      "tcp://a:1", "--keys",          "k",
+              "--name",         "n",         "--threads",       "3",
+              "--max-walltime", "90m",       "--spool",         "s",
+              "--drain-time",   "30",        "--give-up-after", "2h",
+              "--log-format",   "json",      "--no-supervisor", "--insecure-plain",
+              "--parent",       "12",        "--faults",        "seed=7,drop=0.5"});
+  EXPECT_EQ(options.keys, "k");
+  EXPECT_EQ(options.name, "n");
+  EXPECT_EQ(options.num_threads, 3U);
+  EXPECT_EQ(options.walltime_max, 90min);
+  EXPECT_EQ(options.spool, "s");
+  EXPECT_EQ(options.drain_time, 30s);
+  EXPECT_EQ(options.give_up_after, 2h);
+  EXPECT_EQ(options.log_format, LogFormat::json);
+  EXPECT_FALSE(options.is_supervised);
+  EXPECT_TRUE(options.is_plain_waived);
+  EXPECT_EQ(options.parent, 12);
+  EXPECT_EQ(options.faults.value().drop, 0.5);
+}
+
+TEST(WorkerOptions, ComeFromTheEnvironment) {
+  setenv("PROOFMASS_CONNECT", "ipc:///tmp/b", 1);
+  setenv("PROOFMASS_MAX_WALLTIME", "1d", 1);
+  setenv("PROOFMASS_SPOOL", "/s", 1);
+  const Options options = parsed({});
+  unsetenv("PROOFMASS_CONNECT");
+  unsetenv("PROOFMASS_MAX_WALLTIME");
+  unsetenv("PROOFMASS_SPOOL");
+  EXPECT_EQ(options.endpoint, "ipc:///tmp/b");
+  EXPECT_EQ(options.walltime_max, 24h);
+  EXPECT_EQ(options.spool, "/s");
+}
+
+TEST(WorkerOptions, ComeFromAFileUnlessTheyAreArguments) {
+  const TemporaryDirectory directory;
+  const std::string file = (directory / "worker.toml").string();
+  std::ofstream(file) << "connect = \"tcp://c:5\"\nthreads = 2\nmax-walltime = \"2h\"\n"
+                         "insecure-plain = true\n";
+  const Options options = parsed({"--config", file, "--threads", "4"});
+  EXPECT_EQ(options.endpoint, "tcp://c:5");
+  EXPECT_EQ(options.num_threads, 4U);
+  EXPECT_EQ(options.walltime_max, 2h);
+  EXPECT_TRUE(options.is_plain_waived);
+}
+
+TEST(WorkerOptions, AreNotMistypedInAFile) {
+  const TemporaryDirectory directory;
+  const std::string file = (directory / "worker.toml").string();
+  std::ofstream(file) << "connect = \"ipc:///tmp/a\"\nthread = 2\n";
+  EXPECT_NE(error_of({"--config", file}).find("thread"), std::string::npos);
+}
+
+TEST(WorkerOptions, MustNameACoordinator) { EXPECT_EQ(error_of({}), "--connect is required"); }
+
+TEST(WorkerOptions, MustBeOfTheKnownKinds) {
+  const auto error_with = [&](const std::string& name, const std::string& value) {
+    return error_of({"--connect", "ipc:///tmp/a", name, value});
+  };
+  EXPECT_EQ(error_with("--threads", "0"), "--threads: Value 0 not in range 1 to 64");
+  EXPECT_EQ(error_with("--log-format", "xml"), "--log-format: xml not in {text,json}");
+  EXPECT_EQ(error_with("--faults", "drop=2").substr(0, 15), "faults.drop = 2");
+  EXPECT_EQ(error_with("--max-walltime", "5x"),
+            "max-walltime = 5x (must be 1 or more, in seconds or with s, m, h or d; at most 366d)");
+}
+
+TEST(DurationFrom, KnowsUnits) {
+  EXPECT_EQ(duration_from("t", "90"), 90s);
+  EXPECT_EQ(duration_from("t", "90s"), 90s);
+  EXPECT_EQ(duration_from("t", "15m"), 15min);
+  EXPECT_EQ(duration_from("t", "2h"), 2h);
+  EXPECT_EQ(duration_from("t", "366d"), 24h * 366);
+}
+
+TEST(DurationFrom, RefusesWhatIsNoTime) {
+  for (const char* const text : {"", "0", "-1", "1.5h", "h", "1 h", "1H", "367d", "1h30m",
+                                 "99999999999999999999", "9999999999999999d", " 1"}) {
+    try {
+      (void)duration_from("drain-time", text);
+      ADD_FAILURE() << text;
+    } catch (const InvalidArgument& error) {
+      EXPECT_EQ(error.what(),
+                "drain-time = " + std::string(text) +
+                    " (must be 1 or more, in seconds or with s, m, h or d; at most 366d)");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace proofmass::worker

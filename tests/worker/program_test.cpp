@@ -1,0 +1,80 @@
+#include "worker/program.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace proofmass::worker {
+namespace {
+
+struct Outcome {
+  int exit_code = -1;
+  std::string text;  ///< On standard error.
+};
+
+/// Runs a worker in a process of its own.
+Outcome run(std::vector<std::string> arguments) {
+  int ends[2];
+  if (pipe(ends) != 0) return {};
+  const pid_t process = fork();
+  if (process == 0) {
+    dup2(ends[1], STDERR_FILENO);
+    arguments.insert(arguments.begin(), "test-worker");
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    const Program program{.name = "test-worker",
+                          .prepare = [](const Campaign&) { return PreparedCampaign{}; }};
+    _exit(run_worker(static_cast<int>(argv.size()), argv.data(), program));
+  }
+  close(ends[1]);
+  Outcome outcome;
+  std::array<char, 4096> part{};
+  ssize_t size = 0;
+  while ((size = read(ends[0], part.data(), part.size())) > 0) {
+    outcome.text.append(part.data(), static_cast<std::size_t>(size));
+  }
+  close(ends[0]);
+  int status = 0;
+  waitpid(process, &status, 0);
+  if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
+  return outcome;
+}
+
+TEST(WorkerProgram, NeedsAnAddress) { EXPECT_EQ(run({}).exit_code, 2); }
+
+TEST(WorkerProgram, ConnectsToOtherMachinesOnlyWithKeys) {
+  const Outcome outcome = run({"--connect", "tcp://10.0.0.1:5555"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_TRUE(outcome.text.starts_with("test-worker: error: connect = tcp://10.0.0.1:5555 ("))
+      << outcome.text;
+}
+
+TEST(WorkerProgram, NeedsItsKeys) {
+  const Outcome outcome = run({"--connect", "tcp://10.0.0.1:5555", "--keys", "/nowhere"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.text.find("/nowhere/worker.key"), std::string::npos) << outcome.text;
+}
+
+// Found by the second process, whose exit code is handed on.
+TEST(WorkerProgram, NeedsAName) {
+  for (const char* const supervision : {"--no-supervisor", "--log-format=text"}) {
+    const Outcome outcome = run({"--connect", "ipc:///tmp/none", "--name", "a b", supervision});
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_EQ(outcome.text,
+              "test-worker: error: name = a b (must be 1 to 128 of [A-Za-z0-9._-])\n");
+  }
+}
+
+TEST(WorkerProgram, DoesNotOutliveItsCampaign) {
+  const Outcome outcome = run({"--connect", "ipc:///tmp/none", "--parent", "1"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.text,
+            "test-worker: error: parent = gone (the campaign that started this worker)\n");
+}
+
+}  // namespace
+}  // namespace proofmass::worker

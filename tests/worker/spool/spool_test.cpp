@@ -1,0 +1,220 @@
+#include "worker/spool/spool.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <bit>
+#include <csignal>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "core/error.hpp"
+#include "tests/worker/temporary_directory.hpp"
+
+namespace proofmass::worker {
+namespace {
+
+KeptResult result(std::uint64_t run, std::uint64_t campaign = 1, std::uint32_t attempt = 1) {
+  KeptResult kept{{campaign}, {attempt}, {}};
+  kept.computed.result.run = {run};
+  kept.computed.result.truth[3] = 0.1 * static_cast<double>(run);
+  kept.computed.compute_s = 1.5;
+  return kept;
+}
+
+std::vector<std::uint64_t> runs_of(const std::vector<KeptResult>& results) {
+  std::vector<std::uint64_t> runs;
+  for (const KeptResult& kept : results) runs.push_back(kept.computed.result.run.value);
+  return runs;
+}
+
+class SpoolTest : public testing::Test {
+ protected:
+  /// What the file holds, as the next worker sees it.
+  std::vector<std::uint64_t> stored_runs() const {
+    return runs_of(Spool(path, "model").former_results());
+  }
+  void store(const std::vector<KeptResult>& results) const {
+    ASSERT_EQ(Spool(path, "model").append(results), std::nullopt);
+  }
+  std::string content() const {
+    std::ostringstream text;
+    text << std::ifstream(path, std::ios::binary).rdbuf();
+    return text.str();
+  }
+  void replace_content(const std::string& text) const {
+    std::ofstream(path, std::ios::binary) << text;
+  }
+  std::string error_of_opening(const std::string& model = "model",
+                               std::uint64_t size_max = 1 << 20) const {
+    try {
+      const Spool spool(path, model, size_max);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "none";
+  }
+
+  TemporaryDirectory directory;
+  std::filesystem::path path = directory / "spool";
+};
+
+TEST_F(SpoolTest, HandsResultsToTheNextWorker) {
+  store({result(7, 1, 2), result(8, 1, 2), result(7, 2)});
+  const Spool spool(path, "model");
+  ASSERT_EQ(runs_of(spool.former_results()), (std::vector<std::uint64_t>{7, 8, 7}));
+  const KeptResult& kept = spool.former_results()[1];
+  EXPECT_EQ(kept.campaign, wire::CampaignId{1});
+  EXPECT_EQ(kept.attempt, wire::Attempt{2});
+  EXPECT_EQ(std::bit_cast<std::uint64_t>(kept.computed.result.truth[3]),
+            std::bit_cast<std::uint64_t>(0.1 * 8.0));
+  EXPECT_EQ(kept.computed.compute_s, 1.5);
+  EXPECT_EQ(spool.num_bytes_dropped(), 0U);
+}
+
+TEST_F(SpoolTest, AddsToWhatIsThere) {
+  store({result(1)});
+  store({result(2)});
+  EXPECT_EQ(stored_runs(), (std::vector<std::uint64_t>{1, 2}));
+}
+
+// More than one message has room for.
+TEST_F(SpoolTest, TakesManyResults) {
+  std::vector<KeptResult> results;
+  for (std::uint64_t run = 0; run < 5000; ++run) results.push_back(result(run));
+  store(results);
+  const std::vector<std::uint64_t> runs = stored_runs();
+  ASSERT_EQ(runs.size(), 5000U);
+  EXPECT_EQ(runs.back(), 4999U);
+}
+
+TEST_F(SpoolTest, LeavesNoFileBehindIfItHoldsNothing) {
+  { const Spool spool(path, "model"); }
+  EXPECT_FALSE(std::filesystem::exists(path));
+  {
+    Spool spool(path, "model");
+    EXPECT_EQ(spool.append(std::vector{result(1)}), std::nullopt);
+    EXPECT_FALSE(spool.is_empty());
+    spool.clear();
+    EXPECT_TRUE(spool.is_empty());
+    EXPECT_EQ(std::filesystem::file_size(path), spool.size());
+  }
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+// A process may die at any byte: of the two records, every cut leaves the first, or none.
+TEST_F(SpoolTest, DropsARecordThatWasNotWrittenToItsEnd) {
+  store({result(1)});
+  const std::size_t size_of_one = content().size();
+  store({result(2)});
+  const std::string whole = content();
+  const std::size_t header = whole.find('\n') + 1;
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    replace_content(whole.substr(0, size));
+    const Spool spool(path, "model");
+    const std::size_t num_expected = size >= size_of_one ? 1 : 0;
+    EXPECT_EQ(spool.former_results().size(), num_expected) << size;
+    const std::size_t good = size >= size_of_one ? size_of_one : (size >= header ? header : 0);
+    EXPECT_EQ(spool.num_bytes_dropped(), size - good) << size;
+  }
+  store({result(3)});
+  EXPECT_EQ(stored_runs(), (std::vector<std::uint64_t>{1, 3})) << "new ones follow the good ones";
+}
+
+TEST_F(SpoolTest, DropsWhatAFlippedBitHasSpoilt) {
+  store({result(1)});
+  const std::size_t size_of_one = content().size();
+  store({result(2)});
+  const std::string whole = content();
+  for (std::size_t i = size_of_one; i < whole.size(); ++i) {
+    std::string spoilt = whole;
+    spoilt[i] = static_cast<char>(spoilt[i] ^ 0x10);
+    replace_content(spoilt);
+    const Spool spool(path, "model");
+    EXPECT_EQ(runs_of(spool.former_results()), std::vector<std::uint64_t>{1}) << i;
+    EXPECT_EQ(spool.num_bytes_dropped(), whole.size() - size_of_one);
+    EXPECT_EQ(std::filesystem::file_size(path), size_of_one);
+  }
+}
+
+TEST_F(SpoolTest, BelongsToOneWorker) {
+  const Spool first(path, "model");
+  EXPECT_EQ(error_of_opening(), "spool = " + path.string() + " (used by another worker)");
+}
+
+TEST_F(SpoolTest, DoesNotDeliverResultsOfAnotherModel) {
+  store({result(1)});
+  const std::string expected =
+      "spool = " + path.string() + " (must be a spool of the same model, or not exist)";
+  EXPECT_EQ(error_of_opening("model-2"), expected);
+  EXPECT_EQ(stored_runs(), std::vector<std::uint64_t>{1}) << "it is as it was";
+}
+
+TEST_F(SpoolTest, LeavesOtherFilesAlone) {
+  replace_content("something that is no spool, and longer than its first line");
+  EXPECT_EQ(error_of_opening(),
+            "spool = " + path.string() + " (must be a spool of the same model, or not exist)");
+  EXPECT_TRUE(content().starts_with("something"));
+}
+
+TEST_F(SpoolTest, SaysWhyItCannotBeOpened) {
+  path = directory / "missing" / "spool";
+  EXPECT_EQ(error_of_opening(), "spool = " + path.string() + " (No such file or directory)");
+}
+
+TEST_F(SpoolTest, RefusesAFileThatIsTooLarge) {
+  store({result(1), result(2)});
+  EXPECT_EQ(error_of_opening("model", 100),
+            "spool = " + path.string() + " (must be at most 100 bytes)");
+}
+
+TEST_F(SpoolTest, StaysWithinItsSize) {
+  Spool spool(path, "model", 400);
+  ASSERT_EQ(spool.append(std::vector{result(1)}), std::nullopt);
+  const std::uint64_t size = spool.size();
+  EXPECT_EQ(spool.append(std::vector{result(2), result(3)}),
+            "spool = " + path.string() + " (full: must be at most 400 bytes)");
+  EXPECT_EQ(spool.size(), size);
+}
+
+/// No file grows beyond this size for as long as it lives, as on a disk that is full.
+class DiskLimit {
+ public:
+  explicit DiskLimit(rlim_t size) : former_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &former_);
+    const rlimit limit{.rlim_cur = size, .rlim_max = former_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~DiskLimit() {
+    setrlimit(RLIMIT_FSIZE, &former_);
+    std::signal(SIGXFSZ, former_handler_);
+  }
+  DiskLimit(const DiskLimit&) = delete;
+  DiskLimit& operator=(const DiskLimit&) = delete;
+
+ private:
+  rlimit former_{};
+  void (*former_handler_)(int);
+};
+
+// The second record is written in part, and taken back.
+TEST_F(SpoolTest, IsAsBeforeIfTheDiskIsFull) {
+  Spool spool(path, "model");
+  ASSERT_EQ(spool.append(std::vector{result(1)}), std::nullopt);
+  {
+    const DiskLimit limit(spool.size() + 20);
+    EXPECT_EQ(spool.append(std::vector{result(2)}),
+              "spool = " + path.string() + " (File too large)");
+  }
+  EXPECT_EQ(std::filesystem::file_size(path), spool.size());
+  EXPECT_EQ(spool.append(std::vector{result(3)}), std::nullopt);
+}
+
+TEST_F(SpoolTest, SaysThatItCannotBeMadeOnAFullDisk) {
+  const DiskLimit limit(5);
+  EXPECT_EQ(error_of_opening(), "spool = " + path.string() + " (File too large)");
+}
+
+}  // namespace
+}  // namespace proofmass::worker

@@ -1,0 +1,216 @@
+#include "worker/supervision/supervisor.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <functional>
+#include <new>
+#include <string>
+#include <thread>
+
+#include "core/error.hpp"
+
+namespace proofmass::worker {
+namespace {
+
+constexpr RestartConfig at_once{.delay = RestartConfig::Duration::zero(),
+                                .delay_max = RestartConfig::Duration::zero(),
+                                .num_crashes_max = 3};
+
+/// What the processes of a test tell each other.
+struct Board {
+  std::atomic<int> num_starts = 0;
+  std::atomic<std::uint64_t> first_session = 0;
+  std::atomic<std::uint64_t> former_session = 0;
+  std::atomic<int> former_reason = 0;
+  std::atomic<std::uint32_t> former_signal = 0;
+  std::atomic<int> num_requests = 0;
+  std::atomic<pid_t> child = 0;
+};
+
+class SupervisorTest : public testing::Test {
+ protected:
+  SupervisorTest()
+      : board(*new (mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS,
+                         -1, 0)) Board) {}
+  ~SupervisorTest() override { munmap(&board, sizeof(Board)); }
+
+  /// Supervises the work in a process of its own, whose exit code is returned: 99 if it throws.
+  pid_t start_supervisor(const std::function<int(const ChildStart&)>& work,
+                         const RestartConfig& config = at_once) {
+    const pid_t supervisor = fork();
+    if (supervisor != 0) return supervisor;
+    int exit_code = 99;
+    try {
+      exit_code = supervise(work, config);
+    } catch (const Error& error) {
+      std::fprintf(stderr, "%s\n", error.what());
+    }
+    _exit(exit_code);
+  }
+  static int exit_code_of(pid_t process) {
+    int status = 0;
+    waitpid(process, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+  int supervise_here(const std::function<int(const ChildStart&)>& work) {
+    return exit_code_of(start_supervisor(work));
+  }
+  /// Notes what the child was told, and returns how many were started before it.
+  int note(const ChildStart& start) {
+    if (start.former) {
+      board.former_session = start.former->session.value;
+      board.former_reason = static_cast<int>(start.former->reason);
+      board.former_signal = start.former->signal;
+    } else if (board.num_starts == 0) {
+      board.first_session = start.session.value;
+    }
+    return board.num_starts++;
+  }
+
+  Board& board;
+};
+
+TEST_F(SupervisorTest, HandsOnTheExitCode) {
+  EXPECT_EQ(supervise_here([&](const ChildStart& start) { return 7 + note(start); }), 7);
+  EXPECT_EQ(board.num_starts, 1);
+}
+
+TEST_F(SupervisorTest, StartsAWorkerThatCrashedAgainAndSaysSo) {
+  const int exit_code = supervise_here([&](const ChildStart& start) {
+    if (note(start) == 0) {
+      std::signal(SIGSEGV, SIG_DFL);
+      std::raise(SIGSEGV);
+    }
+    return 0;
+  });
+  EXPECT_EQ(exit_code, 0);
+  EXPECT_EQ(board.num_starts, 2);
+  EXPECT_NE(board.first_session, 0U);
+  EXPECT_EQ(board.former_session, board.first_session);
+  EXPECT_EQ(board.former_reason, static_cast<int>(wire::LossReason::crashed));
+  EXPECT_EQ(board.former_signal, static_cast<std::uint32_t>(SIGSEGV));
+}
+
+// Nothing says that memory was short: somebody killed it, and the runs have no part in that.
+TEST_F(SupervisorTest, BlamesNothingForAKill) {
+  const int exit_code = supervise_here([&](const ChildStart& start) {
+    if (note(start) == 0) std::raise(SIGKILL);
+    return 0;
+  });
+  EXPECT_EQ(exit_code, 0);
+  EXPECT_EQ(board.num_starts, 2);
+  EXPECT_EQ(board.former_session, 0U);
+}
+
+TEST_F(SupervisorTest, StartsAWorkerThatHungAgain) {
+  const int exit_code =
+      supervise_here([&](const ChildStart& start) { return note(start) == 0 ? exit_hung : 5; });
+  EXPECT_EQ(exit_code, 5);
+  EXPECT_EQ(board.former_session, 0U);
+}
+
+TEST_F(SupervisorTest, GivesUpAWorkerThatCrashesTooOften) {
+  testing::internal::CaptureStderr();
+  const int exit_code = supervise_here([&](const ChildStart& start) -> int {
+    (void)note(start);
+    std::abort();
+  });
+  const std::string text = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(exit_code, 99);
+  EXPECT_EQ(board.num_starts, 3);
+  EXPECT_NE(text.find("crashes = 3 (must be fewer within 600 s); the last by signal=6 (Aborted)"),
+            std::string::npos)
+      << text;
+}
+
+/// Waits for requests, and ends with their number when the last one has come.
+int count_requests(Board& board, int num_expected) {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, handed_on_signal());
+  siginfo_t info{};
+  board.child = getpid();
+  while (info.si_value.sival_int < num_expected) {
+    sigwaitinfo(&set, &info);
+    board.num_requests = info.si_value.sival_int;
+  }
+  return 40 + info.si_value.sival_int;
+}
+
+// The child has SIGTERM and SIGINT blocked: to its process group they were sent, too.
+TEST_F(SupervisorTest, HandsOnThatItIsAskedToEndAndHowOften) {
+  const pid_t supervisor = start_supervisor([&](const ChildStart&) {
+    std::raise(SIGTERM);
+    return count_requests(board, 2);
+  });
+  while (board.child == 0) std::this_thread::yield();
+  kill(supervisor, SIGTERM);
+  while (board.num_requests == 0) std::this_thread::yield();
+  kill(supervisor, SIGINT);
+  EXPECT_EQ(exit_code_of(supervisor), 42);
+}
+
+TEST_F(SupervisorTest, DoesNotStartAWorkerAgainThatCrashesWhenAskedToEnd) {
+  const pid_t supervisor = start_supervisor([&](const ChildStart& start) -> int {
+    (void)note(start);
+    (void)count_requests(board, 1);
+    std::abort();
+  });
+  while (board.child == 0) std::this_thread::yield();
+  kill(supervisor, SIGTERM);
+  EXPECT_EQ(exit_code_of(supervisor), 128 + SIGABRT);
+  EXPECT_EQ(board.num_starts, 1);
+}
+
+TEST_F(SupervisorTest, EndsWhenItIsAskedToWhileItWaitsToStartAgain) {
+  const RestartConfig in_an_hour{.delay = std::chrono::hours(1),
+                                 .delay_max = std::chrono::hours(1)};
+  const pid_t supervisor = start_supervisor(
+      [&](const ChildStart& start) -> int {
+        (void)note(start);
+        std::abort();
+      },
+      in_an_hour);
+  while (board.num_starts == 0) std::this_thread::yield();
+  kill(supervisor, SIGTERM);
+  const int exit_code = exit_code_of(supervisor);
+  // The request comes before or after the end of the child is known.
+  EXPECT_TRUE(exit_code == 0 || exit_code == 128 + SIGABRT) << exit_code;
+  EXPECT_EQ(board.num_starts, 1);
+}
+
+TEST_F(SupervisorTest, TakesTheWorkerWithItWhenItIsKilled) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  const pid_t supervisor = start_supervisor([&](const ChildStart&) {
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGTERM);
+    board.child = getpid();
+    int signal = 0;
+    sigwait(&set, &signal);
+    const char answer = signal == SIGTERM ? 'T' : '?';
+    return write(ends[1], &answer, 1) == 1 ? 0 : 1;
+  });
+  while (board.child == 0) std::this_thread::yield();
+  kill(supervisor, SIGKILL);
+  EXPECT_EQ(exit_code_of(supervisor), -SIGKILL);
+  char answer = 0;
+  EXPECT_EQ(read(ends[0], &answer, 1), 1);
+  EXPECT_EQ(answer, 'T');
+  close(ends[0]);
+  close(ends[1]);
+}
+
+TEST(RandomSession, IsNeverTheSame) {
+  EXPECT_NE(random_session().value, 0U);
+  EXPECT_NE(random_session(), random_session());
+}
+
+}  // namespace
+}  // namespace proofmass::worker

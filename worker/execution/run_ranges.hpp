@@ -1,0 +1,16 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/campaign/identifiers.hpp"
+
+namespace proofmass::worker {
+
+/// Runs in ascending order, each once, as the fewest ranges.
+[[nodiscard]] std::vector<RunRange> ranges_of(std::span<const RunIndex> runs);
+
+/// The runs of the ranges, in their order.
+[[nodiscard]] std::vector<RunIndex> indices_of(std::span<const RunRange> ranges);
+
+}  // namespace proofmass::worker

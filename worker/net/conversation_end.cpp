@@ -1,0 +1,92 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <utility>
+
+#include "worker/execution/run_ranges.hpp"
+#include "worker/net/conversation.hpp"
+
+// How a conversation ends. While it does, it takes no more runs.
+
+namespace proofmass::worker {
+namespace {
+
+constexpr RunRange all_runs{{0}, num_runs_max};
+
+}  // namespace
+
+void Conversation::on_drain_request(TimePoint now) {
+  if (ending_ || (leaving_ && leaving_->deadline)) return;
+  begin_to_leave({.reason = wire::LossReason::preempted, .deadline = now + config_.drain_time},
+                 now);
+}
+
+void Conversation::on_abandon_request() {
+  if (ending_) return;
+  if (!leaving_) leaving_ = {.reason = wire::LossReason::preempted, .deadline = {}};
+  execution_.abandon();
+  leave("asked to end at once");
+}
+
+void Conversation::watch_time(TimePoint now) {
+  const bool has_deadline = leaving_ && leaving_->deadline;
+  if (!has_deadline && config_.walltime_end) {
+    // Half again of the usual time: a batch that begins now is finished.
+    const Duration usual = execution_.usual_batch_time().value_or(Duration::zero());
+    const Duration needed = usual + usual / 2 + 2 * config_.delivery_time;
+    if (now + needed >= *config_.walltime_end) {
+      begin_to_leave({.reason = wire::LossReason::walltime,
+                      .deadline = *config_.walltime_end - config_.delivery_time},
+                     now);
+    }
+  }
+  if (ending_ || !leaving_ || !leaving_->deadline) return;
+  give_back_late_batches(now);
+  leave_if_done();
+  if (!ending_ && now >= *leaving_->deadline) {
+    execution_.abandon();
+    leave(fmt::format("out of time with {} results not acknowledged", unacknowledged_.size()));
+  }
+}
+
+void Conversation::begin_to_leave(const Leaving& leaving, TimePoint now) {
+  leaving_ = leaving;
+  // First that it wants no runs, or it is lent again what it gives back.
+  if (is_registered_) send_heartbeat(now);
+  if (leaving.deadline) give_back_waiting();
+  leave_if_done();
+}
+
+void Conversation::give_back_waiting() {
+  for (auto entry = unfinished_.begin(); entry != unfinished_.end();) {
+    const wire::CampaignId campaign = entry->first.first;
+    give_back(leaving_->reason, campaign, execution_.drop_waiting(campaign, std::array{all_runs}));
+    entry = unfinished_.upper_bound({campaign, RunIndex{num_runs_max}});
+  }
+}
+
+void Conversation::give_back_late_batches(TimePoint now) {
+  const TimePoint finished_by = *leaving_->deadline - config_.delivery_time;
+  for (const RunningBatch& batch : execution_.computing()) {
+    const bool is_late =
+        now >= finished_by || (batch.time_left && now + *batch.time_left > finished_by);
+    if (!is_late || !execution_.drop_batch(batch.number)) continue;
+    give_back(leaving_->reason, batch.progress.campaign, indices_of(batch.progress.ranges));
+  }
+}
+
+void Conversation::leave_if_done() {
+  if (ending_ || !leaving_ || !unfinished_.empty() || !unacknowledged_.empty()) return;
+  leave(leaving_->reason == wire::LossReason::drained ? "drained" : "nothing left to do");
+}
+
+void Conversation::leave(const std::string& reason) {
+  if (is_registered_) send(wire::Bye{leaving_->reason});
+  end(Ending::Kind::done, reason);
+}
+
+void Conversation::end(Ending::Kind kind, std::string reason) {
+  ending_ = Ending{.kind = kind, .reason = std::move(reason)};
+}
+
+}  // namespace proofmass::worker

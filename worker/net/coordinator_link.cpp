@@ -1,0 +1,135 @@
+#include "worker/net/coordinator_link.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <utility>
+#include <vector>
+#include <zmq.hpp>
+
+#include "core/error.hpp"
+#include "proto/link/connection_monitor.hpp"
+#include "proto/link/socket.hpp"
+
+namespace proofmass::worker {
+namespace {
+
+using Direction = wire::FaultyLink::Direction;
+
+TimePoint time_now() { return std::chrono::steady_clock::now(); }
+
+std::chrono::milliseconds milliseconds_up(Duration time) {
+  return std::chrono::ceil<std::chrono::milliseconds>(std::max(Duration::zero(), time));
+}
+
+}  // namespace
+
+class CoordinatorLink::Parts {
+ public:
+  Parts(const std::string& endpoint, const wire::ClientSecurity& security,
+        const std::optional<wire::FaultPlan>& faults)
+      : socket_(wire::make_dealer(context_, security)),
+        monitor_(context_, socket_, endpoint, security, time_now()) {
+    if (faults) {
+      sending_.emplace(*faults, Direction::sending);
+      receiving_.emplace(*faults, Direction::receiving);
+    }
+  }
+
+  void wait(std::span<const int> descriptors, Duration time_max) {
+    // A connection takes messages only some time after its handshake.
+    const short wanted = is_newly_connected_ ? ZMQ_POLLIN | ZMQ_POLLOUT : ZMQ_POLLIN;
+    std::vector<zmq::pollitem_t> items{{socket_.handle(), 0, wanted, 0},
+                                       {monitor_.handle(), 0, ZMQ_POLLIN, 0}};
+    for (const int descriptor : descriptors) items.push_back({nullptr, descriptor, ZMQ_POLLIN, 0});
+    try {
+      zmq::poll(items, milliseconds_up(time_max));
+    } catch (const zmq::error_t& error) {
+      // A process that was stopped and continued comes back here.
+      if (error.num() != EINTR) throw;
+    }
+    monitor_.update(time_now());
+    const bool is_connected = monitor_.is_connected();
+    is_newly_connected_ = is_connected && (is_newly_connected_ || !was_connected_);
+    was_connected_ = is_connected;
+    can_send_ = (items[0].revents & ZMQ_POLLOUT) != 0;
+  }
+
+  void send(std::string bytes, TimePoint now) {
+    if (!sending_) return transmit(bytes);
+    sending_->pass("", std::move(bytes), now);
+    transmit_due(now);
+  }
+
+  void receive(TimePoint now, const std::function<bool(std::string_view)>& handle) {
+    transmit_due(now);
+    zmq::message_t frame;
+    while (socket_.recv(frame, zmq::recv_flags::dontwait)) {
+      if (receiving_) {
+        receiving_->pass("", frame.to_string(), now);
+      } else if (!handle(frame.to_string_view())) {
+        return;
+      }
+    }
+    if (!receiving_) return;
+    for (const wire::Parcel& parcel : receiving_->due(now)) {
+      if (!handle(parcel.bytes)) return;
+    }
+  }
+
+  bool take_connected() { return can_send_ && std::exchange(is_newly_connected_, false); }
+  std::optional<std::string> take_refusal() { return monitor_.take_refusal(); }
+
+ private:
+  void transmit_due(TimePoint now) {
+    if (!sending_) return;
+    for (const wire::Parcel& parcel : sending_->due(now)) transmit(parcel.bytes);
+  }
+
+  void transmit(const std::string& bytes) {
+    if (!socket_.send(zmq::buffer(bytes), zmq::send_flags::dontwait)) {
+      spdlog::debug("message_not_sent bytes={}", bytes.size());
+    }
+  }
+
+  zmq::context_t context_;
+  zmq::socket_t socket_;
+  wire::ConnectionMonitor monitor_;
+  std::optional<wire::FaultyLink> sending_;
+  std::optional<wire::FaultyLink> receiving_;
+  bool was_connected_ = false;
+  bool is_newly_connected_ = false;  ///< And nobody has been told.
+  bool can_send_ = false;            ///< At the last look; looked at only while nobody was told.
+};
+
+CoordinatorLink::CoordinatorLink(const std::string& endpoint, const wire::ClientSecurity& security,
+                                 const std::optional<wire::FaultPlan>& faults) {
+  try {
+    parts_ = std::make_unique<Parts>(endpoint, security, faults);
+  } catch (const zmq::error_t& error) {
+    throw Error(fmt::format("connect = {} ({})", endpoint, error.what()));
+  }
+}
+
+CoordinatorLink::~CoordinatorLink() = default;
+
+void CoordinatorLink::wait(std::span<const int> descriptors, Duration time_max) {
+  parts_->wait(descriptors, time_max);
+}
+
+void CoordinatorLink::send(std::string bytes, TimePoint now) {
+  parts_->send(std::move(bytes), now);
+}
+
+void CoordinatorLink::receive(TimePoint now, const std::function<bool(std::string_view)>& handle) {
+  parts_->receive(now, handle);
+}
+
+bool CoordinatorLink::take_connected() { return parts_->take_connected(); }
+
+std::optional<std::string> CoordinatorLink::take_refusal() { return parts_->take_refusal(); }
+
+}  // namespace proofmass::worker

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+
+namespace proofmass::worker {
+
+/// Who asks a worker to end, and by which signals.
+enum class SignalSource : std::uint8_t {
+  anyone,      ///< SIGTERM and SIGINT: the first drains, the second ends at once.
+  supervisor,  ///< handed_on_signal(), with how often; SIGTERM and SIGINT drain, as they may come
+               ///< in addition.
+  campaign,    ///< SIGTERM ends at once; SIGINT is ignored: the campaign deals with it.
+};
+
+/// What signals have asked for so far.
+enum class StopRequest : std::uint8_t { none, drain, abandon };
+
+/// Receives signals as a file descriptor does.
+class StopSignals {
+ public:
+  /// Blocks the signals for the calling thread and those that it makes from now on.
+  /// @throws Error if the system has no descriptor left.
+  explicit StopSignals(SignalSource source);
+  ~StopSignals();  ///< The signals stay blocked.
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+
+  /// Readable while request() has something to take in.
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+
+  /// Takes in the signals that have come and returns the strongest request since the beginning.
+  [[nodiscard]] StopRequest request();
+
+ private:
+  SignalSource source_;
+  int descriptor_;
+  StopRequest request_ = StopRequest::none;
+};
+
+}  // namespace proofmass::worker

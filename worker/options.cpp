@@ -1,0 +1,112 @@
+#include "worker/options.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <thread>
+
+#include "core/error.hpp"
+#include "core/simulation/run.hpp"
+#include "proto/wire/messages.hpp"
+
+namespace proofmass::worker {
+namespace {
+
+constexpr unsigned threads_max = wire::slots_max / batch_lanes;
+constexpr std::uint64_t seconds_max = std::uint64_t{366} * 24 * 3600;
+
+/// Seconds in the unit; nothing if there is no such unit.
+std::optional<std::uint64_t> seconds_in(std::string_view unit) {
+  static const std::map<std::string_view, std::uint64_t> units{
+      {"", 1}, {"s", 1}, {"m", 60}, {"h", 3600}, {"d", 86400}};
+  const auto found = units.find(unit);
+  return found == units.end() ? std::nullopt : std::optional(found->second);
+}
+
+/// Declares an option whose value is a time.
+template <typename Target>
+CLI::Option* add_duration(CLI::App& app, const std::string& name, Target& target,
+                          const std::string& description) {
+  return app.add_option_function<std::string>(
+      "--" + name, [name, &target](const std::string& text) { target = duration_from(name, text); },
+      description);
+}
+
+void add_connection(CLI::App& app, Options& options) {
+  app.add_option("--connect", options.endpoint,
+                 "Where the coordinator listens: ipc://PATH or tcp://HOST:PORT")
+      ->envname("PROOFMASS_CONNECT")
+      ->required();
+  app.add_option("--keys", options.keys, "Directory with worker.key and coordinator.pub")
+      ->envname("PROOFMASS_KEYS");
+  app.add_flag("--insecure-plain", options.is_plain_waived,
+               "Allow an address beyond this machine without keys: on a network that you trust");
+  app.add_option("--name", options.name, "Name in logs and database; HOST-PID by default")
+      ->envname("PROOFMASS_NAME");
+  add_duration(app, "give-up-after", options.give_up_after,
+               "How long the coordinator may be silent; 1h by default")
+      ->envname("PROOFMASS_GIVE_UP_AFTER");
+}
+
+void add_work(CLI::App& app, Options& options) {
+  options.num_threads = std::clamp(std::thread::hardware_concurrency(), 1U, threads_max);
+  app.add_option("--threads", options.num_threads,
+                 "Threads that simulate, one a processor by default")
+      ->envname("PROOFMASS_THREADS")
+      ->check(CLI::Range(1U, threads_max));
+  app.add_option("--spool", options.spool,
+                 "File for results that are not acknowledged when the worker ends")
+      ->envname("PROOFMASS_SPOOL");
+  add_duration(app, "max-walltime", options.walltime_max,
+               "Time after which the worker must have ended, e.g. 3600, 90m, 2h")
+      ->envname("PROOFMASS_MAX_WALLTIME");
+  add_duration(app, "drain-time", options.drain_time,
+               "Time to finish and deliver after SIGTERM; 100s by default")
+      ->envname("PROOFMASS_DRAIN_TIME");
+}
+
+void add_process(CLI::App& app, Options& options) {
+  app.set_config("--config", "", "File with these options, as in `connect = \"tcp://a:5555\"`");
+  app.allow_config_extras(CLI::config_extras_mode::error);
+  app.add_option_function<std::string>(
+         "--log-format",
+         [&options](const std::string& text) {
+           options.log_format = text == "json" ? LogFormat::json : LogFormat::text;
+         },
+         "Of the log on standard error; text by default")
+      ->envname("PROOFMASS_LOG_FORMAT")
+      ->check(CLI::IsMember({"text", "json"}));
+  app.add_flag_callback(
+      "--no-supervisor", [&options] { options.is_supervised = false; },
+      "Do not watch the worker from a second process, which starts it again if it crashes");
+  app.add_option("--parent", options.parent, "Process to die with; used by `proofmass run`");
+  app.add_option_function<std::string>(
+         "--faults",
+         [&options](const std::string& text) { options.faults = wire::FaultPlan::parse(text); })
+      ->group("");  // For tests of the program by itself.
+}
+
+}  // namespace
+
+void add_options(CLI::App& app, Options& options) {
+  add_connection(app, options);
+  add_work(app, options);
+  add_process(app, options);
+}
+
+Duration duration_from(std::string_view option, std::string_view text) {
+  std::uint64_t count = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+  const auto unit = seconds_in(text.substr(static_cast<std::size_t>(end - text.data())));
+  if (error != std::errc{} || !unit || count < 1 || count > seconds_max / *unit) {
+    throw InvalidArgument(
+        fmt::format("{} = {} (must be 1 or more, in seconds or with s, m, h or d; at most 366d)",
+                    option, text));
+  }
+  return std::chrono::seconds(count * *unit);
+}
+
+}  // namespace proofmass::worker

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "proto/link/faults.hpp"
+#include "worker/execution/execution.hpp"
+#include "worker/log.hpp"
+
+namespace CLI {
+class App;
+}  // namespace CLI
+
+namespace proofmass::worker {
+
+/// What a worker is told when it starts.
+struct Options {
+  std::string endpoint;
+  std::optional<std::filesystem::path> keys;  ///< Directory; nothing: without keys.
+  bool is_plain_waived = false;               ///< Without keys beyond this machine.
+  std::string name;                           ///< Empty: HOST-PID.
+  unsigned num_threads = 1;
+  std::optional<Duration> walltime_max;
+  std::optional<std::filesystem::path> spool;
+  Duration drain_time = std::chrono::seconds(100);
+  std::optional<Duration> give_up_after;  ///< Nothing: 60 s with a parent, else an hour.
+  LogFormat log_format = LogFormat::text;
+  std::optional<pid_t> parent;  ///< Campaign that started this worker, for itself alone.
+  bool is_supervised = true;
+  std::optional<wire::FaultPlan> faults;
+};
+
+/// Declares the options, which can also come from a file (--config) and from the environment.
+///
+/// @param options  Set while the arguments are parsed, which throws InvalidArgument, too; outlives
+///                 `app`.
+void add_options(CLI::App& app, Options& options);
+
+/// A time such as `90`, `90s`, `15m`, `2h` or `1d`.
+/// @throws InvalidArgument reading `option = text (must be ...)`.
+[[nodiscard]] Duration duration_from(std::string_view option, std::string_view text);
+
+}  // namespace proofmass::worker

@@ -1,0 +1,187 @@
+#include "worker/program.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <utility>
+
+#include "core/error.hpp"
+#include "core/simulation/reference_digest.hpp"
+#include "core/simulation/run.hpp"
+#include "proto/wire/endpoint.hpp"
+#include "proto/wire/names.hpp"
+#include "worker/net/serve.hpp"
+#include "worker/options.hpp"
+#include "worker/supervision/supervisor.hpp"
+
+namespace proofmass::worker {
+namespace {
+
+constexpr int exit_failed = 1;
+constexpr int exit_usage = 2;
+constexpr std::chrono::seconds give_up_with_parent(60);
+/// A thread that computes looks several times an orbit whether it is still wanted.
+constexpr std::chrono::seconds thread_end_max(5);
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  gethostname(name.data(), name.size() - 1);
+  return wire::name_from(name.data());
+}
+
+/// A worker that a campaign started must not outlive it, however that ends.
+void die_with(pid_t parent) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) throw Error("parent = gone (the campaign that started this worker)");
+}
+
+wire::Hello hello_for(const Options& options, const ChildStart& start) {
+  const std::string host = host_name();
+  const auto process_id = static_cast<std::uint64_t>(getpid());
+  wire::Hello hello{.worker_name = options.name.empty()
+                                       ? wire::name_from(fmt::format("{}-{}", host, process_id))
+                                       : options.name,
+                    .host = host,
+                    .process_id = process_id,
+                    .num_slots = static_cast<std::uint32_t>(options.num_threads * batch_lanes),
+                    .model_version = std::string(model_version),
+                    .build = PROOFMASS_VERSION,
+                    .reference_digest = reference_digest(best_instruction_set()),
+                    .former = start.former};
+  if (!wire::is_name(hello.worker_name)) {
+    throw InvalidArgument(
+        fmt::format("name = {} (must be 1 to 128 of [A-Za-z0-9._-])", hello.worker_name));
+  }
+  return hello;
+}
+
+SignalSource signal_source(const Options& options) {
+  if (options.parent) return SignalSource::campaign;
+  return options.is_supervised ? SignalSource::supervisor : SignalSource::anyone;
+}
+
+wire::ClientSecurity security_for(const Options& options) {
+  const auto protection = options.keys              ? wire::Protection::keys
+                          : options.is_plain_waived ? wire::Protection::waived
+                                                    : wire::Protection::none;
+  wire::check_endpoint("connect", options.endpoint, wire::EndpointUse::connect, protection);
+  if (options.keys) return wire::read_client_security(*options.keys, wire::KeyRole::worker);
+  if (!wire::is_local(options.endpoint)) {
+    spdlog::warn("insecure_plain connect={} (anybody on the way can read and change what is said)",
+                 options.endpoint);
+  }
+  return {};
+}
+
+ServeConfig serve_config(const Options& options, TimePoint program_start) {
+  ServeConfig config;
+  config.endpoint = options.endpoint;
+  config.security = security_for(options);
+  config.signals = signal_source(options);
+  config.spool = options.spool;
+  config.faults = options.faults;
+  ConversationConfig& conversation = config.conversation;
+  conversation.drain_time = options.drain_time;
+  if (options.parent) conversation.give_up_after = give_up_with_parent;
+  if (options.give_up_after) conversation.give_up_after = *options.give_up_after;
+  if (options.walltime_max) conversation.walltime_end = program_start + *options.walltime_max;
+  return config;
+}
+
+/// The worker itself; 0, or it throws, or it ends the process because threads hang.
+int work(const Options& options, const Program& program, ServeConfig config,
+         const ChildStart& start) {
+  if (options.faults && options.faults->kill) {
+    wire::arm_kill_point(options.faults->kill->point, options.faults->kill->passage);
+  }
+  config.session = start.session;
+  config.hello = hello_for(options, start);
+  StopSignals signals(config.signals);
+  const Wake progress;
+  Executor executor(program.prepare, [&progress] { progress.notify(); },
+                    {.num_threads = options.num_threads, .batch_size_max = batch_lanes});
+  const Ending ending = serve(config, executor, progress, signals);
+  if (!executor.end_within(thread_end_max)) {
+    spdlog::error("computation_hangs reason=\"{}\" (the process ends without it)", ending.reason);
+    std::fflush(nullptr);
+    _exit(exit_hung);
+  }
+  if (ending.kind == Ending::Kind::failed) throw Error(ending.reason);
+  spdlog::info("worker_ended reason=\"{}\"", ending.reason);
+  return 0;
+}
+
+/// Turns what goes wrong into a message and an exit code.
+int reporting_errors(const Program& program, const std::function<int()>& what) {
+  const auto fail = [&](const std::exception& error, int exit_code) {
+    fmt::print(stderr, "{}: error: {}\n", program.name, error.what());
+    return exit_code;
+  };
+  try {
+    return what();
+  } catch (const InvalidArgument& error) {
+    return fail(error, exit_usage);
+  } catch (const std::exception& error) {
+    return fail(error, exit_failed);
+  }
+}
+
+/// What is meant for the workers of a service is not for those of a campaign.
+void leave_out_service_options(Options& options) {
+  options.keys.reset();
+  options.spool.reset();
+  options.walltime_max.reset();
+}
+
+int run(Options options, const Program& program) {
+  const TimePoint program_start = std::chrono::steady_clock::now();
+  set_up_log(program.name, options.log_format, options.parent ? LogLevel::warning : LogLevel::info);
+  if (options.parent) {
+    die_with(*options.parent);
+    leave_out_service_options(options);
+    std::signal(SIGINT, SIG_IGN);  // Ctrl-C reaches the campaign, which tells its workers.
+  }
+  const ServeConfig config = serve_config(options, program_start);
+  const auto work_from = [&](const ChildStart& start) {
+    return work(options, program, config, start);
+  };
+  if (signal_source(options) != SignalSource::supervisor) {
+    return work_from({.session = random_session(), .former = std::nullopt});
+  }
+  return supervise([&](const ChildStart& start) {
+    return reporting_errors(program, [&] { return work_from(start); });
+  });
+}
+
+}  // namespace
+
+int run_worker(int argc, char** argv, const Program& program) {
+  Options options;
+  CLI::App app(
+      "Simulates runs for a proofmass coordinator.\n"
+      "SIGTERM lets it finish and deliver what it computes; a second one does not.\n"
+      "Exit codes: 0 told to end, 1 cannot go on, 2 wrong usage, 3 a computation hangs.",
+      program.name);
+  add_options(app, options);
+  program.add_options(app);
+  app.set_version_flag("--version", program.name + " " PROOFMASS_VERSION);
+  return reporting_errors(program, [&] {
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      return app.exit(error) == 0 ? 0 : exit_usage;
+    }
+    return run(options, program);
+  });
+}
+
+}  // namespace proofmass::worker

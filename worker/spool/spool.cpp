@@ -1,0 +1,189 @@
+#include "worker/spool/spool.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <map>
+#include <utility>
+#include <variant>
+
+#include "core/error.hpp"
+#include "proto/wire/codec.hpp"
+
+namespace proofmass::worker {
+namespace {
+
+constexpr std::size_t size_bytes = 4;
+constexpr std::size_t checksum_bytes = 8;
+/// No message travels by this header: the conversation makes the one that does.
+constexpr wire::Header record_header{.session = {1}, .epoch = {}, .sequence = 0};
+
+/// FNV-1a, 64 bits: tells a record that was written to its end from one that was not.
+std::uint64_t checksum(std::string_view bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const char byte : bytes) {
+    hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
+  }
+  return hash;
+}
+
+std::string little_endian(std::uint64_t value, std::size_t num_bytes) {
+  std::string bytes;
+  for (std::size_t i = 0; i < num_bytes; ++i) bytes += static_cast<char>(value >> (8 * i));
+  return bytes;
+}
+
+std::uint64_t from_little_endian(std::string_view bytes) {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    value |= std::uint64_t{static_cast<unsigned char>(bytes[i])} << (8 * i);
+  }
+  return value;
+}
+
+std::string record_of(const wire::ResultBatch& batch) {
+  const std::string payload = wire::encode({.header = record_header, .message = batch});
+  return little_endian(payload.size(), size_bytes) +
+         little_endian(checksum(payload), checksum_bytes) + payload;
+}
+
+/// The payload at the start of the bytes; nothing if they do not start with a whole record.
+std::optional<std::string_view> payload_at(std::string_view bytes) {
+  constexpr std::size_t head_bytes = size_bytes + checksum_bytes;
+  if (bytes.size() < head_bytes) return std::nullopt;
+  const std::uint64_t size = from_little_endian(bytes.substr(0, size_bytes));
+  if (bytes.size() - head_bytes < size) return std::nullopt;
+  const std::string_view payload = bytes.substr(head_bytes, size);
+  const std::uint64_t expected = from_little_endian(bytes.substr(size_bytes, checksum_bytes));
+  if (checksum(payload) != expected) return std::nullopt;
+  return payload;
+}
+
+std::optional<wire::ResultBatch> batch_from(std::string_view payload) {
+  const auto decoded = wire::decode(payload);
+  const auto* const packet = std::get_if<wire::Packet>(&decoded);
+  if (packet == nullptr) return std::nullopt;
+  const auto* const batch = std::get_if<wire::ResultBatch>(&packet->message);
+  return batch == nullptr ? std::nullopt : std::optional(*batch);
+}
+
+std::vector<wire::ResultBatch> batches_of(std::span<const KeptResult> results) {
+  std::vector<wire::ResultBatch> batches;
+  std::map<std::pair<wire::CampaignId, wire::Attempt>, std::size_t> open;
+  for (const KeptResult& result : results) {
+    const std::pair key(result.campaign, result.attempt);
+    const auto [entry, is_new] = open.try_emplace(key, batches.size());
+    if (is_new) batches.push_back({result.campaign, result.attempt, {}});
+    wire::ResultBatch& batch = batches[entry->second];
+    batch.results.push_back(result.computed);
+    if (batch.results.size() == wire::runs_per_lease_max) open.erase(key);
+  }
+  return batches;
+}
+
+}  // namespace
+
+Spool::Spool(std::filesystem::path path, std::string_view model, std::uint64_t size_max)
+    : path_(std::move(path)),
+      header_(fmt::format("proofmass-spool 1 {}\n", model)),
+      size_max_(size_max),
+      file_(open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600)) {
+  if (file_ < 0) throw Error(message(std::strerror(errno)));
+  try {
+    lock();
+    read();
+  } catch (const Error&) {
+    close(file_);
+    throw;
+  }
+}
+
+Spool::~Spool() {
+  if (is_empty()) unlink(path_.c_str());
+  close(file_);
+}
+
+std::string Spool::message(std::string_view reason) const {
+  return fmt::format("spool = {} ({})", path_.string(), reason);
+}
+
+void Spool::lock() const {
+  if (flock(file_, LOCK_EX | LOCK_NB) == 0) return;
+  throw Error(message(errno == EWOULDBLOCK ? "used by another worker" : std::strerror(errno)));
+}
+
+void Spool::read() {
+  std::string content;
+  std::array<char, 1 << 16> part{};
+  ssize_t count = 0;
+  while ((count = ::read(file_, part.data(), part.size())) > 0) {
+    content.append(part.data(), static_cast<std::size_t>(count));
+    if (content.size() > size_max_) {
+      throw Error(message(fmt::format("must be at most {} bytes", size_max_)));
+    }
+  }
+  if (count < 0) throw Error(message(std::strerror(errno)));
+  if (content.size() < header_.size() && header_.starts_with(content)) {
+    num_bytes_dropped_ = content.size();
+    if (const auto reason = write(header_)) throw Error(*reason);
+  } else if (content.starts_with(header_)) {
+    read_records(content);
+  } else {
+    throw Error(message("must be a spool of the same model, or not exist"));
+  }
+}
+
+void Spool::read_records(std::string_view content) {
+  size_ = header_.size();
+  while (const auto payload = payload_at(content.substr(size_))) {
+    const auto batch = batch_from(*payload);
+    if (!batch) break;
+    for (const wire::ComputedRun& computed : batch->results) {
+      former_results_.push_back({batch->campaign, batch->attempt, computed});
+    }
+    size_ += size_bytes + checksum_bytes + payload->size();
+  }
+  num_bytes_dropped_ = content.size() - size_;
+  if (num_bytes_dropped_ == 0) return;
+  if (ftruncate(file_, static_cast<off_t>(size_)) != 0) throw Error(message(std::strerror(errno)));
+}
+
+std::optional<std::string> Spool::append(std::span<const KeptResult> results) {
+  std::string records;
+  for (const wire::ResultBatch& batch : batches_of(results)) records += record_of(batch);
+  return write(records);
+}
+
+std::optional<std::string> Spool::write(std::string_view bytes) {
+  if (size_ + bytes.size() > size_max_) {
+    return message(fmt::format("full: must be at most {} bytes", size_max_));
+  }
+  std::size_t num_written = 0;
+  while (num_written < bytes.size()) {
+    const ssize_t count = pwrite(file_, bytes.data() + num_written, bytes.size() - num_written,
+                                 static_cast<off_t>(size_ + num_written));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) break;
+    num_written += static_cast<std::size_t>(count);
+  }
+  if (num_written < bytes.size() || fdatasync(file_) != 0) {
+    std::string reason = message(std::strerror(errno));
+    [[maybe_unused]] const int cut = ftruncate(file_, static_cast<off_t>(size_));
+    return reason;
+  }
+  size_ += bytes.size();
+  return std::nullopt;
+}
+
+void Spool::clear() {
+  if (is_empty()) return;
+  // If it cannot be cut, its results are delivered once more, which changes nothing.
+  if (ftruncate(file_, static_cast<off_t>(header_.size())) == 0) size_ = header_.size();
+}
+
+}  // namespace proofmass::worker

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "worker/execution/execution.hpp"
+
+namespace proofmass::worker {
+
+/// A file of results that no coordinator has acknowledged, for the worker that comes after this
+/// one.
+///
+/// It begins with a line that names the model. Then come records: size of the payload (32 bits) and
+/// its checksum (64 bits), little endian, and the payload, an encoded message with results of one
+/// campaign and attempt. What a process that dies leaves unfinished at the end is dropped by the
+/// next one.
+class Spool {
+ public:
+  static constexpr std::uint64_t default_size_max = std::uint64_t{256} << 20;
+
+  /// Opens or makes the file and reads what it holds.
+  ///
+  /// @param model     is_name() holds; results of another model are not delivered.
+  /// @param size_max  Bytes that the file may have.
+  /// @throws Error reading `spool = PATH (rule)` if it cannot be opened, read or written, is
+  /// another
+  ///         worker's, or is no spool of this model.
+  Spool(std::filesystem::path path, std::string_view model,
+        std::uint64_t size_max = default_size_max);
+  ~Spool();  ///< Removes the file if it holds nothing.
+  Spool(const Spool&) = delete;
+  Spool& operator=(const Spool&) = delete;
+
+  /// The results that it held when it was opened.
+  [[nodiscard]] const std::vector<KeptResult>& former_results() const { return former_results_; }
+  /// Bytes at its end that were no records and have been dropped.
+  [[nodiscard]] std::uint64_t num_bytes_dropped() const { return num_bytes_dropped_; }
+
+  /// Adds results; they survive the process and the machine. If that is not possible, none is added
+  /// and the reason is returned, as `spool = PATH (reason)`.
+  [[nodiscard]] std::optional<std::string> append(std::span<const KeptResult> results);
+  /// Everything has been acknowledged.
+  void clear();
+
+  [[nodiscard]] std::uint64_t size() const { return size_; }  ///< Bytes.
+  [[nodiscard]] bool is_empty() const { return size_ <= header_.size(); }
+
+ private:
+  [[nodiscard]] std::string message(std::string_view reason) const;
+  void lock() const;
+  void read();
+  void read_records(std::string_view content);
+  /// The reason if it cannot be written; then the file is as before.
+  [[nodiscard]] std::optional<std::string> write(std::string_view bytes);
+
+  std::filesystem::path path_;
+  std::string header_;
+  std::uint64_t size_max_;
+  int file_ = -1;
+  std::uint64_t size_ = 0;
+  std::uint64_t num_bytes_dropped_ = 0;
+  std::vector<KeptResult> former_results_;
+};
+
+}  // namespace proofmass::worker

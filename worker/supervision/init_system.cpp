@@ -1,0 +1,61 @@
+#include "worker/supervision/init_system.hpp"
+
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <charconv>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <utility>
+
+namespace proofmass::worker {
+namespace {
+
+std::string environment(const char* name) {
+  const char* const value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+/// The number that is the whole text; nothing if it is not one, or is 0.
+std::optional<std::int64_t> positive_number(std::string_view text) {
+  std::int64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool is_number = error == std::errc{} && end == text.data() + text.size();
+  return is_number && number > 0 ? std::optional(number) : std::nullopt;
+}
+
+}  // namespace
+
+InitSystem InitSystem::from_environment() {
+  std::optional<std::chrono::microseconds> watchdog;
+  if (const auto number = positive_number(environment("WATCHDOG_USEC"))) {
+    watchdog = std::chrono::microseconds(*number);
+  }
+  return {environment("NOTIFY_SOCKET"), watchdog};
+}
+
+InitSystem::InitSystem(std::string socket, std::optional<std::chrono::microseconds> watchdog)
+    : socket_(std::move(socket)), watchdog_(watchdog) {}
+
+void InitSystem::notify(std::string_view lines) const {
+  sockaddr_un address{};
+  if (socket_.empty() || socket_.size() >= sizeof address.sun_path) return;
+  address.sun_family = AF_UNIX;
+  socket_.copy(address.sun_path, socket_.size());
+  if (socket_.front() == '@') address.sun_path[0] = '\0';
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + socket_.size());
+  const int file = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (file < 0) return;
+  [[maybe_unused]] const auto sent = sendto(file, lines.data(), lines.size(), MSG_NOSIGNAL,
+                                            reinterpret_cast<const sockaddr*>(&address), size);
+  close(file);
+}
+
+std::optional<std::chrono::microseconds> InitSystem::watchdog_interval() const {
+  if (!watchdog_) return std::nullopt;
+  return *watchdog_ / 2;
+}
+
+}  // namespace proofmass::worker

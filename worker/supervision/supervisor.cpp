@@ -1,0 +1,164 @@
+#include "worker/supervision/supervisor.hpp"
+
+#include <fmt/format.h>
+#include <signal.h>
+#include <spdlog/spdlog.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <random>
+#include <string>
+
+#include "core/error.hpp"
+
+namespace proofmass::worker {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Processes that the kernel has ended for want of memory, since it started, in this machine.
+std::uint64_t num_out_of_memory() {
+  std::ifstream file("/proc/vmstat");
+  std::string name;
+  std::uint64_t value = 0;
+  while (file >> name >> value) {
+    if (name == "oom_kill") return value;
+  }
+  return 0;
+}
+
+sigset_t supervised_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  for (const int signal : {SIGTERM, SIGINT, SIGCHLD, handed_on_signal()}) sigaddset(&set, signal);
+  return set;
+}
+
+timespec timespec_of(Clock::duration time) {
+  const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(time).count();
+  return {.tv_sec = ns / 1'000'000'000, .tv_nsec = ns % 1'000'000'000};
+}
+
+class Supervisor {
+ public:
+  Supervisor(const std::function<int(const ChildStart&)>& work, const RestartConfig& config)
+      : work_(work), policy_(config), config_(config), signals_(supervised_signals()) {
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+  }
+
+  int run() {
+    std::optional<wire::FormerSession> former;
+    while (true) {
+      const ChildStart start{.session = random_session(), .former = former};
+      const std::uint64_t num_killed_before = num_out_of_memory();
+      const pid_t child = start_child(start);
+      const int status = wait_for(child);
+      if (WIFEXITED(status) && WEXITSTATUS(status) != exit_hung) return WEXITSTATUS(status);
+      if (num_requests_ > 0) return exit_code_of(status);
+      former = former_session(start.session, status, num_out_of_memory() > num_killed_before);
+      if (!wait_before_restart(status)) return 0;
+    }
+  }
+
+ private:
+  pid_t start_child(const ChildStart& start) {
+    std::fflush(nullptr);
+    const pid_t supervisor = getpid();
+    const pid_t child = fork();
+    if (child < 0) throw Error(fmt::format("worker process = none ({})", std::strerror(errno)));
+    if (child > 0) return child;
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() != supervisor) _exit(0);  // It ended before it could be watched.
+    sigset_t children;
+    sigemptyset(&children);
+    sigaddset(&children, SIGCHLD);
+    pthread_sigmask(SIG_UNBLOCK, &children, nullptr);
+    const int exit_code = work_(start);
+    std::fflush(nullptr);
+    _exit(exit_code);  // The supervisor ends the program; this is a part of it.
+  }
+
+  /// Hands requests on until the child has ended, and returns how it did.
+  int wait_for(pid_t child) {
+    int status = 0;
+    while (waitpid(child, &status, WNOHANG) != child) {
+      const int signal = sigwaitinfo(&signals_, nullptr);
+      if (signal != SIGTERM && signal != SIGINT) continue;
+      ++num_requests_;
+      sigqueue(child, handed_on_signal(), {.sival_int = num_requests_});
+    }
+    return status;
+  }
+
+  static int exit_code_of(int status) {
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+
+  /// A child that somebody killed, or that hung, says nothing against its runs: the coordinator
+  /// hears no more of it, or has told it to end.
+  static std::optional<wire::FormerSession> former_session(wire::SessionId session, int status,
+                                                           bool is_memory_short) {
+    if (!WIFSIGNALED(status)) return std::nullopt;
+    const int signal = WTERMSIG(status);
+    if (signal == SIGKILL && !is_memory_short) return std::nullopt;
+    return wire::FormerSession{
+        .session = session,
+        .reason = signal == SIGKILL ? wire::LossReason::out_of_memory : wire::LossReason::crashed,
+        .signal = static_cast<std::uint32_t>(signal)};
+  }
+
+  /// False if it was asked to end meanwhile.
+  bool wait_before_restart(int status) {
+    const std::string how =
+        WIFSIGNALED(status)
+            ? fmt::format("signal={} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)))
+            : fmt::format("exit_code={} (a computation hangs)", WEXITSTATUS(status));
+    const auto delay = policy_.on_crash(Clock::now());
+    if (!delay) {
+      throw Error(fmt::format(
+          "crashes = {} (must be fewer within {} s); the last by {}", config_.num_crashes_max,
+          std::chrono::duration_cast<std::chrono::seconds>(config_.window).count(), how));
+    }
+    spdlog::error("worker_crashed {} restart_in_s={:.1f}", how,
+                  std::chrono::duration<double>(*delay).count());
+    return !is_asked_to_end_within(*delay);
+  }
+
+  bool is_asked_to_end_within(Clock::duration time) {
+    const Clock::time_point until = Clock::now() + time;
+    while (true) {
+      const timespec left = timespec_of(std::max(Clock::duration::zero(), until - Clock::now()));
+      const int signal = sigtimedwait(&signals_, nullptr, &left);
+      if (signal == SIGTERM || signal == SIGINT) return true;
+      if (signal < 0 && errno == EAGAIN) return false;
+    }
+  }
+
+  const std::function<int(const ChildStart&)>& work_;
+  RestartPolicy policy_;
+  RestartConfig config_;
+  sigset_t signals_;
+  int num_requests_ = 0;
+};
+
+}  // namespace
+
+int handed_on_signal() { return SIGRTMIN; }
+
+wire::SessionId random_session() {
+  std::random_device device;
+  std::uint64_t value = 0;
+  while (value == 0) value = (std::uint64_t{device()} << 32) | device();
+  return {value};
+}
+
+int supervise(const std::function<int(const ChildStart&)>& work, const RestartConfig& config) {
+  return Supervisor(work, config).run();
+}
+
+}  // namespace proofmass::worker
