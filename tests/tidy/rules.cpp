@@ -32,8 +32,8 @@ std::string broken_layer(const SourceFile& file, const std::string& include) {
     return "SQLite stays in coordinator/store/*.cpp";
   }
   if (matches(include, "^zmq") &&
-      !(matches(file.path, "^(coordinator|worker)/net/") && is_source)) {
-    return "ZeroMQ stays in */net/*.cpp";
+      !(matches(file.path, "^(coordinator/net|worker/net|proto/link)/") && is_source)) {
+    return "ZeroMQ stays in */net/*.cpp and proto/link/*.cpp";
   }
   if (matches(include, "\\.pb\\.h$|^google/protobuf") && !(file.is_in("proto/wire") && is_source)) {
     return "Protobuf types stay in proto/wire/*.cpp";

@@ -1,0 +1,204 @@
+// Many workers in one process, whose runs cost nothing: what a coordinator has to bear.
+//
+// Prints a line of JSON once all workers are registered, and one each second from then on; ends
+// when the coordinator has told all of them to.
+
+#include <sys/epoll.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <random>
+#include <system_error>
+#include <vector>
+#include <zmq.hpp>
+
+#include "core/simulation/reference_digest.hpp"
+#include "core/simulation/run.hpp"
+#include "tests/benchmarks/swarm_worker.hpp"
+
+namespace {
+
+using namespace proofmass;
+using test::SwarmCount;
+using test::SwarmWorker;
+using TimePoint = SwarmWorker::TimePoint;
+
+constexpr std::chrono::milliseconds tick_interval(100);
+constexpr std::chrono::seconds report_interval(1);
+
+struct SwarmOptions {
+  test::SwarmWorkerConfig worker;
+  int num_workers = 1000;
+};
+
+TimePoint time_now() { return std::chrono::steady_clock::now(); }
+
+double seconds(worker::Duration duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
+/// Each worker has a connection and what wakes its thread.
+void raise_descriptor_limit() {
+  rlimit limit{};
+  getrlimit(RLIMIT_NOFILE, &limit);
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+wire::SessionId random_session() {
+  std::random_device device;
+  const std::uint64_t high = device();
+  return {(high << 32) | device() | 1U};
+}
+
+wire::Hello hello_of(int number, std::uint32_t num_slots) {
+  static const std::uint64_t digest = reference_digest(best_instruction_set());
+  return {.worker_name = "swarm-" + std::to_string(number),
+          .host = "swarm-host-" + std::to_string(number / 32),
+          .process_id = static_cast<std::uint64_t>(getpid()),
+          .num_slots = num_slots,
+          .model_version = std::string(model_version),
+          .build = "benchmark",
+          .reference_digest = digest,
+          .former = std::nullopt};
+}
+
+double largest(const std::vector<double>& values) {
+  return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+class Swarm {
+ public:
+  explicit Swarm(const SwarmOptions& options) : epoll_(epoll_create1(EPOLL_CLOEXEC)) {
+    if (epoll_ < 0) throw std::system_error(errno, std::generic_category(), "epoll_create1");
+    context_.set(zmq::ctxopt::max_sockets, options.num_workers + 16);
+    for (int i = 0; i < options.num_workers; ++i) add_worker(options.worker, i);
+  }
+
+  ~Swarm() { close(epoll_); }
+  Swarm(const Swarm&) = delete;
+  Swarm& operator=(const Swarm&) = delete;
+
+  void run() {
+    while (!is_over()) {
+      wait();
+      const TimePoint now = time_now();
+      if (now >= tick_at_) tick(now);
+      if (report_at_ && now >= *report_at_) report(now);
+    }
+    report(time_now());
+  }
+
+ private:
+  void add_worker(const test::SwarmWorkerConfig& config, int number) {
+    const auto& worker = workers_.emplace_back(std::make_unique<SwarmWorker>(
+        context_, config, random_session(), hello_of(number, config.num_slots), count_, start_));
+    epoll_event event{.events = EPOLLIN, .data = {.ptr = worker.get()}};
+    if (epoll_ctl(epoll_, EPOLL_CTL_ADD, worker->descriptor(), &event) != 0) {
+      throw std::system_error(errno, std::generic_category(), "epoll_ctl");
+    }
+  }
+
+  [[nodiscard]] bool is_over() const {
+    return std::ranges::all_of(workers_, [](const auto& worker) { return worker->has_ended(); });
+  }
+
+  void wait() {
+    std::array<epoll_event, 256> events{};
+    const int timeout_ms = tick_interval.count() / 10;
+    const int count = epoll_wait(epoll_, events.data(), events.size(), timeout_ms);
+    for (int i = 0; i < count; ++i) {
+      static_cast<SwarmWorker*>(events[static_cast<std::size_t>(i)].data.ptr)->serve(time_now());
+    }
+  }
+
+  void tick(TimePoint now) {
+    tick_at_ = now + tick_interval;
+    for (const auto& worker : workers_) {
+      if (!worker->has_ended()) worker->on_tick(time_now());
+    }
+    const auto is_registered = [](const auto& worker) { return worker->is_registered(); };
+    if (!report_at_ && std::ranges::all_of(workers_, is_registered)) report(time_now());
+  }
+
+  void report(TimePoint now) {
+    report_at_ = now + report_interval;
+    std::cout << nlohmann::json{{"time_s", seconds(now - start_)},
+                                {"num_registered", num_registered()},
+                                {"num_leases", count_.num_leases},
+                                {"num_result_messages", count_.num_result_messages},
+                                {"num_results", count_.num_results},
+                                {"num_acknowledged", count_.num_acknowledged},
+                                {"num_rejects", count_.num_rejects},
+                                {"num_unsent", count_.num_unsent},
+                                {"num_heartbeats_answered", count_.heartbeat_answers_s.size()},
+                                {"heartbeat_answer_s_max", largest(count_.heartbeat_answers_s)},
+                                {"heartbeat_unanswered_s_max", unanswered_s_max(now)},
+                                {"acknowledgement_s_median", median(count_.acknowledgements_s)},
+                                {"acknowledgement_s_max", largest(count_.acknowledgements_s)}}
+              << std::endl;
+    count_ = {};
+  }
+
+  [[nodiscard]] std::ptrdiff_t num_registered() const {
+    return std::ranges::count_if(workers_,
+                                 [](const auto& worker) { return worker->is_registered(); });
+  }
+
+  [[nodiscard]] double unanswered_s_max(TimePoint now) const {
+    double longest_s = 0.0;
+    for (const auto& worker : workers_) {
+      const auto time = worker->unanswered_for(now);
+      if (time) longest_s = std::max(longest_s, seconds(*time));
+    }
+    return longest_s;
+  }
+
+  TimePoint start_ = time_now();
+  TimePoint tick_at_ = start_;
+  std::optional<TimePoint> report_at_;  ///< Nothing before all are registered.
+  int epoll_;
+  zmq::context_t context_;
+  SwarmCount count_;
+  std::vector<std::unique_ptr<SwarmWorker>> workers_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Many workers in one process, whose runs cost nothing.", "proofmass-swarm");
+  SwarmOptions options;
+  app.add_option("--connect", options.worker.endpoint, "Address of the coordinator")->required();
+  app.add_option("--workers", options.num_workers, "How many")->check(CLI::Range(1, 4096));
+  app.add_option("--slots", options.worker.num_slots, "Of each")->check(CLI::Range(1, 1024));
+  app.add_option("--runs-held", options.worker.runs_held_max, "Most runs that each has at a time")
+      ->check(CLI::Range(1, 4096));
+  app.add_option("--compute-s", options.worker.compute_s, "What they say that a run takes")
+      ->check(CLI::NonNegativeNumber);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    raise_descriptor_limit();
+    Swarm(options).run();
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << "proofmass-swarm: error: " << error.what() << '\n';
+    return 1;
+  }
+}

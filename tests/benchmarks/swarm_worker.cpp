@@ -1,0 +1,119 @@
+#include "tests/benchmarks/swarm_worker.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string_view>
+#include <variant>
+
+#include "proto/link/socket.hpp"
+#include "proto/wire/codec.hpp"
+
+namespace proofmass::test {
+namespace {
+
+/// One run in so many is timed: enough, and cheap.
+constexpr std::uint64_t timed_run_step = 16;
+
+SwarmWorker::TimePoint time_now() { return std::chrono::steady_clock::now(); }
+
+double seconds(worker::Duration duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
+zmq::socket_t connected_dealer(zmq::context_t& context, const std::string& endpoint) {
+  zmq::socket_t socket = wire::make_dealer(context, {});
+  socket.connect(endpoint);
+  return socket;
+}
+
+}  // namespace
+
+SwarmWorker::SwarmWorker(zmq::context_t& context, const SwarmWorkerConfig& config,
+                         wire::SessionId session, wire::Hello hello, SwarmCount& count,
+                         TimePoint now)
+    : runs_held_max_(config.runs_held_max),
+      count_(count),
+      execution_(config.compute_s),
+      socket_(connected_dealer(context, config.endpoint)),
+      conversation_(
+          session, std::move(hello), execution_,
+          [this](const wire::Packet& packet) { send(packet); }, now) {}
+
+int SwarmWorker::descriptor() { return socket_.get(zmq::sockopt::fd); }
+
+void SwarmWorker::serve(TimePoint now) {
+  // Reading the events takes in what the descriptor has announced; it announces each thing once.
+  const int events = socket_.get(zmq::sockopt::events);
+  if (!is_connected_ && (events & ZMQ_POLLOUT) != 0) {
+    is_connected_ = true;
+    conversation_.on_connected(now);
+  }
+  zmq::message_t frame;
+  while (!has_ended() && socket_.recv(frame, zmq::recv_flags::dontwait)) {
+    receive(frame.to_string_view(), now);
+    if (execution_.has_finished()) conversation_.on_progress(now);
+  }
+}
+
+void SwarmWorker::on_tick(TimePoint now) {
+  conversation_.on_tick(now);
+  serve(now);
+}
+
+std::optional<worker::Duration> SwarmWorker::unanswered_for(TimePoint now) const {
+  if (heartbeats_.empty()) return std::nullopt;
+  return now - heartbeats_.front();
+}
+
+void SwarmWorker::send(wire::Packet packet) {
+  const TimePoint now = time_now();
+  if (auto* const heartbeat = std::get_if<wire::Heartbeat>(&packet.message)) {
+    heartbeat->num_runs_max = std::min(heartbeat->num_runs_max, runs_held_max_);
+    heartbeats_.push_back(now);
+  }
+  if (const auto* const batch = std::get_if<wire::ResultBatch>(&packet.message)) {
+    note_sent(*batch, now);
+  }
+  if (!socket_.send(zmq::buffer(wire::encode(packet)), zmq::send_flags::dontwait)) {
+    ++count_.num_unsent;
+  }
+}
+
+void SwarmWorker::receive(std::string_view bytes, TimePoint now) {
+  const auto decoded = wire::decode(bytes);
+  if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
+    throw std::runtime_error("the coordinator sent what cannot be read: " + error->text);
+  }
+  const auto& packet = std::get<wire::Packet>(decoded);
+  if (std::holds_alternative<wire::RunLease>(packet.message)) ++count_.num_leases;
+  if (std::holds_alternative<wire::Reject>(packet.message)) ++count_.num_rejects;
+  if (const auto* const ack = std::get_if<wire::ResultAck>(&packet.message)) {
+    note_acknowledged(*ack, now);
+  }
+  if (std::holds_alternative<wire::HeartbeatAck>(packet.message) && !heartbeats_.empty()) {
+    count_.heartbeat_answers_s.push_back(seconds(now - heartbeats_.front()));
+    heartbeats_.erase(heartbeats_.begin());
+  }
+  conversation_.on_packet(packet, now);
+}
+
+void SwarmWorker::note_sent(const wire::ResultBatch& batch, TimePoint now) {
+  ++count_.num_result_messages;
+  count_.num_results += batch.results.size();
+  for (const wire::ComputedRun& computed : batch.results) {
+    const RunIndex run = computed.result.run;
+    if (run.value % timed_run_step == 0) timed_.try_emplace({batch.campaign, run}, now);
+  }
+}
+
+void SwarmWorker::note_acknowledged(const wire::ResultAck& ack, TimePoint now) {
+  count_.num_acknowledged += ack.runs.size();
+  for (const RunIndex run : ack.runs) {
+    const auto found = timed_.find({ack.campaign, run});
+    if (found == timed_.end()) continue;
+    count_.acknowledgements_s.push_back(seconds(now - found->second));
+    timed_.erase(found);
+  }
+}
+
+}  // namespace proofmass::test

@@ -1,0 +1,243 @@
+#include <chrono>
+#include <deque>
+#include <map>
+#include <memory>
+#include <set>
+#include <utility>
+#include <variant>
+
+#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/net/worker_desk.hpp"
+#include "core/error.hpp"
+#include "proto/wire/client_codec.hpp"
+#include "proto/wire/codec.hpp"
+#include "tests/fuzz/fuzz_input.hpp"
+
+namespace proofmass::test {
+namespace {
+
+using coordinator::Arrival;
+using coordinator::TimePoint;
+using wire::CampaignId;
+
+constexpr std::size_t num_connections = 8;
+
+std::shared_ptr<const Campaign> make_campaign(bool has_table) {
+  Campaign campaign;
+  campaign.num_runs = fuzz_num_runs;
+  if (has_table) {
+    campaign.name = "table";
+    campaign.dispersions[3] = {.law = Law::table, .file = "f.csv", .column = "a"};
+    campaign.table_columns = {std::vector<double>(fuzz_num_runs, 1e-4)};
+  }
+  campaign.validate();
+  return std::make_shared<const Campaign>(std::move(campaign));
+}
+
+coordinator::StoredCampaign stored(bool has_table) {
+  static const auto plain_definition = make_campaign(false);
+  static const auto table_definition = make_campaign(true);
+  coordinator::StoredCampaign campaign;
+  campaign.definition = has_table ? table_definition : plain_definition;
+  campaign.audit_fraction = has_table ? 0.5 : 0.0;
+  if (has_table) campaign.finished = {{.first = {2}, .count = 3}};
+  return campaign;
+}
+
+coordinator::DispatchConfig config() {
+  coordinator::DispatchConfig config;
+  config.reference_digest = fuzz_reference_digest;
+  config.num_workers_max = 6;
+  return config;
+}
+
+/// The coordinator without sockets and files, in a time of its own.
+class World final : public coordinator::Outbox {
+ public:
+  World() : state_(initial_state(config(), {}, now_)), desk_(state_, fuzz_epoch, surroundings()) {
+    on_campaign(state_, fuzz_campaign, stored(false), now_, *this);
+    on_campaign(state_, fuzz_table_campaign, stored(true), now_, *this);
+    check_invariants(state_);
+  }
+
+  void play(const Step& step) {
+    act(step);
+    check_invariants(state_);
+  }
+
+  [[nodiscard]] const FuzzSummary& summary() const { return summary_; }
+
+  // Outbox.
+  void send(wire::WorkerId worker, wire::Message message) override {
+    desk_.send(worker, std::move(message));
+  }
+  void store(Arrival arrival) override {
+    const auto& run = arrival.computed.result.run;
+    PROOFMASS_EXPECT(run.value < fuzz_num_runs);
+    PROOFMASS_EXPECT(handed_over_.emplace(arrival.campaign, run).second);
+    to_commit_.push_back(std::move(arrival));
+  }
+  void compare(Arrival arrival) override { to_compare_.push_back(std::move(arrival)); }
+  void record(const coordinator::Loss& loss) override {
+    PROOFMASS_EXPECT(loss.runs.count > 0 && loss.runs.end() <= fuzz_num_runs);
+    summary_.num_lost += loss.runs.count;
+  }
+  void give_up(CampaignId, RunIndex run) override {
+    PROOFMASS_EXPECT(run.value < fuzz_num_runs);
+    ++summary_.num_given_up;
+  }
+  void log(coordinator::Event event) override {
+    // A line of the log is one line.
+    PROOFMASS_EXPECT(event.text.find('\n') == std::string::npos);
+  }
+
+ private:
+  coordinator::WorkerDesk::Surroundings surroundings() {
+    return {.transmit =
+                [this](const std::string&, const std::string& bytes) {
+                  note_sent(bytes);
+                  return true;
+                },
+            .is_allowed = [](const std::string&, TimePoint) { return true; },
+            .on_leaving = [](wire::WorkerId, wire::LossReason) {}};
+  }
+
+  void note_sent(std::string_view bytes) {
+    const auto decoded = wire::decode(bytes);
+    const auto* const packet = std::get_if<wire::Packet>(&decoded);
+    PROOFMASS_EXPECT(packet != nullptr);
+    summary_.num_leases += std::holds_alternative<wire::RunLease>(packet->message) ? 1U : 0U;
+    summary_.num_rejections += std::holds_alternative<wire::Reject>(packet->message) ? 1U : 0U;
+  }
+
+  static std::string routing_id(const Step& step) {
+    return std::string(1, static_cast<char>('a' + step.number % num_connections));
+  }
+
+  void act(const Step& step) {
+    switch (step.kind) {
+      case StepKind::worker_message:
+        return desk_.receive({.from = {.routing_id = routing_id(step), .key = "", .host = ""},
+                              .frames = {step.content}},
+                             now_, *this);
+      case StepKind::client_request:
+        return carry_out_request(step.content);
+      case StepKind::client_reply:
+        return check_reply(step.content);
+      case StepKind::coordinator_message:
+        return check_message(step.content);
+      case StepKind::commit:
+        return commit(std::size_t{step.number} + 1);
+      case StepKind::compare:
+        return compare_next(step.number % 2 == 0);
+      case StepKind::elapse:
+        return elapse(step.value * std::chrono::milliseconds(10));
+      case StepKind::store_failure:
+        return fail_or_recover(step.number % 2 == 0);
+      case StepKind::gone:
+        return end_process(step);
+    }
+  }
+
+  /// What has been decoded is encoded and decoded again: to the same bytes.
+  void check_message(std::string_view bytes) {
+    const auto decoded = wire::decode(bytes);
+    const auto* const packet = std::get_if<wire::Packet>(&decoded);
+    if (packet == nullptr) return;
+    ++summary_.num_orders;
+    const std::string once = wire::encode(*packet);
+    PROOFMASS_EXPECT(wire::encode(std::get<wire::Packet>(wire::decode(once))) == once);
+  }
+
+  void check_reply(std::string_view bytes) {
+    const auto decoded = wire::decode_reply(bytes);
+    const auto* const packet = std::get_if<wire::ReplyPacket>(&decoded);
+    if (packet == nullptr) return;
+    ++summary_.num_replies;
+    const std::string once = wire::encode(*packet);
+    PROOFMASS_EXPECT(wire::encode(std::get<wire::ReplyPacket>(wire::decode_reply(once))) == once);
+  }
+
+  void carry_out_request(std::string_view bytes) {
+    const auto decoded = wire::decode_request(bytes);
+    const auto* const packet = std::get_if<wire::RequestPacket>(&decoded);
+    if (packet == nullptr) return;
+    ++summary_.num_requests;
+    const std::string once = wire::encode(*packet);
+    PROOFMASS_EXPECT(wire::encode(std::get<wire::RequestPacket>(wire::decode_request(once))) ==
+                     once);
+    const auto* const control = std::get_if<wire::ControlRequest>(&packet->request);
+    if (control == nullptr) return;
+    control_campaign(control->campaign == "table" ? fuzz_table_campaign : fuzz_campaign,
+                     control->action);
+  }
+
+  /// As the service does it.
+  void control_campaign(CampaignId id, wire::ControlAction action) {
+    const coordinator::Phase phase = state_.campaigns.at(id).phase;
+    if (phase == coordinator::Phase::finished) return;
+    if (action == wire::ControlAction::pause) return on_pause(state_, id, *this);
+    if (action == wire::ControlAction::cancel) return on_cancel(state_, id, *this);
+    if (phase != coordinator::Phase::active) on_resume(state_, id, now_, *this);
+  }
+
+  void commit(std::size_t count_max) {
+    std::map<CampaignId, std::vector<RunIndex>> committed;
+    for (std::size_t i = 0; i < count_max && !to_commit_.empty(); ++i) {
+      const Arrival& arrival = to_commit_.front();
+      committed[arrival.campaign].push_back(arrival.computed.result.run);
+      to_commit_.pop_front();
+      ++summary_.num_committed;
+    }
+    for (const auto& [id, runs] : committed) on_committed(state_, id, runs, now_, *this);
+  }
+
+  void compare_next(bool is_equal) {
+    if (to_compare_.empty()) return;
+    const Arrival arrival = std::move(to_compare_.front());
+    to_compare_.pop_front();
+    ++summary_.num_compared;
+    on_compared(state_, arrival.campaign, arrival.computed.result.run, arrival.worker, is_equal,
+                now_, *this);
+  }
+
+  void elapse(TimePoint::duration duration) {
+    now_ += duration;
+    on_tick(state_, now_, *this);
+    desk_.review(now_, *this);
+  }
+
+  void fail_or_recover(bool fails) {
+    if (fails == is_failing_) return;
+    is_failing_ = fails;
+    if (fails) return on_store_failed(state_, fuzz_campaign, "disk full", *this);
+    on_store_recovered(state_, fuzz_campaign, now_, *this);
+  }
+
+  void end_process(const Step& step) {
+    const auto worker = desk_.peers().worker_at(routing_id(step));
+    if (!worker) return;
+    const bool ran_out = step.number >= num_connections;
+    on_gone(state_, *worker, ran_out ? wire::LossReason::out_of_memory : wire::LossReason::crashed,
+            now_, *this);
+  }
+
+  TimePoint now_{};
+  coordinator::State state_;
+  coordinator::WorkerDesk desk_;
+  std::set<std::pair<CampaignId, RunIndex>> handed_over_;
+  std::deque<Arrival> to_commit_;
+  std::deque<Arrival> to_compare_;
+  bool is_failing_ = false;
+  FuzzSummary summary_;
+};
+
+}  // namespace
+
+FuzzSummary run_fuzz_input(std::string_view input) {
+  World world;
+  for (const Step& step : parse_steps(input)) world.play(step);
+  return world.summary();
+}
+
+}  // namespace proofmass::test

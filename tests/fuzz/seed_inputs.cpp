@@ -1,0 +1,324 @@
+#include "tests/fuzz/seed_inputs.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "core/simulation/run.hpp"
+#include "proto/wire/client_codec.hpp"
+#include "proto/wire/codec.hpp"
+#include "tests/fuzz/fuzz_input.hpp"
+
+namespace proofmass::test {
+namespace {
+
+/// A worker process that says real things on one connection.
+class Speaker {
+ public:
+  Speaker(std::vector<Step>& steps, std::uint8_t connection, std::uint64_t session)
+      : steps_(steps), connection_(connection), session_{session} {}
+
+  void say(wire::Message message, wire::Epoch epoch = fuzz_epoch) {
+    const wire::Header header{.session = session_, .epoch = epoch, .sequence = ++sequence_};
+    steps_.push_back({.kind = StepKind::worker_message,
+                      .number = connection_,
+                      .value = 0,
+                      .content = wire::encode({.header = header, .message = std::move(message)})});
+  }
+
+  void say_hello(const std::string& host) {
+    say(wire::Hello{.worker_name = "w",
+                    .host = host,
+                    .process_id = 1000,
+                    .num_slots = 4,
+                    .model_version = std::string(model_version),
+                    .build = "b",
+                    .reference_digest = fuzz_reference_digest,
+                    .former = {}},
+        wire::Epoch{});
+  }
+
+  /// Runs [first, first + count) are held; the first of them are being computed.
+  void beat(wire::CampaignId campaign, std::uint64_t first, std::uint64_t count,
+            std::uint32_t attempt = 1) {
+    wire::Heartbeat heartbeat{
+        .num_runs_max = 8, .num_orbits_done = ++num_orbits_, .held = {}, .computing = {}};
+    if (count > 0) {
+      const RunRange runs{.first = {first}, .count = count};
+      heartbeat.held = {{.campaign = campaign, .attempt = {attempt}, .ranges = {runs}}};
+      heartbeat.computing = {
+          {.campaign = campaign,
+           .ranges = {{.first = {first}, .count = std::min<std::uint64_t>(count, 4)}},
+           .num_orbits_done = num_orbits_}};
+    }
+    say(std::move(heartbeat));
+  }
+
+  void deliver(wire::CampaignId campaign, std::uint64_t first, std::uint64_t count,
+               std::uint32_t attempt = 1) {
+    wire::ResultBatch batch{.campaign = campaign, .attempt = {attempt}, .results = {}};
+    for (std::uint64_t run = first; run < first + count; ++run) {
+      wire::ComputedRun computed;
+      computed.result.run = {run};
+      computed.compute_s = 0.5;
+      batch.results.push_back(computed);
+    }
+    say(std::move(batch));
+  }
+
+  void give_back(wire::CampaignId campaign, std::uint64_t first, std::uint64_t count) {
+    const RunRange runs{.first = {first}, .count = count};
+    say(wire::GiveBack{.reason = wire::LossReason::drained,
+                       .runs = {{.campaign = campaign, .attempt = {1}, .ranges = {runs}}}});
+  }
+
+ private:
+  std::vector<Step>& steps_;
+  std::uint8_t connection_;
+  wire::SessionId session_;
+  std::uint64_t sequence_ = 0;
+  std::uint32_t num_orbits_ = 0;
+};
+
+Step happening(StepKind kind, std::uint8_t number = 0, std::uint16_t value = 0) {
+  return {.kind = kind, .number = number, .value = value, .content = {}};
+}
+
+Step elapsed(std::uint16_t seconds) {
+  constexpr std::uint16_t per_second = 100;
+  return happening(StepKind::elapse, 0, static_cast<std::uint16_t>(seconds * per_second));
+}
+
+Step from_client(wire::ClientRequest request) {
+  return {.kind = StepKind::client_request,
+          .number = 0,
+          .value = 0,
+          .content = wire::encode(wire::RequestPacket{.id = 1, .request = std::move(request)})};
+}
+
+Step to_client(wire::ClientReply reply) {
+  return {.kind = StepKind::client_reply,
+          .number = 0,
+          .value = 0,
+          .content = wire::encode(wire::ReplyPacket{.id = 1, .reply = std::move(reply)})};
+}
+
+Step control(wire::ControlAction action, const std::string& campaign) {
+  return from_client(wire::ControlRequest{.action = action, .campaign = campaign});
+}
+
+std::string worker_that_delivers() {
+  std::vector<Step> steps;
+  Speaker worker(steps, 0, 11);
+  worker.say_hello("h");
+  worker.beat(fuzz_campaign, 0, 0);
+  worker.say(wire::CampaignRequest{.campaign = fuzz_campaign});
+  worker.beat(fuzz_campaign, 0, 8);
+  worker.deliver(fuzz_campaign, 0, 4);
+  steps.push_back(happening(StepKind::commit, 3));
+  worker.deliver(fuzz_campaign, 0, 4);  // Late, or repeated.
+  steps.push_back(happening(StepKind::compare));
+  steps.push_back(happening(StepKind::compare, 1));
+  worker.give_back(fuzz_campaign, 4, 2);
+  worker.say(wire::Bye{.reason = wire::LossReason::walltime});
+  return to_bytes(steps);
+}
+
+std::string workers_that_are_lost() {
+  std::vector<Step> steps;
+  Speaker first(steps, 0, 11);
+  Speaker second(steps, 1, 12);
+  first.say_hello("h");
+  second.say_hello("g");
+  first.beat(fuzz_campaign, 0, 0);
+  second.beat(fuzz_campaign, 0, 0);
+  first.beat(fuzz_campaign, 0, 8);
+  steps.push_back(happening(StepKind::gone, 0));
+  steps.push_back(elapsed(20));
+  second.beat(fuzz_campaign, 8, 8);
+  first.deliver(fuzz_campaign, 0, 2);
+  steps.push_back(elapsed(70));
+  second.deliver(fuzz_campaign, 8, 8);
+  second.beat(fuzz_campaign, 0, 2);
+  steps.push_back(happening(StepKind::commit, 20));
+  return to_bytes(steps);
+}
+
+/// The last run of a campaign crashes one worker after the other, each on another host.
+std::string run_that_crashes_workers() {
+  std::vector<Step> steps;
+  steps.push_back(control(wire::ControlAction::cancel, "table"));
+  Speaker first(steps, 0, 11);
+  first.say_hello("h");
+  first.deliver(fuzz_campaign, 1, fuzz_num_runs - 1);
+  steps.push_back(happening(StepKind::commit, fuzz_num_runs));
+  first.say(wire::Bye{.reason = wire::LossReason::drained});
+  for (std::uint8_t i = 1; i <= 4; ++i) {
+    Speaker worker(steps, i, 11U + i);
+    worker.say_hello(std::string(1, static_cast<char>('h' + i)));
+    worker.beat(fuzz_campaign, 0, 0);
+    steps.push_back(happening(StepKind::gone, i));
+  }
+  return to_bytes(steps);
+}
+
+/// All runs of the campaign with tables and audits, by two workers.
+std::string campaign_that_is_audited() {
+  std::vector<Step> steps;
+  Speaker first(steps, 0, 11);
+  Speaker second(steps, 1, 12);
+  steps.push_back(control(wire::ControlAction::cancel, "hardy2013"));
+  first.say_hello("h");
+  second.say_hello("g");
+  for (std::uint64_t run = 0; run < fuzz_num_runs; run += 4) {
+    first.beat(fuzz_table_campaign, 0, 0);
+    first.deliver(fuzz_table_campaign, run, 4);
+    steps.push_back(happening(StepKind::commit, 7));
+    second.beat(fuzz_table_campaign, 0, 0);
+    second.deliver(fuzz_table_campaign, run, 4, 2);
+    steps.push_back(happening(StepKind::compare));
+    steps.push_back(elapsed(1));
+  }
+  return to_bytes(steps);
+}
+
+std::string campaign_that_is_controlled() {
+  std::vector<Step> steps;
+  Speaker worker(steps, 0, 11);
+  worker.say_hello("h");
+  worker.beat(fuzz_campaign, 0, 0);
+  steps.push_back(control(wire::ControlAction::pause, "hardy2013"));
+  worker.beat(fuzz_campaign, 0, 8);
+  steps.push_back(control(wire::ControlAction::resume, "hardy2013"));
+  steps.push_back(happening(StepKind::store_failure, 0));
+  worker.deliver(fuzz_campaign, 0, 2);
+  steps.push_back(happening(StepKind::store_failure, 1));
+  steps.push_back(control(wire::ControlAction::cancel, "table"));
+  steps.push_back(control(wire::ControlAction::resume, "table"));
+  return to_bytes(steps);
+}
+
+std::string stranger() {
+  std::vector<Step> steps;
+  Speaker worker(steps, 0, 11);
+  worker.beat(fuzz_campaign, 0, 8);  // Before Hello.
+  worker.say(wire::Bye{}, wire::Epoch{8});
+  worker.say(wire::Stop{});
+  worker.say_hello("h");  // Is not listened to any more.
+  Speaker other_model(steps, 1, 12);
+  other_model.say(wire::Hello{.worker_name = "w",
+                              .host = "h",
+                              .process_id = 1,
+                              .num_slots = 1,
+                              .model_version = "other",
+                              .build = "b",
+                              .reference_digest = 1,
+                              .former = wire::FormerSession{.session = {11}}},
+                  wire::Epoch{});
+  Speaker thief(steps, 2, 12);
+  thief.say_hello("h");
+  return to_bytes(steps);
+}
+
+/// Workers that are registered and say what cannot be: one lie each, at the very edge.
+std::string liars() {
+  constexpr std::uint64_t last = fuzz_num_runs - 1;
+  constexpr std::uint32_t attempt_max = 0xffff'ffff;
+  std::vector<Step> steps;
+  std::uint8_t connection = 0;
+  const auto lie = [&](const std::function<void(Speaker&)>& say) {
+    Speaker worker(steps, connection, 11U + connection);
+    worker.say_hello("h");
+    worker.beat(fuzz_campaign, 0, 0);
+    say(worker);
+    ++connection;
+  };
+  lie([](Speaker& worker) { worker.deliver(fuzz_campaign, last, 2); });
+  lie([](Speaker& worker) { worker.deliver({.value = 9}, 0, 1); });
+  lie([](Speaker& worker) { worker.deliver(fuzz_campaign, 0, 1, attempt_max); });
+  lie([](Speaker& worker) { worker.beat(fuzz_campaign, last, 2); });
+  lie([](Speaker& worker) { worker.beat(fuzz_campaign, last, 1, attempt_max); });
+  lie([](Speaker& worker) { worker.beat({.value = 9}, 0, 1); });
+  lie([](Speaker& worker) { worker.give_back(fuzz_campaign, last, 2); });
+  lie([](Speaker& worker) { worker.give_back(fuzz_table_campaign, 0, num_runs_max); });
+  steps.push_back(elapsed(70));
+  steps.push_back(elapsed(70));
+  return to_bytes(steps);
+}
+
+Campaign campaign_with_table() {
+  Campaign campaign;
+  campaign.num_runs = 2;
+  campaign.dispersions[3] = {.law = Law::table, .file = "f.csv", .column = "a"};
+  campaign.table_columns = {{1e-4, 2e-4}};
+  return campaign;
+}
+
+std::string client_messages() {
+  wire::CampaignStatus campaign;
+  campaign.name = "a";
+  campaign.num_runs = 10;
+  campaign.remaining_s = 1.5;
+  campaign.storage_failure = "disk full";
+  const wire::StatusReply status{.version = "0",
+                                 .model_version = "m",
+                                 .uptime_s = 1.0,
+                                 .num_workers = 1,
+                                 .num_slots = 2,
+                                 .campaigns = {campaign}};
+  wire::WorkerStatus worker;
+  worker.id = {1};
+  worker.name = worker.host = "w";
+  return to_bytes({from_client(wire::StatusRequest{}), from_client(wire::WorkersRequest{}),
+                   to_client(status), to_client(wire::WorkersReply{.workers = {worker}}),
+                   to_client(wire::DoneReply{"done"}), to_client(wire::ErrorReply{"a = b (c)"})});
+}
+
+std::string submission() {
+  return to_bytes({from_client(wire::SubmitRequest{
+      .campaign = campaign_with_table(), .priority = -5, .audit_fraction = 0.25})});
+}
+
+std::string coordinator_messages() {
+  std::vector<Step> steps;
+  const auto add = [&](wire::Message message) {
+    const wire::Header header{.session = {11}, .epoch = fuzz_epoch, .sequence = steps.size() + 1};
+    steps.push_back({.kind = StepKind::coordinator_message,
+                     .number = 0,
+                     .value = 0,
+                     .content = wire::encode({.header = header, .message = std::move(message)})});
+  };
+  const RunRange runs{.first = {3}, .count = 2};
+  add(wire::Welcome{.worker = {1}, .heartbeat_interval_s = 5.0});
+  add(wire::Reject{.reason = wire::RejectReason::full, .text = "full"});
+  add(wire::RunLease{.campaign = fuzz_campaign,
+                     .runs = runs,
+                     .attempt = {1},
+                     .is_alone = true,
+                     .table_values = {0.5, 0.25}});
+  add(wire::Retract{.campaign = fuzz_campaign, .ranges = {runs}});
+  add(wire::ResultAck{.campaign = fuzz_campaign, .runs = {{3}, {4}}});
+  add(wire::Forget{.campaign = fuzz_campaign});
+  add(wire::HeartbeatAck{});
+  add(wire::Drain{});
+  add(wire::Stop{});
+  return to_bytes(steps);
+}
+
+}  // namespace
+
+std::map<std::string, std::string> seed_inputs() {
+  return {{"campaign_that_is_audited.bin", campaign_that_is_audited()},
+          {"campaign_that_is_controlled.bin", campaign_that_is_controlled()},
+          {"client_messages.bin", client_messages()},
+          {"coordinator_messages.bin", coordinator_messages()},
+          {"liars.bin", liars()},
+          {"run_that_crashes_workers.bin", run_that_crashes_workers()},
+          {"stranger.bin", stranger()},
+          {"submission.bin", submission()},
+          {"worker_that_delivers.bin", worker_that_delivers()},
+          {"workers_that_are_lost.bin", workers_that_are_lost()}};
+}
+
+}  // namespace proofmass::test
