@@ -27,7 +27,7 @@ void restore_blame(State& state, CampaignId id, const StoredCampaign& stored, Ru
     if (blamed.num_crashes == 0 || !open.remove(blamed.run)) continue;
     campaign.suspects[blamed.run].num_crashes =
         std::clamp(state.config.crashes_per_run_max - 1, 1U, blamed.num_crashes);
-    detail::make_pending(state, id, RunSet(RunRange{blamed.run, 1}), {blamed.attempt.value + 1},
+    detail::make_pending(state, id, RunSet(RunRange{blamed.run, 1}), detail::after(blamed.attempt),
                          outbox);
   }
 }

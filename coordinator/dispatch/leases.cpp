@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <iterator>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -12,8 +14,6 @@
 
 namespace proofmass::coordinator::detail {
 namespace {
-
-Attempt after(Attempt attempt) { return {attempt.value + 1}; }
 
 /// The lease of a copy becomes the first one of the run.
 void promote_copy(State& state, CampaignId id, RunIndex run, LeaseId copy) {
@@ -109,6 +109,11 @@ void take_off_and_tell(State& state, LeaseId lease, RunIndex run, WorkerId by,
 }
 
 }  // namespace
+
+Attempt after(Attempt attempt) {
+  constexpr std::uint32_t last = std::numeric_limits<std::uint32_t>::max();
+  return {attempt.value == last ? last : attempt.value + 1};
+}
 
 LeaseId open_lease(State& state, Lease lease) {
   PROOFMASS_EXPECT(!lease.remaining.empty());

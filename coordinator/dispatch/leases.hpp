@@ -14,6 +14,9 @@ namespace proofmass::coordinator::detail {
 using RunsByCampaign = std::map<CampaignId, RunSet>;
 using RunsByWorker = std::map<WorkerId, RunSet>;
 
+/// The attempt that follows; the largest follows itself, because a worker may claim any.
+[[nodiscard]] Attempt after(Attempt attempt);
+
 /// Adds a lease to the state and to all that counts leases.
 /// @pre Runs of a first lease have no other place; those of a copy are in `lent`.
 LeaseId open_lease(State& state, Lease lease);

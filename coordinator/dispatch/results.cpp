@@ -154,7 +154,7 @@ void on_committed(State& state, CampaignId id, std::span<const RunIndex> runs, T
     for (const WorkerId worker : waiting) acknowledged[worker].push_back(run);
     if (is_audited(campaign.definition->seed, run, campaign.audit_fraction)) {
       detail::add_to_audit(campaign,
-                           {.first_worker = waiting.front(), .attempt = {attempt.value + 1}},
+                           {.first_worker = waiting.front(), .attempt = detail::after(attempt)},
                            RunSet(RunRange{run, 1}));
     }
     campaign.delivered.erase(found);
