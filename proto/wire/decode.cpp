@@ -4,10 +4,14 @@
 #include "proto/proofmass.pb.h"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/codec.hpp"
+#include "proto/wire/field_count.hpp"
 #include "proto/wire/message_reader.hpp"
 
 namespace proofmass::wire {
 namespace {
+
+/// The largest batch of results has 40,000.
+constexpr std::size_t fields_max = 65536;
 
 DecodeError too_large(std::size_t size, std::size_t size_max) {
   return {DecodeFault::too_large,
@@ -32,9 +36,13 @@ std::variant<Packet, DecodeError> decode(std::string_view bytes) {
   detail::silence_protobuf();
   if (bytes.size() > definition_size_max) return too_large(bytes.size(), definition_size_max);
   proto::Envelope envelope;
-  if (!envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+  const bool is_parsed =
+      detail::has_fields_at_most(bytes, *proto::Envelope::descriptor(), fields_max) &&
+      envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+  if (!is_parsed) {
     return DecodeError{DecodeFault::unparsable,
-                       fmt::format("message = {} bytes (must be an envelope)", bytes.size())};
+                       fmt::format("message = {} bytes (must be an envelope of at most {} fields)",
+                                   bytes.size(), fields_max)};
   }
   if (envelope.protocol_version() != protocol_version) {
     return wrong_version(envelope.protocol_version());

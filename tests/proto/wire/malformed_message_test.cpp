@@ -79,7 +79,18 @@ TEST(MalformedEnvelope, MayBeLargeForADefinitionOnly) {
 TEST(MalformedEnvelope, ThatIsNoneIsUnparsable) {
   const DecodeError error = refusal_of("GET / HTTP/1.1");
   EXPECT_EQ(error.fault, DecodeFault::unparsable);
-  EXPECT_EQ(error.text, "message = 14 bytes (must be an envelope)");
+  EXPECT_EQ(error.text, "message = 14 bytes (must be an envelope of at most 65536 fields)");
+}
+
+// Parsed, two bytes a field would take a hundred times their size.
+TEST(MalformedEnvelope, OfTooManyFieldsIsNotParsed) {
+  proto::Envelope envelope;
+  envelope.set_protocol_version(protocol_version);
+  envelope.set_session(1);
+  for (int i = 0; i < 65536; ++i) envelope.mutable_heartbeat()->add_held();
+  const DecodeError error = refusal_of(envelope.SerializeAsString());
+  EXPECT_EQ(error.fault, DecodeFault::unparsable);
+  EXPECT_EQ(error.text, "message = 131088 bytes (must be an envelope of at most 65536 fields)");
 }
 
 TEST(MalformedEnvelope, OfAnotherVersionIsRefused) {
