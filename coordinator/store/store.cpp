@@ -18,6 +18,7 @@
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_lock.hpp"
 #include "core/campaign/dispersion.hpp"
+#include "proto/link/kill_point.hpp"
 
 namespace proofmass::coordinator {
 
@@ -251,6 +252,7 @@ CommitSummary Store::write(std::span<const Entry> entries) {
   try {
     Transaction transaction(parts_->database);
     CommitSummary summary = parts_->rows->write(entries);
+    wire::kill_point(wire::KillPoint::before_commit);
     transaction.commit();
     return summary;
   } catch (...) {

@@ -135,11 +135,21 @@ TEST_P(CoordinatorKilled, LosesNothing) {
 
 INSTANTIATE_TEST_SUITE_P(AtEachNamedPoint, CoordinatorKilled,
                          testing::Values("after_open:1", "after_lend:3", "after_receive:1",
-                                         "after_receive:3", "after_commit:1", "after_commit:3",
-                                         "after_acknowledge:2"),
+                                         "after_receive:3", "before_commit:2", "after_commit:1",
+                                         "after_commit:3", "after_acknowledge:2"),
                          [](const auto& point) {
                            return std::regex_replace(point.param, std::regex(":"), "_");
                          });
+
+TEST_F(CoordinatorProcess, KilledWhileItMakesAFileLeavesNoHalfFile) {
+  Process killed = start_coordinator({"short.toml", "--faults", "kill=while_migrating:2"});
+  EXPECT_EQ(killed.wait(), -SIGKILL) << errors_of("coordinator");
+  EXPECT_FALSE(std::filesystem::exists(path("served/hardy2013.db")));
+  Process worker = start_worker("worker");
+  Process coordinator = start_coordinator({"short.toml"});
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+  EXPECT_EQ(stored_runs(path("served/hardy2013.db")), reference());
+}
 
 TEST_F(CoordinatorProcess, LosesNothingOnABadNetwork) {
   Process first = start_worker("first");

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "coordinator/store/store_error.hpp"
+#include "proto/link/kill_point.hpp"
 
 namespace proofmass::coordinator::detail {
 
@@ -46,6 +47,7 @@ void migrate(Database& database) {
        ++version) {
     database.execute(std::string(migrations()[static_cast<std::size_t>(version)]));
     PROOFMASS_EXPECT(database.integer("PRAGMA user_version") == version + 1);
+    wire::kill_point(wire::KillPoint::while_migrating);
   }
 }
 
