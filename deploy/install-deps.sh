@@ -1,7 +1,7 @@
 #!/bin/bash
 # Installs the Debian 12 packages that Proofmass is built, run and tested with; with --all, also
-# those for fuzzing and for benchmarks beside other systems. Does nothing if all are there. Uses sudo
-# unless run as root.
+# those for fuzzing and for benchmarks beside other systems. Does nothing if all are there. Uses
+# sudo unless run as root.
 set -euo pipefail
 
 packages=(
