@@ -180,9 +180,7 @@ class Swarm {
   std::vector<std::unique_ptr<SwarmWorker>> workers_;
 };
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App app("Many workers in one process, whose runs cost nothing.", "proofmass-swarm");
   SwarmOptions options;
   app.add_option("--connect", options.worker.endpoint, "Address of the coordinator")->required();
@@ -193,12 +191,20 @@ int main(int argc, char** argv) {
   app.add_option("--compute-s", options.worker.compute_s, "What they say that a run takes")
       ->check(CLI::NonNegativeNumber);
   CLI11_PARSE(app, argc, argv);
+  raise_descriptor_limit();
+  Swarm(options).run();
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
   try {
-    raise_descriptor_limit();
-    Swarm(options).run();
-    return 0;
+    return run(argc, argv);
   } catch (const std::exception& error) {
-    std::cerr << "proofmass-swarm: error: " << error.what() << '\n';
+    std::fputs("proofmass-swarm: error: ", stderr);
+    std::fputs(error.what(), stderr);
+    std::fputc('\n', stderr);
     return 1;
   }
 }

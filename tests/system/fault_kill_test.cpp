@@ -126,5 +126,26 @@ TEST_F(StoppedWorker, DeliversLateResultsThatAreCompared) {
   EXPECT_EQ(digest("null"), undisturbed_digest("null"));
 }
 
+using StoppedCoordinator = FaultTest;
+
+// Its own silence is not the workers': what they said meanwhile counts.
+TEST_F(StoppedCoordinator, TakesNoWorkerForLost) {
+  using std::chrono::steady_clock;
+  Process coordinator = this->coordinator(
+      "coordinator", {"null.toml", "--exit-when-done", "--time-scale", "0.02"});
+  Process one = null_worker("one");
+  Process two = null_worker("two");
+  wait_for_done("null", 100);
+  coordinator.signal(SIGSTOP);
+  const auto end = steady_clock::now() + std::chrono::seconds(2);  // They are lost after 1.2 s.
+  wait_until("later", [&] { return steady_clock::now() >= end; });
+  coordinator.signal(SIGCONT);
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+  EXPECT_EQ(one.wait(), 0) << errors_of("one");
+  EXPECT_EQ(two.wait(), 0) << errors_of("two");
+  EXPECT_EQ(num_log_lines("coordinator", "reason=silent"), 0U) << errors_of("coordinator");
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
 }  // namespace
 }  // namespace proofmass::test

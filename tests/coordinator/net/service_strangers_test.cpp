@@ -35,9 +35,11 @@ TEST_F(ServiceStrangers, AreClosedOutIfTheySendGarbage) {
   const auto reject = bad.receive<wire::Reject>();
   EXPECT_EQ(reject.reason, wire::RejectReason::malformed);
   EXPECT_EQ(reject.text, "message = 7 bytes (must be an envelope of at most 65536 fields)");
-  EXPECT_THAT(wait_for_event("peer_closed_out"),
-              AllOf(HasSubstr(fmt::format(":{} key=none ", getpid())),
-                    HasSubstr("reason=\"message = 7 bytes (must be an envelope of at most 65536 fields)\"")));
+  EXPECT_THAT(
+      wait_for_event("peer_closed_out"),
+      AllOf(
+          HasSubstr(fmt::format(":{} key=none ", getpid())),
+          HasSubstr("reason=\"message = 7 bytes (must be an envelope of at most 65536 fields)\"")));
   bad.say_hello();  // Not listened to any more.
   expect_service();
   in_service([&] { EXPECT_FALSE(service->worker_of(1001)); });
