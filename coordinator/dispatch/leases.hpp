@@ -37,9 +37,6 @@ void make_pending(State& state, CampaignId id, RunSet runs, Attempt attempt, Out
 /// Committed runs are to be computed a second time.
 void add_to_audit(CampaignState& campaign, const AuditKey& key, const RunSet& runs);
 
-/// Committed runs are to be computed a second time.
-void add_to_audit(CampaignState& campaign, const AuditKey& key, const RunSet& runs);
-
 /// Removes a run from wherever it is open.
 /// @param by       Who has its result.
 /// @param holders  Gets the run for each other worker to which it was lent.
