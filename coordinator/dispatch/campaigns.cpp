@@ -57,6 +57,7 @@ void recall(State& state, CampaignId id, Outbox& outbox) {
     const auto found = state.leases.find(lease);
     if (found == state.leases.end()) continue;
     const RunSet runs = found->second.remaining;
+    for (const RunRange& range : runs.ranges()) detail::note_unleased(state, lease, range);
     detail::lose(state, lease, runs, LossReason::retracted, {}, outbox);
   }
 }

@@ -35,10 +35,7 @@ void drop_copies(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
   const std::vector<LeaseId> leases = state.campaigns.at(id).copies.at(run).leases;
   for (const LeaseId lease : leases) {
     const WorkerId holder = state.leases.at(lease).worker;
-    Worker& worker = state.workers.at(holder);
-    worker.unleased[id].add({run, 1});
-    worker.clear_at =
-        std::max(worker.clear_at, state.leases.at(lease).lent_at + state.config.arrival_max);
+    note_unleased(state, lease, {run, 1});
     take_off(state, lease, {run, 1});
     send_retract(holder, id, RunSet(RunRange{run, 1}), outbox);
   }
@@ -167,6 +164,13 @@ void take_off(State& state, LeaseId id, RunRange runs) {
   if (!lease.remaining.empty()) return;
   worker.leases.erase(id);
   state.leases.erase(found);
+}
+
+void note_unleased(State& state, LeaseId id, RunRange runs) {
+  const Lease& lease = state.leases.at(id);
+  Worker& worker = state.workers.at(lease.worker);
+  worker.unleased[lease.campaign].add(runs);
+  worker.clear_at = std::max(worker.clear_at, lease.lent_at + state.config.arrival_max);
 }
 
 void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const RunSet& blamed,

@@ -25,6 +25,9 @@ LeaseId open_lease(State& state, Lease lease);
 /// @pre They are on it.
 void take_off(State& state, LeaseId lease, RunRange runs);
 
+/// To be called before runs are taken off a lease though their worker may go on with them.
+void note_unleased(State& state, LeaseId lease, RunRange runs);
+
 /// The worker will not deliver these runs of a lease: they are open again, or on a copy.
 /// @param blamed  Runs against which the loss counts; of this campaign.
 void lose(State& state, LeaseId lease, const RunSet& runs, LossReason reason, const RunSet& blamed,

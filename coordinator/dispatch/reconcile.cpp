@@ -170,6 +170,7 @@ void reconcile(State& state, WorkerId id, const wire::Heartbeat& heartbeat, Time
       settle_surplus(state, id, campaign, runs, now, outbox);
     } else {
       outbox.send(id, wire::Forget{.campaign = campaign});
+      state.workers.at(id).unleased[campaign] = all_of(runs);
     }
   }
   settle_missing(state, id, all_held, now, outbox);

@@ -76,7 +76,7 @@ struct Worker {
   std::uint64_t num_alone = 0;  ///< Suspects on its leases; nothing else is lent with one.
   /// Open runs that it holds though they are not lent to it, as the newest heartbeat has it.
   std::map<CampaignId, RunSet> unleased;
-  /// Until then it may get a copy that is lent to it no more: a heartbeat without it proves
+  /// Until then it may get runs that were taken off its leases: a heartbeat without them proves
   /// nothing.
   TimePoint clear_at;
   TimePoint retracted_at;  ///< When runs were last asked back for idle workers.

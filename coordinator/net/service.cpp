@@ -21,6 +21,7 @@
 #include "coordinator/net/descriptor_limit.hpp"
 #include "coordinator/net/router_socket.hpp"
 #include "coordinator/net/wake.hpp"
+#include "coordinator/net/waking_time.hpp"
 #include "coordinator/net/worker_desk.hpp"
 #include "coordinator/net/worker_history.hpp"
 #include "core/error.hpp"
@@ -37,8 +38,6 @@ constexpr std::chrono::seconds review_interval(1);
 constexpr int worker_messages_per_turn_max = 1000;
 // ... nor workers by clients that ask much.
 constexpr int client_messages_per_turn_max = 16;
-
-TimePoint now() { return std::chrono::steady_clock::now(); }
 
 wire::Epoch random_epoch() {
   wire::Epoch epoch;
@@ -112,6 +111,8 @@ class Service::Parts final : public Outbox {
   // The authenticator watches the sockets, and must be there before they are bound.
   ~Parts() override { authenticator_.reset(); }
 
+  /// For all that is measured here and in the dispatch.
+  [[nodiscard]] TimePoint now() { return time_.at(std::chrono::steady_clock::now()); }
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const CampaignDesk& desk() const { return desk_; }
   [[nodiscard]] std::string workers_endpoint() const { return worker_socket_.endpoint(); }
@@ -329,6 +330,7 @@ class Service::Parts final : public Outbox {
     history_.end_all(LossReason::drained);
   }
 
+  WakingTime time_{std::chrono::steady_clock::now()};
   ServiceConfig config_;
   Log log_;
   wire::Epoch epoch_;
@@ -364,7 +366,7 @@ void Service::run(const std::atomic<StopRequest>& stop, const std::function<void
 std::vector<wire::CampaignStatus> Service::campaigns() const {
   std::vector<wire::CampaignStatus> campaigns;
   for (const CampaignId id : parts_->state().order) {
-    campaigns.push_back(parts_->desk().status_of(id, now()));
+    campaigns.push_back(parts_->desk().status_of(id, parts_->now()));
   }
   return campaigns;
 }

@@ -66,7 +66,7 @@ Process FaultTest::null_worker(const std::string& name, const Arguments& further
   Arguments arguments{"--connect", workers_endpoint, "--name", name, "--threads", "1"};
   arguments.insert(arguments.end(), further.begin(), further.end());
   if (std::find(further.begin(), further.end(), "--run-time") == further.end()) {
-    arguments.insert(arguments.end(), {"--run-time", "0.02"});
+    arguments.insert(arguments.end(), {"--run-time", "0.05"});
   }
   return start_behind(prefix, name, "proofmass-null-worker", arguments);
 }

@@ -126,13 +126,28 @@ TEST_F(StoppedWorker, DeliversLateResultsThatAreCompared) {
   EXPECT_EQ(digest("null"), undisturbed_digest("null"));
 }
 
+// As batch systems suspend programs. It does not take its own silence for the coordinator's.
+TEST_F(StoppedWorker, GoesOnAfterLongerThanItWouldWaitForItsCoordinator) {
+  using std::chrono::steady_clock;
+  Process coordinator = this->coordinator("coordinator", {"null.toml", "--exit-when-done"});
+  Process worker = null_worker("worker", {"--no-supervisor", "--give-up-after", "4"});
+  wait_for_done("null", 100);
+  worker.signal(SIGSTOP);
+  const auto end = steady_clock::now() + std::chrono::seconds(5);
+  wait_until("later", [&] { return steady_clock::now() >= end; });
+  worker.signal(SIGCONT);
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+  EXPECT_EQ(worker.wait(), 0) << errors_of("worker");
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
 using StoppedCoordinator = FaultTest;
 
 // Its own silence is not the workers': what they said meanwhile counts.
 TEST_F(StoppedCoordinator, TakesNoWorkerForLost) {
   using std::chrono::steady_clock;
-  Process coordinator = this->coordinator(
-      "coordinator", {"null.toml", "--exit-when-done", "--time-scale", "0.02"});
+  Process coordinator =
+      this->coordinator("coordinator", {"null.toml", "--exit-when-done", "--time-scale", "0.02"});
   Process one = null_worker("one");
   Process two = null_worker("two");
   wait_for_done("null", 100);

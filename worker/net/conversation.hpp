@@ -72,6 +72,8 @@ class Conversation {
   void on_progress(TimePoint now);
   /// To be called some times a second.
   void on_tick(TimePoint now);
+  /// The process was stopped for so long: nothing that was said meanwhile has been heard.
+  void on_slept(Duration duration) { heard_at_ += duration; }
   /// Gives back what has not begun, finishes what can be finished in time, delivers, leaves.
   void on_drain_request(TimePoint now);
   /// Leaves at once. Whoever asks keeps the results, or they will be computed again.

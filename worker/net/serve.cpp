@@ -19,6 +19,7 @@ namespace proofmass::worker {
 namespace {
 
 constexpr std::chrono::milliseconds tick_interval(100);
+constexpr std::chrono::seconds awake_turn_max(1);       ///< Longer ones were spent asleep.
 constexpr std::chrono::milliseconds fault_interval(5);  ///< How exactly faults are timed.
 constexpr std::chrono::seconds spool_interval(30);
 constexpr std::chrono::seconds status_interval(10);
@@ -124,9 +125,12 @@ class Service {
 
   Ending run() {
     TimePoint tick_at = time_now();
+    TimePoint turned_at = tick_at;
     while (!conversation_.ending()) {
       link_.wait(std::array{progress_.descriptor(), signals_.descriptor()}, wait_max_);
       const TimePoint now = time_now();
+      const Duration turn_time = now - std::exchange(turned_at, now);
+      if (turn_time > awake_turn_max) conversation_.on_slept(turn_time);
       heed_link(now);
       if (progress_.take()) conversation_.on_progress(now);
       heed_signals(now);

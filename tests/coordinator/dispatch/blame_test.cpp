@@ -166,6 +166,29 @@ TEST_F(BlameTest, OnlyACrashAloneTellsAgainstASuspect) {
   outbox.forget();
 }
 
+// Otherwise it would be blamed for what the worker still computes of that campaign.
+TEST_F(BlameTest, ASuspectWaitsUntilAWorkerHasForgottenACancelledCampaign) {
+  add_campaign(one, 1);
+  add_worker(first);
+  crash(first);
+  add_campaign(two, 1, 5);
+  outbox.forget();
+  add_worker(second);
+  ASSERT_EQ(outbox.take_sent<wire::RunLease>(second).campaign, two);
+  on_cancel(state, two, outbox);
+  outbox.forget();
+  heartbeat(second, {held(two, {{0}, 1})});
+  EXPECT_EQ(outbox.take_sent<wire::Forget>(second).campaign, two);
+  outbox.expect_nothing_more();
+
+  now += 11s;
+  heartbeat(second);  // It may have been sent before the lease arrived.
+  outbox.expect_nothing_more();
+  now += 1s;
+  heartbeat(second);
+  EXPECT_TRUE(outbox.take_sent<wire::RunLease>(second).is_alone);
+}
+
 TEST_F(BlameTest, ASuspectIsTriedOnAnotherHost) {
   add_campaign(one, 1);
   add_worker(first, 1, "bad");

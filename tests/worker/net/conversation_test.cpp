@@ -128,6 +128,17 @@ TEST_F(ConversationTest, GivesUpACoordinatorThatIsSilent) {
   expect_ending(Ending::Kind::failed, "coordinator = silent for 60 s (is it running?)");
 }
 
+TEST_F(ConversationTest, DoesNotCountTheTimeInWhichItWasStopped) {
+  start({.give_up_after = 60s});
+  (void)take_sent<wire::Hello>();
+  conversation->on_slept(3600s);
+  tick_after(3659s);
+  EXPECT_FALSE(conversation->ending().has_value());
+  sent.clear();
+  tick_after(1s);
+  expect_ending(Ending::Kind::failed, "coordinator = silent for 60 s (is it running?)");
+}
+
 TEST_F(ConversationTest, SaysWhyItWasNotLetIn) {
   start({.give_up_after = 60s});
   conversation->on_refused("the key of this worker is not on its list");
