@@ -46,6 +46,18 @@ Eigen::MatrixXd gram_matrix(const LineFit& fit, const std::vector<double>& lines
 
 }  // namespace
 
+LineWeights::Marks::Marks(std::size_t first, std::size_t count)
+    : first_block(first), num_blocks(count), stride((count + num_marks_max - 1) / num_marks_max) {}
+
+bool LineWeights::Marks::is_end_of_stretch(std::size_t block) const {
+  const std::size_t next = block + 1 - first_block;
+  return next == num_blocks || next % stride == 0;
+}
+
+std::size_t LineWeights::Marks::stretch_of(std::size_t block) const {
+  return (block - first_block) / stride;
+}
+
 LineWeights::LineWeights(const LineFit& fit) : fit_(fit), lines_hz_(fit.fit_hz) {
   lines_hz_.insert(lines_hz_.end(), fit.known_hz.begin(), fit.known_hz.end());
   if (fit.num_samples < fit.num_dropped + 2 * lines_hz_.size()) {
@@ -59,12 +71,12 @@ LineWeights::LineWeights(const LineFit& fit) : fit_(fit), lines_hz_(fit.fit_hz) 
 
   const std::size_t num_outputs = 2 * num_fit_lines();
   means_.assign(num_outputs, 0.0);
-  block_ends_.resize((fit_.num_samples + block_size - 1) / block_size);
+  marks_ = Marks(0, (fit_.num_samples + block_size - 1) / block_size);
   States states{};
   std::vector<double> weights(block_size * num_outputs);
   std::vector<double> sums(num_outputs, 0.0);
   for (std::size_t block = num_blocks(); block-- > 0;) {
-    block_ends_[block] = states;
+    if (marks_.is_end_of_stretch(block)) marks_.ends[marks_.stretch_of(block)] = states;
     run_backwards(block, states, weights);
     for (std::size_t i = 0; i < samples_in(block) * num_outputs; ++i) {
       sums[i % num_outputs] += weights[i];
@@ -156,13 +168,39 @@ void LineWeights::run_backwards(std::size_t block, States& states,
       states.data(), weights.data());
 }
 
-void LineWeights::fill_block(std::size_t block, std::span<double> weights) const {
-  const std::size_t num_outputs = means_.size();
-  PROOFMASS_EXPECT(weights.size() >= samples_in(block) * num_outputs);
-  States states = block_ends_[block];
-  run_backwards(block, states, weights);
-  for (std::size_t k = 0; k < samples_in(block); ++k) {
-    for (std::size_t i = 0; i < num_outputs; ++i) weights[k * num_outputs + i] -= means_[i];
+void LineWeights::refine(const Marks& coarse, std::size_t stretch, Marks& fine,
+                         std::span<double> scratch) const {
+  const std::size_t first = coarse.first_block + stretch * coarse.stride;
+  const std::size_t end = std::min(first + coarse.stride, coarse.first_block + coarse.num_blocks);
+  fine = Marks(first, end - first);
+  States states = coarse.ends[stretch];
+  for (std::size_t block = end; block-- > first;) {
+    if (fine.is_end_of_stretch(block)) fine.ends[fine.stretch_of(block)] = states;
+    run_backwards(block, states, scratch);
+  }
+}
+
+void WeightReader::fill_block(std::size_t block, std::span<double> weights) {
+  const std::size_t num_outputs = weights_.means_.size();
+  const std::size_t num_samples = weights_.samples_in(block);
+  PROOFMASS_EXPECT(weights.size() >=
+                   num_outputs * std::min(weights_.num_samples(), LineWeights::block_size));
+  const LineWeights::Marks* marks = &weights_.marks_;
+  for (LineWeights::Marks& finer : levels_) {
+    if (marks->stride == 1) break;
+    const std::size_t stretch = marks->stretch_of(block);
+    const std::size_t first = marks->first_block + stretch * marks->stride;
+    if (finer.num_blocks == 0 || finer.first_block != first) {
+      weights_.refine(*marks, stretch, finer, weights);
+    }
+    marks = &finer;
+  }
+  LineWeights::States states = marks->ends[marks->stretch_of(block)];
+  weights_.run_backwards(block, states, weights);
+  for (std::size_t k = 0; k < num_samples; ++k) {
+    for (std::size_t i = 0; i < num_outputs; ++i) {
+      weights[k * num_outputs + i] -= weights_.means_[i];
+    }
   }
 }
 

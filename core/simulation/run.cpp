@@ -102,13 +102,14 @@ struct RunPlan::Parts {
         noise(make_noise_model(c.scenario.noise, c.scenario.simulation.sample_period_s)),
         drag_free(drag_free_gains(c.scenario.drag_free, c.scenario.simulation.sample_period_s)),
         attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)) {
+    weights.reserve(campaign.scenario.sessions.size());
     for (const Session& session : campaign.scenario.sessions) {
       weights.emplace_back(line_fit(campaign.scenario, session));
     }
   }
 
-  [[nodiscard]] SessionSetup setup(std::size_t i) const {
-    return {.weights = &weights[i],
+  [[nodiscard]] SessionSetup setup(std::size_t i, WeightReader& reader) const {
+    return {.reader = &reader,
             .drag_free = drag_free,
             .attitude = attitude,
             .regressor = regressor_kind(campaign.scenario.sessions[i].target),
@@ -124,7 +125,8 @@ struct RunPlan::Parts {
         .constants = make_loop_constants(instrument, scenario, session),
         .noise = SessionNoise(noise, campaign.seed, run, session.name)};
     std::vector<double> buffer(LineWeights::block_size * 2 * weights[i].num_fit_lines());
-    record_session(signals, setup(i), std::span(&alone, 1), buffer, progress);
+    WeightReader reader(weights[i]);
+    record_session(signals, setup(i, reader), std::span(&alone, 1), buffer, progress);
     return to_phasors(alone.sums, weights[i].num_fit_lines());
   }
 
@@ -136,8 +138,9 @@ struct RunPlan::Parts {
     SessionSignals signals(scenario, session, orbit, environment);
     const NoiseStreams streams = noise_streams(session.name);
     std::vector<double> buffer(LineWeights::block_size * 2 * weights[i].num_fit_lines());
+    WeightReader reader(weights[i]);
     BatchSession batch{.signals = &signals,
-                       .setup = setup(i),
+                       .setup = setup(i, reader),
                        .noise = &noise,
                        .streams = &streams,
                        .seed = campaign.seed,

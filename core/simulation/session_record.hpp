@@ -79,7 +79,7 @@ PROOFMASS_INLINE std::array<T, num_signals> ground_signals(const Observation<T>&
 
 /// What the runs of a batch share in one session.
 struct SessionSetup {
-  const LineWeights* weights = nullptr;
+  WeightReader* reader = nullptr;
   DragFreeGains drag_free;
   AttitudeGains attitude;
   RegressorKind regressor = RegressorKind::none;
@@ -124,7 +124,7 @@ template <typename Signals, typename Group>
 __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSetup& setup,
                                               std::span<Group> groups, std::size_t num_samples,
                                               const double* weights) {
-  const std::size_t num_outputs = 2 * setup.weights->num_fit_lines();
+  const std::size_t num_outputs = 2 * setup.reader->weights().num_fit_lines();
   for (std::size_t k = 0; k < num_samples; ++k) {
     const SharedSample& shared = signals.next();
     for (auto& [constants, noise, loop, sums] : groups) {
@@ -148,10 +148,11 @@ inline void record_session(Signals& signals, const SessionSetup& setup, std::spa
                            std::span<double> buffer, const Progress& progress) {
   for (Group& group : groups) group.loop.begin(signals.reference_at_start());
   advance_groups(signals, setup, groups, static_cast<std::size_t>(signals.num_settling()), nullptr);
+  const LineWeights& weights = setup.reader->weights();
   std::size_t num_done = 0;
-  for (std::size_t block = 0; block < setup.weights->num_blocks(); ++block) {
-    setup.weights->fill_block(block, buffer);
-    const std::size_t num_samples = setup.weights->samples_in(block);
+  for (std::size_t block = 0; block < weights.num_blocks(); ++block) {
+    setup.reader->fill_block(block, buffer);
+    const std::size_t num_samples = weights.samples_in(block);
     advance_groups(signals, setup, groups, num_samples, buffer.data());
     num_done += num_samples;
     progress(num_done);

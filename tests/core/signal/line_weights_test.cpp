@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstddef>
@@ -29,8 +30,9 @@ std::vector<double> weighted_amplitudes(const LineWeights& weights,
   std::vector<double> block_weights(LineWeights::block_size * num_outputs);
   std::vector<double> sums(num_outputs, 0.0);
   std::size_t k = 0;
+  WeightReader reader(weights);
   for (std::size_t block = 0; block < weights.num_blocks(); ++block) {
-    weights.fill_block(block, block_weights);
+    reader.fill_block(block, block_weights);
     for (std::size_t j = 0; j < weights.samples_in(block); ++j, ++k) {
       for (std::size_t i = 0; i < num_outputs; ++i) {
         sums[i] += block_weights[j * num_outputs + i] * record[k];
@@ -112,6 +114,13 @@ TEST(LineWeights, GiveTheEstimateOfTheProcedureForAnyLength) {
   }
 }
 
+// More blocks than the states that are kept.
+TEST(LineWeights, GiveTheEstimateOfTheProcedureForManyBlocks) {
+  LineFit fit = line_fit(260 * LineWeights::block_size + 517, 400, 9.88e-3);
+  fit.known_hz = {4.2e-3, 1.9e-2};
+  expect_same_estimate(fit);
+}
+
 TEST(LineWeights, GiveTheEstimateOfTheProcedureForAnyTransient) {
   for (const std::size_t num_dropped : {0U, 1U, 2047U, 2048U, 2049U, 5000U}) {
     LineFit fit = line_fit(9000, num_dropped, 9.88e-3);
@@ -173,6 +182,28 @@ TEST(LineWeights, PhasorOfASineIsTheFiltersGainTimesItsAmplitude) {
   EXPECT_LT(std::abs(actual - expected), 1e-10);
 }
 
+// A record of so many blocks that their states are found in three steps; summed as it goes, for its
+// 34 million samples. Rounding of as many terms of order one, 1e-8 at most, is averaged likewise.
+TEST(LineWeights, PhasorOfASineIsTheFiltersGainAfterAHundredDays) {
+  constexpr double line_hz = 0.01;
+  const LineWeights weights(line_fit(400 * 84'000, 7000, line_hz));
+  ASSERT_GT(weights.num_blocks(), 128U * 128U);
+  WeightReader reader(weights);
+  std::vector<double> values(2 * LineWeights::block_size);
+  const std::vector<double> cycle = sine_record(400, line_hz, 3.0, 0.4);
+  std::vector<double> sums(2, 0.0);
+  std::size_t k = 0;
+  for (std::size_t block = 0; block < weights.num_blocks(); ++block) {
+    reader.fill_block(block, values);
+    for (std::size_t j = 0; j < weights.samples_in(block); ++j, ++k) {
+      for (std::size_t i = 0; i < 2; ++i) sums[i] += values[2 * j + i] * cycle[k % 400];
+    }
+  }
+  const LineFit fit = line_fit(400, 0, line_hz);
+  const std::complex<double> expected = response(fit.filter, line_hz) * std::polar(3.0, 0.4);
+  EXPECT_LT(std::abs(phasor(sums, 0) - expected), 1e-10);
+}
+
 // Two lines, unequal gains; each line's phasor is that of its own sine.
 TEST(LineWeights, TellTwoLinesApart) {
   LineFit fit = line_fit(24000, 7000, 0.01);
@@ -211,16 +242,26 @@ TEST(LineWeights, GiveZeroForAConstant) {
   }
 }
 
+/// The weights of one block by a reader that has read nothing before.
+std::vector<double> block_of(const LineWeights& weights, std::size_t block) {
+  WeightReader reader(weights);
+  std::vector<double> values(2 * LineWeights::block_size);
+  reader.fill_block(block, values);
+  values.resize(2 * weights.samples_in(block));
+  return values;
+}
+
 TEST(LineWeights, AreTheSameBlockByBlockInAnyOrder) {
-  const LineWeights weights(line_fit(5000, 400, 9.88e-3));
-  ASSERT_EQ(weights.num_blocks(), 3U);
-  EXPECT_EQ(weights.samples_in(2), 5000 - 2 * LineWeights::block_size);
-  std::vector<double> first(2 * LineWeights::block_size);
-  std::vector<double> again(2 * LineWeights::block_size);
-  weights.fill_block(0, first);
-  weights.fill_block(2, again);
-  weights.fill_block(0, again);
-  EXPECT_EQ(first, again);
+  const LineWeights weights(line_fit(300 * LineWeights::block_size + 5, 400, 9.88e-3));
+  ASSERT_EQ(weights.num_blocks(), 301U);  // Three in a stretch.
+  EXPECT_EQ(weights.samples_in(300), 5U);
+  WeightReader reader(weights);
+  std::vector<double> values(2 * LineWeights::block_size);
+  for (const std::size_t block : {0U, 1U, 2U, 3U, 300U, 299U, 150U, 0U, 2U, 1U}) {
+    reader.fill_block(block, values);
+    const std::vector<double> alone = block_of(weights, block);
+    EXPECT_TRUE(std::equal(alone.begin(), alone.end(), values.begin())) << block;
+  }
 }
 
 std::string refusal(const LineFit& fit) {
