@@ -11,9 +11,13 @@ namespace proofmass::coordinator {
 /// What is to be done once all arguments are parsed; returns an ExitCode.
 using Command = std::function<int()>;
 
-/// Declares `run`, `report`, `init`, `bench` and `keygen`.
+/// Declares `run`, `init`, `bench` and `keygen`.
 /// @param chosen  Set while the arguments are parsed; outlives `app`.
 void add_local_commands(CLI::App& app, Command& chosen);
+
+/// Declares `report` and `sensitivity`.
+/// @param chosen  As above.
+void add_report_commands(CLI::App& app, Command& chosen);
 
 /// Declares `submit`, `status`, `watch`, `pause`, `resume`, `cancel` and `workers`.
 /// @param chosen  As above.

@@ -5,10 +5,10 @@
 
 #include "coordinator/cli/bench_command.hpp"
 #include "coordinator/cli/command_line.hpp"
+#include "coordinator/cli/init_command.hpp"
 #include "coordinator/cli/keygen_command.hpp"
 #include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/run_command.hpp"
-#include "coordinator/cli/small_commands.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -29,13 +29,6 @@ void add_run(CLI::App& app, Command& chosen) {
       ->check(CLI::Range(1U, workers_max));
   run.add_flag("--quiet", options->is_quiet, "Show no progress");
   run.callback([options, &chosen] { chosen = [options] { return run_campaign(*options); }; });
-}
-
-void add_report(CLI::App& app, Command& chosen) {
-  const auto database = std::make_shared<std::filesystem::path>();
-  CLI::App& report = *app.add_subcommand("report", "Print the tables of a database");
-  report.add_option("DB", *database, "Database of a campaign")->required();
-  report.callback([database, &chosen] { chosen = [database] { return print_report(*database); }; });
 }
 
 void add_init(CLI::App& app, Command& chosen) {
@@ -81,7 +74,6 @@ void add_keygen(CLI::App& app, Command& chosen) {
 
 void add_local_commands(CLI::App& app, Command& chosen) {
   add_run(app, chosen);
-  add_report(app, chosen);
   add_init(app, chosen);
   add_bench(app, chosen);
   add_keygen(app, chosen);

@@ -2,23 +2,29 @@
 
 #include <fmt/format.h>
 
+#include "coordinator/report/digest.hpp"
+
 namespace proofmass::coordinator {
 
 std::string report_text(const Store& store, const Scenario& scenario) {
   const CampaignStatistics statistics = read_statistics(store, scenario);
-  return fmt::format("{}{}\n{}\n{}",
-                     summary_text(store.name(), store.seed(), store.num_runs(), statistics),
-                     given_up_text(store.given_up_runs()), accuracy_table(scenario, statistics),
-                     budget_table(scenario, statistics));
+  std::string text =
+      summary_text(store.name(), store.seed(), store.num_runs(), statistics, digest_of(store)) +
+      given_up_text(store.given_up_runs());
+  for (const std::string& table : {accuracy_table(scenario, statistics), interval_table(statistics),
+                                   budget_table(scenario, statistics)}) {
+    if (!table.empty()) text += "\n" + table;
+  }
+  return text;
 }
 
 std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_t num_runs,
-                         const CampaignStatistics& statistics) {
+                         const CampaignStatistics& statistics, std::string_view digest) {
   const std::uint64_t num_imperfect =
       statistics.num_not_converged + statistics.num_not_finite + statistics.num_no_draw;
-  std::string text =
-      fmt::format("Campaign  {}\nSeed      {}\nRuns      {} finished of {}, {} completed\n", name,
-                  seed, statistics.num_runs, num_runs, statistics.num_runs - num_imperfect);
+  std::string text = fmt::format(
+      "Campaign  {}\nSeed      {}\nDigest    {}\nRuns      {} finished of {}, {} completed\n", name,
+      seed, digest, statistics.num_runs, num_runs, statistics.num_runs - num_imperfect);
   if (num_imperfect > 0) {
     text += fmt::format("          {} not converged, {} not finite, {} without draw\n",
                         statistics.num_not_converged, statistics.num_not_finite,

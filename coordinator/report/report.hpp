@@ -11,15 +11,16 @@
 
 namespace proofmass::coordinator {
 
-/// Everything that `proofmass report` prints: summary and both tables, computed from the results in
+/// Everything that `proofmass report` prints: summary and all tables, computed from the results in
 /// the file. Lines have at most 80 characters.
 [[nodiscard]] std::string report_text(const Store& store, const Scenario& scenario);
 
 /// Name, seed, and how many runs ended how.
 /// @param num_runs  Runs wanted.
+/// @param digest    Of the results; see Digest.
 [[nodiscard]] std::string summary_text(std::string_view name, std::uint64_t seed,
-                                       std::uint64_t num_runs,
-                                       const CampaignStatistics& statistics);
+                                       std::uint64_t num_runs, const CampaignStatistics& statistics,
+                                       std::string_view digest);
 
 /// The line that names the runs that were given up; empty if there are none.
 /// @param given_up  Ascending.
@@ -28,6 +29,10 @@ namespace proofmass::coordinator {
 /// Accuracy of each parameter beside [Hardy2013] tab:perfo-numerical.
 [[nodiscard]] std::string accuracy_table(const Scenario& scenario,
                                          const CampaignStatistics& statistics);
+
+/// What the draws that were made say about all draws: 95 % intervals of mean and standard
+/// deviation, and the errors' bias and skewness.
+[[nodiscard]] std::string interval_table(const CampaignStatistics& statistics);
 
 /// Budget before and after calibration beside [Hardy2013] tab:Budget and tab:Budget_cali.
 [[nodiscard]] std::string budget_table(const Scenario& scenario,

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/report/digest.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
@@ -101,18 +102,46 @@ TEST(BudgetTable, HasDashesAfterCalibrationWhileNoRunHasAnEstimate) {
                               "  2.0e-13  1.1e-15  3.6e-16"));
 }
 
+TEST(IntervalTable, ShowsHowSureTheFiguresAre) {
+  CampaignStatistics statistics = paper_statistics(100);
+  AccuracyStatistic& accuracy = statistics.accuracy[index(Parameter::k2c)];
+  accuracy.mean_interval = Interval{.lower = 51.5, .upper = 72.5, .confidence = 0.95};
+  accuracy.deviation_interval = Interval{.lower = 47.25, .upper = 63.75, .confidence = 0.95};
+  accuracy.error.bias = -12.5;
+  accuracy.error.skewness = -0.756;
+  const std::vector<std::string> lines = lines_of(interval_table(statistics));
+  EXPECT_THAT(lines, Contains("K2c/K1c²       62.0    51.5    72.5 │    54.0    47.2    63.8 │"
+                              "    -12.5  -0.76"));
+  EXPECT_THAT(lines, Contains("K2d/K1c²       25.0       -       - │    23.0       -       - │"
+                              "        0   0.00"));
+}
+
+// 59 draws are what 95 % with 95 % confidence takes [Wilks1941]: 0.95^59 = 0.0485.
+TEST(IntervalTable, TellsWhatTheWorstIsWorth) {
+  EXPECT_THAT(interval_table(paper_statistics(59)),
+              HasSubstr("worst of 59: with 95 % confidence 95.049 % of all draws"));
+  EXPECT_THAT(interval_table(paper_statistics(58)),
+              HasSubstr("worst of 58: with 95 % confidence 94.966 % of all draws"));
+}
+
+TEST(IntervalTable, IsLeftOutWhileNoRunHasAnEstimate) {
+  EXPECT_EQ(interval_table(CampaignStatistics{}), "");
+}
+
 TEST(Summary, TellsHowTheRunsEnded) {
   CampaignStatistics statistics = paper_statistics(90);
-  EXPECT_EQ(summary_text("hardy2013", 1, 100, statistics),
+  EXPECT_EQ(summary_text("hardy2013", 1, 100, statistics, "0f3a"),
             "Campaign  hardy2013\n"
             "Seed      1\n"
+            "Digest    0f3a\n"
             "Runs      90 finished of 100, 90 completed\n");
   statistics.num_not_converged = 3;
   statistics.num_not_finite = 2;
   statistics.num_no_draw = 1;
-  EXPECT_EQ(summary_text("hardy2013", 1, 100, statistics),
+  EXPECT_EQ(summary_text("hardy2013", 1, 100, statistics, "0f3a"),
             "Campaign  hardy2013\n"
             "Seed      1\n"
+            "Digest    0f3a\n"
             "Runs      90 finished of 100, 84 completed\n"
             "          3 not converged, 2 not finite, 1 without draw\n");
 }
@@ -126,14 +155,19 @@ TEST(Report, FitsATerminal) {
     for (AccuracyStatistic& accuracy : statistics.accuracy) {
       accuracy.worst = accuracy.mean = accuracy.standard_deviation = 1.2345e-6 * factor;
       accuracy.num_beyond_objective = most;
+      accuracy.mean_interval = accuracy.deviation_interval =
+          Interval{.lower = 1.1111e-6 * factor, .upper = 1.3333e-6 * factor, .confidence = 0.95};
+      accuracy.error.bias = -1.2345e-6 * factor;
+      accuracy.error.skewness = -12.345;
     }
     Scenario scenario;
     for (double& objective : scenario.objectives) objective *= factor;
     EXPECT_THAT(lines_of(accuracy_table(scenario, statistics)), Each(FitsATerminal()));
+    EXPECT_THAT(lines_of(interval_table(statistics)), Each(FitsATerminal()));
     EXPECT_THAT(lines_of(budget_table(scenario, statistics)), Each(FitsATerminal()));
   }
   EXPECT_THAT(lines_of(summary_text(std::string(64, 'n'), std::numeric_limits<std::uint64_t>::max(),
-                                    most, statistics)),
+                                    most, statistics, std::string(64, 'f'))),
               Each(FitsATerminal()));
 }
 
@@ -141,7 +175,8 @@ TEST(Report, FitsATerminal) {
 TEST(Report, AlignsEveryRow) {
   const CampaignStatistics statistics = paper_statistics(100);
   for (const std::string& table :
-       {accuracy_table(Scenario{}, statistics), budget_table(Scenario{}, statistics)}) {
+       {accuracy_table(Scenario{}, statistics), interval_table(statistics),
+        budget_table(Scenario{}, statistics)}) {
     const std::vector<std::string> lines = lines_of(table);
     for (std::size_t i = 3; i + 1 < lines.size(); ++i) {
       EXPECT_EQ(text_width(lines[i]), text_width(lines[4])) << lines[i];
@@ -165,9 +200,10 @@ TEST_F(StoredReport, IsThatOfTheResultsInTheFile) {
   // Errors grow with the run: the last is the worst.
   EXPECT_EQ(statistics.accuracy[0].worst_run, RunIndex{9});
   EXPECT_EQ(statistics.accuracy[0].worst, test::result_of(9).error(Parameter::a_c11_delta_x));
-  EXPECT_EQ(report_text(store, scenario), summary_text("hardy2013", 1, 12, statistics) + "\n" +
-                                              accuracy_table(scenario, statistics) + "\n" +
-                                              budget_table(scenario, statistics));
+  EXPECT_EQ(report_text(store, scenario),
+            summary_text("hardy2013", 1, 12, statistics, digest_of(store)) + "\n" +
+                accuracy_table(scenario, statistics) + "\n" + interval_table(statistics) + "\n" +
+                budget_table(scenario, statistics));
 }
 
 TEST_F(StoredReport, IsStoredForSql) {

@@ -1,10 +1,9 @@
-#include "coordinator/cli/small_commands.hpp"
+#include "coordinator/cli/init_command.hpp"
 
 #include <gtest/gtest.h>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/exit_code.hpp"
-#include "coordinator/store/store.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 
 namespace proofmass::coordinator {
@@ -39,11 +38,6 @@ TEST(Init, SaysWhyAFileCannotBeWritten) {
   } catch (const Error& error) {
     EXPECT_EQ(std::string(error.what()), file.string() + ": No such file or directory");
   }
-}
-
-TEST(Report, NeedsADatabase) {
-  const test::TemporaryDirectory directory;
-  EXPECT_THROW((void)print_report(directory / "none.db"), StoreError);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "coordinator/cli/small_commands.hpp"
+#include "coordinator/cli/init_command.hpp"
 
 #include <fmt/format.h>
 
@@ -7,18 +7,9 @@
 #include <fstream>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/cli/campaign_start.hpp"
 #include "coordinator/cli/exit_code.hpp"
-#include "coordinator/report/report.hpp"
-#include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {
-
-int print_report(const std::filesystem::path& database) {
-  const Store store = Store::open_read_only(database);
-  fmt::print("{}", report_text(store, stored_campaign(store).scenario));
-  return exit_done;
-}
 
 int write_campaign(const std::filesystem::path& file, IfFileExists if_exists) {
   if (if_exists == IfFileExists::refuse && std::filesystem::exists(file)) {

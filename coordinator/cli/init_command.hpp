@@ -5,11 +5,6 @@
 
 namespace proofmass::coordinator {
 
-/// Prints the tables of a database's campaign, finished or not.
-/// @return An ExitCode.
-/// @throws StoreError.
-[[nodiscard]] int print_report(const std::filesystem::path& database);
-
 enum class IfFileExists : std::uint8_t { refuse, replace };
 
 /// Writes the paper's campaign, commented.

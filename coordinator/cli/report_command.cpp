@@ -1,0 +1,71 @@
+#include "coordinator/cli/report_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/campaign_file/nearest_name.hpp"
+#include "coordinator/cli/campaign_start.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/report/report.hpp"
+#include "coordinator/report/requirement_text.hpp"
+#include "coordinator/report/sensitivity_text.hpp"
+#include "coordinator/store/store.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+int print_requirements(const Store& store, const std::vector<std::string>& requirements) {
+  bool are_met = true;
+  std::string_view separator = "";
+  for (const RequirementAnswer& answer : check_requirements(store, requirements)) {
+    fmt::print("{}{}", separator, requirement_text(answer));
+    separator = "\n";
+    are_met = are_met && answer.check.verdict == Verdict::met;
+  }
+  return are_met ? exit_done : exit_not_met;
+}
+
+Parameter parameter_named(std::string_view name) {
+  const auto& infos = parameter_infos();
+  const auto found = std::ranges::find(infos, name, &ParameterInfo::name);
+  if (found != infos.end()) return found->parameter;
+  std::string names;
+  for (const ParameterInfo& info : infos) names += fmt::format(" {}", info.name);
+  throw UsageError(fmt::format("parameter = {} (must be one of{})", name, names));
+}
+
+}  // namespace
+
+int print_report(const ReportOptions& options) {
+  const Store store = Store::open_read_only(options.database);
+  if (!options.requirements.empty()) return print_requirements(store, options.requirements);
+  fmt::print("{}", report_text(store, stored_campaign(store).scenario));
+  return exit_done;
+}
+
+int print_sensitivity(const SensitivityOptions& options) {
+  std::vector<Parameter> parameters;
+  if (options.parameter) parameters.push_back(parameter_named(*options.parameter));
+  const Store store = Store::open_read_only(options.database);
+  const DrawnRuns drawn = read_drawn_runs(store, stored_campaign(store), sensitivity_runs_max);
+  if (options.run) {
+    const RunIndex run{*options.run};
+    const Parameter parameter =
+        parameters.empty() ? worst_parameter_of(drawn, run) : parameters.front();
+    fmt::print("{}", explanation_text(drawn, parameter, run, options.num_rows));
+    return exit_done;
+  }
+  if (parameters.empty()) {
+    for (const ParameterInfo& info : parameter_infos()) parameters.push_back(info.parameter);
+  }
+  std::string_view separator = "";
+  for (const Parameter parameter : parameters) {
+    fmt::print("{}{}", separator, sensitivity_text(drawn, parameter, options.num_rows));
+    separator = "\n";
+  }
+  return exit_done;
+}
+
+}  // namespace proofmass::coordinator

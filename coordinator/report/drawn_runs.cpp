@@ -1,0 +1,45 @@
+#include "coordinator/report/drawn_runs.hpp"
+
+#include <fmt/format.h>
+
+#include "core/campaign/draw.hpp"
+
+namespace proofmass::coordinator {
+
+namespace {
+
+std::vector<std::string> column_names() {
+  std::vector<std::string> names(drawn_names().begin(), drawn_names().end());
+  for (const ParameterInfo& info : parameter_infos()) {
+    names.push_back(fmt::format("truth_{}{}", info.name, info.unit_suffix));
+  }
+  return names;
+}
+
+void append(const RunResult& result, const DrawnValues& values, DrawnRuns& drawn) {
+  drawn.runs.push_back(result.run);
+  for (std::size_t i = 0; i < num_drawn; ++i) drawn.columns[i].push_back(values[i]);
+  for (const ParameterInfo& info : parameter_infos()) {
+    const std::size_t i = index(info.parameter);
+    drawn.columns[num_drawn + i].push_back(result.truth[i]);
+    drawn.errors[i].push_back(result.error(info.parameter));
+  }
+}
+
+}  // namespace
+
+DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign,
+                          std::uint64_t num_runs_max) {
+  DrawnRuns drawn;
+  drawn.names = column_names();
+  drawn.columns.resize(drawn.names.size());
+  store.for_each_result([&](const RunResult& result) {
+    if (!result.has_estimate() || drawn.runs.size() == num_runs_max) return;
+    const DrawnValues values = draw_values(campaign.dispersions, campaign.seed, result.run,
+                                           result.num_draws - 1, campaign.table_values(result.run));
+    append(result, values, drawn);
+  });
+  return drawn;
+}
+
+}  // namespace proofmass::coordinator

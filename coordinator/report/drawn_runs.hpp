@@ -1,0 +1,31 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "coordinator/store/store.hpp"
+#include "core/campaign/campaign.hpp"
+#include "core/campaign/dispersion.hpp"
+
+namespace proofmass::coordinator {
+
+/// What was drawn for runs that have an estimate, and how far their estimates are off. Draws are
+/// made again from the definition; no file holds them.
+struct DrawnRuns {
+  std::vector<RunIndex> runs;  ///< Ascending; n of them.
+  /// Drawn quantities as in drawn_names(), then the true parameters that follow from them, as in
+  /// `truth_k2d_s2_m`. Units are in the names.
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> columns;  ///< Their values, shape [names.size()][n].
+  /// estimate − truth, SI; shape [num_parameters][n].
+  std::array<std::vector<double>, num_parameters> errors;
+};
+
+/// The first runs of a campaign file that have an estimate, `num_runs_max` of them at most.
+/// @param campaign  The definition in the file.
+[[nodiscard]] DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign,
+                                        std::uint64_t num_runs_max);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,77 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <optional>
+
+#include "coordinator/report/report.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "core/statistics/tolerance.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t label_width = 11;
+constexpr std::size_t figure_width = 8;
+constexpr std::size_t triple_width = 3 * figure_width + 1;
+constexpr std::size_t bias_width = 9;
+constexpr std::size_t skewness_width = 7;
+constexpr std::size_t signed_width = bias_width + skewness_width;
+
+std::string triple(std::string_view one, std::string_view two, std::string_view three) {
+  return right_aligned(one, figure_width) + right_aligned(two, figure_width) +
+         right_aligned(three, figure_width) + " ";
+}
+
+std::string triple(double value, const std::optional<Interval>& interval, double scale) {
+  const auto figure = [&](double number) { return measured_figure(number / scale); };
+  if (!interval) return triple(figure(value), "-", "-");
+  return triple(figure(value), figure(interval->lower), figure(interval->upper));
+}
+
+std::string signed_figure(double value) {
+  return fmt::format("{}{}", value < 0.0 ? "-" : "", measured_figure(std::abs(value)));
+}
+
+std::string heading() {
+  const std::string rule =
+      fmt::format("{}┼{}┼{}\n", horizontal_rule(label_width + triple_width),
+                  horizontal_rule(triple_width), horizontal_rule(signed_width));
+  return fmt::format("{}│{}│{}\n{}{}│{}│{}{}\n{}",
+                     left_aligned(left_aligned("", label_width) + centred("|error|", triple_width),
+                                  label_width + triple_width),
+                     left_aligned(centred("|error|", triple_width), triple_width),
+                     centred("error", signed_width), left_aligned("parameter", label_width),
+                     triple("mean", "from", "to"), triple("std", "from", "to"),
+                     right_aligned("bias", bias_width), right_aligned("skew", skewness_width),
+                     rule);
+}
+
+std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy) {
+  const double scale = info.display_scale;
+  return fmt::format("{}{}│{}│{}{}\n", left_aligned(info.label, label_width),
+                     triple(accuracy.mean, accuracy.mean_interval, scale),
+                     triple(accuracy.standard_deviation, accuracy.deviation_interval, scale),
+                     right_aligned(signed_figure(accuracy.error.bias / scale), bias_width),
+                     right_aligned(fmt::format("{:.2f}", accuracy.error.skewness), skewness_width));
+}
+
+/// What "the worst of n" is worth [Wilks1941].
+std::string worth_of_worst(std::uint64_t num_runs) {
+  const double coverage = std::pow(1.0 - default_confidence, 1.0 / static_cast<double>(num_runs));
+  // Rounded down: no more is claimed than holds.
+  return fmt::format("worst of {}: with 95 % confidence {} % of all draws stay below\n", num_runs,
+                     std::floor(coverage * 1e5) / 1e3);
+}
+
+}  // namespace
+
+std::string interval_table(const CampaignStatistics& statistics) {
+  if (statistics.num_estimated == 0) return "";
+  std::string text = fmt::format("95 % intervals, in the units above\n\n{}", heading());
+  for (const ParameterInfo& info : parameter_infos()) {
+    text += row(info, statistics.accuracy[index(info.parameter)]);
+  }
+  return text + worth_of_worst(statistics.num_estimated);
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,93 @@
+#include "coordinator/report/requirement_text.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "coordinator/report/text_cells.hpp"
+#include "core/campaign/statistics.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+std::string_view name_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::met:
+      return "met";
+    case Verdict::not_met:
+      return "not met";
+    case Verdict::undecided:
+      return "undecided";
+  }
+  PROOFMASS_EXPECT(false);
+}
+
+std::string percent(double fraction) { return fmt::format("{:.4g} %", 100.0 * fraction); }
+
+std::string exceedance_line(const RequirementCheck& check) {
+  std::string line =
+      fmt::format("Exceeding    {} of {} runs", check.num_exceedances, check.num_runs);
+  if (check.exceedance) {
+    line += fmt::format("; {} to {} of all draws (95 % interval)", percent(check.exceedance->lower),
+                        percent(check.exceedance->upper));
+  }
+  return line + "\n";
+}
+
+std::string bound_line(const RequirementAnswer& answer) {
+  const RequirementCheck& check = answer.check;
+  const Tolerance& tolerance = answer.requirement.tolerance;
+  if (!check.bound) {
+    return fmt::format("Bound        none: {} draws at least, for {} with {}\n",
+                       wilks_num_runs(tolerance, 1).value_or(0), percent(tolerance.coverage),
+                       percent(tolerance.confidence));
+  }
+  const ParameterInfo& info = parameter_infos()[index(answer.requirement.parameter)];
+  return fmt::format("Bound        {} of all draws below {:.6g}{}{}, with {}\n",
+                     percent(tolerance.coverage), check.bound->value, info.unit == "1" ? "" : " ",
+                     info.unit == "1" ? "" : info.unit, percent(tolerance.confidence));
+}
+
+std::string needed_line(const RequirementCheck& check) {
+  if (check.verdict != Verdict::undecided) return "";
+  const auto count = [](const std::optional<std::uint64_t>& num_runs) {
+    return num_runs ? std::to_string(*num_runs) : "no number of";
+  };
+  return fmt::format(
+      "Draws        {} meet it if no further one exceeds it,\n"
+      "             {} decide if they go on to exceed it as often\n",
+      count(check.num_runs_at_best), count(check.num_runs_at_this_rate));
+}
+
+}  // namespace
+
+std::vector<RequirementAnswer> check_requirements(const Store& store,
+                                                  std::span<const std::string> texts) {
+  std::vector<RequirementAnswer> answers;
+  for (const std::string& text : texts) {
+    answers.push_back({.text = text, .requirement = parse_requirement(text), .check = {}});
+  }
+  ParameterArray no_objectives{};
+  StatisticsAccumulator accumulator(no_objectives);
+  std::uint64_t num_without_estimate = 0;
+  for (const RunRange& range : store.given_up_runs()) num_without_estimate += range.count;
+  store.for_each_result([&](const RunResult& result) {
+    accumulator.add(result);
+    if (!result.has_estimate()) ++num_without_estimate;
+  });
+  for (RequirementAnswer& answer : answers) {
+    std::vector<double> errors = accumulator.errors(answer.requirement.parameter);
+    for (double& error : errors) error = std::abs(error);
+    answer.check = check_requirement(answer.requirement, errors, num_without_estimate);
+  }
+  return answers;
+}
+
+std::string requirement_text(const RequirementAnswer& answer) {
+  return fmt::format("Requirement  {}\nAnswer       {}\n{}{}{}", answer.text,
+                     name_of(answer.check.verdict), exceedance_line(answer.check),
+                     bound_line(answer), needed_line(answer.check));
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "coordinator/report/drawn_runs.hpp"
+#include "core/campaign/identifiers.hpp"
+#include "core/campaign/parameter.hpp"
+
+namespace proofmass::coordinator {
+
+/// Runs that sensitivities are computed from at most: a million would take minutes and say no more.
+inline constexpr std::uint64_t sensitivity_runs_max = 100'000;
+
+/// Which drawn quantities drive a parameter's error, and which its magnitude: the `num_rows` with
+/// the largest first-order index of each, with rank correlations and their 95 % intervals. Lines
+/// have at most 80 characters.
+/// @throws InvalidArgument below 16 runs.
+[[nodiscard]] std::string sensitivity_text(const DrawnRuns& drawn, Parameter parameter,
+                                           std::size_t num_rows);
+
+/// Why a run is as far off as it is: the place of its |error| among the runs, and its values of the
+/// quantities that drive |error| and error of the parameter, each with its percentile.
+/// @throws InvalidArgument if the run is not among those, or they are below 16.
+[[nodiscard]] std::string explanation_text(const DrawnRuns& drawn, Parameter parameter,
+                                           RunIndex run, std::size_t num_rows);
+
+/// The parameter for which the run's |error| has the highest rank.
+/// @throws InvalidArgument if the run is not among those.
+[[nodiscard]] Parameter worst_parameter_of(const DrawnRuns& drawn, RunIndex run);
+
+}  // namespace proofmass::coordinator

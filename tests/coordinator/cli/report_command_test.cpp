@@ -1,0 +1,94 @@
+#include "coordinator/cli/report_command.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/store/store.hpp"
+#include "tests/coordinator/cli/temporary_directory.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+/// 60 runs whose errors of every parameter are 1, 2, ... 60 times 1e-6.
+class ReportCommand : public testing::Test {
+ protected:
+  void SetUp() override {
+    Campaign campaign = hardy2013_campaign();
+    campaign.num_runs = 60;
+    Store store = Store::create(database_, campaign, canonical_definition(campaign));
+    std::vector<Delivery> deliveries;
+    for (std::uint64_t run = 0; run < campaign.num_runs; ++run) {
+      Delivery delivery{.result = {.run = {run}, .num_draws = 1}, .worker = {1}, .attempt = {1}};
+      delivery.result.estimate.fill(1e-6 * static_cast<double>(run + 1));
+      deliveries.push_back(delivery);
+    }
+    store.commit(deliveries);
+  }
+
+  [[nodiscard]] int answer(const std::string& requirement) const {
+    return print_report({.database = database_, .requirements = {requirement}});
+  }
+
+  template <typename Exception, typename Call>
+  [[nodiscard]] static std::string refusal(const Call& call) {
+    try {
+      call();
+    } catch (const Exception& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+
+  test::TemporaryDirectory directory_;
+  std::filesystem::path database_ = directory_ / "a.db";
+};
+
+TEST_F(ReportCommand, NeedsADatabase) {
+  EXPECT_THROW((void)print_report({.database = directory_ / "none.db", .requirements = {}}),
+               StoreError);
+}
+
+// 59 runs below the limit show 95 % with 95 % [Wilks1941], and none is above 61e-6.
+TEST_F(ReportCommand, TellsInItsExitCodeWhetherARequirementIsMet) {
+  EXPECT_EQ(answer("a_c12 < 61e-6 for 95% with 95%"), exit_done);
+  EXPECT_EQ(answer("a_c12 < 61e-6 for 99% with 95%"), exit_not_met);
+  EXPECT_EQ(answer("a_c12 < 30e-6 for 95% with 95%"), exit_not_met);
+}
+
+TEST_F(ReportCommand, NeedsAllRequirementsMet) {
+  EXPECT_EQ(print_report({.database = database_,
+                          .requirements = {"a_c12 < 61e-6 for 95% with 95%",
+                                           "k2c < 61e-6 for 95% with 95%"}}),
+            exit_done);
+  EXPECT_EQ(print_report({.database = database_,
+                          .requirements = {"a_c12 < 61e-6 for 95% with 95%",
+                                           "k2c < 30e-6 for 95% with 95%"}}),
+            exit_not_met);
+}
+
+TEST_F(ReportCommand, RefusesARequirementThatCannotBeRead) {
+  EXPECT_EQ(refusal<Error>([&] { (void)answer("a_c12 is small"); }),
+            "requirement = a_c12 is small (must read \"PARAMETER < LIMIT for COVERAGE% with "
+            "CONFIDENCE%\")");
+}
+
+TEST_F(ReportCommand, RefusesAnUnknownParameter) {
+  EXPECT_EQ(refusal<UsageError>([&] {
+              (void)print_sensitivity({.database = database_, .parameter = "k2e", .run = {}});
+            }),
+            "parameter = k2e (must be one of a_c11_delta_x a_c11_delta_z a_c11_delta_y a_c12 "
+            "a_c13 a_d11_prime a_d12 a_d13 k2d k2c)");
+}
+
+TEST_F(ReportCommand, RefusesARunWithoutAnEstimate) {
+  EXPECT_EQ(refusal<InvalidArgument>([&] {
+              (void)print_sensitivity({.database = database_, .parameter = {}, .run = 60});
+            }),
+            "run = 60 (must be one of the first 60 runs with an estimate)");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,71 @@
+#include "coordinator/report/requirement_text.hpp"
+
+#include <gmock/gmock.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+/// What is said of so many runs, so many of them at 1e-3 and the others at 1e-4.
+std::string answer_to(const std::string& text, std::size_t num_runs, std::size_t num_beyond) {
+  std::vector<double> errors(num_runs, 1e-4);
+  std::fill_n(errors.begin(), num_beyond, 1e-3);
+  const Requirement requirement = parse_requirement(text);
+  return requirement_text({.text = text,
+                           .requirement = requirement,
+                           .check = check_requirement(requirement, errors, 0)});
+}
+
+// [Wilks1941]: 299 runs for 99 % with 95 %. Clopper and Pearson: 1 - 0.025^(1/299) = 1.226 %.
+TEST(RequirementText, SaysThatItIsMet) {
+  EXPECT_EQ(answer_to("a_c12 < 9e-4 for 99% with 95%", 299, 0),
+            "Requirement  a_c12 < 9e-4 for 99% with 95%\n"
+            "Answer       met\n"
+            "Exceeding    0 of 299 runs; 0 % to 1.226 % of all draws (95 % interval)\n"
+            "Bound        99 % of all draws below 0.0001 rad, with 95 %\n");
+}
+
+TEST(RequirementText, SaysHowManyDrawsItTakes) {
+  const std::string text = answer_to("a_c12 < 9e-4 for 99% with 95%", 100, 0);
+  EXPECT_THAT(text, testing::HasSubstr("Answer       undecided\n"));
+  EXPECT_THAT(text,
+              testing::HasSubstr("Bound        none: 299 draws at least, for 99 % with 95 %\n"));
+  EXPECT_THAT(text, testing::HasSubstr("Draws        299 meet it if no further one exceeds it,\n"
+                                       "             299 decide if"));
+}
+
+TEST(RequirementText, SaysThatItIsNotMet) {
+  const std::string text = answer_to("a_c12 < 9e-4 for 99% with 95%", 100, 20);
+  EXPECT_THAT(text, testing::HasSubstr("Answer       not met\n"));
+  EXPECT_THAT(text, testing::Not(testing::HasSubstr("Draws")));
+}
+
+TEST(RequirementText, LeavesOutTheUnitOfAPureNumber) {
+  EXPECT_THAT(answer_to("a_d11_prime < 9e-4 for 95% with 95%", 59, 0),
+              testing::HasSubstr(" below 0.0001, with 95 %\n"));
+}
+
+using StoredRequirement = test::StoreTest;
+
+TEST_F(StoredRequirement, CountsRunsWithoutAnEstimateAsExceeding) {
+  Store store = Store::create(file(), test::campaign_of(12), "");
+  std::vector<Delivery> deliveries = test::deliveries_of(0, 10);
+  deliveries[4].result.status = RunStatus::no_draw;
+  store.commit(deliveries);
+  const Entry given_up = GivenUpRun{.run = {11}};
+  store.write({&given_up, 1});
+  const std::vector<std::string> texts{"k2c < 1e9 for 50% with 50%"};
+
+  const auto answers = check_requirements(store, texts);
+
+  ASSERT_EQ(answers.size(), 1U);
+  EXPECT_EQ(answers[0].check.num_runs, 11U);
+  EXPECT_EQ(answers[0].check.num_exceedances, 2U);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

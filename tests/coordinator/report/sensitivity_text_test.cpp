@@ -1,0 +1,133 @@
+#include "coordinator/report/sensitivity_text.hpp"
+
+#include <gmock/gmock.h>
+
+#include <random>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "core/campaign/draw.hpp"
+#include "core/error.hpp"
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::Each;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+MATCHER(FitsATerminal, "has at most 80 characters") { return text_width(arg) <= 80; }
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+/// Every quantity uniform in [-1, 1]; the error of K2c is that with index 7, and that of a_c12 the
+/// square of that with index 20.
+DrawnRuns made_up_runs() {
+  std::mt19937_64 bits(5);
+  DrawnRuns drawn;
+  drawn.names.assign(drawn_names().begin(), drawn_names().end());
+  drawn.columns.resize(num_drawn);
+  for (std::uint64_t run = 0; run < 1000; ++run) {
+    drawn.runs.push_back({run});
+    for (auto& column : drawn.columns) {
+      column.push_back(static_cast<double>(bits() >> 11) * 0x1p-52 - 1.0);
+    }
+    for (auto& errors : drawn.errors) errors.push_back(1.0);
+    drawn.errors[index(Parameter::k2c)].back() = drawn.columns[7].back();
+    drawn.errors[index(Parameter::a_c12)].back() =
+        drawn.columns[20].back() * drawn.columns[20].back();
+  }
+  return drawn;
+}
+
+TEST(SensitivityText, NamesTheQuantityThatDrivesAnError) {
+  const auto lines = lines_of(sensitivity_text(made_up_runs(), Parameter::k2c, 2));
+  ASSERT_EQ(lines.size(), 12U);
+  EXPECT_EQ(lines[0], "K2c/K1c²: 1000 runs");
+  EXPECT_THAT(lines[2], StartsWith("drives |error|"));
+  EXPECT_THAT(lines[4], StartsWith(drawn_names()[7]));
+  EXPECT_THAT(lines[7], StartsWith("drives error"));
+  EXPECT_THAT(lines[9], StartsWith(drawn_names()[7]));
+  EXPECT_THAT(lines[9], HasSubstr(" +1.00 (+1.00, +1.00)"));
+}
+
+// |error| goes as the magnitude, which no correlation sees.
+TEST(SensitivityText, FindsWhatActsThroughItsSquare) {
+  const auto lines = lines_of(sensitivity_text(made_up_runs(), Parameter::a_c12, 1));
+  EXPECT_THAT(lines[4], StartsWith(drawn_names()[20]));
+  EXPECT_THAT(lines[4], HasSubstr(" 9"));
+}
+
+TEST(SensitivityText, FitsATerminal) {
+  const DrawnRuns drawn = made_up_runs();
+  EXPECT_THAT(lines_of(sensitivity_text(drawn, Parameter::k2c, num_drawn)), Each(FitsATerminal()));
+  EXPECT_THAT(lines_of(explanation_text(drawn, Parameter::k2c, {3}, num_drawn)),
+              Each(FitsATerminal()));
+}
+
+TEST(SensitivityText, SaysNothingOfAnErrorThatDoesNotVary) {
+  const auto lines = lines_of(sensitivity_text(made_up_runs(), Parameter::k2d, 5));
+  EXPECT_EQ(lines.size(), 7U);
+}
+
+TEST(ExplanationText, ShowsTheRunsValuesOfWhatDrivesTheError) {
+  DrawnRuns drawn = made_up_runs();
+  drawn.columns[7][42] = 1.5;
+  drawn.errors[index(Parameter::k2c)][42] = 1.5;
+  const auto lines = lines_of(explanation_text(drawn, Parameter::k2c, {42}, 1));
+  EXPECT_EQ(lines[0], "Run 42: error of K2c/K1c² 1.5 s²/m, rank 1 of 1000");
+  EXPECT_THAT(lines[4], StartsWith(drawn_names()[7]));
+  EXPECT_THAT(lines[4], HasSubstr(" 1.5        99.9"));
+  EXPECT_EQ(worst_parameter_of(drawn, {42}), Parameter::a_c11_delta_x);  // All are equal there.
+}
+
+TEST(ExplanationText, RefusesARunThatIsNotThere) {
+  try {
+    (void)explanation_text(made_up_runs(), Parameter::k2c, {1000}, 1);
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_STREQ(error.what(), "run = 1000 (must be one of the first 1000 runs with an estimate)");
+  }
+}
+
+using DrawnRunsTest = test::StoreTest;
+
+// Run by run what the simulation draws, those that were rejected first included.
+TEST_F(DrawnRunsTest, AreThoseOfTheSimulation) {
+  Campaign campaign = hardy2013_campaign();
+  campaign.num_runs = 50;
+  Store store = Store::create(file(), campaign, canonical_definition(campaign));
+  std::vector<Delivery> deliveries = test::deliveries_of(0, 50);
+  for (Delivery& delivery : deliveries) {
+    delivery.result.num_draws = draw_instrument(campaign, delivery.result.run, {}).num_draws;
+  }
+  deliveries[4].result.status = RunStatus::not_finite;
+  store.commit(deliveries);
+
+  const DrawnRuns drawn = read_drawn_runs(store, campaign, 40);
+
+  ASSERT_EQ(drawn.runs.size(), 40U);
+  EXPECT_EQ(drawn.names[num_drawn + 1], "truth_a_c11_delta_z_m");
+  EXPECT_EQ(drawn.runs[4], RunIndex{5});
+  for (std::size_t i = 0; i < drawn.runs.size(); ++i) {
+    DrawnValues values{};
+    for (std::size_t j = 0; j < num_drawn; ++j) values[j] = drawn.columns[j][i];
+    EXPECT_EQ(drawn.columns[num_drawn + 1][i],
+              test::result_of(drawn.runs[i].value).truth[index(Parameter::a_c11_delta_z)]);
+    const Instrument instrument = *draw_instrument(campaign, drawn.runs[i], {}).instrument;
+    EXPECT_EQ(sensitivity_matrices(make_instrument(values)).common,
+              sensitivity_matrices(instrument).common);
+  }
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
