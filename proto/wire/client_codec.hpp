@@ -22,6 +22,7 @@ inline constexpr std::size_t reply_size_max = std::size_t{4} << 20;
 inline constexpr std::size_t campaigns_per_reply_max = 4096;
 inline constexpr std::size_t workers_per_reply_max = 4096;
 inline constexpr std::size_t reply_text_size_max = 4096;  ///< Of any text in a reply, bytes.
+inline constexpr std::size_t stop_rule_size_max = 200;    ///< Bytes.
 inline constexpr int priority_max = 100;                  ///< And its negative.
 
 /// A request as it travels.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/error.hpp"
+#include "core/statistics/stop_rule.hpp"
 #include "proto/client.pb.h"
 #include "proto/wire/campaign_codec.hpp"
 #include "proto/wire/checks.hpp"
@@ -31,6 +32,13 @@ int checked_priority(int priority) {
   return priority;
 }
 
+std::string checked_stop_rule(const std::string& rule) {
+  require(rule.size() <= stop_rule_size_max, "until", fmt::format("{} bytes", rule.size()),
+          fmt::format("must be at most {}", stop_rule_size_max));
+  if (!rule.empty()) (void)parse_stop_rule(rule);
+  return rule;
+}
+
 template <typename Core, typename Sent>
 Core enumerator(Sent sent, std::uint64_t maximum, std::string_view field) {
   const int value = static_cast<int>(sent);
@@ -45,7 +53,12 @@ ClientRequest read(const proto::SubmitRequest& message) {
           "must be in [0, 1]");
   SubmitRequest submit{.campaign = detail::decode_campaign(message.campaign()),
                        .priority = checked_priority(message.priority()),
-                       .audit_fraction = fraction};
+                       .audit_fraction = fraction,
+                       .stop_rule = checked_stop_rule(message.stop_rule())};
+  if (message.has_failures_max()) {
+    require_in(message.failures_max(), 0, num_runs_max, "failures");
+    submit.failures_max = message.failures_max();
+  }
   for (const proto::TableColumn& column : message.table_columns()) {
     submit.campaign.table_columns.emplace_back(column.values().begin(), column.values().end());
   }

@@ -18,6 +18,8 @@ void write(const SubmitRequest& submit, proto::RequestEnvelope& envelope) {
   }
   message.set_priority(submit.priority);
   message.set_audit_fraction(submit.audit_fraction);
+  message.set_stop_rule(submit.stop_rule);
+  if (submit.failures_max) message.set_failures_max(*submit.failures_max);
 }
 
 void write(const StatusRequest&, proto::RequestEnvelope& envelope) { envelope.mutable_status(); }

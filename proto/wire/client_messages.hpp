@@ -19,6 +19,10 @@ struct SubmitRequest {
   Campaign campaign;            ///< Its name is the campaign's; is_name() holds.
   int priority = 0;             ///< -100 to 100; runs of a higher one are lent first.
   double audit_fraction = 0.0;  ///< 0 to 1.
+  /// See parse_stop_rule(): the campaign's runs are as many as it may take. Empty: all of them.
+  std::string stop_rule = {};
+  /// Runs without an estimate and given up; with more, the campaign is cancelled.
+  std::optional<std::uint64_t> failures_max = {};
 };
 
 struct StatusRequest {};

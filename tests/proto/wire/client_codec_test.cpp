@@ -41,16 +41,27 @@ Campaign campaign_with_tables() {
 
 TEST(SubmitRequest, KeepsTheCampaignAndItsTables) {
   const Campaign campaign = campaign_with_tables();
-  const SubmitRequest submit = round_trip_request(
-      SubmitRequest{.campaign = campaign, .priority = -100, .audit_fraction = 0.1});
+  const SubmitRequest submit = round_trip_request(SubmitRequest{.campaign = campaign,
+                                                                .priority = -100,
+                                                                .audit_fraction = 0.1,
+                                                                .stop_rule = "std(a_c13) within 5%",
+                                                                .failures_max = 0});
   EXPECT_EQ(submit.priority, -100);
   EXPECT_EQ(submit.audit_fraction, 0.1);
+  EXPECT_EQ(submit.stop_rule, "std(a_c13) within 5%");
+  EXPECT_EQ(submit.failures_max, 0U);
   EXPECT_EQ(submit.campaign.name, "tables");
   EXPECT_EQ(submit.campaign.seed, 7U);
   EXPECT_EQ(submit.campaign.num_runs, 2U);
   EXPECT_EQ(submit.campaign.scenario.noise.scale, 0.1);
   EXPECT_EQ(submit.campaign.dispersions, campaign.dispersions);
   EXPECT_EQ(submit.campaign.table_columns, campaign.table_columns);
+}
+
+TEST(SubmitRequest, NeedsNeitherRuleNorBudget) {
+  const SubmitRequest submit = round_trip_request(SubmitRequest{});
+  EXPECT_EQ(submit.stop_rule, "");
+  EXPECT_EQ(submit.failures_max, std::nullopt);
 }
 
 TEST(QuestionRequests, AreTold) {

@@ -190,6 +190,15 @@ TEST(MalformedSubmitRequest, HasAPriorityAndAFraction) {
   }
 }
 
+TEST(MalformedSubmitRequest, HasAStopRuleAndABudget) {
+  EXPECT_EQ(refusal_of_submit([](auto& submit) { submit.set_stop_rule("soon"); }),
+            "until = soon (soon is no statistic; they are mean, std and p1 to p99)");
+  EXPECT_EQ(refusal_of_submit([](auto& submit) { submit.set_stop_rule(std::string(201, ' ')); }),
+            "until = 201 bytes (must be at most 200)");
+  EXPECT_EQ(refusal_of_submit([](auto& submit) { submit.set_failures_max(1'000'000'001); }),
+            "failures = 1000000001 (must be in [0, 1000000000])");
+}
+
 TEST(MalformedSubmitRequest, HasACampaignThatPassesItsRules) {
   EXPECT_EQ(refusal_of_submit([](auto& submit) { submit.clear_campaign(); }),
             "num_runs = 0 (must be in [1, 1000000000])");
