@@ -104,7 +104,8 @@ std::shared_ptr<const Campaign> CampaignFolder::extend(Store& store, const Campa
 void CampaignFolder::summarise(
     const std::filesystem::path& file, const Scenario& scenario,
     const std::function<void(const std::function<void(Store&)>&)>& write) {
-  const CampaignStatistics statistics = read_statistics(Store::open_read_only(file), scenario);
+  const DigestedStatistics statistics =
+      read_digested_statistics(Store::open_read_only(file), scenario);
   write([&](Store& store) { write_statistics(store, scenario, statistics); });
 }
 

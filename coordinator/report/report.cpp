@@ -55,15 +55,26 @@ std::string given_up_text(std::span<const RunRange> given_up) {
   return line + "\n";
 }
 
-void update_statistics(Store& store, const Scenario& scenario) {
-  write_statistics(store, scenario, read_statistics(store, scenario));
+DigestedStatistics read_digested_statistics(const Store& store, const Scenario& scenario) {
+  StatisticsAccumulator accumulator(scenario.objectives);
+  Digest digest;
+  store.for_each_result([&](const RunResult& result) {
+    accumulator.add(result);
+    digest.add(result);
+  });
+  return {.statistics = accumulator.statistics(), .digest = digest.finish()};
 }
 
-void write_statistics(Store& store, const Scenario& scenario,
-                      const CampaignStatistics& statistics) {
+void update_statistics(Store& store, const Scenario& scenario) {
+  write_statistics(store, scenario, read_digested_statistics(store, scenario));
+}
+
+void write_statistics(Store& store, const Scenario& scenario, const DigestedStatistics& digested) {
+  const CampaignStatistics& statistics = digested.statistics;
   store.write_statistics(statistics, budget_before_calibration(scenario),
                          budget_after_calibration(scenario, statistics.worst_errors()),
-                         budget_after_calibration(scenario, statistics.mean_errors()));
+                         budget_after_calibration(scenario, statistics.mean_errors()),
+                         digested.digest);
 }
 
 }  // namespace proofmass::coordinator

@@ -41,8 +41,18 @@ namespace proofmass::coordinator {
 /// Statistics of the results in a campaign file.
 [[nodiscard]] CampaignStatistics read_statistics(const Store& store, const Scenario& scenario);
 
-/// Stores statistics and the budgets that follow from them in the file.
-void write_statistics(Store& store, const Scenario& scenario, const CampaignStatistics& statistics);
+/// Statistics and the digest of the results that they were computed from.
+struct DigestedStatistics {
+  CampaignStatistics statistics;
+  std::string digest;
+};
+
+/// Reads the results of a campaign file once for both.
+[[nodiscard]] DigestedStatistics read_digested_statistics(const Store& store,
+                                                          const Scenario& scenario);
+
+/// Stores statistics, their digest, and the budgets that follow from them in the file.
+void write_statistics(Store& store, const Scenario& scenario, const DigestedStatistics& digested);
 
 /// Brings the statistics and budgets that are stored in the file up to its results.
 void update_statistics(Store& store, const Scenario& scenario);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -99,6 +100,52 @@ struct Comparison {
   bool is_equal = false;   ///< Every bit that means something.
 
   bool operator==(const Comparison&) const = default;
+};
+
+/// What people have to say of a campaign.
+struct Note {
+  std::string time_utc;  ///< As in `2024-02-29T12:00:10Z`.
+  std::string text;
+};
+
+/// Marks the campaign with a word: 1 to 64 of the characters A-Z a-z 0-9 . _ and -.
+struct AddTag {
+  std::string tag;
+};
+
+struct RemoveTag {
+  std::string tag;
+};
+
+/// Text in UTF-8, at most 2,000 bytes, without control characters but the end of a line.
+struct AddNote {
+  std::string text;
+};
+
+/// What people add to a campaign file, also while a coordinator serves it.
+using Annotation = std::variant<AddTag, RemoveTag, AddNote>;
+
+/// When a campaign ends before all of its runs are finished.
+struct StopPlan {
+  std::string stop_rule;                      ///< `std(a_c13) within 5%`; empty: none.
+  std::optional<std::uint64_t> num_runs_max;  ///< However far the rule is from being reached; > 0.
+  std::optional<std::uint64_t> failures_max;  ///< Runs without an estimate, above which it stops.
+
+  bool operator==(const StopPlan&) const = default;
+};
+
+/// What the stored statistics were computed from.
+struct Summary {
+  std::uint64_t num_finished = 0;
+  std::uint64_t num_estimated = 0;  ///< Completed or not converged.
+  std::uint64_t num_not_converged = 0;
+  std::uint64_t num_not_finite = 0;
+  std::uint64_t num_no_draw = 0;
+  std::uint64_t num_given_up = 0;  ///< Not among the finished ones.
+  std::string digest;              ///< Of the results, 64 hexadecimal digits.
+  std::string computed_utc;
+
+  bool operator==(const Summary&) const = default;
 };
 
 /// What became of the deliveries of one commit.

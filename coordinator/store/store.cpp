@@ -3,16 +3,19 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <functional>
 #include <optional>
 #include <system_error>
 #include <utility>
 #include <variant>
 
+#include "coordinator/store/detail/annotation_rows.hpp"
 #include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/file_system.hpp"
+#include "coordinator/store/detail/integrity.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
@@ -79,13 +82,13 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
   transaction.commit();
 }
 
-// The campaign file appears under its name complete, or not at all.
-void make_campaign_file(const std::filesystem::path& path, const Campaign& campaign,
-                        std::string_view definition) {
+// A file appears under its name complete, or not at all.
+void appear_complete(const std::filesystem::path& path,
+                     const std::function<void(const std::filesystem::path&)>& write) {
   const std::filesystem::path draft = std::filesystem::path(path).concat(".new");
   remove_draft(draft);
   try {
-    write_draft(draft, campaign, definition);
+    write(draft);
   } catch (...) {
     remove_draft(draft);
     throw;
@@ -145,7 +148,8 @@ Store Store::create(const std::filesystem::path& path, const Campaign& campaign,
   detail::check_directory_of(path);
   auto lock = std::make_unique<detail::StoreLock>(path);
   check_absence(path);
-  make_campaign_file(path, campaign, definition);
+  appear_complete(
+      path, [&](const std::filesystem::path& draft) { write_draft(draft, campaign, definition); });
   return Store(std::make_unique<Parts>(path, std::move(lock)));
 }
 
@@ -159,6 +163,19 @@ Store Store::open(const std::filesystem::path& path) {
 Store Store::open_read_only(const std::filesystem::path& path) {
   check_presence(path);
   return Store(std::make_unique<Parts>(path));
+}
+
+void Store::annotate(const std::filesystem::path& path, const Annotation& annotation) {
+  check_presence(path);
+  check_that_name_is_the_only_one(path);
+  detail::check_directory_of(path);
+  Database database(path, Access::read_write);
+  detail::check_campaign_file(database, path);
+  detail::check_up_to_date(database, path);
+  configure(database);
+  Transaction transaction(database);
+  detail::write_annotation(database, annotation);
+  transaction.commit();
 }
 
 wire::CampaignId Store::id() const {
@@ -190,6 +207,10 @@ std::string Store::model_version() const {
 
 std::string Store::build() const { return parts_->database.text("SELECT build FROM campaign"); }
 
+std::string Store::created_utc() const {
+  return parts_->database.text("SELECT created_utc FROM campaign");
+}
+
 EnvironmentTable Store::environment_table() const {
   return detail::read_environment_table(parts_->database);
 }
@@ -210,6 +231,25 @@ void Store::extend(const Campaign& campaign, std::string_view definition) {
 }
 
 CampaignControl Store::control() const { return detail::read_control(parts_->database); }
+
+StopPlan Store::stop_plan() const { return detail::read_stop_plan(parts_->database); }
+
+void Store::set_stop_plan(const StopPlan& plan) {
+  Transaction transaction(parts_->database);
+  detail::write_stop_plan(parts_->database, plan);
+  transaction.commit();
+}
+
+void Store::record_stop_check(std::uint64_t num_runs, std::string_view statistic,
+                              const StopCheck& check) {
+  Transaction transaction(parts_->database);
+  detail::replace_stop_check(parts_->database, num_runs, statistic, check);
+  transaction.commit();
+}
+
+std::vector<std::string> Store::tags() const { return detail::read_tags(parts_->database); }
+
+std::vector<Note> Store::notes() const { return detail::read_notes(parts_->database); }
 
 std::vector<RunRange> Store::finished_runs() const {
   Statement select = parts_->database.prepare("SELECT run_index FROM delivery ORDER BY run_index");
@@ -271,19 +311,35 @@ void Store::for_each_result(const std::function<void(const RunResult&)>& visit) 
 }
 
 void Store::write_statistics(const CampaignStatistics& statistics, const Budget& before,
-                             const Budget& after_worst, const Budget& after_mean) {
+                             const Budget& after_worst, const Budget& after_mean,
+                             std::string_view digest) {
   const bool has_estimates = statistics.num_estimated > 0;
   Transaction transaction(parts_->database);
   detail::replace_statistics(parts_->database, statistics);
   detail::replace_budgets(parts_->database, {.before = before,
                                              .after_worst = has_estimates ? &after_worst : nullptr,
                                              .after_mean = has_estimates ? &after_mean : nullptr});
+  detail::replace_summary(parts_->database, statistics, digest);
   transaction.commit();
 }
+
+std::optional<Summary> Store::summary() const { return detail::read_summary(parts_->database); }
 
 void Store::record_event(std::string_view kind, std::string_view text) {
   const Entry event = EventEntry{.kind = std::string(kind), .text = std::string(text)};
   write({&event, 1});
+}
+
+void Store::check_integrity() const { detail::check_integrity(parts_->database); }
+
+void Store::back_up(const std::filesystem::path& destination) const {
+  const detail::StoreLock lock(destination);
+  check_absence(destination);
+  appear_complete(destination, [&](const std::filesystem::path& draft) {
+    Database copy(draft, Access::create);
+    parts_->database.copy_to(copy);
+    copy.execute("PRAGMA journal_mode = DELETE");  // The copied header may ask for a log.
+  });
 }
 
 }  // namespace proofmass::coordinator

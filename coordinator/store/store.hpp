@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,6 +19,7 @@
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"
 #include "core/environment/environment_table.hpp"
+#include "core/statistics/stop_rule.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::coordinator {
@@ -47,6 +49,12 @@ class Store {
   ///         older than this program.
   static Store open_read_only(const std::filesystem::path& path);
 
+  /// Adds a tag or a note, or removes a tag, also while a coordinator serves the file. A tag that
+  /// is there already stays as it is. At most 100 tags and 1,000 notes.
+  /// @throws StoreError as open() does, but for the lock; if the file is older than this program;
+  ///         `tag = x (rule)`, `note = x (rule)`.
+  static void annotate(const std::filesystem::path& path, const Annotation& annotation);
+
   /// Closes the file. Of a coordinator's, no other file (log, lock) remains unless somebody reads.
   ~Store();
   Store(Store&&) noexcept;
@@ -60,6 +68,7 @@ class Store {
   [[nodiscard]] std::string definition() const;
   [[nodiscard]] std::string model_version() const;  ///< That of the program that made the file.
   [[nodiscard]] std::string build() const;          ///< The same; empty before version 4.
+  [[nodiscard]] std::string created_utc() const;    ///< As in `2024-02-29T12:00:10Z`.
   [[nodiscard]] EnvironmentTable environment_table() const;
 
   /// Values of `table` quantities for each run, shape [elements][num_runs].
@@ -73,6 +82,16 @@ class Store {
   void extend(const Campaign& campaign, std::string_view definition);
 
   [[nodiscard]] CampaignControl control() const;
+
+  [[nodiscard]] StopPlan stop_plan() const;
+  void set_stop_plan(const StopPlan& plan);
+  /// Keeps what came of evaluating a stop rule; replaces what is there of these runs.
+  /// @param statistic  Of the rule: `std(a_c13)`.
+  void record_stop_check(std::uint64_t num_runs, std::string_view statistic,
+                         const StopCheck& check);
+
+  [[nodiscard]] std::vector<std::string> tags() const;  ///< Ascending.
+  [[nodiscard]] std::vector<Note> notes() const;        ///< In the order in which they were added.
 
   /// Ascending; neighbours are one range.
   [[nodiscard]] std::vector<RunRange> finished_runs() const;
@@ -101,14 +120,28 @@ class Store {
   /// Calls visit(result) for each finished run, in run order. Zeros have no sign.
   void for_each_result(const std::function<void(const RunResult&)>& visit) const;
 
-  /// Replaces the stored statistics and budgets.
+  /// Replaces the stored statistics and budgets, and the summary of what they were computed from.
   /// @param after_worst  With each parameter's worst error; ignored while no run has an estimate.
   /// @param after_mean   The same with the mean errors.
+  /// @param digest       Of the same results, 64 hexadecimal digits.
   void write_statistics(const CampaignStatistics& statistics, const Budget& before,
-                        const Budget& after_worst, const Budget& after_mean);
+                        const Budget& after_worst, const Budget& after_mean,
+                        std::string_view digest);
+  /// That of the last write_statistics(); empty before the first.
+  [[nodiscard]] std::optional<Summary> summary() const;
 
   /// Appends to the campaign's log, of which the newest 10,000 entries are kept.
   void record_event(std::string_view kind, std::string_view text);
+
+  /// Checks every page, row, index and reference, and that the schema is that of a new file. Takes
+  /// some 5 s for a million runs.
+  /// @throws StoreError naming the first finding.
+  void check_integrity() const;
+
+  /// Copies the file as it is now, complete or not at all, also while a coordinator writes to it.
+  /// The copy is one file, readable on read-only media.
+  /// @throws StoreError if the destination exists or cannot be written.
+  void back_up(const std::filesystem::path& destination) const;
 
  private:
   struct Parts;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -59,6 +60,32 @@ CampaignControl read_control(const Database& database) {
 void write_control(const Database& database, const CampaignControl& control) {
   database.prepare("UPDATE campaign SET phase = ?, priority = ?, audit_fraction = ?")
       .run(name_of(control.phase), std::int64_t{control.priority}, control.audit_fraction);
+}
+
+StopPlan read_stop_plan(const Database& database) {
+  Statement select = database.prepare("SELECT stop_rule, num_runs_max, failures_max FROM campaign");
+  PROOFMASS_EXPECT(select.step());
+  return {.stop_rule = select.text(0),
+          .num_runs_max = select.optional_count(1),
+          .failures_max = select.optional_count(2)};
+}
+
+void write_stop_plan(const Database& database, const StopPlan& plan) {
+  database.prepare("UPDATE campaign SET stop_rule = ?, num_runs_max = ?, failures_max = ?")
+      .run(plan.stop_rule, plan.num_runs_max, plan.failures_max);
+}
+
+void replace_stop_check(const Database& database, std::uint64_t num_runs,
+                        std::string_view statistic, const StopCheck& check) {
+  const bool is_bounded = check.interval.has_value();
+  database
+      .prepare(
+          "INSERT OR REPLACE INTO stop_check (statistic, num_runs, estimate, lower, upper,"
+          " relative_half_width, is_reached) VALUES (?, ?, ?, ?, ?, ?, ?)")
+      .run(statistic, num_runs, check.estimate,
+           is_bounded ? std::optional(check.interval->lower) : std::nullopt,
+           is_bounded ? std::optional(check.interval->upper) : std::nullopt,
+           check.relative_half_width, std::int64_t{check.is_reached});
 }
 
 std::vector<RunRange> read_given_up_runs(const Database& database) {

@@ -1,15 +1,26 @@
 #pragma once
 
+#include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/records.hpp"
+#include "core/statistics/stop_rule.hpp"
 
 namespace proofmass::coordinator::detail {
 
 /// How the campaign is served: columns of `campaign`.
 [[nodiscard]] CampaignControl read_control(const Database& database);
 void write_control(const Database& database, const CampaignControl& control);
+
+/// When the campaign ends early: columns of `campaign`.
+[[nodiscard]] StopPlan read_stop_plan(const Database& database);
+void write_stop_plan(const Database& database, const StopPlan& plan);
+
+/// A row of `stop_check`.
+void replace_stop_check(const Database& database, std::uint64_t num_runs,
+                        std::string_view statistic, const StopCheck& check);
 
 /// Runs without a result that are given up, ascending; neighbours are one range.
 [[nodiscard]] std::vector<RunRange> read_given_up_runs(const Database& database);

@@ -17,6 +17,7 @@ constexpr int busy_timeout_ms = 5000;
 int open_flags(Access access) {
   switch (access) {
     case Access::create:
+    case Access::memory:
       return SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
     case Access::read_write:
       return SQLITE_OPEN_READWRITE;
@@ -83,6 +84,14 @@ void Statement::bind(int position, double value) {
   check(sqlite3_bind_double(statement_.get(), position, value));
 }
 
+void Statement::bind(int position, const std::optional<std::uint64_t>& value) {
+  if (value) {
+    bind(position, *value);
+  } else {
+    check(sqlite3_bind_null(statement_.get(), position));
+  }
+}
+
 void Statement::bind(int position, std::string_view value) {
   check(sqlite3_bind_text64(statement_.get(), position, value.data(), value.size(),
                             SQLITE_TRANSIENT, SQLITE_UTF8));
@@ -113,6 +122,11 @@ std::uint64_t Statement::count(int column) const {
   return static_cast<std::uint64_t>(value);
 }
 
+std::optional<std::uint64_t> Statement::optional_count(int column) const {
+  if (sqlite3_column_type(statement_.get(), column) == SQLITE_NULL) return std::nullopt;
+  return count(column);
+}
+
 std::string Statement::text(int column) const {
   const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
   const int size = sqlite3_column_bytes(statement_.get(), column);
@@ -123,7 +137,8 @@ void Database::Close::operator()(sqlite3* connection) const { sqlite3_close_v2(c
 
 Database::Database(const std::filesystem::path& path, Access access) : path_(path) {
   // An absolute path is never mistaken for `:memory:` or a URI.
-  const std::string name = std::filesystem::absolute(path).string();
+  const std::string name =
+      access == Access::memory ? ":memory:" : std::filesystem::absolute(path).string();
   sqlite3* connection = nullptr;
   const int code = sqlite3_open_v2(name.c_str(), &connection, open_flags(access), nullptr);
   connection_.reset(connection);
@@ -166,10 +181,21 @@ std::int64_t Database::last_row() const { return sqlite3_last_insert_rowid(conne
 
 bool Database::in_transaction() const { return sqlite3_get_autocommit(connection_.get()) == 0; }
 
-void Database::fail(int code) const {
-  throw StoreError(
-      fmt::format("campaign file = {} ({})", path_.string(), explanation(code, connection_.get())));
+// In one step: with several, a writer in another process would begin the copy anew each time.
+void Database::copy_to(Database& copy) const {
+  sqlite3_backup* backup =
+      sqlite3_backup_init(copy.connection_.get(), "main", connection_.get(), "main");
+  if (backup == nullptr) copy.fail(sqlite3_errcode(copy.connection_.get()));
+  sqlite3_backup_step(backup, -1);
+  const int code = sqlite3_backup_finish(backup);
+  if (code != SQLITE_OK) copy.fail(code);
 }
+
+void Database::refuse(std::string_view what) const {
+  throw StoreError(fmt::format("campaign file = {} ({})", path_.string(), what));
+}
+
+void Database::fail(int code) const { refuse(explanation(code, connection_.get())); }
 
 Transaction::Transaction(Database& database) : database_(database) {
   database_.execute("BEGIN IMMEDIATE");

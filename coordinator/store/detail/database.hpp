@@ -12,8 +12,8 @@ struct sqlite3_stmt;
 
 namespace proofmass::coordinator::detail {
 
-/// How a database file is opened.
-enum class Access { create, read_write, read_only };
+/// How a database file is opened; `memory` opens none, and the path is for messages.
+enum class Access { create, read_write, read_only, memory };
 
 class Database;
 
@@ -41,6 +41,7 @@ class Statement {
   /// @pre The value is finite; SQLite would turn NaN into NULL.
   void bind(int position, const std::optional<double>& value);
   void bind(int position, double value);
+  void bind(int position, const std::optional<std::uint64_t>& value);  ///< The value, or NULL.
   void bind(int position, std::string_view value);
 
   /// Goes to the next row; false, and reset, after the last.
@@ -51,6 +52,7 @@ class Statement {
   [[nodiscard]] double real(int column) const;
   [[nodiscard]] std::int64_t integer(int column) const;
   [[nodiscard]] std::uint64_t count(int column) const;  ///< @pre The integer is not negative.
+  [[nodiscard]] std::optional<std::uint64_t> optional_count(int column) const;  ///< Empty: NULL.
   [[nodiscard]] std::string text(int column) const;
 
  private:
@@ -88,6 +90,12 @@ class Database {
   /// Key of the row that was inserted last.
   [[nodiscard]] std::int64_t last_row() const;
   [[nodiscard]] bool in_transaction() const;
+
+  /// Replaces the content of another database by that of this one, as it is now.
+  void copy_to(Database& copy) const;
+
+  /// @throws StoreError `campaign file = path (what)`.
+  [[noreturn]] void refuse(std::string_view what) const;
 
   /// @throws StoreError `campaign file = path (what went wrong, with a remedy)`.
   [[noreturn]] void fail(int code) const;

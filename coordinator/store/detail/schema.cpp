@@ -2,12 +2,25 @@
 
 #include <fmt/format.h>
 
+#include <map>
 #include <string>
 
 #include "coordinator/store/store_error.hpp"
 #include "proto/link/kill_point.hpp"
 
 namespace proofmass::coordinator::detail {
+namespace {
+
+/// Definitions by kind and name: `view budget`.
+std::map<std::string, std::string> schema_objects(const Database& database) {
+  Statement select =
+      database.prepare("SELECT type || ' ' || name, coalesce(sql, '') FROM sqlite_schema");
+  std::map<std::string, std::string> objects;
+  while (select.step()) objects.emplace(select.text(0), select.text(1));
+  return objects;
+}
+
+}  // namespace
 
 std::int64_t schema_version() { return static_cast<std::int64_t>(migrations().size()); }
 
@@ -39,6 +52,23 @@ void check_up_to_date(const Database& database, const std::filesystem::path& pat
       fmt::format("campaign file = {} (is older than this program: its user_version is "
                   "{}, not {}; resuming the campaign brings it up to date)",
                   path.string(), version, schema_version()));
+}
+
+void check_schema(const Database& database) {
+  Database fresh("new campaign", Access::memory);
+  {
+    Transaction transaction(fresh);
+    migrate(fresh);
+    transaction.commit();
+  }
+  std::map<std::string, std::string> expected = schema_objects(fresh);
+  for (const auto& [name, sql] : schema_objects(database)) {
+    const auto found = expected.find(name);
+    if (found == expected.end()) database.refuse("has what is no part of a campaign: " + name);
+    if (found->second != sql) database.refuse("has another definition of " + name);
+    expected.erase(found);
+  }
+  if (!expected.empty()) database.refuse("lacks " + expected.begin()->first);
 }
 
 void migrate(Database& database) {

@@ -24,6 +24,11 @@ inline constexpr std::int64_t application_id = 0x50724D73;
 /// @throws StoreError otherwise.
 void check_campaign_file(const Database& database, const std::filesystem::path& path);
 
+/// Checks that each table, view, index and trigger is that of a new file, and that there is none
+/// else. @pre check_up_to_date().
+/// @throws StoreError naming the first that is not.
+void check_schema(const Database& database);
+
 /// Checks that a campaign file has the version of this program: a reader cannot migrate it.
 /// @param path  For the message.
 /// @throws StoreError otherwise.

@@ -2,6 +2,10 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
+#include <utility>
+
+#include "core/error.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -14,17 +18,98 @@ std::optional<double> entry_of(const Budget* budget, std::size_t i) {
   return budget == nullptr ? std::nullopt : std::optional(entry_of(*budget, i));
 }
 
+constexpr int num_statistic_columns = 31;
+
+/// Binds the columns of `statistic` one after the other.
+class StatisticRow {
+ public:
+  explicit StatisticRow(Statement insert) : insert_(std::move(insert)) {}
+
+  template <typename Value>
+  void put(const Value& value) {
+    insert_.bind(++position_, value);
+  }
+
+  void put(const std::optional<Interval>& interval) {
+    put(interval ? std::optional(interval->lower) : std::nullopt);
+    put(interval ? std::optional(interval->upper) : std::nullopt);
+  }
+
+  void put(const ErrorStatistic& error) {
+    put(error.bias);
+    put(error.bias_interval);
+    put(error.rms);
+    put(error.standard_deviation);
+    put(error.deviation_interval);
+    put(error.skewness);
+  }
+
+  void put(const AccuracyStatistic& accuracy) {
+    put(accuracy.worst);
+    put(accuracy.worst_run.value);
+    put(accuracy.num_beyond_objective);
+    put(accuracy.mean);
+    put(accuracy.mean_interval);
+    put(accuracy.standard_deviation);
+    put(accuracy.deviation_interval);
+    for (const PercentileStatistic& percentile : accuracy.percentiles) {
+      put(percentile.value);
+      put(percentile.interval);
+    }
+    put(accuracy.error);
+  }
+
+  void insert() {
+    PROOFMASS_EXPECT(position_ == num_statistic_columns);
+    insert_.finish();
+    position_ = 0;
+  }
+
+ private:
+  Statement insert_;
+  int position_ = 0;
+};
+
 }  // namespace
 
 void replace_statistics(Database& database, const CampaignStatistics& statistics) {
   database.execute("DELETE FROM statistic");
   if (statistics.num_estimated == 0) return;
-  Statement insert = database.prepare("INSERT INTO statistic VALUES (?, ?, ?, ?, ?, ?, ?)");
+  std::string places = "?";
+  for (int column = 1; column < num_statistic_columns; ++column) places += ", ?";
+  StatisticRow row(database.prepare("INSERT INTO statistic VALUES (" + places + ")"));
   for (const ParameterInfo& info : parameter_infos()) {
-    const AccuracyStatistic& accuracy = statistics.accuracy[index(info.parameter)];
-    insert.run(info.name, statistics.num_estimated, accuracy.worst, accuracy.worst_run.value,
-               accuracy.mean, accuracy.standard_deviation, accuracy.num_beyond_objective);
+    row.put(info.name);
+    row.put(statistics.num_estimated);
+    row.put(statistics.accuracy[index(info.parameter)]);
+    row.insert();
   }
+}
+
+void replace_summary(const Database& database, const CampaignStatistics& statistics,
+                     std::string_view digest) {
+  database
+      .prepare(
+          "INSERT OR REPLACE INTO summary (summary_id, num_finished, num_estimated,"
+          " num_not_converged, num_not_finite, num_no_draw, num_given_up, digest)"
+          " VALUES (1, ?, ?, ?, ?, ?, (SELECT count(*) FROM run_failure), ?)")
+      .run(statistics.num_runs, statistics.num_estimated, statistics.num_not_converged,
+           statistics.num_not_finite, statistics.num_no_draw, digest);
+}
+
+std::optional<Summary> read_summary(const Database& database) {
+  Statement select = database.prepare(
+      "SELECT num_finished, num_estimated, num_not_converged, num_not_finite, num_no_draw,"
+      " num_given_up, digest, computed_utc FROM summary");
+  if (!select.step()) return std::nullopt;
+  return Summary{.num_finished = select.count(0),
+                 .num_estimated = select.count(1),
+                 .num_not_converged = select.count(2),
+                 .num_not_finite = select.count(3),
+                 .num_no_draw = select.count(4),
+                 .num_given_up = select.count(5),
+                 .digest = select.text(6),
+                 .computed_utc = select.text(7)};
 }
 
 void replace_budgets(Database& database, const Budgets& budgets) {

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <optional>
+#include <string_view>
+
 #include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/records.hpp"
 #include "core/campaign/budget.hpp"
 #include "core/campaign/statistics.hpp"
 
@@ -8,6 +12,11 @@ namespace proofmass::coordinator::detail {
 
 /// Replaces the rows of `statistic`; leaves none if no run has an estimate.
 void replace_statistics(Database& database, const CampaignStatistics& statistics);
+
+/// Replaces the row of `summary`.
+void replace_summary(const Database& database, const CampaignStatistics& statistics,
+                     std::string_view digest);
+[[nodiscard]] std::optional<Summary> read_summary(const Database& database);
 
 /// A campaign's three budgets; those after calibration are absent while no run has an estimate.
 struct Budgets {

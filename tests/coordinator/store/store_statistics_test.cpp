@@ -31,6 +31,8 @@ CampaignStatistics distinct_statistics() {
   return statistics;
 }
 
+const std::string digest(64, '5');
+
 Budget constant_budget(double entry) {
   Budget budget;
   budget.entries.fill(entry);
@@ -41,7 +43,7 @@ Budget constant_budget(double entry) {
 TEST_F(StoreStatistics, AppearInParameterAccuracyInThePapersOrder) {
   Store store = Store::create(file(), campaign_of(9), "");
   store.write_statistics(distinct_statistics(), constant_budget(1), constant_budget(2),
-                         constant_budget(3));
+                         constant_budget(3), digest);
   const Database database(file(), Access::read_only);
   Statement row = database.prepare(
       "SELECT parameter, unit, objective, worst, mean, standard_deviation, num_beyond_objective,"
@@ -71,7 +73,7 @@ TEST_F(StoreStatistics, AppearInParameterAccuracyInThePapersOrder) {
 TEST_F(StoreStatistics, AppearInBudgetWithItsTotalLast) {
   Store store = Store::create(file(), campaign_of(9), "");
   store.write_statistics(distinct_statistics(), constant_budget(1), constant_budget(2),
-                         constant_budget(3));
+                         constant_budget(3), digest);
   const Database database(file(), Access::read_only);
   Statement row = database.prepare(
       "SELECT term, before_m_s2, after_worst_m_s2, after_mean_m_s2, paper_before_m_s2,"
@@ -95,9 +97,11 @@ TEST_F(StoreStatistics, AppearInBudgetWithItsTotalLast) {
 TEST_F(StoreStatistics, ReplaceTheOlderOnes) {
   Store store = Store::create(file(), campaign_of(9), "");
   CampaignStatistics statistics = distinct_statistics();
-  store.write_statistics(statistics, constant_budget(1), constant_budget(2), constant_budget(3));
+  store.write_statistics(statistics, constant_budget(1), constant_budget(2), constant_budget(3),
+                         digest);
   statistics.accuracy[0].worst = 44.0;
-  store.write_statistics(statistics, constant_budget(5), constant_budget(2), constant_budget(3));
+  store.write_statistics(statistics, constant_budget(5), constant_budget(2), constant_budget(3),
+                         digest);
   const Database database(file(), Access::read_only);
   EXPECT_EQ(database.integer("SELECT count(*) FROM parameter_accuracy"), 10);
   EXPECT_EQ(database.integer("SELECT worst = 44 FROM parameter_accuracy LIMIT 1"), 1);
@@ -115,7 +119,8 @@ TEST_F(StoreStatistics, AreNullWhileNoRunHasAnEstimate) {
         database.integer("SELECT count(after_worst_m_s2) + count(after_mean_m_s2) FROM budget"), 0);
   };
   expect_nulls();
-  store.write_statistics({.num_runs = 2, .num_no_draw = 2}, constant_budget(1), Budget{}, Budget{});
+  store.write_statistics({.num_runs = 2, .num_no_draw = 2}, constant_budget(1), Budget{}, Budget{},
+                         digest);
   expect_nulls();
 }
 
