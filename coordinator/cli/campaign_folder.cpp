@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "coordinator/cli/campaign_start.hpp"
-#include "coordinator/report/report.hpp"
+#include "coordinator/report/summarise.hpp"
 #include "core/error.hpp"
 #include "core/simulation/run.hpp"
 
@@ -89,11 +89,8 @@ std::vector<ServedCampaign> CampaignFolder::load(
   return campaigns;
 }
 
-ServedCampaign CampaignFolder::open(const Campaign& wanted) {
-  const std::filesystem::path file = file_of(wanted);
-  return {.file = file,
-          .store = open_or_create(wanted, file, remedy),
-          .definition = std::make_shared<const Campaign>(wanted)};
+ServedCampaign CampaignFolder::open(const Campaign& wanted, const StopPlan& plan) {
+  return open_or_create(wanted, plan, file_of(wanted), remedy);
 }
 
 std::shared_ptr<const Campaign> CampaignFolder::extend(Store& store, const Campaign& wanted) {
@@ -101,12 +98,10 @@ std::shared_ptr<const Campaign> CampaignFolder::extend(Store& store, const Campa
   return std::make_shared<const Campaign>(wanted);
 }
 
-void CampaignFolder::summarise(
+std::optional<std::uint64_t> CampaignFolder::summarise(
     const std::filesystem::path& file, const Scenario& scenario,
     const std::function<void(const std::function<void(Store&)>&)>& write) {
-  const DigestedStatistics statistics =
-      read_digested_statistics(Store::open_read_only(file), scenario);
-  write([&](Store& store) { write_statistics(store, scenario, statistics); });
+  return summarise_file(file, scenario, write);
 }
 
 std::filesystem::path CampaignFolder::file_of(const Campaign& campaign) const {

@@ -26,11 +26,12 @@ class CampaignFolder final : public CampaignFiles {
   [[nodiscard]] std::vector<ServedCampaign> load(
       const std::function<void(const std::string&)>& warn) const;
 
-  [[nodiscard]] ServedCampaign open(const Campaign& wanted) override;
+  [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan& plan) override;
   [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,
                                                        const Campaign& wanted) override;
-  void summarise(const std::filesystem::path& file, const Scenario& scenario,
-                 const std::function<void(const std::function<void(Store&)>&)>& write) override;
+  std::optional<std::uint64_t> summarise(
+      const std::filesystem::path& file, const Scenario& scenario,
+      const std::function<void(const std::function<void(Store&)>&)>& write) override;
 
  private:
   [[nodiscard]] std::filesystem::path file_of(const Campaign& campaign) const;

@@ -27,6 +27,16 @@ void require_same(const Store& store, const Campaign& wanted, const std::filesys
   throw UsageError(fmt::format("{}\n{}", text, remedy));
 }
 
+// A rule that has not been checked leaves a campaign unfinished.
+void set_plan(Store& store, const StopPlan& plan) {
+  store.set_stop_plan(plan);
+  CampaignControl control = store.control();
+  if (control.phase != wire::CampaignPhase::finished) return;
+  control.phase = wire::CampaignPhase::active;
+  const Entry entry = control;
+  (void)store.write({&entry, 1});
+}
+
 }  // namespace
 
 Campaign stored_campaign(const Store& store) {
@@ -51,14 +61,26 @@ void extend_to(Store& store, const Campaign& wanted, const std::filesystem::path
   if (wanted.num_runs > num_runs) store.extend(wanted, canonical_definition(wanted));
 }
 
-Store open_or_create(const Campaign& wanted, const std::filesystem::path& database,
-                     std::string_view remedy) {
-  if (!std::filesystem::exists(database)) {
-    return Store::create(database, wanted, canonical_definition(wanted));
+ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,
+                              const std::filesystem::path& database, std::string_view remedy) {
+  if (!plan.stop_rule.empty() && !wanted.table_columns.empty()) {
+    throw UsageError(fmt::format("until = {} (must not be with quantities whose law is a table)",
+                                 plan.stop_rule));
   }
-  Store store = Store::open(database);
-  extend_to(store, wanted, database, remedy);
-  return store;
+  Campaign campaign = wanted;
+  const auto with_horizon = [&](std::uint64_t num_runs_now) {
+    campaign.num_runs = horizon_of(plan, wanted.num_runs, num_runs_now);
+    return campaign;
+  };
+  const bool is_new = !std::filesystem::exists(database);
+  Store store = is_new ? Store::create(database, with_horizon(0), canonical_definition(campaign))
+                       : Store::open(database);
+  if (!is_new) extend_to(store, with_horizon(store.num_runs()), database, remedy);
+  if (store.stop_plan() != plan) set_plan(store, plan);
+  // Shared with the dispatch and with messages under way.
+  return {.file = database,
+          .store = std::move(store),
+          .definition = std::make_shared<const Campaign>(std::move(campaign))};
 }
 
 }  // namespace proofmass::coordinator

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/net/campaign_files.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 
@@ -21,9 +22,12 @@ namespace proofmass::coordinator {
 void extend_to(Store& store, const Campaign& wanted, const std::filesystem::path& database,
                std::string_view remedy);
 
-/// The database for a campaign: a new one, or the one that exists, after extend_to().
-/// @throws UsageError as extend_to() does; StoreError if it cannot be used.
-[[nodiscard]] Store open_or_create(const Campaign& wanted, const std::filesystem::path& database,
-                                   std::string_view remedy = "name another database with --db");
+/// The database for a campaign, a new one, or the one that exists after extend_to(); and the
+/// campaign with as many runs as are to be computed next, see horizon_of().
+/// @throws UsageError as extend_to() does, or if there is a stop rule and quantities are read from
+///         tables, which have an end of their own; StoreError if it cannot be used.
+[[nodiscard]] ServedCampaign open_or_create(
+    const Campaign& wanted, const StopPlan& plan, const std::filesystem::path& database,
+    std::string_view remedy = "name another database with --db");
 
 }  // namespace proofmass::coordinator

@@ -26,6 +26,7 @@ void add_submit(CLI::App& app, Command& chosen) {
   submit.add_option("--priority", options->priority, "Runs of a higher one are computed first")
       ->check(CLI::Range(-wire::priority_max, wire::priority_max));
   add_audit_option(submit, options->audit_fraction);
+  add_stop_options(submit, options->stop);
   add_override_options(submit, options->overrides);
   add_client_options(submit, options->client);
   submit.callback([options, &chosen] { chosen = [options] { return submit_campaign(*options); }; });

@@ -25,6 +25,7 @@ void add_run(CLI::App& app, Command& chosen) {
   run.add_option("--db", options->database, "Database; FILE's stem with .db, here, by default");
   add_override_options(run, options->overrides);
   add_audit_option(run, options->audit_fraction);
+  add_stop_options(run, options->stop);
   run.add_option("--workers", options->num_workers, "Worker processes; one a processor by default")
       ->check(CLI::Range(1U, workers_max));
   run.add_flag("--quiet", options->is_quiet, "Show no progress");

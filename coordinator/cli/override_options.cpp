@@ -2,6 +2,9 @@
 
 #include <CLI/CLI.hpp>
 
+#include "core/error.hpp"
+#include "core/statistics/stop_rule.hpp"
+
 namespace proofmass::coordinator {
 
 void add_override_options(CLI::App& command, Overrides& overrides) {
@@ -12,6 +15,22 @@ void add_override_options(CLI::App& command, Overrides& overrides) {
                   "Replace a value of the file, e.g. noise.scale=0; may be repeated")
       ->take_all()
       ->allow_extra_args(false);
+}
+
+void add_stop_options(CLI::App& command, StopOptions& options) {
+  command
+      .add_option("--until", options.rule,
+                  "Compute no more runs than it takes, as in\n\"std(a_c13) within 5%\"")
+      ->check([](const std::string& rule) {
+        try {
+          (void)parse_stop_rule(rule);
+        } catch (const ConfigError& error) {
+          return std::string(error.what());
+        }
+        return std::string();
+      });
+  command.add_option("--failures", options.failures_max,
+                     "Cancel it when more runs than this have no estimate");
 }
 
 void add_audit_option(CLI::App& command, double& audit_fraction) {

@@ -18,6 +18,7 @@
 #include "coordinator/net/private_endpoint.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/report/report.hpp"
+#include "coordinator/report/summarise.hpp"
 #include "core/simulation/reference_digest.hpp"
 #include "core/simulation/run.hpp"
 
@@ -45,9 +46,37 @@ std::uint64_t num_workers(const RunOptions& options, std::uint64_t num_runs_miss
   return std::min<std::uint64_t>(options.num_workers.value_or(num_processors), num_batches);
 }
 
+StopPlan plan_of(const RunOptions& options, std::uint64_t num_runs) {
+  StopPlan plan{.stop_rule = options.stop.rule,
+                .num_runs_max = {},
+                .failures_max = options.stop.failures_max};
+  if (!plan.stop_rule.empty()) plan.num_runs_max = num_runs;
+  return plan;
+}
+
+/// The file of a campaign that asks for more runs until its stop rule is reached.
+class GrowingFile final : public CampaignFiles {
+ public:
+  [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan&) override {
+    throw UsageError(fmt::format("submit = {} (nobody is there to submit)", wanted.name));
+  }
+  [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,
+                                                       const Campaign& wanted) override {
+    store.extend(wanted, canonical_definition(wanted));
+    return std::make_shared<const Campaign>(wanted);
+  }
+  std::optional<std::uint64_t> summarise(
+      const std::filesystem::path& file, const Scenario& scenario,
+      const std::function<void(const std::function<void(Store&)>&)>& write) override {
+    return summarise_file(file, scenario, write);
+  }
+};
+
 /// The service of one campaign for the workers of this process.
-ServiceConfig service_config(const PrivateEndpoint& endpoint, std::uint64_t num_workers) {
+ServiceConfig service_config(const PrivateEndpoint& endpoint, std::uint64_t num_workers,
+                             CampaignFiles& files) {
   ServiceConfig config;
+  config.files = &files;
   config.workers_endpoint = endpoint.address();
   config.end = ServiceEnd::when_done;
   config.given_up = GivenUpRuns::retry;
@@ -68,36 +97,36 @@ Log log_to(ProgressDisplay& display) {
   };
 }
 
-ServedCampaign served(const Campaign& campaign, Store store, const std::filesystem::path& database,
-                      const RunOptions& options) {
+void make_active(Store& store, const RunOptions& options) {
   const Entry control = CampaignControl{.phase = wire::CampaignPhase::active,
                                         .priority = store.control().priority,
                                         .audit_fraction = options.audit_fraction};
   (void)store.write({&control, 1});
-  // Shared with the dispatch and with messages under way.
-  return {.file = database,
-          .store = std::move(store),
-          .definition = std::make_shared<const Campaign>(campaign)};
 }
 
 /// What came of a campaign.
 struct Outcome {
   Store store;
-  bool is_done = false;  ///< Every run is stored or given up.
+  bool is_done = false;  ///< Every run is stored or given up, and the stop rule is decided.
 };
 
-/// Computes the missing runs.
-Outcome compute(const Campaign& campaign, Store store, const std::filesystem::path& database,
-                const RunOptions& options) {
-  const std::uint64_t num_runs_missing = num_missing(store);
-  if (num_runs_missing == 0) return {.store = std::move(store), .is_done = true};
+/// Computes the missing runs, up to `num_runs` in all.
+Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOptions& options) {
+  const bool is_decided =
+      options.stop.rule.empty() || campaign.store.control().phase == wire::CampaignPhase::finished;
+  if (num_missing(campaign.store) == 0 && is_decided) {
+    return {.store = std::move(campaign.store), .is_done = true};
+  }
+  make_active(campaign.store, options);
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   ProgressDisplay display(options.is_quiet ? DisplayMode::quiet : display_mode_for(stderr), stderr);
   const PrivateEndpoint endpoint;
-  const std::uint64_t num_local = num_workers(options, num_runs_missing);
+  GrowingFile file;
+  const std::uint64_t num_local =
+      num_workers(options, num_runs - count(campaign.store.finished_runs()));
   std::vector<ServedCampaign> campaigns;
-  campaigns.push_back(served(campaign, std::move(store), database, options));
-  Service service(std::move(campaigns), service_config(endpoint, num_local), log_to(display));
+  campaigns.push_back(std::move(campaign));
+  Service service(std::move(campaigns), service_config(endpoint, num_local, file), log_to(display));
   LocalWorkers workers(service, display);
   workers.start(num_local);
   service.run(stop, [&] {
@@ -127,17 +156,34 @@ int say_given_up(std::span<const RunRange> given_up, std::uint64_t num_runs) {
   return exit_cannot_be_done;
 }
 
+int say_cancelled(const Store& store, std::uint64_t failures_max) {
+  fmt::print(stderr,
+             "proofmass: error: {} of {} runs given up or without an estimate (at most {} with "
+             "--failures); cancelled\n",
+             store.num_without_estimate() + count(store.given_up_runs()), store.num_runs(),
+             failures_max);
+  return exit_cannot_be_done;
+}
+
 }  // namespace
 
 int run_campaign(const RunOptions& options) {
   const Campaign campaign = read_campaign(options.campaign_file, options.overrides);
   const std::filesystem::path database = database_of(options);
-  Outcome outcome = compute(campaign, open_or_create(campaign, database), database, options);
-  update_statistics(outcome.store, campaign.scenario);
+  Outcome outcome = compute(open_or_create(campaign, plan_of(options, campaign.num_runs), database),
+                            campaign.num_runs, options);
+  // The service has seen to those of a campaign that is finished.
+  if (outcome.store.control().phase != wire::CampaignPhase::finished) {
+    update_statistics(outcome.store, campaign.scenario);
+  }
   if (!outcome.is_done) return say_interrupted(outcome.store, database);
   fmt::print("{}", report_text(outcome.store, campaign.scenario));
+  if (outcome.store.control().phase == wire::CampaignPhase::cancelled) {
+    return say_cancelled(outcome.store, options.stop.failures_max.value_or(0));
+  }
   const std::vector<RunRange> given_up = outcome.store.given_up_runs();
-  return given_up.empty() ? exit_done : say_given_up(given_up, campaign.num_runs);
+  if (!given_up.empty()) return say_given_up(given_up, outcome.store.num_runs());
+  return is_rule_missed(outcome.store) ? exit_not_met : exit_done;
 }
 
 }  // namespace proofmass::coordinator

@@ -60,7 +60,7 @@ std::vector<ServedCampaign> campaigns_of(const ServeOptions& options, CampaignFo
         campaigns.begin(), campaigns.end(),
         [&](const ServedCampaign& campaign) { return campaign.definition->name == wanted.name; });
     if (known == campaigns.end()) {
-      campaigns.push_back(folder.open(wanted));
+      campaigns.push_back(folder.open(wanted, {}));
     } else {
       known->definition = folder.extend(known->store, wanted);
     }

@@ -22,7 +22,9 @@ wire::SubmitRequest submit_request(const SubmitOptions& options) {
   }
   return {.campaign = std::move(campaign),
           .priority = options.priority,
-          .audit_fraction = options.audit_fraction};
+          .audit_fraction = options.audit_fraction,
+          .stop_rule = options.stop.rule,
+          .failures_max = options.stop.failures_max};
 }
 
 int submit_campaign(const SubmitOptions& options) {

@@ -6,6 +6,7 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/client_options.hpp"
+#include "coordinator/cli/override_options.hpp"
 
 namespace proofmass::coordinator {
 
@@ -17,6 +18,7 @@ struct SubmitOptions {
   std::optional<std::string> name;  ///< By default the one in the file.
   int priority = 0;                 ///< -100 to 100.
   double audit_fraction = 0.0;      ///< 0 to 1.
+  StopOptions stop;
 };
 
 /// The request that the arguments ask for.

@@ -105,6 +105,13 @@ void on_extended(State& state, CampaignId id, std::shared_ptr<const Campaign> de
   detail::lend_to_hungry(state, now, outbox);
 }
 
+void on_control(State& state, CampaignId id, int priority, double audit_fraction) {
+  CampaignState& campaign = state.campaigns.at(id);
+  campaign.priority = priority;
+  campaign.audit_fraction = audit_fraction;
+  detail::sort_served(state);
+}
+
 void on_pause(State& state, CampaignId id, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
   if (campaign.phase != Phase::active) return;

@@ -48,10 +48,11 @@ Phase phase_of(CampaignPhase phase) {
   PROOFMASS_EXPECT(false);
 }
 
-CampaignControl control_of(const CampaignState& campaign) {
-  return {.phase = phase_of(campaign.phase),
-          .priority = campaign.priority,
-          .audit_fraction = campaign.audit_fraction};
+StopPlan plan_of(const wire::SubmitRequest& request) {
+  StopPlan plan{
+      .stop_rule = request.stop_rule, .num_runs_max = {}, .failures_max = request.failures_max};
+  if (!plan.stop_rule.empty()) plan.num_runs_max = request.campaign.num_runs;
+  return plan;
 }
 
 StoredCampaign stored_campaign_of(const ServedCampaign& campaign, GivenUpRuns given_up) {
@@ -97,11 +98,15 @@ void CampaignDesk::serve(ServedCampaign campaign, GivenUpRuns given_up, TimePoin
   wire::kill_point(wire::KillPoint::after_open);
   const StoredCampaign stored = stored_campaign_of(campaign, given_up);
   campaign.store.begin_coordinator(start_);
-  served_.emplace(id, Served{.file = campaign.file,
-                             .name = campaign.definition->name,
-                             .rate = RateMeter(now),
-                             .written = campaign.store.control(),
-                             .summary = {}});
+  served_.emplace(id,
+                  Served{.file = campaign.file,
+                         .name = campaign.definition->name,
+                         .rate = RateMeter(now),
+                         .written = campaign.store.control(),
+                         .plan = campaign.store.stop_plan(),
+                         .is_decided = campaign.store.control().phase == CampaignPhase::finished,
+                         .num_failures_before = campaign.store.num_without_estimate(),
+                         .summary = {}});
   writer_.open(id, std::move(campaign.store));
   on_campaign(state_, id, stored, now, outbox);
 }
@@ -126,10 +131,9 @@ wire::ClientReply CampaignDesk::carry_out(const wire::SubmitRequest& request, Ti
   }
   auto id = find(request.campaign.name);
   if (id) {
-    extend(*id, request.campaign, now, outbox);
-    resume(*id, now, outbox);
+    resubmit(*id, request, now, outbox);
   } else {
-    ServedCampaign campaign = files_->open(request.campaign);
+    ServedCampaign campaign = files_->open(request.campaign, plan_of(request));
     const Entry control = CampaignControl{.phase = CampaignPhase::active,
                                           .priority = request.priority,
                                           .audit_fraction = request.audit_fraction};
@@ -141,17 +145,34 @@ wire::ClientReply CampaignDesk::carry_out(const wire::SubmitRequest& request, Ti
   return done_reply(*id);
 }
 
+void CampaignDesk::resubmit(CampaignId id, const wire::SubmitRequest& request, TimePoint now,
+                            Outbox& outbox) {
+  const CampaignState& campaign = state_.campaigns.at(id);
+  if (!campaign.storage_failure.empty()) throw Error(campaign.storage_failure);
+  const StopPlan plan = plan_of(request);
+  Campaign wanted = request.campaign;
+  wanted.num_runs = horizon_of(plan, wanted.num_runs, campaign.definition->num_runs);
+  extend(id, wanted, now, outbox);
+  Served& served = served_.at(id);
+  if (plan != served.plan) {
+    writer_.access(id, [&](Store& store) { store.set_stop_plan(plan); });
+    served.plan = plan;
+    served.is_decided = false;
+  }
+  on_control(state_, id, request.priority, request.audit_fraction);
+  resume(id, now, outbox);
+}
+
 void CampaignDesk::resume(CampaignId id, TimePoint now, Outbox& outbox) {
   const Phase phase = state_.campaigns.at(id).phase;
   if (phase == Phase::paused || phase == Phase::cancelled) on_resume(state_, id, now, outbox);
 }
 
 void CampaignDesk::extend(CampaignId id, const Campaign& wanted, TimePoint now, Outbox& outbox) {
-  const CampaignState& campaign = state_.campaigns.at(id);
-  if (!campaign.storage_failure.empty()) throw Error(campaign.storage_failure);
   std::shared_ptr<const Campaign> extended;
   writer_.access(id, [&](Store& store) { extended = files_->extend(store, wanted); });
-  if (extended->num_runs == campaign.definition->num_runs) return;
+  if (extended->num_runs == state_.campaigns.at(id).definition->num_runs) return;
+  served_.at(id).is_decided = false;
   on_extended(state_, id, std::move(extended), now, outbox);
 }
 
@@ -214,7 +235,7 @@ wire::CampaignStatus CampaignDesk::status_of(CampaignId id, TimePoint now) const
   const Served& served = served_.at(id);
   const double rate_hz = served.rate.rate_hz(now);
   return {.name = served.name,
-          .phase = phase_of(campaign.phase),
+          .phase = phase_of(id),
           .priority = campaign.priority,
           .num_runs = campaign.definition->num_runs,
           .num_done = campaign.committed.size(),
@@ -229,6 +250,14 @@ wire::CampaignStatus CampaignDesk::status_of(CampaignId id, TimePoint now) const
           .storage_failure = campaign.storage_failure};
 }
 
+CampaignPhase CampaignDesk::phase_of(CampaignId id) const {
+  const Phase phase = state_.campaigns.at(id).phase;
+  const Served& served = served_.at(id);
+  const bool is_undecided = !served.plan.stop_rule.empty() && !served.is_decided;
+  if (phase == Phase::finished && is_undecided) return CampaignPhase::active;
+  return coordinator::phase_of(phase);
+}
+
 void CampaignDesk::review(TimePoint now, Outbox& outbox) {
   for (auto& [id, served] : served_) {
     const CampaignState& campaign = state_.campaigns.at(id);
@@ -237,48 +266,109 @@ void CampaignDesk::review(TimePoint now, Outbox& outbox) {
       served.rate.add(num_committed - served.num_committed_seen, now);
       served.num_committed_seen = num_committed;
     }
-    const CampaignControl control = control_of(campaign);
-    if (control != served.written) {
-      writer_.set_control(id, control);
-      if (control.phase == CampaignPhase::finished) served.is_summary_due = files_ != nullptr;
-      served.written = control;
-    }
-    review_summary(id, served, outbox);
+    review_failures(id, served, outbox);
+    review_summary(id, served, now, outbox);
+    review_control(id, served);
   }
 }
 
-void CampaignDesk::review_summary(CampaignId id, Served& served, Outbox& outbox) {
+void CampaignDesk::review_failures(CampaignId id, const Served& served, Outbox& outbox) {
+  if (!served.plan.failures_max) return;
+  const CampaignState& campaign = state_.campaigns.at(id);
+  if (campaign.phase != Phase::active && campaign.phase != Phase::paused) return;
+  const std::uint64_t num_failures =
+      served.num_failures_before + campaign.num_without_estimate + campaign.given_up.size();
+  if (num_failures <= *served.plan.failures_max) return;
+  on_cancel(state_, id, outbox);
+  outbox.log({.severity = Severity::error,
+              .kind = "too_many_failures",
+              .text = fmt::format("without_estimate={} failures_max={}", num_failures,
+                                  *served.plan.failures_max),
+              .campaign = id});
+}
+
+void CampaignDesk::review_control(CampaignId id, Served& served) {
+  const CampaignState& campaign = state_.campaigns.at(id);
+  const CampaignControl control{.phase = phase_of(id),
+                                .priority = campaign.priority,
+                                .audit_fraction = campaign.audit_fraction};
+  if (control == served.written) return;
+  writer_.set_control(id, control);
+  const bool has_new_results = served.num_summarised != campaign.num_committed_here;
+  if (control.phase == CampaignPhase::finished && has_new_results) {
+    served.is_summary_due = files_ != nullptr;
+  }
+  served.written = control;
+}
+
+void CampaignDesk::review_summary(CampaignId id, Served& served, TimePoint now, Outbox& outbox) {
   if (served.summary.valid()) {
     if (served.summary.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
-    const std::string failure = served.summary.get();
-    if (failure.empty()) {
-      outbox.log({.kind = "campaign_summarised", .text = "", .campaign = id});
-    } else {
-      outbox.log({.severity = Severity::error,
-                  .kind = "statistics_failed",
-                  .text = fmt::format("reason=\"{}\"", failure),
-                  .campaign = id});
-    }
+    take_summary(id, served, now, outbox);
   }
-  if (!std::exchange(served.is_summary_due, false)) return;
+  const bool is_finished = state_.campaigns.at(id).phase == Phase::finished;
+  const bool is_undecided = is_finished && phase_of(id) != CampaignPhase::finished;
+  const bool is_due = std::exchange(served.is_summary_due, false);
+  if (is_due || is_undecided) begin_summary(id, served);
+}
+
+void CampaignDesk::take_summary(CampaignId id, Served& served, TimePoint now, Outbox& outbox) {
+  const auto [failure, num_runs] = served.summary.get();
+  const Campaign& definition = *state_.campaigns.at(id).definition;
+  // A rule that cannot be checked stops: nobody knows how much further it would go.
+  served.is_decided = true;
+  if (!failure.empty()) {
+    outbox.log({.severity = Severity::error,
+                .kind = "statistics_failed",
+                .text = fmt::format("reason=\"{}\"", failure),
+                .campaign = id});
+    return;
+  }
+  outbox.log({.kind = "campaign_summarised",
+              .text = num_runs ? fmt::format("runs={} next={}", definition.num_runs, *num_runs)
+                               : fmt::format("runs={}", definition.num_runs),
+              .campaign = id});
+  if (num_runs && state_.campaigns.at(id).phase == Phase::finished) {
+    go_on_to(id, *num_runs, now, outbox);
+  }
+}
+
+void CampaignDesk::go_on_to(CampaignId id, std::uint64_t num_runs, TimePoint now, Outbox& outbox) {
+  Campaign wanted = *state_.campaigns.at(id).definition;
+  wanted.num_runs = num_runs;
+  try {
+    extend(id, wanted, now, outbox);
+  } catch (const Error& error) {
+    outbox.log({.severity = Severity::error,
+                .kind = "campaign_not_extended",
+                .text = fmt::format("runs={} reason=\"{}\"", num_runs, error.what()),
+                .campaign = id});
+  }
+}
+
+void CampaignDesk::begin_summary(CampaignId id, Served& served) {
   served.num_summarised = state_.campaigns.at(id).num_committed_here;
   served.summary = std::async(
       std::launch::async,
       [this, id, file = served.file, definition = state_.campaigns.at(id).definition] {
         try {
-          files_->summarise(
-              file, definition->scenario,
-              [&](const std::function<void(Store&)>& action) { writer_.access(id, action); });
-          return std::string();
+          return Summarised{
+              .failure = {},
+              .num_runs = files_->summarise(
+                  file, definition->scenario,
+                  [&](const std::function<void(Store&)>& action) { writer_.access(id, action); })};
         } catch (const std::exception& error) {
-          return std::string(error.what());
+          return Summarised{.failure = error.what(), .num_runs = {}};
         }
       });
 }
 
 bool CampaignDesk::is_all_done() const {
-  return std::all_of(state_.campaigns.begin(), state_.campaigns.end(), [](const auto& item) {
-    return item.second.phase == Phase::cancelled || is_finished(item.second);
+  return std::all_of(state_.campaigns.begin(), state_.campaigns.end(), [&](const auto& item) {
+    const auto& [id, campaign] = item;
+    const bool is_undecided =
+        campaign.phase == Phase::finished && phase_of(id) != CampaignPhase::finished;
+    return campaign.phase == Phase::cancelled || (is_finished(campaign) && !is_undecided);
   });
 }
 
@@ -309,7 +399,7 @@ std::optional<CampaignId> CampaignDesk::find(std::string_view name) const {
 wire::DoneReply CampaignDesk::done_reply(CampaignId id) const {
   const CampaignState& campaign = state_.campaigns.at(id);
   return {.text = fmt::format("campaign {}: {}, {} runs, {} of them done",
-                              campaign.definition->name, wire::name_of(phase_of(campaign.phase)),
+                              campaign.definition->name, wire::name_of(phase_of(id)),
                               campaign.definition->num_runs, campaign.committed.size())};
 }
 

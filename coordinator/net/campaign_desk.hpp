@@ -53,6 +53,12 @@ class CampaignDesk {
   [[nodiscard]] std::vector<ServedCampaign> close();
 
  private:
+  /// What came of bringing statistics up to date.
+  struct Summarised {
+    std::string failure;                    ///< Empty if nothing went wrong.
+    std::optional<std::uint64_t> num_runs;  ///< That the stop rule asks for next.
+  };
+
   /// What the desk knows of a campaign beside the dispatch's state.
   struct Served {
     std::filesystem::path file;
@@ -60,20 +66,31 @@ class CampaignDesk {
     RateMeter rate;
     std::uint64_t num_committed_seen = 0;
     CampaignControl written;  ///< As the file has it.
+    StopPlan plan;
+    bool is_decided = false;                ///< The stop rule was checked with the runs of now.
+    std::uint64_t num_failures_before = 0;  ///< Runs without an estimate, when it came.
     bool is_summary_due = false;
     std::uint64_t num_summarised = 0;  ///< Of the runs committed here.
-    std::future<std::string> summary;  ///< What went wrong; empty text if nothing did.
+    std::future<Summarised> summary;
   };
 
   wire::ClientReply carry_out(const wire::SubmitRequest& request, TimePoint now, Outbox& outbox);
   wire::ClientReply carry_out(const wire::ControlRequest& request, TimePoint now, Outbox& outbox);
   wire::ClientReply carry_out(const wire::StatusRequest& request, TimePoint now, Outbox& outbox);
   wire::ClientReply carry_out(const wire::WorkersRequest& request, TimePoint now, Outbox& outbox);
+  void resubmit(CampaignId id, const wire::SubmitRequest& request, TimePoint now, Outbox& outbox);
   void extend(CampaignId id, const Campaign& wanted, TimePoint now, Outbox& outbox);
   void resume(CampaignId id, TimePoint now, Outbox& outbox);
   [[nodiscard]] std::optional<CampaignId> find(std::string_view name) const;
   [[nodiscard]] wire::DoneReply done_reply(CampaignId id) const;
-  void review_summary(CampaignId id, Served& served, Outbox& outbox);
+  /// As shown and stored: a campaign whose stop rule is still to be checked is not finished.
+  [[nodiscard]] wire::CampaignPhase phase_of(CampaignId id) const;
+  void review_failures(CampaignId id, const Served& served, Outbox& outbox);
+  void review_control(CampaignId id, Served& served);
+  void review_summary(CampaignId id, Served& served, TimePoint now, Outbox& outbox);
+  void take_summary(CampaignId id, Served& served, TimePoint now, Outbox& outbox);
+  void go_on_to(CampaignId id, std::uint64_t num_runs, TimePoint now, Outbox& outbox);
+  void begin_summary(CampaignId id, Served& served);
 
   State& state_;
   StoreWriter& writer_;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
@@ -19,6 +20,14 @@ struct ServedCampaign {
   bool has_new_results = false;                ///< Since its statistics were computed.
 };
 
+/// The number of runs that a campaign is to have for now. With a stop rule it is the next at which
+/// the rule is checked, so that the stopping point does not depend on workers and their order.
+///
+/// @param num_runs_wanted  Asked for; with a stop rule, at most.
+/// @param num_runs_now     In the file; 0 for a new one.
+[[nodiscard]] std::uint64_t horizon_of(const StopPlan& plan, std::uint64_t num_runs_wanted,
+                                       std::uint64_t num_runs_now);
+
 /// What becomes of runs that crashed too many workers of the coordinator before this one.
 enum class GivenUpRuns : std::uint8_t {
   keep,   ///< They stay given up, and runs that crashed once or twice stay suspect.
@@ -30,9 +39,10 @@ class CampaignFiles {
  public:
   virtual ~CampaignFiles() = default;
 
-  /// The file for a campaign that is not served: a new one, or one that was served before.
+  /// The file for a campaign that is not served: a new one, or one that was served before. With a
+  /// stop rule it has as many runs as the rule is to be checked with next.
   /// @throws Error if there is another campaign in the file, naming what differs.
-  virtual ServedCampaign open(const Campaign& wanted) = 0;
+  virtual ServedCampaign open(const Campaign& wanted, const StopPlan& plan) = 0;
 
   /// Gives a served file as many runs as are wanted. Called in the writer's thread.
   ///
@@ -40,12 +50,14 @@ class CampaignFiles {
   /// @throws Error if it is another campaign, naming what differs, or has more runs already.
   virtual std::shared_ptr<const Campaign> extend(Store& store, const Campaign& wanted) = 0;
 
-  /// Brings a file's statistics up to its results. Called in a thread of its own, while the service
-  /// goes on.
+  /// Brings a file's statistics up to its results, all of which are there, and checks its stop
+  /// rule. Called in a thread of its own, while the service goes on.
   ///
   /// @param write  Lets its argument use the file in the writer's thread.
-  virtual void summarise(const std::filesystem::path& file, const Scenario& scenario,
-                         const std::function<void(const std::function<void(Store&)>&)>& write) = 0;
+  /// @return The number of runs that the rule asks for next; empty if there are enough.
+  virtual std::optional<std::uint64_t> summarise(
+      const std::filesystem::path& file, const Scenario& scenario,
+      const std::function<void(const std::function<void(Store&)>&)>& write) = 0;
 };
 
 }  // namespace proofmass::coordinator

@@ -3,14 +3,16 @@
 #include <fmt/format.h>
 
 #include "coordinator/report/digest.hpp"
+#include "coordinator/report/summarise.hpp"
 
 namespace proofmass::coordinator {
 
 std::string report_text(const Store& store, const Scenario& scenario) {
-  const CampaignStatistics statistics = read_statistics(store, scenario);
+  const ReadResults results = read_results(store, scenario);
+  const CampaignStatistics& statistics = results.statistics;
   std::string text =
-      summary_text(store.name(), store.seed(), store.num_runs(), statistics, digest_of(store)) +
-      given_up_text(store.given_up_runs());
+      summary_text(store.name(), store.seed(), store.num_runs(), statistics, results.digest) +
+      given_up_text(store.given_up_runs()) + stop_text(store);
   for (const std::string& table : {accuracy_table(scenario, statistics), interval_table(statistics),
                                    budget_table(scenario, statistics)}) {
     if (!table.empty()) text += "\n" + table;
@@ -33,12 +35,6 @@ std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_
   return text;
 }
 
-CampaignStatistics read_statistics(const Store& store, const Scenario& scenario) {
-  StatisticsAccumulator accumulator(scenario.objectives);
-  store.for_each_result([&](const RunResult& result) { accumulator.add(result); });
-  return accumulator.statistics();
-}
-
 std::string given_up_text(std::span<const RunRange> given_up) {
   if (given_up.empty()) return "";
   std::uint64_t num_runs = 0;
@@ -55,26 +51,29 @@ std::string given_up_text(std::span<const RunRange> given_up) {
   return line + "\n";
 }
 
-DigestedStatistics read_digested_statistics(const Store& store, const Scenario& scenario) {
-  StatisticsAccumulator accumulator(scenario.objectives);
+ReadResults read_results(const Store& store, const Scenario& scenario) {
+  ReadResults results{
+      .accumulator = StatisticsAccumulator(scenario.objectives), .statistics = {}, .digest = {}};
   Digest digest;
   store.for_each_result([&](const RunResult& result) {
-    accumulator.add(result);
+    results.accumulator.add(result);
     digest.add(result);
   });
-  return {.statistics = accumulator.statistics(), .digest = digest.finish()};
+  results.statistics = results.accumulator.statistics();
+  results.digest = digest.finish();
+  return results;
 }
 
 void update_statistics(Store& store, const Scenario& scenario) {
-  write_statistics(store, scenario, read_digested_statistics(store, scenario));
+  write_statistics(store, scenario, read_results(store, scenario));
 }
 
-void write_statistics(Store& store, const Scenario& scenario, const DigestedStatistics& digested) {
-  const CampaignStatistics& statistics = digested.statistics;
+void write_statistics(Store& store, const Scenario& scenario, const ReadResults& results) {
+  const CampaignStatistics& statistics = results.statistics;
   store.write_statistics(statistics, budget_before_calibration(scenario),
                          budget_after_calibration(scenario, statistics.worst_errors()),
                          budget_after_calibration(scenario, statistics.mean_errors()),
-                         digested.digest);
+                         results.digest);
 }
 
 }  // namespace proofmass::coordinator

@@ -38,21 +38,17 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string budget_table(const Scenario& scenario,
                                        const CampaignStatistics& statistics);
 
-/// Statistics of the results in a campaign file.
-[[nodiscard]] CampaignStatistics read_statistics(const Store& store, const Scenario& scenario);
-
-/// Statistics and the digest of the results that they were computed from.
-struct DigestedStatistics {
+/// What one pass over the results of a campaign file yields.
+struct ReadResults {
+  StatisticsAccumulator accumulator;  ///< With all errors.
   CampaignStatistics statistics;
   std::string digest;
 };
 
-/// Reads the results of a campaign file once for both.
-[[nodiscard]] DigestedStatistics read_digested_statistics(const Store& store,
-                                                          const Scenario& scenario);
+[[nodiscard]] ReadResults read_results(const Store& store, const Scenario& scenario);
 
 /// Stores statistics, their digest, and the budgets that follow from them in the file.
-void write_statistics(Store& store, const Scenario& scenario, const DigestedStatistics& digested);
+void write_statistics(Store& store, const Scenario& scenario, const ReadResults& results);
 
 /// Brings the statistics and budgets that are stored in the file up to its results.
 void update_statistics(Store& store, const Scenario& scenario);

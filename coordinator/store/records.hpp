@@ -134,6 +134,13 @@ struct StopPlan {
   bool operator==(const StopPlan&) const = default;
 };
 
+/// A stop rule against the runs [0, num_runs), as it was stored.
+struct StoredStopCheck {
+  std::uint64_t num_runs = 0;
+  bool is_reached = false;
+  std::optional<double> relative_half_width;  ///< Empty if runs were too few for an interval.
+};
+
 /// What the stored statistics were computed from.
 struct Summary {
   std::uint64_t num_finished = 0;

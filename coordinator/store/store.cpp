@@ -247,6 +247,16 @@ void Store::record_stop_check(std::uint64_t num_runs, std::string_view statistic
   transaction.commit();
 }
 
+std::optional<StoredStopCheck> Store::last_stop_check(std::string_view statistic) const {
+  return detail::read_last_stop_check(parts_->database, statistic);
+}
+
+std::uint64_t Store::num_without_estimate() const {
+  // The index has all that are not completed.
+  return static_cast<std::uint64_t>(
+      parts_->database.integer("SELECT count(*) FROM run_result WHERE status <> 1 AND status > 2"));
+}
+
 std::vector<std::string> Store::tags() const { return detail::read_tags(parts_->database); }
 
 std::vector<Note> Store::notes() const { return detail::read_notes(parts_->database); }

@@ -89,6 +89,10 @@ class Store {
   /// @param statistic  Of the rule: `std(a_c13)`.
   void record_stop_check(std::uint64_t num_runs, std::string_view statistic,
                          const StopCheck& check);
+  /// The one with the most runs.
+  [[nodiscard]] std::optional<StoredStopCheck> last_stop_check(std::string_view statistic) const;
+  /// Finished runs without an estimate.
+  [[nodiscard]] std::uint64_t num_without_estimate() const;
 
   [[nodiscard]] std::vector<std::string> tags() const;  ///< Ascending.
   [[nodiscard]] std::vector<Note> notes() const;        ///< In the order in which they were added.

@@ -75,6 +75,18 @@ void write_stop_plan(const Database& database, const StopPlan& plan) {
       .run(plan.stop_rule, plan.num_runs_max, plan.failures_max);
 }
 
+std::optional<StoredStopCheck> read_last_stop_check(const Database& database,
+                                                    std::string_view statistic) {
+  Statement select = database.prepare(
+      "SELECT num_runs, is_reached, relative_half_width FROM stop_check WHERE statistic = ? "
+      "ORDER BY num_runs DESC LIMIT 1");
+  select.bind(1, statistic);
+  if (!select.step()) return std::nullopt;
+  return StoredStopCheck{.num_runs = select.count(0),
+                         .is_reached = select.integer(1) != 0,
+                         .relative_half_width = select.optional_real(2)};
+}
+
 void replace_stop_check(const Database& database, std::uint64_t num_runs,
                         std::string_view statistic, const StopCheck& check) {
   const bool is_bounded = check.interval.has_value();

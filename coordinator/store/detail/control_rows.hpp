@@ -18,6 +18,9 @@ void write_control(const Database& database, const CampaignControl& control);
 [[nodiscard]] StopPlan read_stop_plan(const Database& database);
 void write_stop_plan(const Database& database, const StopPlan& plan);
 
+/// The row of `stop_check` with the most runs.
+[[nodiscard]] std::optional<StoredStopCheck> read_last_stop_check(const Database& database,
+                                                                  std::string_view statistic);
 /// A row of `stop_check`.
 void replace_stop_check(const Database& database, std::uint64_t num_runs,
                         std::string_view statistic, const StopCheck& check);

@@ -122,6 +122,11 @@ std::uint64_t Statement::count(int column) const {
   return static_cast<std::uint64_t>(value);
 }
 
+std::optional<double> Statement::optional_real(int column) const {
+  if (sqlite3_column_type(statement_.get(), column) == SQLITE_NULL) return std::nullopt;
+  return real(column);
+}
+
 std::optional<std::uint64_t> Statement::optional_count(int column) const {
   if (sqlite3_column_type(statement_.get(), column) == SQLITE_NULL) return std::nullopt;
   return count(column);

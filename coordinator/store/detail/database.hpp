@@ -50,6 +50,7 @@ class Statement {
   void finish();
 
   [[nodiscard]] double real(int column) const;
+  [[nodiscard]] std::optional<double> optional_real(int column) const;  ///< Empty: NULL.
   [[nodiscard]] std::int64_t integer(int column) const;
   [[nodiscard]] std::uint64_t count(int column) const;  ///< @pre The integer is not negative.
   [[nodiscard]] std::optional<std::uint64_t> optional_count(int column) const;  ///< Empty: NULL.

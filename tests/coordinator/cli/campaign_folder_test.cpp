@@ -72,15 +72,15 @@ TEST_F(CampaignFolderTest, SaysWhyItCannotBeMade) {
 
 TEST_F(CampaignFolderTest, KeepsEachCampaignInAFileOfItsName) {
   CampaignFolder folder(directory / "served");
-  EXPECT_EQ(folder.open(campaign_of("b")).file, directory / "served/b.db");
-  (void)folder.open(campaign_of("a"));
+  EXPECT_EQ(folder.open(campaign_of("b"), {}).file, directory / "served/b.db");
+  (void)folder.open(campaign_of("a"), {});
   EXPECT_THAT(loaded(folder), ElementsAre("a", "b"));
   EXPECT_THAT(warnings, IsEmpty());
 }
 
 TEST_F(CampaignFolderTest, LeavesAloneWhatItCannotServe) {
   CampaignFolder folder(directory / "served");
-  (void)folder.open(campaign_of("a"));
+  (void)folder.open(campaign_of("a"), {});
   std::ofstream(directory / "served/b.db") << "something else";
   std::ofstream(directory / "served/notes.txt") << "something else";
   EXPECT_THAT(loaded(folder), ElementsAre("a"));
@@ -90,7 +90,7 @@ TEST_F(CampaignFolderTest, LeavesAloneWhatItCannotServe) {
 
 TEST_F(CampaignFolderTest, ServesOneOfTwoCopies) {
   CampaignFolder folder(directory / "served");
-  (void)folder.open(campaign_of("a"));
+  (void)folder.open(campaign_of("a"), {});
   std::filesystem::copy_file(directory / "served/a.db", directory / "served/b.db");
   EXPECT_THAT(loaded(folder), ElementsAre("a"));
   EXPECT_THAT(warnings, ElementsAre((directory / "served/b.db").string() +
@@ -99,8 +99,8 @@ TEST_F(CampaignFolderTest, ServesOneOfTwoCopies) {
 
 TEST_F(CampaignFolderTest, OpensACampaignAgainAndExtendsIt) {
   CampaignFolder folder(directory / "served");
-  (void)folder.open(campaign_of("a", 10));
-  ServedCampaign campaign = folder.open(campaign_of("a", 11));
+  (void)folder.open(campaign_of("a", 10), {});
+  ServedCampaign campaign = folder.open(campaign_of("a", 11), {});
   EXPECT_EQ(campaign.store.num_runs(), 11U);
   EXPECT_EQ(folder.extend(campaign.store, campaign_of("a", 12))->num_runs, 12U);
   EXPECT_EQ(campaign.store.num_runs(), 12U);
@@ -108,11 +108,11 @@ TEST_F(CampaignFolderTest, OpensACampaignAgainAndExtendsIt) {
 
 TEST_F(CampaignFolderTest, SaysHowTheCampaignInAFileDiffers) {
   CampaignFolder folder(directory / "served");
-  (void)folder.open(campaign_of("a"));
+  (void)folder.open(campaign_of("a"), {});
   Campaign other = campaign_of("a");
   other.seed = 2;
   try {
-    (void)folder.open(other);
+    (void)folder.open(other, {});
     FAIL();
   } catch (const UsageError& error) {
     EXPECT_EQ(error.what(), (directory / "served/a.db").string() +
@@ -124,7 +124,7 @@ TEST_F(CampaignFolderTest, SaysHowTheCampaignInAFileDiffers) {
 
 TEST_F(CampaignFolderTest, BringsStatisticsUpToDateBesideTheWriter) {
   CampaignFolder folder(directory / "served");
-  ServedCampaign campaign = folder.open(campaign_of("a", 1));
+  ServedCampaign campaign = folder.open(campaign_of("a", 1), {});
   Delivery delivery{.result = {}, .worker = {1}, .attempt = {1}};
   const std::vector<Entry> entries{
       WorkerJoined{.session = {1}, .name = "w", .host = "h", .process_id = 1}, delivery};

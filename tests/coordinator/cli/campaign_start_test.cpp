@@ -18,7 +18,7 @@ Campaign campaign_of(std::uint64_t num_runs) {
 
 std::string refusal(const Campaign& wanted, const std::filesystem::path& database) {
   try {
-    (void)open_or_create(wanted, database);
+    (void)open_or_create(wanted, {}, database);
   } catch (const UsageError& error) {
     return error.what();
   }
@@ -28,14 +28,14 @@ std::string refusal(const Campaign& wanted, const std::filesystem::path& databas
 TEST(CampaignStart, MakesTheDatabaseAndOpensItAgain) {
   const test::TemporaryDirectory directory;
   const auto database = directory / "a.db";
-  EXPECT_EQ(open_or_create(campaign_of(10), database).num_runs(), 10U);
-  EXPECT_EQ(open_or_create(campaign_of(10), database).num_runs(), 10U);
+  EXPECT_EQ(open_or_create(campaign_of(10), {}, database).store.num_runs(), 10U);
+  EXPECT_EQ(open_or_create(campaign_of(10), {}, database).store.num_runs(), 10U);
 }
 
 TEST(CampaignStart, RefusesAnotherCampaignAndSaysWhatDiffers) {
   const test::TemporaryDirectory directory;
   const auto database = directory / "a.db";
-  (void)open_or_create(campaign_of(10), database);
+  (void)open_or_create(campaign_of(10), {}, database);
   Campaign other = campaign_of(10);
   other.seed = 2;
   EXPECT_EQ(refusal(other, database), database.string() +
@@ -48,7 +48,7 @@ TEST(CampaignStart, RefusesAnotherCampaignAndSaysWhatDiffers) {
 TEST(CampaignStart, RefusesACampaignThatAnotherModelBegan) {
   const test::TemporaryDirectory directory;
   const auto database = directory / "a.db";
-  (void)open_or_create(campaign_of(10), database);
+  (void)open_or_create(campaign_of(10), {}, database);
   detail::Database(database, detail::Access::read_write)
       .execute("UPDATE campaign SET model_version = 'older'");
   EXPECT_EQ(refusal(campaign_of(10), database),
@@ -59,14 +59,14 @@ TEST(CampaignStart, RefusesACampaignThatAnotherModelBegan) {
 TEST(CampaignStart, ExtendsToMoreRuns) {
   const test::TemporaryDirectory directory;
   const auto database = directory / "a.db";
-  (void)open_or_create(campaign_of(10), database);
-  EXPECT_EQ(open_or_create(campaign_of(12), database).num_runs(), 12U);
+  (void)open_or_create(campaign_of(10), {}, database);
+  EXPECT_EQ(open_or_create(campaign_of(12), {}, database).store.num_runs(), 12U);
 }
 
 TEST(CampaignStart, RefusesFewerRunsThanBefore) {
   const test::TemporaryDirectory directory;
   const auto database = directory / "a.db";
-  (void)open_or_create(campaign_of(10), database);
+  (void)open_or_create(campaign_of(10), {}, database);
   EXPECT_EQ(refusal(campaign_of(9), database), "runs = 9 (must be at least 10, the number that " +
                                                    database.string() + " was asked for)");
 }
@@ -77,7 +77,7 @@ TEST(CampaignStart, ReadsACampaignWithTablesBack) {
   campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
   campaign.dispersions[9] = {.law = Law::table, .file = "f.csv", .column = "b"};
   campaign.table_columns = {{1e-4, 2e-4, 3e-4}, {1e-3, -2e-3, 0.1}};
-  const Store store = open_or_create(campaign, directory / "a.db");
+  const Store store = open_or_create(campaign, {}, directory / "a.db").store;
   const Campaign stored = stored_campaign(store);
   EXPECT_EQ(stored.table_columns, campaign.table_columns);
   EXPECT_EQ(stored.dispersions, campaign.dispersions);

@@ -99,10 +99,12 @@ class PlayingWorker {
     return receive<wire::RunLease>();
   }
 
-  void deliver(const wire::RunLease& lease) {
+  void deliver(const wire::RunLease& lease, RunStatus status = RunStatus::completed) {
     wire::ResultBatch batch{.campaign = lease.campaign, .attempt = lease.attempt, .results = {}};
     for (std::uint64_t run = lease.runs.first.value; run < lease.runs.end(); ++run) {
-      batch.results.emplace_back().result.run = {run};
+      RunResult& result = batch.results.emplace_back().result;
+      result.run = {run};
+      result.status = status;
     }
     send(batch);
   }

@@ -106,6 +106,24 @@ TEST_F(ServiceClients, ExtendACampaignThatIsServed) {
   EXPECT_EQ(worker.receive<wire::RunLease>().runs.first, RunIndex{1});
 }
 
+TEST_F(ServiceClients, GiveACampaignThatIsServedAnotherPriorityAndPlan) {
+  start_with({test::campaign_of("a", 3)});
+  (void)client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 300),
+                                         .priority = -2,
+                                         .audit_fraction = 0.25,
+                                         .stop_rule = "mean(k2c) within 5%",
+                                         .failures_max = 7});
+  EXPECT_EQ(client->status().campaigns[0].priority, -2);
+  EXPECT_EQ(client->status().campaigns[0].num_runs, 128U);  // The first at which rules are checked.
+  end(StopRequest::now);
+  const Store store = Store::open_read_only(directory / "a.db");
+  EXPECT_EQ(store.control().priority, -2);
+  EXPECT_EQ(store.control().audit_fraction, 0.25);
+  const StopPlan expected{
+      .stop_rule = "mean(k2c) within 5%", .num_runs_max = 300, .failures_max = 7};
+  EXPECT_EQ(store.stop_plan(), expected);
+}
+
 TEST_F(ServiceClients, AreToldWhyACampaignCannotBeExtended) {
   start_with({test::campaign_of("a", 3)});
   EXPECT_EQ(client->error(wire::SubmitRequest{.campaign = test::campaign_of("a", 2)}),

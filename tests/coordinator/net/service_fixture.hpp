@@ -34,12 +34,15 @@ class PlainFiles final : public coordinator::CampaignFiles {
  public:
   explicit PlainFiles(const TemporaryDirectory& directory) : directory_(directory) {}
 
-  coordinator::ServedCampaign open(const Campaign& wanted) override {
+  coordinator::ServedCampaign open(const Campaign& wanted,
+                                   const coordinator::StopPlan& plan) override {
     const auto file = directory_ / (wanted.name + ".db");
+    coordinator::Store store = std::filesystem::exists(file)
+                                   ? coordinator::Store::open(file)
+                                   : coordinator::Store::create(file, wanted, "definition");
+    store.set_stop_plan(plan);
     return {.file = file,
-            .store = std::filesystem::exists(file)
-                         ? coordinator::Store::open(file)
-                         : coordinator::Store::create(file, wanted, "definition"),
+            .store = std::move(store),
             .definition = std::make_shared<const Campaign>(wanted)};
   }
   std::shared_ptr<const Campaign> extend(coordinator::Store& store,
@@ -48,13 +51,20 @@ class PlainFiles final : public coordinator::CampaignFiles {
     if (wanted.num_runs > store.num_runs()) store.extend(wanted, "definition");
     return std::make_shared<const Campaign>(wanted);
   }
-  void summarise(
+  std::optional<std::uint64_t> summarise(
       const std::filesystem::path& file, const Scenario&,
       const std::function<void(const std::function<void(coordinator::Store&)>&)>& write) override {
+    std::uint64_t num_runs = 0;
     write([&](coordinator::Store& store) {
       store.record_event("summarised", file.filename().string());
+      num_runs = store.num_runs();
     });
+    return next_runs(num_runs);
   }
+
+  /// What a stop rule asks for, after so many runs.
+  std::function<std::optional<std::uint64_t>(std::uint64_t)> next_runs =
+      [](std::uint64_t) -> std::optional<std::uint64_t> { return std::nullopt; };
 
  private:
   const TemporaryDirectory& directory_;
@@ -73,7 +83,7 @@ class ServiceTest : public testing::Test {
 
   void start(const std::vector<Campaign>& campaigns) {
     std::vector<coordinator::ServedCampaign> served;
-    for (const Campaign& campaign : campaigns) served.push_back(files.open(campaign));
+    for (const Campaign& campaign : campaigns) served.push_back(files.open(campaign, plan));
     stop = coordinator::StopRequest::none;
     service = std::make_unique<coordinator::Service>(
         std::move(served), config, [this](const coordinator::Event& event) { note(event); });
@@ -137,6 +147,7 @@ class ServiceTest : public testing::Test {
   TemporaryDirectory directory;
   coordinator::PrivateEndpoint endpoint;
   PlainFiles files{directory};
+  coordinator::StopPlan plan;  ///< Of the campaigns that are there from the start.
   coordinator::ServiceConfig config;
   std::unique_ptr<coordinator::Service> service;
   std::atomic<coordinator::StopRequest> stop = coordinator::StopRequest::none;

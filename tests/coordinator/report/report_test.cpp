@@ -193,7 +193,7 @@ TEST_F(StoredReport, IsThatOfTheResultsInTheFile) {
   store.commit(deliveries);
   const Scenario scenario;
 
-  const CampaignStatistics statistics = read_statistics(store, scenario);
+  const CampaignStatistics statistics = read_results(store, scenario).statistics;
 
   EXPECT_EQ(statistics.num_runs, 10u);
   EXPECT_EQ(statistics.num_estimated, 9u);
@@ -212,7 +212,7 @@ TEST_F(StoredReport, IsStoredForSql) {
   const Scenario scenario;
   update_statistics(store, scenario);
 
-  const CampaignStatistics statistics = read_statistics(store, scenario);
+  const CampaignStatistics statistics = read_results(store, scenario).statistics;
   const detail::Database database(file(), detail::Access::read_only);
   detail::Statement row = database.prepare("SELECT worst, mean FROM parameter_accuracy");
   for (const AccuracyStatistic& accuracy : statistics.accuracy) {

@@ -1,0 +1,134 @@
+// Campaigns that end before all of their runs are finished, over real sockets.
+
+#include <gtest/gtest.h>
+
+#include <future>
+#include <optional>
+#include <stdexcept>
+
+#include "core/error.hpp"
+#include "tests/coordinator/net/service_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using wire::CampaignPhase;
+
+class ServiceStop : public test::ServiceTest {
+ protected:
+  [[nodiscard]] Store file_of_a() const { return Store::open_read_only(directory / "a.db"); }
+};
+
+TEST_F(ServiceStop, GoesOnAsLongAsTheStopRuleAsks) {
+  config.end = ServiceEnd::when_done;
+  plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
+  files.next_runs = [](std::uint64_t num_runs) {
+    return num_runs < 12 ? std::optional(num_runs + 4) : std::nullopt;
+  };
+  start({test::campaign_of("a", 4)});
+  test::PlayingWorker worker(endpoint.address());
+  worker.work();
+  wait_for_end();
+  EXPECT_EQ(num_stored("a"), 12U);
+  EXPECT_EQ(file_of_a().num_runs(), 12U);
+  EXPECT_EQ(file_of_a().control().phase, CampaignPhase::finished);
+}
+
+// Or a program that waits for the end would leave before it.
+TEST_F(ServiceStop, IsNotFinishedWhileTheRuleIsChecked) {
+  plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
+  std::promise<void> begun;
+  std::promise<void> released;
+  files.next_runs = [&](std::uint64_t) -> std::optional<std::uint64_t> {
+    begun.set_value();
+    released.get_future().get();
+    return std::nullopt;
+  };
+  start({test::campaign_of("a", 1)});
+  test::PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  begun.get_future().get();
+  bool is_done = true;
+  CampaignPhase phase = CampaignPhase::finished;
+  in_service([&] {
+    is_done = service->is_done();
+    phase = service->campaigns().front().phase;
+  });
+  EXPECT_FALSE(is_done);
+  EXPECT_EQ(phase, CampaignPhase::active);
+  EXPECT_EQ(file_of_a().control().phase, CampaignPhase::active);
+  released.set_value();
+  (void)wait_for_event("campaign_summarised runs=1");
+  in_service([&] { is_done = service->is_done(); });
+  EXPECT_TRUE(is_done);
+}
+
+TEST_F(ServiceStop, ChecksARuleThatItsPredecessorDidNot) {
+  config.end = ServiceEnd::when_done;
+  start({test::campaign_of("a", 1)});
+  test::PlayingWorker worker(endpoint.address());
+  worker.work();
+  wait_for_end();
+  service.reset();
+  {
+    Store store = Store::open(directory / "a.db");
+    const Entry active = CampaignControl{};
+    store.write({&active, 1});
+  }
+  plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
+  files.next_runs = [](std::uint64_t num_runs) {
+    return num_runs < 2 ? std::optional<std::uint64_t>(2) : std::nullopt;
+  };
+  start({test::campaign_of("a", 1)});
+  test::PlayingWorker another(endpoint.address(), 1002);
+  another.work();
+  wait_for_end();
+  EXPECT_EQ(num_stored("a"), 2U);
+}
+
+TEST_F(ServiceStop, EndsACampaignWhoseRuleCannotBeChecked) {
+  config.end = ServiceEnd::when_done;
+  plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
+  files.next_runs = [](std::uint64_t) -> std::optional<std::uint64_t> {
+    throw Error("no disk is there");
+  };
+  start({test::campaign_of("a", 1)});
+  test::PlayingWorker worker(endpoint.address());
+  worker.work();
+  wait_for_end();
+  EXPECT_EQ(wait_for_event("statistics_failed"), "statistics_failed reason=\"no disk is there\"");
+  EXPECT_EQ(num_stored("a"), 1U);
+}
+
+TEST_F(ServiceStop, CancelsACampaignWithMoreFailuresThanItMayHave) {
+  plan = {.stop_rule = "", .num_runs_max = {}, .failures_max = 1};
+  start({test::campaign_of("a", 5)});
+  test::PlayingWorker one(endpoint.address(), 1001);
+  test::PlayingWorker two(endpoint.address(), 1002);
+  one.deliver(one.borrow(1), RunStatus::no_draw);
+  (void)one.receive<wire::ResultAck>();
+  EXPECT_EQ(file_of_a().control().phase, CampaignPhase::active);
+  two.deliver(two.borrow(1), RunStatus::not_finite);
+  EXPECT_EQ(wait_for_event("too_many_failures"),
+            "too_many_failures without_estimate=2 failures_max=1");
+  end(StopRequest::now);
+  EXPECT_EQ(file_of_a().control().phase, CampaignPhase::cancelled);
+  EXPECT_EQ(num_stored("a"), 2U);
+}
+
+TEST_F(ServiceStop, CountsTheFailuresOfItsPredecessor) {
+  plan = {.stop_rule = "", .num_runs_max = {}, .failures_max = 1};
+  start({test::campaign_of("a", 5)});
+  test::PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow(1), RunStatus::no_draw);
+  (void)worker.receive<wire::ResultAck>();
+  end(StopRequest::now);
+  start({test::campaign_of("a", 5)});
+  test::PlayingWorker another(endpoint.address(), 1002);
+  another.deliver(another.borrow(1), RunStatus::no_draw);
+  EXPECT_EQ(wait_for_event("too_many_failures"),
+            "too_many_failures without_estimate=2 failures_max=1");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
