@@ -76,8 +76,8 @@ void ProgressDisplay::update(const wire::CampaignStatus& status) {
   if (mode_ == DisplayMode::bar) return show_bar(status);
   if (mode_ == DisplayMode::quiet) return;
   const std::uint64_t tenths = percent(status) / 10;
-  if (!is_first_ && tenths <= tenths_shown_) return;
-  is_first_ = false;
+  if (status.num_runs == num_runs_shown_ && tenths <= tenths_shown_) return;
+  num_runs_shown_ = status.num_runs;
   tenths_shown_ = tenths;
   fmt::print(stream_, "{}\n", progress_line(status));
 }

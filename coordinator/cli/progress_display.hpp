@@ -47,7 +47,7 @@ class ProgressDisplay {
   bool has_bar_ = false;
   std::string shown_;
   std::uint64_t tenths_shown_ = 0;
-  bool is_first_ = true;
+  std::uint64_t num_runs_shown_ = 0;  ///< A stop rule asks for more and more.
 };
 
 /// `bar` if the stream is a terminal, `lines` otherwise.

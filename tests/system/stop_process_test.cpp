@@ -1,0 +1,90 @@
+// Campaigns that end before all of their runs are finished, with real processes.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <string>
+
+#include "tests/system/campaign_process.hpp"
+
+namespace proofmass::test {
+namespace {
+
+class StopRule : public CampaignProcess {
+ protected:
+  /// The rule of the mean of |error| of K2d: its interval is 16 % to either side at 128 runs, if
+  /// errors scatter by nine tenths of their mean, and 13 % at 192.
+  [[nodiscard]] Process start_until(const std::string& name, const std::string& percent,
+                                    const Arguments& further) const {
+    Arguments arguments{"--until", "mean(k2d) within " + percent + "%"};
+    arguments.insert(arguments.end(), further.begin(), further.end());
+    return start(name, arguments);
+  }
+
+  [[nodiscard]] std::string num_checked(const std::string& name) const {
+    return stored_text(path(name + ".db"), "SELECT group_concat(num_runs) FROM stop_check");
+  }
+};
+
+TEST_F(StopRule, EndsAtTheSameRunForAnyWorkers) {
+  EXPECT_EQ(start_until("one", "14.5", {"--workers", "1"}).wait(), 0) << errors_of("one");
+  EXPECT_EQ(start_until("three", "14.5", {"--workers", "3"}).wait(), 0) << errors_of("three");
+  const auto runs = stored_runs(path("one.db"));
+  EXPECT_EQ(runs.size(), 192U);
+  EXPECT_EQ(stored_runs(path("three.db")), runs);
+  EXPECT_EQ(num_checked("three"), "128,192");
+  EXPECT_TRUE(
+      contains(read_file(path("one.out")), " after 192 runs; mean(k2d) within 14.5%: reached"));
+}
+
+TEST_F(StopRule, IsCheckedAtTheSameCountsAfterACrash) {
+  Process run = start_until("killed", "14.5", {"--workers", "2"});
+  wait_for_runs("killed", 130);
+  run.signal_all(SIGKILL);
+  EXPECT_EQ(run.wait(), -SIGKILL);
+  EXPECT_EQ(start_until("killed", "14.5", {}).wait(), 0) << errors_of("killed");
+  EXPECT_EQ(stored_runs(path("killed.db")).size(), 192U);
+  EXPECT_EQ(num_checked("killed"), "128,192");
+}
+
+// 320 runs are all that the campaign file asks for; the last check is with those.
+TEST_F(StopRule, SaysThatAllRunsAreNotEnough) {
+  EXPECT_EQ(start_until("all", "1", {}).wait(), 3) << errors_of("all");
+  EXPECT_EQ(stored_runs(path("all.db")).size(), num_runs);
+  EXPECT_EQ(num_checked("all"), "128,192,256,320");
+  EXPECT_TRUE(contains(read_file(path("all.out")), " after 320 runs; mean(k2d) within 1%: not"));
+}
+
+TEST_F(StopRule, IsFollowedByATighterOne) {
+  EXPECT_EQ(start_until("tighter", "50", {}).wait(), 0) << errors_of("tighter");
+  EXPECT_EQ(stored_runs(path("tighter.db")).size(), 128U);
+  EXPECT_EQ(start_until("tighter", "14.5", {}).wait(), 0) << errors_of("tighter");
+  EXPECT_EQ(stored_runs(path("tighter.db")).size(), 192U);
+}
+
+TEST_F(StopRule, IsRefusedIfItCannotBeRead) {
+  EXPECT_EQ(start("wrong", {"--until", "soon"}).wait(), 2);
+  EXPECT_TRUE(contains(errors_of("wrong"),
+                       "until = soon (soon is no statistic; they are mean, std "
+                       "and p1 to p99)"))
+      << errors_of("wrong");
+}
+
+using FailureBudget = CampaignProcess;
+
+// No instrument is as well aligned as this.
+TEST_F(FailureBudget, EndsACampaignThatFails) {
+  const Arguments hopeless{"--set", "acceptance.a_c1j_max_rad=1e-12", "--failures", "40"};
+  EXPECT_EQ(start("failing", hopeless).wait(), 1);
+  EXPECT_TRUE(contains(errors_of("failing"),
+                       " of 320 runs given up or without an estimate (at most "
+                       "40 with --failures); cancelled\n"))
+      << errors_of("failing");
+  const auto file = path("failing.db");
+  EXPECT_EQ(stored_text(file, "SELECT phase FROM campaign"), "cancelled");
+  EXPECT_EQ(stored_text(file, "SELECT count(*) > 40 AND count(*) < 320 FROM run_result"), "1");
+  EXPECT_TRUE(contains(read_file(path("failing.out")), " without draw\n"));
+}
+
+}  // namespace
+}  // namespace proofmass::test
