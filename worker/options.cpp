@@ -74,7 +74,7 @@ void add_process(CLI::App& app, Options& options) {
   app.add_option_function<std::string>(
          "--log-format",
          [&options](const std::string& text) {
-           options.log_format = text == "json" ? LogFormat::json : LogFormat::text;
+           options.log_format = text == "json" ? wire::LogFormat::json : wire::LogFormat::text;
          },
          "Of the log on standard error; text by default")
       ->envname("PROOFMASS_LOG_FORMAT")

@@ -9,8 +9,8 @@
 #include <string_view>
 
 #include "proto/link/faults.hpp"
+#include "proto/link/log.hpp"
 #include "worker/execution/execution.hpp"
-#include "worker/log.hpp"
 
 namespace CLI {
 class App;
@@ -29,7 +29,7 @@ struct Options {
   std::optional<std::filesystem::path> spool;
   Duration drain_time = std::chrono::seconds(100);
   std::optional<Duration> give_up_after;  ///< Nothing: 60 s with a parent, else an hour.
-  LogFormat log_format = LogFormat::text;
+  wire::LogFormat log_format = wire::LogFormat::text;
   std::optional<pid_t> parent;  ///< Campaign that started this worker, for itself alone.
   bool is_supervised = true;
   std::optional<wire::FaultPlan> faults;

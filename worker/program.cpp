@@ -144,7 +144,8 @@ void leave_out_service_options(Options& options) {
 
 int run(Options options, const Program& program) {
   const TimePoint program_start = std::chrono::steady_clock::now();
-  set_up_log(program.name, options.log_format, options.parent ? LogLevel::warning : LogLevel::info);
+  wire::set_up_log(program.name, options.log_format,
+                   options.parent ? wire::LogLevel::warning : wire::LogLevel::info);
   if (options.parent) {
     die_with(*options.parent);
     leave_out_service_options(options);

@@ -30,8 +30,8 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
                  "Seconds that workers have after SIGTERM to deliver what they hold")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  const std::map<std::string, LogFormat> formats{{"text", LogFormat::text},
-                                                 {"json", LogFormat::json}};
+  const std::map<std::string, proofmass::wire::LogFormat> formats{
+      {"text", proofmass::wire::LogFormat::text}, {"json", proofmass::wire::LogFormat::json}};
   app.add_option("--log-format", options.log_format, "text or json")
       ->envname("PROOFMASS_LOG_FORMAT")
       ->transform(CLI::CheckedTransformer(formats));

@@ -1,7 +1,6 @@
 #include "coordinator/cli/serve_command.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -11,12 +10,12 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_folder.hpp"
-#include "coordinator/cli/event_format.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/report/report.hpp"
 #include "core/simulation/reference_digest.hpp"
 #include "core/simulation/run.hpp"
+#include "proto/link/init_system.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -33,18 +32,48 @@ spdlog::level::level_enum level_of(Severity severity) {
   PROOFMASS_EXPECT(false);
 }
 
-Log make_log(LogFormat format) {
-  spdlog::set_default_logger(spdlog::stderr_logger_mt("proofmass-coordinator"));
-  if (format == LogFormat::text) {
-    return [](const Event& event) {
-      spdlog::log(level_of(event.severity), "{} {}", event.kind, event.text);
-    };
-  }
-  spdlog::set_pattern("%v");
+Log make_log(wire::LogFormat format) {
+  wire::set_up_log("proofmass-coordinator", format, wire::LogLevel::info);
   return [](const Event& event) {
-    spdlog::log(level_of(event.severity), "{}", json_line(event, std::chrono::system_clock::now()));
+    spdlog::log(level_of(event.severity), "{} {}", event.kind, event.text);
   };
 }
+
+/// Tells the init system how the coordinator is.
+class Notices {
+ public:
+  void on_tick(const Service& service, StopRequest stop) {
+    using std::chrono::steady_clock;
+    if (stop != StopRequest::none && !std::exchange(is_stopping_, true)) notify("STOPPING=1");
+    const steady_clock::time_point now = steady_clock::now();
+    const auto watchdog = init_system_.watchdog_interval();
+    if (watchdog && take_turn(watchdog_at_, now, *watchdog)) notify("WATCHDOG=1");
+    if (!take_turn(status_at_, now, status_interval)) return;
+    std::size_t num_active = 0;
+    for (const wire::CampaignStatus& campaign : service.campaigns()) {
+      num_active += campaign.phase == wire::CampaignPhase::active ? 1U : 0U;
+    }
+    notify(fmt::format("STATUS={} campaigns to compute", num_active));
+  }
+  void ready() const { notify("READY=1"); }
+
+ private:
+  static constexpr std::chrono::seconds status_interval{5};
+
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  static bool take_turn(TimePoint& at, TimePoint now, std::chrono::microseconds interval) {
+    if (now < at) return false;
+    at = now + interval;
+    return true;
+  }
+  void notify(std::string_view lines) const { init_system_.notify(lines); }
+
+  wire::InitSystem init_system_ = wire::InitSystem::from_environment();
+  bool is_stopping_ = false;
+  TimePoint watchdog_at_ = TimePoint::min();
+  TimePoint status_at_ = TimePoint::min();
+};
 
 /// Those of the directory, and those of campaign files that are not among them or have more runs.
 std::vector<ServedCampaign> campaigns_of(const ServeOptions& options, CampaignFolder& folder,
@@ -126,7 +155,9 @@ int serve_campaigns(const ServeOptions& options) {
   }
   Service service(campaigns_of(options, folder, log), config, log);
   log_start(service, log);
-  service.run(stop, [] {});
+  Notices notices;
+  notices.ready();
+  service.run(stop, [&] { notices.on_tick(service, stop); });
   const bool is_done = service.is_done();
   const bool has_given_up = finish(service.close(), log);
   const bool is_in_order =

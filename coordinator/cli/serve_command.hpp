@@ -7,14 +7,9 @@
 #include <vector>
 
 #include "coordinator/net/service.hpp"
+#include "proto/link/log.hpp"
 
 namespace proofmass::coordinator {
-
-/// How the log on standard error looks.
-enum class LogFormat : std::uint8_t {
-  text,  ///< `[time] [info] worker_registered worker=1 name=a`.
-  json,  ///< An object a line.
-};
 
 /// Arguments of `proofmass-coordinator`.
 struct ServeOptions {
@@ -25,7 +20,7 @@ struct ServeOptions {
   bool is_plain_waived = false;
   ServiceEnd end = ServiceEnd::never;
   double drain_time_s = 120.0;  ///< ≥ 0.
-  LogFormat log_format = LogFormat::text;
+  wire::LogFormat log_format = wire::LogFormat::text;
   std::string faults;       ///< As FaultPlan::parse() reads them.
   double time_scale = 1.0;  ///< > 0; of all that is waited for. Below 1 in tests of this program.
   std::vector<std::filesystem::path> campaign_files;  ///< To be served beside those that are there.

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/proto/link/notice_receiver.hpp"
 #include "tests/system/campaign_process.hpp"
 
 namespace proofmass::test {
@@ -57,6 +58,26 @@ TEST_F(CoordinatorProcess, ServesWorkersThatConnectAndLeave) {
   EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
   EXPECT_EQ(late.wait(), 0) << errors_of("late");
   EXPECT_EQ(stored_runs(path("served/hardy2013.db")), reference());
+}
+
+TEST_F(CoordinatorProcess, TellsTheInitSystemHowItIs) {
+  const NoticeReceiver init_system(path("notify").string());
+  std::string told;
+  const auto wait_for_notice = [&](const std::string& notice) {
+    wait_until(notice, [&] { return contains(told += init_system.receive() + '\n', notice); });
+  };
+  Process coordinator(directory / "", "coordinator", "/usr/bin/env",
+                      {"NOTIFY_SOCKET=" + path("notify").string(), "WATCHDOG_USEC=200000",
+                       programs + "/proofmass-coordinator", "--directory", "served", "--bind",
+                       endpoint(), "short.toml"});
+  wait_for_notice("READY=1\n");
+  EXPECT_TRUE(std::filesystem::exists(path("socket")));
+  wait_for_notice("STATUS=1 campaigns to compute\n");
+  wait_for_notice("WATCHDOG=1\n");
+  EXPECT_FALSE(contains(told, "STOPPING=1"));
+  coordinator.signal(SIGTERM);
+  wait_for_notice("STOPPING=1\n");
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
 }
 
 TEST_F(CoordinatorProcess, ThreeThreadsOfAWorkerGiveTheBitsOfOne) {

@@ -104,7 +104,7 @@ INSTANTIATE_TEST_SUITE_P(Seed, RandomFaults, testing::Values(1U, 2U, 3U),
 
 using StoppedWorker = FaultTest;
 
-// What it was computing is computed by another. When it goes on it may be told so before it is done:
+// Another computes what it was computing. When it goes on it may be told so before it is done:
 // late results are those of a worker that is cut off, see FaultyNetwork.
 TEST_F(StoppedWorker, HoldsUpNothing) {
   Process coordinator = this->coordinator(

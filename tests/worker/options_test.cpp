@@ -42,7 +42,7 @@ TEST(WorkerOptions, HaveDefaults) {
   EXPECT_FALSE(options.give_up_after.has_value());
   EXPECT_FALSE(options.keys.has_value());
   EXPECT_GE(options.num_threads, 1U);
-  EXPECT_EQ(options.log_format, LogFormat::text);
+  EXPECT_EQ(options.log_format, wire::LogFormat::text);
   EXPECT_TRUE(options.is_supervised);
 }
 
@@ -61,7 +61,7 @@ TEST(WorkerOptions, ComeFromArguments) {
   EXPECT_EQ(options.spool, "s");
   EXPECT_EQ(options.drain_time, 30s);
   EXPECT_EQ(options.give_up_after, 2h);
-  EXPECT_EQ(options.log_format, LogFormat::json);
+  EXPECT_EQ(options.log_format, wire::LogFormat::json);
   EXPECT_FALSE(options.is_supervised);
   EXPECT_TRUE(options.is_plain_waived);
   EXPECT_EQ(options.parent, 12);

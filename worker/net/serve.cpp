@@ -9,11 +9,11 @@
 #include <utility>
 #include <variant>
 
+#include "proto/link/init_system.hpp"
 #include "proto/link/kill_point.hpp"
 #include "proto/wire/codec.hpp"
 #include "worker/net/coordinator_link.hpp"
 #include "worker/spool/spooler.hpp"
-#include "worker/supervision/init_system.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -102,7 +102,7 @@ class Notices {
   void notify(std::string_view lines) const { init_system_.notify(lines); }
 
   const Conversation& conversation_;
-  InitSystem init_system_ = InitSystem::from_environment();
+  wire::InitSystem init_system_ = wire::InitSystem::from_environment();
   bool is_ready_ = false;
   bool is_stopping_ = false;
   TimePoint watchdog_at_ = TimePoint::min();

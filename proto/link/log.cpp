@@ -1,17 +1,31 @@
-#include "coordinator/cli/event_format.hpp"
+#include "proto/link/log.hpp"
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cstddef>
+#include <memory>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
-#include "core/error.hpp"
-
-namespace proofmass::coordinator {
+namespace proofmass::wire {
 namespace {
+
+class JsonFormatter final : public spdlog::formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) override {
+    const spdlog::string_view_t level = spdlog::level::to_string_view(message.level);
+    const std::string text = json_line({message.payload.data(), message.payload.size()},
+                                       {level.data(), level.size()}, message.time);
+    line.append(text.data(), text.data() + text.size());
+    line.push_back('\n');
+  }
+  [[nodiscard]] std::unique_ptr<formatter> clone() const override {
+    return std::make_unique<JsonFormatter>();
+  }
+};
 
 /// The next word of a text, which is taken off it; a part in quotes belongs to its word.
 std::string_view take_word(std::string_view& text) {
@@ -32,28 +46,23 @@ std::string_view unquoted(std::string_view value) {
 
 }  // namespace
 
-std::string_view name_of(Severity severity) {
-  switch (severity) {
-    case Severity::info:
-      return "info";
-    case Severity::warning:
-      return "warning";
-    case Severity::error:
-      return "error";
-  }
-  PROOFMASS_EXPECT(false);
+void set_up_log(const std::string& program, LogFormat format, LogLevel level) {
+  spdlog::set_default_logger(spdlog::stderr_logger_mt(program));
+  spdlog::set_level(level == LogLevel::info ? spdlog::level::info : spdlog::level::warn);
+  if (format == LogFormat::json) spdlog::set_formatter(std::make_unique<JsonFormatter>());
 }
 
-std::string json_line(const Event& event, std::chrono::system_clock::time_point time) {
-  nlohmann::ordered_json line;
+std::string json_line(std::string_view message, std::string_view level,
+                      std::chrono::system_clock::time_point time) {
   const auto second = std::chrono::floor<std::chrono::seconds>(time);
   const auto part = std::chrono::floor<std::chrono::milliseconds>(time - second);
+  nlohmann::ordered_json line;
   line["time"] = fmt::format("{:%FT%T}.{:03}Z", second, part.count());
-  line["level"] = name_of(event.severity);
-  line["event"] = event.kind;
+  line["level"] = level;
+  line["event"] = take_word(message);
   std::string rest;
-  for (std::string_view text = event.text; !text.empty();) {
-    const std::string_view word = take_word(text);
+  while (!message.empty()) {
+    const std::string_view word = take_word(message);
     const std::size_t equals = word.find('=');
     if (equals != std::string_view::npos && equals > 0) {
       line[std::string(word.substr(0, equals))] = unquoted(word.substr(equals + 1));
@@ -66,4 +75,4 @@ std::string json_line(const Event& event, std::chrono::system_clock::time_point 
   return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::wire

@@ -1,8 +1,8 @@
-#include "worker/log.hpp"
+#include "proto/link/log.hpp"
 
 #include <gtest/gtest.h>
 
-namespace proofmass::worker {
+namespace proofmass::wire {
 namespace {
 
 using namespace std::chrono_literals;
@@ -30,4 +30,4 @@ TEST(JsonLine, IsJsonWhateverAPeerSays) {
 }
 
 }  // namespace
-}  // namespace proofmass::worker
+}  // namespace proofmass::wire

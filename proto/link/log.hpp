@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace proofmass::worker {
+namespace proofmass::wire {
 
 enum class LogFormat : std::uint8_t {
   text,  ///< For people.
@@ -24,4 +24,4 @@ void set_up_log(const std::string& program, LogFormat format, LogLevel level);
 [[nodiscard]] std::string json_line(std::string_view message, std::string_view level,
                                     std::chrono::system_clock::time_point time);
 
-}  // namespace proofmass::worker
+}  // namespace proofmass::wire

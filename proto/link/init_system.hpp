@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace proofmass::worker {
+namespace proofmass::wire {
 
 /// The init system that started this process, as systemd's sd_notify(3) describes it: it is
 /// told when the service is ready, that it lives, and what it does. Without one, nothing happens.
@@ -29,4 +29,4 @@ class InitSystem {
   std::optional<std::chrono::microseconds> watchdog_;
 };
 
-}  // namespace proofmass::worker
+}  // namespace proofmass::wire

@@ -1,4 +1,4 @@
-#include "worker/supervision/init_system.hpp"
+#include "proto/link/init_system.hpp"
 
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -10,7 +10,7 @@
 #include <cstdlib>
 #include <utility>
 
-namespace proofmass::worker {
+namespace proofmass::wire {
 namespace {
 
 std::string environment(const char* name) {
@@ -58,4 +58,4 @@ std::optional<std::chrono::microseconds> InitSystem::watchdog_interval() const {
   return *watchdog_ / 2;
 }
 
-}  // namespace proofmass::worker
+}  // namespace proofmass::wire
