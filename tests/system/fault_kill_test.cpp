@@ -107,8 +107,8 @@ using StoppedWorker = FaultTest;
 // Another computes what it was computing. When it goes on it may be told so before it is done:
 // late results are those of a worker that is cut off, see FaultyNetwork.
 TEST_F(StoppedWorker, HoldsUpNothing) {
-  Process coordinator = this->coordinator(
-      "coordinator", {"null.toml", "--time-scale", "0.02", "--exit-when-done"});
+  Process coordinator =
+      this->coordinator("coordinator", {"null.toml", "--time-scale", "0.02", "--exit-when-done"});
   Process slow = null_worker("slow", {"--no-supervisor", "--run-time", "0.5"});
   wait_for_log("coordinator", "name=slow");
   const Process quick = null_worker("quick");
