@@ -218,7 +218,8 @@ bool is_lent(const CampaignState& campaign) {
 }
 
 bool is_backed_up(const State& state, const CampaignState& campaign) {
-  return 2 * campaign.delivered.size() >= state.config.uncommitted_max;
+  const std::uint64_t num_under_way = campaign.delivered.size() + campaign.num_comparing;
+  return 2 * num_under_way >= state.config.uncommitted_max;
 }
 
 void send_lease(const State& state, LeaseId id, Outbox& outbox) {

@@ -73,7 +73,10 @@ struct Intake {
     return {.campaign = campaign_id, .worker = id, .attempt = attempt, .computed = computed};
   }
 
+  // What a worker sends again and again must not fill the memory: one that is not compared, is
+  // lost.
   void compare(const wire::ComputedRun& computed) {
+    if (campaign.num_comparing >= state.config.uncommitted_max) return;
     ++campaign.num_comparing;
     outbox.compare(arrival(computed));
   }
@@ -167,11 +170,12 @@ void on_committed(State& state, CampaignId id, std::span<const RunIndex> runs, T
 }
 
 void on_compared(State& state, CampaignId id, RunIndex run, WorkerId worker, bool is_equal,
-                 TimePoint, Outbox& outbox) {
+                 TimePoint now, Outbox& outbox) {
   const auto found = state.campaigns.find(id);
   if (found == state.campaigns.end()) return;
   CampaignState& campaign = found->second;
   PROOFMASS_EXPECT(campaign.num_comparing > 0);
+  const bool was_backed_up = detail::is_backed_up(state, campaign);
   --campaign.num_comparing;
   ++campaign.num_audited;
   if (!is_equal) {
@@ -182,6 +186,7 @@ void on_compared(State& state, CampaignId id, RunIndex run, WorkerId worker, boo
                 .campaign = id});
   }
   detail::finish_if_done(state, id, outbox);
+  if (was_backed_up) detail::lend_to_hungry(state, now, outbox);
 }
 
 void on_store_failed(State& state, CampaignId id, const std::string& reason, Outbox& outbox) {

@@ -64,6 +64,7 @@ StoredCampaign stored_campaign_of(const ServedCampaign& campaign, GivenUpRuns gi
                         .audit_fraction = control.audit_fraction,
                         .finished = store.finished_runs(),
                         .given_up = {},
+                        .compared = store.compared_runs(),
                         .blamed = {}};
   if (given_up == GivenUpRuns::retry) return stored;
   stored.given_up = store.given_up_runs();

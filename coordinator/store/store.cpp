@@ -262,14 +262,15 @@ std::vector<std::string> Store::tags() const { return detail::read_tags(parts_->
 std::vector<Note> Store::notes() const { return detail::read_notes(parts_->database); }
 
 std::vector<RunRange> Store::finished_runs() const {
-  Statement select = parts_->database.prepare("SELECT run_index FROM delivery ORDER BY run_index");
-  std::vector<RunRange> ranges;
-  while (select.step()) detail::append_run(ranges, RunIndex{select.count(0)});
-  return ranges;
+  return detail::read_runs(parts_->database, "SELECT run_index FROM delivery ORDER BY 1");
+}
+
+std::vector<RunRange> Store::compared_runs() const {
+  return detail::read_runs(parts_->database, "SELECT DISTINCT run_index FROM audit ORDER BY 1");
 }
 
 std::vector<RunRange> Store::given_up_runs() const {
-  return detail::read_given_up_runs(parts_->database);
+  return detail::read_runs(parts_->database, "SELECT run_index FROM run_failure ORDER BY 1");
 }
 
 std::vector<BlamedRun> Store::blamed_runs() const {

@@ -100,6 +100,8 @@ class Store {
   /// Ascending; neighbours are one range.
   [[nodiscard]] std::vector<RunRange> finished_runs() const;
   [[nodiscard]] std::vector<RunRange> given_up_runs() const;  ///< The same; none is finished.
+  /// Finished runs of which a second result was compared with the stored one, ascending.
+  [[nodiscard]] std::vector<RunRange> compared_runs() const;
   /// Runs that are neither finished nor given up, ascending.
   [[nodiscard]] std::vector<BlamedRun> blamed_runs() const;
 

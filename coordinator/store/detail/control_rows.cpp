@@ -47,6 +47,15 @@ class RunLookup {
   Statement select_;
 };
 
+/// Appends to ranges that end before the run.
+void append_run(std::vector<RunRange>& ranges, RunIndex run) {
+  if (!ranges.empty() && ranges.back().end() == run.value) {
+    ++ranges.back().count;
+  } else {
+    ranges.push_back({.first = run, .count = 1});
+  }
+}
+
 }  // namespace
 
 CampaignControl read_control(const Database& database) {
@@ -100,8 +109,8 @@ void replace_stop_check(const Database& database, std::uint64_t num_runs,
            check.relative_half_width, std::int64_t{check.is_reached});
 }
 
-std::vector<RunRange> read_given_up_runs(const Database& database) {
-  Statement select = database.prepare("SELECT run_index FROM run_failure ORDER BY run_index");
+std::vector<RunRange> read_runs(const Database& database, std::string_view sql) {
+  Statement select = database.prepare(sql);
   std::vector<RunRange> ranges;
   while (select.step()) append_run(ranges, RunIndex{select.count(0)});
   return ranges;
@@ -142,14 +151,6 @@ void end_start(const Database& database, wire::Epoch epoch) {
           "UPDATE coordinator_start SET ended_utc = strftime('%Y-%m-%dT%H:%M:%fZ', 'now') "
           "WHERE epoch = ?")
       .run(hexadecimal(epoch.value));
-}
-
-void append_run(std::vector<RunRange>& ranges, RunIndex run) {
-  if (!ranges.empty() && ranges.back().end() == run.value) {
-    ++ranges.back().count;
-  } else {
-    ranges.push_back({.first = run, .count = 1});
-  }
 }
 
 }  // namespace proofmass::coordinator::detail

@@ -25,16 +25,13 @@ void write_stop_plan(const Database& database, const StopPlan& plan);
 void replace_stop_check(const Database& database, std::uint64_t num_runs,
                         std::string_view statistic, const StopCheck& check);
 
-/// Runs without a result that are given up, ascending; neighbours are one range.
-[[nodiscard]] std::vector<RunRange> read_given_up_runs(const Database& database);
+/// The runs in the first column of a query, which are ascending; neighbours are one range.
+[[nodiscard]] std::vector<RunRange> read_runs(const Database& database, std::string_view sql);
 
 /// Runs that were blamed for losses and are neither finished nor given up, ascending.
 [[nodiscard]] std::vector<BlamedRun> read_blamed_runs(const Database& database);
 
 void insert_start(const Database& database, const CoordinatorStart& start);
 void end_start(const Database& database, wire::Epoch epoch);
-
-/// Appends to ranges that end before the run.
-void append_run(std::vector<RunRange>& ranges, RunIndex run);
 
 }  // namespace proofmass::coordinator::detail

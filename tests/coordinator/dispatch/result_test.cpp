@@ -52,6 +52,19 @@ TEST_F(ResultTest, RepeatedAfterTheCommitIsAcknowledgedAtOnceAndCompared) {
   EXPECT_EQ(campaign(one).num_audited, 1U);
 }
 
+// Of one that sends the same again and again; it would fill the memory if the disk is slow.
+TEST_F(ResultTest, IsNotComparedWhileTooManyWaitForThat) {
+  complete(first, one, {0});
+  state.config.uncommitted_max = 2;
+  for (int i = 0; i < 3; ++i) deliver(first, one, {0});
+  EXPECT_EQ(outbox.take_compared(), (Runs{{0}, {0}}));
+  EXPECT_EQ(campaign(one).num_comparing, 2U);
+  EXPECT_EQ(campaign(one).num_duplicates, 3U);
+  for (int i = 0; i < 3; ++i) (void)outbox.take_sent<wire::ResultAck>(first);
+  on_compared(state, one, {0}, first, true, now, outbox);
+  on_compared(state, one, {0}, first, true, now, outbox);
+}
+
 TEST_F(ResultTest, OfAnotherWorkerWaitsForTheSameCommitAndIsCompared) {
   add_worker(second);
   outbox.forget();

@@ -245,6 +245,19 @@ TEST_F(StoreDispatch, KeepsRunsThatAreGivenUpWithTheLastReason) {
               ElementsAre(RunRange{RunIndex{5}, 2}, RunRange{RunIndex{9}, 1}));
 }
 
+// A coordinator that starts again does not have them computed a third time.
+TEST_F(StoreDispatch, KnowsOfWhichRunsASecondResultWasCompared) {
+  Store store = Store::create(file(), test::campaign_of(8), "");
+  store.commit(test::deliveries_of(0, 8));
+  std::vector<Entry> entries;
+  for (const Delivery& delivery : test::deliveries_of(2, 2)) {
+    entries.emplace_back(SecondDelivery{delivery});
+  }
+  entries.emplace_back(entries.front());
+  store.write(entries);
+  EXPECT_THAT(store.compared_runs(), ElementsAre(RunRange{RunIndex{2}, 2}));
+}
+
 TEST_F(StoreDispatch, PrefersAResultToAFailureInEitherOrder) {
   Store store = create();
   write(store, {GivenUpRun{RunIndex{1}}, GivenUpRun{RunIndex{2}}, delivery_of(2)});
