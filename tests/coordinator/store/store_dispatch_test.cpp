@@ -250,10 +250,10 @@ TEST_F(StoreDispatch, KnowsOfWhichRunsASecondResultWasCompared) {
   Store store = Store::create(file(), test::campaign_of(8), "");
   store.commit(test::deliveries_of(0, 8));
   std::vector<Entry> entries;
-  for (const Delivery& delivery : test::deliveries_of(2, 2)) {
+  for (const Delivery& delivery : test::deliveries_of(2, 4)) {
     entries.emplace_back(SecondDelivery{delivery});
   }
-  entries.emplace_back(entries.front());
+  entries.push_back(entries.at(0));
   store.write(entries);
   EXPECT_THAT(store.compared_runs(), ElementsAre(RunRange{RunIndex{2}, 2}));
 }
