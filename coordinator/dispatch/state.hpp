@@ -14,6 +14,7 @@
 #include "coordinator/dispatch/lease_index.hpp"
 #include "coordinator/dispatch/run_set.hpp"
 #include "core/campaign/campaign.hpp"
+#include "proto/wire/client_messages.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::coordinator {
@@ -106,12 +107,7 @@ struct Lease {
 };
 
 /// Whether a campaign's runs are lent.
-enum class Phase : std::uint8_t {
-  active,
-  paused,
-  finished,   ///< Every run is stored or given up.
-  cancelled,  ///< Open runs are dropped; what is stored stands.
-};
+using Phase = wire::CampaignPhase;
 
 /// What speaks against a run.
 struct Suspicion {

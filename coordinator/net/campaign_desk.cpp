@@ -18,36 +18,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-using wire::CampaignPhase;
-
-CampaignPhase phase_of(Phase phase) {
-  switch (phase) {
-    case Phase::active:
-      return CampaignPhase::active;
-    case Phase::paused:
-      return CampaignPhase::paused;
-    case Phase::finished:
-      return CampaignPhase::finished;
-    case Phase::cancelled:
-      return CampaignPhase::cancelled;
-  }
-  PROOFMASS_EXPECT(false);
-}
-
-Phase phase_of(CampaignPhase phase) {
-  switch (phase) {
-    case CampaignPhase::active:
-      return Phase::active;
-    case CampaignPhase::paused:
-      return Phase::paused;
-    case CampaignPhase::finished:
-      return Phase::finished;
-    case CampaignPhase::cancelled:
-      return Phase::cancelled;
-  }
-  PROOFMASS_EXPECT(false);
-}
-
 StopPlan plan_of(const wire::SubmitRequest& request) {
   StopPlan plan{
       .stop_rule = request.stop_rule, .num_runs_max = {}, .failures_max = request.failures_max};
@@ -59,7 +29,7 @@ StoredCampaign stored_campaign_of(const ServedCampaign& campaign, GivenUpRuns gi
   const Store& store = campaign.store;
   const CampaignControl control = store.control();
   StoredCampaign stored{.definition = campaign.definition,
-                        .phase = phase_of(control.phase),
+                        .phase = control.phase,
                         .priority = control.priority,
                         .audit_fraction = control.audit_fraction,
                         .finished = store.finished_runs(),
@@ -99,15 +69,14 @@ void CampaignDesk::serve(ServedCampaign campaign, GivenUpRuns given_up, TimePoin
   wire::kill_point(wire::KillPoint::after_open);
   const StoredCampaign stored = stored_campaign_of(campaign, given_up);
   campaign.store.begin_coordinator(start_);
-  served_.emplace(id,
-                  Served{.file = campaign.file,
-                         .name = campaign.definition->name,
-                         .rate = RateMeter(now),
-                         .written = campaign.store.control(),
-                         .plan = campaign.store.stop_plan(),
-                         .is_decided = campaign.store.control().phase == CampaignPhase::finished,
-                         .num_failures_before = campaign.store.num_without_estimate(),
-                         .summary = {}});
+  served_.emplace(id, Served{.file = campaign.file,
+                             .name = campaign.definition->name,
+                             .rate = RateMeter(now),
+                             .written = campaign.store.control(),
+                             .plan = campaign.store.stop_plan(),
+                             .is_decided = campaign.store.control().phase == Phase::finished,
+                             .num_failures_before = campaign.store.num_without_estimate(),
+                             .summary = {}});
   writer_.open(id, std::move(campaign.store));
   on_campaign(state_, id, stored, now, outbox);
 }
@@ -135,7 +104,7 @@ wire::ClientReply CampaignDesk::carry_out(const wire::SubmitRequest& request, Ti
     resubmit(*id, request, now, outbox);
   } else {
     ServedCampaign campaign = files_->open(request.campaign, plan_of(request));
-    const Entry control = CampaignControl{.phase = CampaignPhase::active,
+    const Entry control = CampaignControl{.phase = Phase::active,
                                           .priority = request.priority,
                                           .audit_fraction = request.audit_fraction};
     (void)campaign.store.write({&control, 1});
@@ -251,12 +220,12 @@ wire::CampaignStatus CampaignDesk::status_of(CampaignId id, TimePoint now) const
           .storage_failure = campaign.storage_failure};
 }
 
-CampaignPhase CampaignDesk::phase_of(CampaignId id) const {
+Phase CampaignDesk::phase_of(CampaignId id) const {
   const Phase phase = state_.campaigns.at(id).phase;
   const Served& served = served_.at(id);
   const bool is_undecided = !served.plan.stop_rule.empty() && !served.is_decided;
-  if (phase == Phase::finished && is_undecided) return CampaignPhase::active;
-  return coordinator::phase_of(phase);
+  if (phase == Phase::finished && is_undecided) return Phase::active;
+  return phase;
 }
 
 void CampaignDesk::review(TimePoint now, Outbox& outbox) {
@@ -296,7 +265,7 @@ void CampaignDesk::review_control(CampaignId id, Served& served) {
   if (control == served.written) return;
   writer_.set_control(id, control);
   const bool has_new_results = served.num_summarised != campaign.num_committed_here;
-  if (control.phase == CampaignPhase::finished && has_new_results) {
+  if (control.phase == Phase::finished && has_new_results) {
     served.is_summary_due = files_ != nullptr;
   }
   served.written = control;
@@ -308,7 +277,7 @@ void CampaignDesk::review_summary(CampaignId id, Served& served, TimePoint now, 
     take_summary(id, served, now, outbox);
   }
   const bool is_finished = state_.campaigns.at(id).phase == Phase::finished;
-  const bool is_undecided = is_finished && phase_of(id) != CampaignPhase::finished;
+  const bool is_undecided = is_finished && phase_of(id) != Phase::finished;
   const bool is_due = std::exchange(served.is_summary_due, false);
   if (is_due || is_undecided) begin_summary(id, served);
 }
@@ -367,8 +336,7 @@ void CampaignDesk::begin_summary(CampaignId id, Served& served) {
 bool CampaignDesk::is_all_done() const {
   return std::all_of(state_.campaigns.begin(), state_.campaigns.end(), [&](const auto& item) {
     const auto& [id, campaign] = item;
-    const bool is_undecided =
-        campaign.phase == Phase::finished && phase_of(id) != CampaignPhase::finished;
+    const bool is_undecided = campaign.phase == Phase::finished && phase_of(id) != Phase::finished;
     return campaign.phase == Phase::cancelled || (is_finished(campaign) && !is_undecided);
   });
 }

@@ -84,7 +84,7 @@ class CampaignDesk {
   [[nodiscard]] std::optional<CampaignId> find(std::string_view name) const;
   [[nodiscard]] wire::DoneReply done_reply(CampaignId id) const;
   /// As shown and stored: a campaign whose stop rule is still to be checked is not finished.
-  [[nodiscard]] wire::CampaignPhase phase_of(CampaignId id) const;
+  [[nodiscard]] Phase phase_of(CampaignId id) const;
   void review_failures(CampaignId id, const Served& served, Outbox& outbox);
   void review_control(CampaignId id, Served& served);
   void review_summary(CampaignId id, Served& served, TimePoint now, Outbox& outbox);

@@ -37,8 +37,13 @@ struct ControlRequest {
 
 using ClientRequest = std::variant<SubmitRequest, StatusRequest, WorkersRequest, ControlRequest>;
 
-/// The values are sent: never renumber.
-enum class CampaignPhase : std::uint8_t { active = 1, paused = 2, finished = 3, cancelled = 4 };
+/// Whether a campaign's runs are lent. The values are sent: never renumber.
+enum class CampaignPhase : std::uint8_t {
+  active = 1,
+  paused = 2,
+  finished = 3,   ///< Every run is stored or given up.
+  cancelled = 4,  ///< Open runs are dropped; what is stored stands.
+};
 
 /// Where a campaign stands. Counts of runs, each exact.
 struct CampaignStatus {
