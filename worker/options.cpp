@@ -37,17 +37,17 @@ CLI::Option* add_duration(CLI::App& app, const std::string& name, Target& target
 
 void add_connection(CLI::App& app, Options& options) {
   app.add_option("--connect", options.endpoint,
-                 "Where the coordinator listens: ipc://PATH or tcp://HOST:PORT")
+                 "Where the coordinator listens, ipc://PATH or\ntcp://HOST:PORT")
       ->envname("PROOFMASS_CONNECT")
       ->required();
   app.add_option("--keys", options.keys, "Directory with worker.key and coordinator.pub")
       ->envname("PROOFMASS_KEYS");
   app.add_flag("--insecure-plain", options.is_plain_waived,
-               "Allow an address beyond this machine without keys: on a network that you trust");
+               "Allow an address beyond this machine without\nkeys: on a network that you trust");
   app.add_option("--name", options.name, "Name in logs and database; HOST-PID by default")
       ->envname("PROOFMASS_NAME");
   add_duration(app, "give-up-after", options.give_up_after,
-               "How long the coordinator may be silent; 1h by default")
+               "How long the coordinator may be silent; 1h by\ndefault")
       ->envname("PROOFMASS_GIVE_UP_AFTER");
 }
 
@@ -58,18 +58,18 @@ void add_work(CLI::App& app, Options& options) {
       ->envname("PROOFMASS_THREADS")
       ->check(CLI::Range(1U, threads_max));
   app.add_option("--spool", options.spool,
-                 "File for results that are not acknowledged when the worker ends")
+                 "File for results that are not acknowledged\nwhen the worker ends")
       ->envname("PROOFMASS_SPOOL");
   add_duration(app, "max-walltime", options.walltime_max,
-               "Time after which the worker must have ended, e.g. 3600, 90m, 2h")
+               "Time after which the worker must have ended,\ne.g. 3600, 90m, 2h")
       ->envname("PROOFMASS_MAX_WALLTIME");
   add_duration(app, "drain-time", options.drain_time,
-               "Time to finish and deliver after SIGTERM; 100s by default")
+               "Time to finish and deliver after SIGTERM; 100s\nby default")
       ->envname("PROOFMASS_DRAIN_TIME");
 }
 
 void add_process(CLI::App& app, Options& options) {
-  app.set_config("--config", "", "File with these options, as in `connect = \"tcp://a:5555\"`");
+  app.set_config("--config", "", "File with these options, as in\n`connect = \"tcp://a:5555\"`");
   app.allow_config_extras(CLI::config_extras_mode::error);
   app.add_option_function<std::string>(
          "--log-format",
@@ -81,7 +81,7 @@ void add_process(CLI::App& app, Options& options) {
       ->check(CLI::IsMember({"text", "json"}));
   app.add_flag_callback(
       "--no-supervisor", [&options] { options.is_supervised = false; },
-      "Do not watch the worker from a second process, which starts it again if it crashes");
+      "Do not watch the worker from a second process,\nwhich starts it again if it crashes");
   app.add_option("--parent", options.parent, "Process to die with; used by `proofmass run`");
   app.add_option_function<std::string>(
          "--faults",

@@ -19,8 +19,7 @@ namespace {
 
 void add_submit(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<SubmitOptions>();
-  CLI::App& submit =
-      *app.add_subcommand("submit", "Hand a campaign, or more runs of one, to a coordinator");
+  CLI::App& submit = *app.add_subcommand("submit", "Hand a campaign or more runs to a coordinator");
   submit.add_option("FILE", options->campaign_file, "Campaign file (TOML)")->required();
   submit.add_option("--name", options->name, "Name of the campaign; the one in FILE by default");
   submit.add_option("--priority", options->priority, "Runs of a higher one are computed first")

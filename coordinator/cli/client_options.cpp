@@ -22,7 +22,7 @@ void add_client_options(CLI::App& command, ClientOptions& options) {
   ClientConnectionConfig& connection = options.connection;
   command
       .add_option("--connect", connection.endpoint,
-                  "The coordinator's address for clients, e.g. tcp://127.0.0.1:5556")
+                  "The coordinator's address for clients,\ne.g. tcp://127.0.0.1:5556")
       ->envname("PROOFMASS_CONNECT_CLIENTS")
       ->required();
   command.add_option("--keys", connection.keys, "Directory with client.key and coordinator.pub")

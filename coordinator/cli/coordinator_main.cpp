@@ -1,4 +1,3 @@
-#include <map>
 
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/serve_command.hpp"
@@ -8,16 +7,17 @@ namespace {
 using namespace proofmass::coordinator;
 
 void add_addresses(CLI::App& app, ServeOptions& options) {
-  app.add_option("--bind", options.endpoint, "Where workers connect: ipc://PATH or tcp://HOST:PORT")
+  app.add_option("--bind", options.endpoint,
+                 "Where workers connect, ipc://PATH or\ntcp://HOST:PORT")
       ->envname("PROOFMASS_BIND")
       ->required();
   app.add_option("--bind-clients", options.clients_endpoint,
-                 "Where clients connect; a socket in the directory by default")
+                 "Where clients connect; a socket in the\ndirectory by default")
       ->envname("PROOFMASS_BIND_CLIENTS");
   app.add_option("--keys", options.keys, "Directory of keys, made by `proofmass keygen`")
       ->envname("PROOFMASS_KEYS");
   app.add_flag("--insecure-plain", options.is_plain_waived,
-               "Serve other machines without keys: on a network that you trust");
+               "Serve other machines without keys: on a\nnetwork that you trust");
 }
 
 void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
@@ -27,14 +27,18 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
       ->required();
   app.add_flag("--exit-when-done", ends_when_done, "End when every campaign is finished");
   app.add_option("--drain-time", options.drain_time_s,
-                 "Seconds that workers have after SIGTERM to deliver what they hold")
+                 "Seconds that workers have after SIGTERM to\ndeliver what they hold")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  const std::map<std::string, proofmass::wire::LogFormat> formats{
-      {"text", proofmass::wire::LogFormat::text}, {"json", proofmass::wire::LogFormat::json}};
-  app.add_option("--log-format", options.log_format, "text or json")
+  app.add_option_function<std::string>(
+         "--log-format",
+         [&options](const std::string& text) {
+           using proofmass::wire::LogFormat;
+           options.log_format = text == "json" ? LogFormat::json : LogFormat::text;
+         },
+         "Of the log on standard error; text by default")
       ->envname("PROOFMASS_LOG_FORMAT")
-      ->transform(CLI::CheckedTransformer(formats));
+      ->check(CLI::IsMember({"text", "json"}));
   // For tests of the program by itself.
   app.add_option("--faults", options.faults)->group("");
   app.add_option("--time-scale", options.time_scale)->group("")->check(CLI::PositiveNumber);
@@ -45,10 +49,10 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
 int main(int argc, char** argv) {
   CLI::App app(
       "Lends the runs of campaigns to workers and stores their results.\n"
-      "SIGTERM lets workers deliver what they hold; SIGINT, or a second signal, does not.");
+      "SIGTERM lets workers deliver what they hold; SIGINT, or a second one, does not.");
   app.footer(exit_codes_text);
   app.set_version_flag("--version", "proofmass-coordinator " PROOFMASS_VERSION);
-  app.set_config("--config", "", "File with these options, as in `bind = \"tcp://*:5555\"`")
+  app.set_config("--config", "", "File with these options, as in\n`bind = \"tcp://*:5555\"`")
       ->envname("PROOFMASS_CONFIG");
   app.allow_config_extras(CLI::config_extras_mode::error);
   ServeOptions options;

@@ -62,8 +62,7 @@ void add_bench(CLI::App& app, Command& chosen) {
 
 void add_keygen(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<KeygenOptions>();
-  CLI::App& keygen =
-      *app.add_subcommand("keygen", "Make the keys of a coordinator, its workers and clients");
+  CLI::App& keygen = *app.add_subcommand("keygen", "Make keys of a coordinator, workers, clients");
   keygen.add_option("DIRECTORY", options->directory, "Directory to make, or to add a key to")
       ->required();
   keygen.add_option("--worker", options->worker, "Add a key of this name for a worker");

@@ -12,7 +12,7 @@ void add_override_options(CLI::App& command, Overrides& overrides) {
   command.add_option("--seed", overrides.seed, "Seed of the campaign");
   command
       .add_option("--set", overrides.assignments,
-                  "Replace a value of the file, e.g. noise.scale=0; may be repeated")
+                  "Replace a value of the file, e.g.\nnoise.scale=0; may be repeated")
       ->take_all()
       ->allow_extra_args(false);
 }
@@ -30,13 +30,13 @@ void add_stop_options(CLI::App& command, StopOptions& options) {
         return std::string();
       });
   command.add_option("--failures", options.failures_max,
-                     "Cancel it when more runs than this have no estimate");
+                     "Cancel it when more runs have no estimate");
 }
 
 void add_audit_option(CLI::App& command, double& audit_fraction) {
   command
       .add_option("--audit", audit_fraction,
-                  "Fraction of the runs to compute a second time, elsewhere, and compare")
+                  "Fraction of the runs to compute a second time,\nelsewhere, and compare")
       ->check(CLI::Range(0.0, 1.0));
 }
 

@@ -1,0 +1,56 @@
+// What people read first.
+
+#include <gtest/gtest.h>
+
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/system/campaign_process.hpp"
+
+namespace proofmass::test {
+namespace {
+
+class Help : public testing::Test {
+ protected:
+  [[nodiscard]] std::string help_of(const std::string& program, const Arguments& arguments) const {
+    Process process(directory_ / "", "help", programs + "/" + program, arguments);
+    EXPECT_EQ(process.wait(), 0) << program;
+    return read_file(directory_ / "help.out");
+  }
+
+  static void expect_fits(const std::string& text) {
+    std::istringstream stream(text);
+    for (std::string line; std::getline(stream, line);) EXPECT_LE(line.size(), 80U) << line;
+  }
+
+ private:
+  TemporaryDirectory directory_;
+};
+
+/// The commands that the help of `proofmass` lists.
+std::vector<std::string> commands_in(const std::string& text) {
+  std::istringstream stream(text.substr(text.find("Subcommands:\n")));
+  std::string line;
+  std::getline(stream, line);
+  std::vector<std::string> commands;
+  while (std::getline(stream, line) && line.starts_with("  ")) {
+    commands.push_back(line.substr(2, line.find(' ', 2) - 2));
+  }
+  return commands;
+}
+
+TEST_F(Help, FitsATerminal) {
+  const std::string text = help_of("proofmass", {"--help"});
+  expect_fits(text);
+  const std::vector<std::string> commands = commands_in(text);
+  EXPECT_GT(commands.size(), 10U);
+  for (const std::string& command : commands) {
+    expect_fits(help_of("proofmass", {command, "--help"}));
+  }
+  expect_fits(help_of("proofmass-coordinator", {"--help"}));
+  expect_fits(help_of("proofmass-worker", {"--help"}));
+}
+
+}  // namespace
+}  // namespace proofmass::test
