@@ -9,7 +9,7 @@ enum ExitCode : int {
   exit_done = 0,
   exit_cannot_be_done = 1,  ///< Disk, database, address, workers that crash.
   exit_wrong_usage = 2,     ///< Arguments or campaign file.
-  exit_not_met = 3,         ///< A requirement is not met, or undecided.
+  exit_not_met = 3,         ///< A requirement is not met or undecided, a stop rule not reached.
   exit_interrupted = 130,   ///< SIGINT or SIGTERM; what is stored stands.
 };
 

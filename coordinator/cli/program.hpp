@@ -19,7 +19,7 @@ inline constexpr const char* exit_codes_text =
     "  0    done\n"
     "  1    cannot be done: disk, database, address, workers that crash\n"
     "  2    wrong usage or campaign file\n"
-    "  3    a requirement is not met, or undecided\n"
+    "  3    a requirement or stop rule is not met\n"
     "  130  interrupted by SIGINT or SIGTERM; what is stored stands";
 
 /// Parses the arguments, does the work and turns what goes wrong into a message and an exit code.
