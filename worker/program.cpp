@@ -106,7 +106,7 @@ int work(const Options& options, const Program& program, ServeConfig config,
   config.session = start.session;
   config.hello = hello_for(options, start);
   StopSignals signals(config.signals);
-  const Wake progress;
+  const wire::Wake progress;
   Executor executor(program.prepare, [&progress] { progress.notify(); },
                     {.num_threads = options.num_threads, .batch_size_max = batch_lanes});
   const Ending ending = serve(config, executor, progress, signals);

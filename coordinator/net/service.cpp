@@ -20,12 +20,12 @@
 #include "coordinator/net/client_desk.hpp"
 #include "coordinator/net/descriptor_limit.hpp"
 #include "coordinator/net/router_socket.hpp"
-#include "coordinator/net/wake.hpp"
 #include "coordinator/net/waking_time.hpp"
 #include "coordinator/net/worker_desk.hpp"
 #include "coordinator/net/worker_history.hpp"
 #include "core/error.hpp"
 #include "proto/link/key_files.hpp"
+#include "proto/link/wake.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
 
@@ -251,7 +251,7 @@ class Service::Parts final : public Outbox {
   }
 
   void turn() {
-    wake_.clear();
+    (void)wake_.take();
     if (authenticator_ != nullptr) authenticator_->serve(now());
     receive_from_workers();
     for (const Completion& completion : writer_.take_completions()) {
@@ -335,7 +335,7 @@ class Service::Parts final : public Outbox {
   Log log_;
   wire::Epoch epoch_;
   zmq::context_t context_;
-  Wake wake_;
+  wire::Wake wake_;
   std::unique_ptr<Authenticator> authenticator_;
   RouterSocket worker_socket_;
   std::unique_ptr<RouterSocket> client_socket_;

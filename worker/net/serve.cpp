@@ -111,7 +111,7 @@ class Notices {
 
 class Service {
  public:
-  Service(const ServeConfig& config, Execution& execution, const Wake& progress,
+  Service(const ServeConfig& config, Execution& execution, const wire::Wake& progress,
           StopSignals& signals)
       : progress_(progress),
         signals_(signals),
@@ -199,7 +199,7 @@ class Service {
     notices_.on_tick(now);
   }
 
-  const Wake& progress_;
+  const wire::Wake& progress_;
   StopSignals& signals_;
   StopRequest former_request_ = StopRequest::none;
   Duration wait_max_;
@@ -211,7 +211,7 @@ class Service {
 
 }  // namespace
 
-Ending serve(const ServeConfig& config, Execution& execution, const Wake& progress,
+Ending serve(const ServeConfig& config, Execution& execution, const wire::Wake& progress,
              StopSignals& signals) {
   return Service(config, execution, progress, signals).run();
 }

@@ -6,10 +6,10 @@
 
 #include "proto/link/faults.hpp"
 #include "proto/link/security.hpp"
+#include "proto/link/wake.hpp"
 #include "proto/wire/messages.hpp"
 #include "worker/net/conversation.hpp"
 #include "worker/net/stop_signals.hpp"
-#include "worker/net/wake.hpp"
 
 namespace proofmass::worker {
 
@@ -31,7 +31,7 @@ struct ServeConfig {
 /// @param execution  Its runs may still be computed when the function returns.
 /// @param progress   Notified by the execution when it has something new.
 /// @throws Error if the socket cannot be made, or the spool not be used.
-[[nodiscard]] Ending serve(const ServeConfig& config, Execution& execution, const Wake& progress,
-                           StopSignals& signals);
+[[nodiscard]] Ending serve(const ServeConfig& config, Execution& execution,
+                           const wire::Wake& progress, StopSignals& signals);
 
 }  // namespace proofmass::worker

@@ -101,7 +101,7 @@ class ServeTest : public testing::Test {
     return std::async(std::launch::async, [this, promise = std::move(thread)]() mutable {
       StopSignals signals(config.signals);
       promise.set_value(pthread_self());
-      const Wake progress;
+      const wire::Wake progress;
       Executor executor(prepare, [&] { progress.notify(); },
                         {.num_threads = 1, .batch_size_max = 2});
       return serve(config, executor, progress, signals);

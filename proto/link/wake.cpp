@@ -1,4 +1,4 @@
-#include "worker/net/wake.hpp"
+#include "proto/link/wake.hpp"
 
 #include <fmt/format.h>
 #include <sys/eventfd.h>
@@ -10,7 +10,7 @@
 
 #include "core/error.hpp"
 
-namespace proofmass::worker {
+namespace proofmass::wire {
 
 Wake::Wake() : descriptor_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (descriptor_ < 0) throw Error(fmt::format("eventfd: {}", std::strerror(errno)));
@@ -29,4 +29,4 @@ bool Wake::take() const {
   return read(descriptor_, &count, sizeof count) == sizeof count;
 }
 
-}  // namespace proofmass::worker
+}  // namespace proofmass::wire

@@ -1,6 +1,6 @@
 #pragma once
 
-namespace proofmass::coordinator {
+namespace proofmass::wire {
 
 /// Wakes a loop that polls file descriptors, from any thread.
 class Wake {
@@ -10,13 +10,14 @@ class Wake {
   Wake(const Wake&) = delete;
   Wake& operator=(const Wake&) = delete;
 
-  /// Readable from a notify() to the next clear().
+  /// Readable from a notify() to the next take().
   [[nodiscard]] int descriptor() const { return descriptor_; }
   void notify() const;
-  void clear() const;
+  /// True if notify() was called since the last time.
+  [[nodiscard]] bool take() const;
 
  private:
   int descriptor_;
 };
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::wire
