@@ -6,6 +6,7 @@
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
+#include "coordinator/store/detail/standout_rows.hpp"
 #include "coordinator/store/detail/worker_rows.hpp"
 #include "coordinator/store/records.hpp"
 
@@ -38,6 +39,7 @@ class EntryRows {
 
   const Database& database_;
   ResultRows results_;
+  StandoutRows standouts_;
   WorkerRows workers_;
   Statement insert_delivery_;
   Statement delete_failure_;

@@ -68,6 +68,49 @@ TEST_F(StoreMigration, FromVersion3MakesACampaignToBeServed) {
   EXPECT_THAT(store.given_up_runs(), IsEmpty());
 }
 
+TEST_F(StoreMigration, FromVersion4KeepsStatisticsAndFindsTheRunsThatStandOut) {
+  {
+    Store::create(file(), test::campaign_of(30), "");
+    Database old(directory() / "old.db", Access::create);
+    for (std::size_t i = 0; i < 4; ++i) old.execute(std::string(detail::migrations()[i]));
+    old.execute("ATTACH '" + file().string() + "' AS new");
+    old.execute(
+        "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition,"
+        " model_version) VALUES (1, 'old', '42', 30, 'text', 'hardy2013-1')");
+    old.execute("INSERT INTO parameter SELECT * FROM new.parameter");
+    old.execute("INSERT INTO statistic VALUES ('a_c13', 7, 0.5, 3, 0.25, 0.125, 2)");
+    old.execute("INSERT INTO worker (session, name, host) VALUES ('0000000000000001', 'w', 'h')");
+    // Half of the results by the old program: run 2 is the worst.
+    Store store = Store::open(file());
+    std::vector<Delivery> deliveries = test::deliveries_of(0, 15);
+    deliveries[2].result.estimate[4] = 7.0;
+    store.commit(deliveries);
+    const std::string columns =
+        old.text("SELECT group_concat(name) FROM pragma_table_info('run_result')");
+    old.execute("INSERT INTO run_result (" + columns + ") SELECT " + columns +
+                " FROM new.run_result");
+  }
+  const auto all = [&](const std::string& view) {
+    return Database(file(), Access::read_only)
+        .text("SELECT group_concat(quote(run_index) || parameter || quote(ratio), ';') FROM " +
+              view);
+  };
+  const std::string worst = all("worst_runs");
+  const std::string overruns = all("overruns");
+  std::filesystem::rename(directory() / "old.db", file());
+  Store store = Store::open(file());
+  EXPECT_EQ(all("worst_runs"), worst);
+  EXPECT_EQ(all("overruns"), overruns);
+  EXPECT_EQ(store.summary(), std::nullopt);
+  EXPECT_EQ(store.stop_plan(), StopPlan{});
+  EXPECT_THAT(store.tags(), IsEmpty());
+  EXPECT_EQ(Database(file(), Access::read_only)
+                .text("SELECT worst || ' ' || worst_run_index || ' ' || mean || ' ' ||"
+                      " standard_deviation || ' ' || num_beyond_objective || ' ' || num_runs ||"
+                      " ' ' || quote(bias) FROM parameter_accuracy WHERE parameter = 'a_c13'"),
+            "0.5 3 0.25 0.125 2 7 NULL");
+}
+
 // A table in the way: nothing of the step may remain.
 TEST_F(StoreMigration, ThatFailsLeavesTheFileAsItWas) {
   make_file_of_version_3();

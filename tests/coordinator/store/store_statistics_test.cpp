@@ -27,6 +27,20 @@ CampaignStatistics distinct_statistics() {
     accuracy.mean = level / 16.0;
     accuracy.standard_deviation = level / 32.0;
     accuracy.num_beyond_objective = i;
+    accuracy.mean_interval = Interval{level + 100.0, level + 101.0, 0.95};
+    accuracy.deviation_interval = Interval{level + 102.0, level + 103.0, 0.95};
+    for (std::size_t k = 0; k < percentile_levels.size(); ++k) {
+      const double first = level + 200.0 + 3.0 * static_cast<double>(k);
+      accuracy.percentiles[k] = {.level = percentile_levels[k],
+                                 .value = first,
+                                 .interval = Interval{first + 1.0, first + 2.0, 0.95}};
+    }
+    accuracy.error = {.bias = -level,
+                      .bias_interval = Interval{-level - 300.0, -level - 299.0, 0.95},
+                      .rms = level + 301.0,
+                      .standard_deviation = level + 302.0,
+                      .deviation_interval = Interval{level + 303.0, level + 304.0, 0.95},
+                      .skewness = level - 305.0};
   }
   return statistics;
 }
@@ -68,6 +82,75 @@ TEST_F(StoreStatistics, AppearInParameterAccuracyInThePapersOrder) {
     EXPECT_EQ(row.real(11), info.paper.standard_deviation);
   }
   EXPECT_FALSE(row.step());
+}
+
+TEST_F(StoreStatistics, AppearWithTheirIntervals) {
+  Store store = Store::create(file(), campaign_of(9), "");
+  store.write_statistics(distinct_statistics(), constant_budget(1), constant_budget(2),
+                         constant_budget(3), digest);
+  const Database database(file(), Access::read_only);
+  Statement row = database.prepare(
+      "SELECT mean_lower, mean_upper, standard_deviation_lower, standard_deviation_upper,"
+      " percentile_50, percentile_50_lower, percentile_50_upper,"
+      " percentile_90, percentile_90_lower, percentile_90_upper,"
+      " percentile_95, percentile_95_lower, percentile_95_upper,"
+      " percentile_99, percentile_99_lower, percentile_99_upper,"
+      " bias, bias_lower, bias_upper, rms, error_standard_deviation,"
+      " error_standard_deviation_lower, error_standard_deviation_upper, skewness"
+      " FROM parameter_accuracy");
+  for (double level = 1.0; level <= 10.0; ++level) {
+    ASSERT_TRUE(row.step());
+    std::vector<double> expected;
+    for (int i = 0; i < 4; ++i) expected.push_back(level + 100.0 + i);
+    for (int i = 0; i < 12; ++i) expected.push_back(level + 200.0 + i);
+    expected.insert(expected.end(), {-level, -level - 300.0, -level - 299.0});
+    for (int i = 0; i < 4; ++i) expected.push_back(level + 301.0 + i);
+    expected.push_back(level - 305.0);
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      EXPECT_EQ(row.real(static_cast<int>(i)), expected[i]) << i;
+    }
+  }
+  EXPECT_FALSE(row.step());
+}
+
+TEST_F(StoreStatistics, HaveNoIntervalWhereRunsAreTooFew) {
+  Store store = Store::create(file(), campaign_of(9), "");
+  CampaignStatistics statistics{.num_runs = 1, .num_estimated = 1};
+  store.write_statistics(statistics, constant_budget(1), constant_budget(2), constant_budget(3),
+                         digest);
+  const Database database(file(), Access::read_only);
+  EXPECT_EQ(database.integer(
+                "SELECT count(mean) + count(percentile_99) + count(bias) FROM parameter_accuracy"),
+            30);
+  EXPECT_EQ(database.integer("SELECT count(mean_lower) + count(standard_deviation_upper) +"
+                             " count(percentile_50_lower) + count(percentile_99_upper) +"
+                             " count(bias_lower) + count(error_standard_deviation_upper)"
+                             " FROM parameter_accuracy"),
+            0);
+}
+
+TEST_F(StoreStatistics, ComeWithASummary) {
+  Store store = Store::create(file(), campaign_of(9), "");
+  EXPECT_EQ(store.summary(), std::nullopt);
+  store.write(std::vector<Entry>{GivenUpRun{.run = RunIndex{8}}});
+  CampaignStatistics statistics = distinct_statistics();
+  statistics.num_not_converged = 3;
+  statistics.num_not_finite = 1;
+  statistics.num_no_draw = 2;
+  const Budget budget = constant_budget(1);
+  store.write_statistics(statistics, budget, budget, budget, std::string(64, 'a'));
+  store.write_statistics(statistics, budget, budget, budget, digest);
+  const std::optional<Summary> summary = Store::open_read_only(file()).summary();
+  ASSERT_TRUE(summary);
+  EXPECT_THAT(summary->computed_utc, ::testing::MatchesRegex("20[0-9-]+T[0-9:]+Z"));
+  EXPECT_EQ(*summary, (Summary{.num_finished = 9,
+                               .num_estimated = 7,
+                               .num_not_converged = 3,
+                               .num_not_finite = 1,
+                               .num_no_draw = 2,
+                               .num_given_up = 1,
+                               .digest = digest,
+                               .computed_utc = summary->computed_utc}));
 }
 
 TEST_F(StoreStatistics, AppearInBudgetWithItsTotalLast) {

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "coordinator/store/detail/database.hpp"
+#include "core/campaign/parameter.hpp"
+#include "core/campaign/run_result.hpp"
+
+namespace proofmass::coordinator::detail {
+
+/// Runs that are kept for each parameter in `worst_run`.
+inline constexpr std::size_t num_worst_runs = 10;
+
+/// A run and its |error| of some parameter, SI.
+struct WorstRun {
+  double magnitude = 0.0;
+  RunIndex run;
+
+  bool operator==(const WorstRun&) const = default;
+};
+
+/// The runs with the largest |error| of one parameter: the same ones in whatever order runs come.
+class WorstRuns {
+ public:
+  /// What became of a run that was offered.
+  struct Change {
+    bool is_taken = false;
+    std::optional<RunIndex> dropped;  ///< In its place.
+  };
+
+  /// Takes a run if its |error| is among the largest; of equal ones the first run counts as larger.
+  Change offer(const WorstRun& offered);
+
+  /// Largest first.
+  [[nodiscard]] const std::vector<WorstRun>& runs() const { return runs_; }
+
+ private:
+  std::vector<WorstRun> runs_;
+};
+
+/// The worst runs of each parameter, by its index.
+using WorstRunTable = std::array<WorstRuns, num_parameters>;
+
+/// The rows of `worst_run`.
+[[nodiscard]] WorstRunTable read_worst_runs(const Database& database);
+
+/// Largest acceptable |error| of each parameter, SI.
+[[nodiscard]] ParameterArray read_objectives(const Database& database);
+
+/// Which parameters have an |error| above their objective: bit i for the one with index i.
+[[nodiscard]] std::uint64_t exceeded_objectives(const RunResult& result,
+                                                const ParameterArray& objectives);
+
+/// Keeps `overrun` and `worst_run` in step with `run_result`. Knows the rows that are there: to be
+/// thrown away with a transaction that is rolled back.
+class StandoutRows {
+ public:
+  explicit StandoutRows(const Database& database);
+
+  /// @pre The result was stored just now, for the first time.
+  void add(const RunResult& result);
+
+ private:
+  ParameterArray objectives_;
+  WorstRunTable worst_;
+  Statement insert_overrun_;
+  Statement insert_worst_;
+  Statement delete_worst_;
+};
+
+}  // namespace proofmass::coordinator::detail
