@@ -319,6 +319,19 @@ class Service::Parts final : public Outbox {
     on_store_recovered(state_, recovered.campaign, now(), *this);
   }
 
+  void complete(const LogGrown& grown) {
+    log({.severity = Severity::warning,
+         .kind = "write_ahead_log_grown",
+         .text = fmt::format("size_bytes={} (somebody reads an old state of the file)", grown.size),
+         .campaign = grown.campaign});
+  }
+  void complete(const LogShrunk& shrunk) {
+    log({.severity = Severity::info,
+         .kind = "write_ahead_log_shrunk",
+         .text = "",
+         .campaign = shrunk.campaign});
+  }
+
   /// Results are acknowledged before their workers are told to end.
   void end() {
     writer_.flush();

@@ -139,6 +139,9 @@ class Store {
   /// Appends to the campaign's log, of which the newest 10,000 entries are kept.
   void record_event(std::string_view kind, std::string_view text);
 
+  /// Bytes of the write-ahead log, which only grows while somebody reads one state of the file.
+  [[nodiscard]] std::uint64_t log_size() const;
+
   /// Checks every page, row, index and reference, and that the schema is that of a new file. Takes
   /// some 5 s for a million runs.
   /// @throws StoreError naming the first finding.

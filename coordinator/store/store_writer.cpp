@@ -30,6 +30,7 @@ struct OpenFile {
   detail::WaitingEntries waiting;
   std::vector<Entry> writing;         // Taken from `waiting`; not empty if the last attempt failed.
   std::optional<TimePoint> retry_at;  // If the last attempt failed.
+  bool has_large_log = false;         // As was said last.
 };
 
 /// Something that the caller waits for, after all that was handed over for its file.
@@ -62,13 +63,15 @@ std::vector<RunIndex> delivered_runs(const std::vector<Entry>& entries) {
 struct Attempted {
   CommitSummary summary;
   std::optional<std::string> failure;
+  std::uint64_t log_size = 0;  // Afterwards.
 };
 
 Attempted try_to_write(Store& store, const std::vector<Entry>& entries) {
   try {
-    return {.summary = store.write(entries), .failure = std::nullopt};
+    CommitSummary summary = store.write(entries);
+    return {.summary = std::move(summary), .failure = {}, .log_size = store.log_size()};
   } catch (const std::exception& error) {
-    return {.summary = {}, .failure = error.what()};
+    return {.summary = {}, .failure = error.what(), .log_size = store.log_size()};
   }
 }
 
@@ -92,6 +95,7 @@ struct StoreWriter::Parts {
   void write_all(wire::CampaignId campaign, Lock& lock);
   bool write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock);
   void finish_write(wire::CampaignId campaign, OpenFile& file, Attempted attempted);
+  void watch_log(wire::CampaignId campaign, OpenFile& file, std::uint64_t log_size);
   [[nodiscard]] std::optional<TimePoint> next_due_time() const;
   [[nodiscard]] std::vector<wire::CampaignId> ids() const;
 
@@ -212,6 +216,7 @@ bool StoreWriter::Parts::write_some(wire::CampaignId campaign, std::size_t num_m
   const bool is_written = !attempted.failure;
   lock.lock();
   const std::size_t num_before = completions.size();
+  watch_log(campaign, open_file, attempted.log_size);
   finish_write(campaign, open_file, std::move(attempted));
   const bool has_news = completions.size() > num_before;
   lock.unlock();
@@ -239,6 +244,18 @@ void StoreWriter::Parts::finish_write(wire::CampaignId campaign, OpenFile& open_
     completions.emplace_back(Compared{.campaign = campaign, .comparison = comparison});
   }
   if (has_failed_before) completions.emplace_back(StoreRecovered{.campaign = campaign});
+}
+
+void StoreWriter::Parts::watch_log(wire::CampaignId campaign, OpenFile& open_file,
+                                   std::uint64_t log_size) {
+  const bool is_large = log_size > config.log_size_max;
+  if (is_large == open_file.has_large_log) return;
+  open_file.has_large_log = is_large;
+  if (is_large) {
+    completions.emplace_back(LogGrown{.campaign = campaign, .size = log_size});
+  } else {
+    completions.emplace_back(LogShrunk{.campaign = campaign});
+  }
 }
 
 std::optional<TimePoint> StoreWriter::Parts::next_due_time() const {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -22,6 +23,8 @@ struct WriterConfig {
   /// Entries other than results that wait for one file, at most; further ones are counted and
   /// dropped.
   std::size_t num_records_max = 100'000;
+  /// Size of a file's write-ahead log above which LogGrown is said. Some megabytes are usual.
+  std::uint64_t log_size_max = std::uint64_t{64} << 20;
 };
 
 /// These results are durable. Each result that was delivered is named once.
@@ -48,7 +51,21 @@ struct StoreRecovered {
   wire::CampaignId campaign;
 };
 
-using Completion = std::variant<Committed, Compared, StoreFailed, StoreRecovered>;
+/// The write-ahead log has become larger than usual: somebody has been reading one state of the
+/// file for long, and what was written since cannot leave the log before they end. Said once until
+/// LogShrunk. Nothing is lost, but for space on the disk.
+struct LogGrown {
+  wire::CampaignId campaign;
+  std::uint64_t size = 0;  ///< Bytes.
+};
+
+/// The log is of the usual size again.
+struct LogShrunk {
+  wire::CampaignId campaign;
+};
+
+using Completion =
+    std::variant<Committed, Compared, StoreFailed, StoreRecovered, LogGrown, LogShrunk>;
 
 /// Writes to campaign files, in a thread of its own: a service never waits for a disk.
 ///

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <system_error>
 
 #include "coordinator/store/store_error.hpp"
 
@@ -194,6 +195,13 @@ void Database::copy_to(Database& copy) const {
   sqlite3_backup_step(backup, -1);
   const int code = sqlite3_backup_finish(backup);
   if (code != SQLITE_OK) copy.fail(code);
+}
+
+std::uint64_t Database::log_size() const {
+  std::error_code error;
+  const std::uintmax_t size =
+      std::filesystem::file_size(std::filesystem::path(path_).concat("-wal"), error);
+  return error ? 0 : size;
 }
 
 void Database::refuse(std::string_view what) const {

@@ -95,6 +95,9 @@ class Database {
   /// Replaces the content of another database by that of this one, as it is now.
   void copy_to(Database& copy) const;
 
+  /// Bytes of the write-ahead log; 0 if there is none.
+  [[nodiscard]] std::uint64_t log_size() const;
+
   /// @throws StoreError `campaign file = path (what)`.
   [[noreturn]] void refuse(std::string_view what) const;
 

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "coordinator/store/detail/database.hpp"
 #include "tests/coordinator/store/writer_fixture.hpp"
 
@@ -155,6 +157,40 @@ TEST_F(StoreWriterTest, LetsOthersUseTheFileAfterAllThatWasHandedOver) {
             }),
             "campaign.runs = 150 (must be at least 200, as in the campaign file)");
   EXPECT_THAT(take_completions(), ElementsAre("committed 99", "committed 199"));
+}
+
+// A reader in the middle of a table holds its state of the file; the log cannot begin anew.
+TEST_F(StoreWriterTest, SaysThatAReaderMakesTheLogGrow) {
+  WriterConfig config = patient_config();
+  config.log_size_max = 10'000'000;
+  StoreWriter& writer = start(config);
+  writer.open(id, create(40'000));
+  for (std::uint64_t run = 0; run < 10'000; ++run) writer.deliver(id, delivery_of(run));
+  writer.flush();
+  EXPECT_THAT(take_completions(), ::testing::Not(::testing::Contains("log grown")));
+  {
+    const Database reader(file(), Access::read_only);
+    detail::Statement select = reader.prepare("SELECT * FROM run_result");
+    ASSERT_TRUE(select.step());
+    for (std::uint64_t run = 10'000; run < 40'000; ++run) writer.deliver(id, delivery_of(run));
+    writer.flush();
+    for (int i = 0; i < 3; ++i) {
+      writer.record_event(id, {.kind = "note", .text = ""});
+      writer.flush();
+    }
+    const std::vector<std::string> texts = take_completions();
+    EXPECT_EQ(std::ranges::count(texts, "log grown"), 1);
+    EXPECT_THAT(texts, ::testing::Not(::testing::Contains("log shrunk")));
+  }
+  // One commit puts all that is in the log into the file, the next one begins the log anew.
+  for (int i = 0; i < 2; ++i) {
+    writer.record_event(id, {.kind = "note", .text = ""});
+    writer.flush();
+  }
+  EXPECT_THAT(take_completions(), ElementsAre("log shrunk"));
+  const Store store = writer.close(id);
+  EXPECT_LT(store.log_size(), config.log_size_max);
+  EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{0}, 40'000}));
 }
 
 TEST_F(StoreWriterTest, WritesWhatWaitsWhenItEnds) {

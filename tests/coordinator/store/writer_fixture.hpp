@@ -96,6 +96,8 @@ class WriterTest : public StoreTest {
     return "failed " + failed.text;
   }
   static std::string text_of(const coordinator::StoreRecovered&) { return "recovered"; }
+  static std::string text_of(const coordinator::LogGrown&) { return "log grown"; }
+  static std::string text_of(const coordinator::LogShrunk&) { return "log shrunk"; }
 
   std::mutex mutex_;
   std::condition_variable woken_;
