@@ -32,9 +32,13 @@ using detail::Transaction;
 
 namespace {
 
-// A file from elsewhere is data: nothing in its schema may call functions with side effects.
+constexpr std::uint64_t usual_log_size = std::uint64_t{8} << 20;
+
+// A file from elsewhere is data: nothing in its schema may call functions with side effects, and
+// what a page says of its content is checked when it is read.
 void configure(Database& database) {
-  database.execute("PRAGMA trusted_schema = OFF; PRAGMA foreign_keys = ON");
+  database.execute(
+      "PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA foreign_keys = ON");
 }
 
 void check_presence(const std::filesystem::path& path) {
@@ -110,16 +114,19 @@ struct Store::Parts {
 };
 
 Store::Parts::Parts(const std::filesystem::path& path) : database(path, Access::read_only) {
+  configure(database);
   detail::check_campaign_file(database, path);
   detail::check_up_to_date(database, path);
-  configure(database);
 }
 
 Store::Parts::Parts(const std::filesystem::path& path, std::unique_ptr<detail::StoreLock> held_lock)
     : lock(std::move(held_lock)), database(path, Access::read_write) {
-  detail::check_campaign_file(database, path);
   configure(database);
+  detail::check_campaign_file(database, path);
+  detail::check_after_unclean_end(database);
   database.execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+  // A log that had to grow gives the disk its space back when it begins anew.
+  database.execute(fmt::format("PRAGMA journal_size_limit = {}", usual_log_size));
   Transaction transaction(database);
   detail::migrate(database);
   transaction.commit();
@@ -170,9 +177,9 @@ void Store::annotate(const std::filesystem::path& path, const Annotation& annota
   check_that_name_is_the_only_one(path);
   detail::check_directory_of(path);
   Database database(path, Access::read_write);
+  configure(database);
   detail::check_campaign_file(database, path);
   detail::check_up_to_date(database, path);
-  configure(database);
   Transaction transaction(database);
   detail::write_annotation(database, annotation);
   transaction.commit();
@@ -340,6 +347,8 @@ void Store::record_event(std::string_view kind, std::string_view text) {
   const Entry event = EventEntry{.kind = std::string(kind), .text = std::string(text)};
   write({&event, 1});
 }
+
+std::uint64_t Store::log_size() const { return parts_->database.log_size(); }
 
 void Store::check_integrity() const { detail::check_integrity(parts_->database); }
 

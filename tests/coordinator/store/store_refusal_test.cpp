@@ -87,6 +87,26 @@ TEST_F(StoreRefusal, ToReadAnOlderFile) {
               "brings it up to date"));
 }
 
+// What is stored is what was delivered: nothing in a file from elsewhere changes it.
+TEST_F(StoreRefusal, OfAFileThatActsByItself) {
+  create();
+  Database(file(), Access::read_write)
+      .execute("CREATE TRIGGER t AFTER INSERT ON run_result BEGIN DELETE FROM run_result; END");
+  EXPECT_EQ(error_of_open(), message("has triggers, which a campaign has none of"));
+  EXPECT_EQ(error_of_open_read_only(), message("has triggers, which a campaign has none of"));
+}
+
+// Of a file that was closed in order only pages are checked, of any other its rows as well.
+TEST_F(StoreRefusal, OfAFileWithAWrongRowAfterACoordinatorWasKilled) {
+  create();
+  Database(file(), Access::read_write)
+      .execute("PRAGMA ignore_check_constraints = ON; UPDATE campaign SET num_runs = -1");
+  EXPECT_EQ(error_of_open(), "");
+  Database(file(), Access::read_write).execute("PRAGMA journal_mode = WAL");
+  EXPECT_EQ(error_of_open(),
+            message("is damaged: CHECK constraint failed in campaign; restore it from a copy"));
+}
+
 // Zeros in the middle of the pages of results: the header and the schema are still good.
 TEST_F(StoreRefusal, OfADamagedFile) {
   Store::create(file(), campaign_of(1000), "").commit(deliveries_of(0, 1000));
