@@ -32,7 +32,7 @@ using detail::Transaction;
 
 namespace {
 
-constexpr std::uint64_t usual_log_size = std::uint64_t{8} << 20;
+constexpr std::uint64_t usual_log_size = std::uint64_t{4} << 20;
 
 // A file from elsewhere is data: nothing in its schema may call functions with side effects, and
 // what a page says of its content is checked when it is read.

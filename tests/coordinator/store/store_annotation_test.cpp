@@ -154,7 +154,9 @@ TEST_F(StoreStop, ChecksAreKeptOnceForEachCount) {
                            .estimate = 0.5,
                            .interval = Interval{.lower = 0.25, .upper = 0.75, .confidence = 0.95},
                            .relative_half_width = 0.125});
-  store.record_stop_check(128, "std(a_c13)", {.estimate = 2.0});
+  StopCheck again;
+  again.estimate = 2.0;
+  store.record_stop_check(128, "std(a_c13)", again);
   const Database database(file(), Access::read_only);
   EXPECT_EQ(
       database.text("SELECT group_concat(num_runs || ' ' || statistic || ' ' || estimate || ' ' || "

@@ -25,6 +25,10 @@ class StoreMigration : public test::StoreTest {
       old.execute(std::string(detail::migrations()[static_cast<std::size_t>(i)]));
     }
     old.execute("INSERT INTO campaign VALUES (1, 'old', '42', 5, 'text', 'hardy2013-1', '')");
+    for (const ParameterInfo& info : parameter_infos()) {
+      old.execute("INSERT INTO parameter VALUES (" + std::to_string(index(info.parameter) + 1) +
+                  ", '" + std::string(info.name) + "', '', '', 1, 0, 0, 0)");
+    }
     for (const int run : {0, 1, 4}) {
       old.execute("INSERT INTO run_result (run_index, status, num_draws, num_rounds) VALUES (" +
                   std::to_string(run) + ", 4, 1, 0)");

@@ -162,9 +162,9 @@ TEST_F(StoreWriterTest, LetsOthersUseTheFileAfterAllThatWasHandedOver) {
 // A reader in the middle of a table holds its state of the file; the log cannot begin anew.
 TEST_F(StoreWriterTest, SaysThatAReaderMakesTheLogGrow) {
   WriterConfig config = patient_config();
-  config.log_size_max = 10'000'000;
+  config.log_size_max = 8'000'000;
   StoreWriter& writer = start(config);
-  writer.open(id, create(40'000));
+  writer.open(id, create(50'000));
   for (std::uint64_t run = 0; run < 10'000; ++run) writer.deliver(id, delivery_of(run));
   writer.flush();
   EXPECT_THAT(take_completions(), ::testing::Not(::testing::Contains("log grown")));
@@ -172,7 +172,7 @@ TEST_F(StoreWriterTest, SaysThatAReaderMakesTheLogGrow) {
     const Database reader(file(), Access::read_only);
     detail::Statement select = reader.prepare("SELECT * FROM run_result");
     ASSERT_TRUE(select.step());
-    for (std::uint64_t run = 10'000; run < 40'000; ++run) writer.deliver(id, delivery_of(run));
+    for (std::uint64_t run = 10'000; run < 50'000; ++run) writer.deliver(id, delivery_of(run));
     writer.flush();
     for (int i = 0; i < 3; ++i) {
       writer.record_event(id, {.kind = "note", .text = ""});
@@ -190,7 +190,7 @@ TEST_F(StoreWriterTest, SaysThatAReaderMakesTheLogGrow) {
   EXPECT_THAT(take_completions(), ElementsAre("log shrunk"));
   const Store store = writer.close(id);
   EXPECT_LT(store.log_size(), config.log_size_max);
-  EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{0}, 40'000}));
+  EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{0}, 50'000}));
 }
 
 TEST_F(StoreWriterTest, WritesWhatWaitsWhenItEnds) {
