@@ -8,11 +8,11 @@ packages=(
   g++ cmake ninja-build pkg-config git
   libeigen3-dev libhwy-dev librandom123-dev
   libzmq3-dev cppzmq-dev libsodium-dev libprotobuf-dev protobuf-compiler
-  libsqlite3-dev sqlite3
+  libsqlite3-dev sqlite3 libhdf5-dev
   libspdlog-dev libfmt-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev
   # Tests only.
   libgtest-dev libgmock-dev libbenchmark-dev qemu-user clang-format
-  iproute2 iptables faketime python3-scipy python3-mpmath
+  iproute2 iptables faketime python3-scipy python3-mpmath python3-h5py
 )
 # The fuzzer, and the systems that the dispatch is measured beside.
 more_packages=(clang libclang-rt-14-dev parallel python3-distributed python3-ipyparallel)
