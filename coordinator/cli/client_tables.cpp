@@ -159,17 +159,6 @@ std::string worker_row(const WorkerStatus& worker) {
 
 }  // namespace
 
-std::string shortened(std::string_view text, std::size_t width) {
-  if (text_width(text) <= width) return std::string(text);
-  std::size_t size = 0;
-  // Every byte that continues a UTF-8 character goes with the one before it.
-  for (std::size_t num_characters = 0; size < text.size(); ++size) {
-    const bool continues = (static_cast<unsigned char>(text[size]) & 0xc0) == 0x80;
-    if (!continues && ++num_characters >= width) break;
-  }
-  return std::string(text.substr(0, size)) + "…";
-}
-
 std::string status_table(const wire::StatusReply& status) {
   std::string text = service_line(status);
   if (status.campaigns.empty()) return text + "no campaigns\n";

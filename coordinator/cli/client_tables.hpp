@@ -18,7 +18,4 @@ namespace proofmass::coordinator {
 /// `hardy2013 active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left`, and the notes.
 [[nodiscard]] std::string campaign_line(const wire::CampaignStatus& campaign);
 
-/// Text cut to `width` characters, the last of them `…` if something is missing.
-[[nodiscard]] std::string shortened(std::string_view text, std::size_t width);
-
 }  // namespace proofmass::coordinator

@@ -8,6 +8,7 @@
 
 #include "coordinator/cli/client_json.hpp"
 #include "coordinator/cli/client_tables.hpp"
+#include "coordinator/report/text_cells.hpp"
 
 namespace proofmass::coordinator {
 namespace {

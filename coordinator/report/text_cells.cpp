@@ -34,6 +34,17 @@ std::string centred(std::string_view text, std::size_t width) {
   return std::string(margin, ' ') + std::string(text);
 }
 
+std::string shortened(std::string_view text, std::size_t width) {
+  if (text_width(text) <= width) return std::string(text);
+  std::size_t size = 0;
+  // Every byte that continues a UTF-8 character goes with the one before it.
+  for (std::size_t num_characters = 0; size < text.size(); ++size) {
+    const bool continues = (static_cast<unsigned char>(text[size]) & 0xc0) == 0x80;
+    if (!continues && ++num_characters >= width) break;
+  }
+  return std::string(text.substr(0, size)) + "…";
+}
+
 std::string horizontal_rule(std::size_t count) {
   std::string rule;
   for (std::size_t i = 0; i < count; ++i) rule += "─";

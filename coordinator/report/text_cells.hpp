@@ -15,6 +15,9 @@ namespace proofmass::coordinator {
 /// Text in the middle of `width` characters, without spaces behind it.
 [[nodiscard]] std::string centred(std::string_view text, std::size_t width);
 
+/// Text cut to `width` characters, the last of them `…` if something is missing.
+[[nodiscard]] std::string shortened(std::string_view text, std::size_t width);
+
 /// `count` times the line ─.
 [[nodiscard]] std::string horizontal_rule(std::size_t count);
 

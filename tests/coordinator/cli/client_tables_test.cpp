@@ -160,12 +160,5 @@ TEST(CampaignLine, OfOneThatIsOverHasNoRate) {
   EXPECT_EQ(campaign_line(status), "a finished: 100 of 100 runs, 100 %");
 }
 
-TEST(ShortenedText, EndsWithAMarkIfSomethingIsMissing) {
-  EXPECT_EQ(shortened("abcde", 5), "abcde");
-  EXPECT_EQ(shortened("abcdef", 5), "abcd…");
-  EXPECT_EQ(shortened("─────", 3), "──…");
-  EXPECT_EQ(shortened("ab", 1), "…");
-}
-
 }  // namespace
 }  // namespace proofmass::coordinator

@@ -27,6 +27,13 @@ TEST(Alignment, CutsNothing) {
   EXPECT_EQ(centred("Δxyz", 2), "Δxyz");
 }
 
+TEST(ShortenedText, EndsWithAMarkIfSomethingIsMissing) {
+  EXPECT_EQ(shortened("abcde", 5), "abcde");
+  EXPECT_EQ(shortened("abcdef", 5), "abcd…");
+  EXPECT_EQ(shortened("─────", 3), "──…");
+  EXPECT_EQ(shortened("ab", 1), "…");
+}
+
 TEST(MeasuredFigure, HasThreeSignificantDigits) {
   EXPECT_EQ(measured_figure(0.0), "0");
   EXPECT_EQ(measured_figure(0.0012345), "0.00123");
