@@ -65,6 +65,18 @@ inline constexpr std::uintmax_t data_file_size_max = std::uintmax_t{64} << 20;
 /// The campaign of [Hardy2013] section 5: 100 draws, corrections of first order.
 [[nodiscard]] Campaign hardy2013_campaign();
 
+/// A value that two campaigns do not share.
+struct DefinitionDifference {
+  std::string field;   ///< `noise.scale`.
+  std::string first;   ///< As in a campaign file, or what is to be said about a file's rows.
+  std::string second;  ///< The same.
+};
+
+/// Everything but the number of runs that two campaigns do not share, in the order of a campaign
+/// file. The name of a data file whose values are the same is no difference.
+[[nodiscard]] std::vector<DefinitionDifference> compare_definitions(const Campaign& first,
+                                                                    const Campaign& second);
+
 /// What keeps the runs of two campaigns from being compared or joined, a line each:
 /// `seed: 1 in the database, 2 asked for`. The number of runs is no difference, nor is the name of
 /// a data file whose values are the same.

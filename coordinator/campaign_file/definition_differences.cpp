@@ -17,10 +17,10 @@ using detail::Entry;
 /// Collects the differences between two campaigns, part by part.
 class Comparison {
  public:
-  Comparison(const Campaign& stored, const Campaign& wanted) : stored_(stored), wanted_(wanted) {}
+  Comparison(const Campaign& first, const Campaign& second) : first_(first), second_(second) {}
 
-  std::vector<std::string> run() {
-    compare_entries("", fields_of(stored_), fields_of(wanted_));
+  std::vector<DefinitionDifference> run() {
+    compare_entries("", fields_of(first_), fields_of(second_));
     compare_sessions();
     compare_environment();
     compare_dispersions();
@@ -28,9 +28,9 @@ class Comparison {
   }
 
  private:
-  void differ(std::string_view path, std::string_view stored, std::string_view wanted) {
+  void differ(std::string_view path, std::string_view first, std::string_view second) {
     differences_.push_back(
-        fmt::format("{}: {} in the database, {} asked for", path, stored, wanted));
+        {.field = std::string(path), .first = std::string(first), .second = std::string(second)});
   }
 
   // More runs extend a campaign; the values of data files are compared, not their names.
@@ -46,11 +46,11 @@ class Comparison {
     return entries;
   }
 
-  void compare_entries(const std::string& prefix, const std::vector<Entry>& stored,
-                       const std::vector<Entry>& wanted) {
-    for (std::size_t i = 0; i < stored.size(); ++i) {
-      if (stored[i].text != wanted[i].text) {
-        differ(prefix + stored[i].path, stored[i].text, wanted[i].text);
+  void compare_entries(const std::string& prefix, const std::vector<Entry>& first,
+                       const std::vector<Entry>& second) {
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      if (first[i].text != second[i].text) {
+        differ(prefix + first[i].path, first[i].text, second[i].text);
       }
     }
   }
@@ -64,62 +64,62 @@ class Comparison {
   }
 
   void compare_sessions() {
-    const std::vector<Session>& stored = stored_.scenario.sessions;
-    const std::vector<Session>& wanted = wanted_.scenario.sessions;
-    if (stored.size() != wanted.size()) {
-      differ("session", fmt::format("{}", stored.size()), fmt::format("{}", wanted.size()));
+    const std::vector<Session>& first = first_.scenario.sessions;
+    const std::vector<Session>& second = second_.scenario.sessions;
+    if (first.size() != second.size()) {
+      differ("session", fmt::format("{}", first.size()), fmt::format("{}", second.size()));
       return;
     }
-    for (std::size_t i = 0; i < stored.size(); ++i) {
+    for (std::size_t i = 0; i < first.size(); ++i) {
       const std::string prefix = fmt::format("session[{}].", i);
-      compare_entries(prefix, detail::session_entries(stored[i]),
-                      detail::session_entries(wanted[i]));
-      if (stored[i].excitations != wanted[i].excitations) {
-        differ(prefix + "excitations", excitations_text(stored[i]), excitations_text(wanted[i]));
+      compare_entries(prefix, detail::session_entries(first[i]),
+                      detail::session_entries(second[i]));
+      if (first[i].excitations != second[i].excitations) {
+        differ(prefix + "excitations", excitations_text(first[i]), excitations_text(second[i]));
       }
     }
   }
 
   void compare_environment() {
-    const EnvironmentTable& stored = stored_.environment_table;
-    const EnvironmentTable& wanted = wanted_.environment_table;
-    if (stored.size() != wanted.size()) {
-      differ("environment.file", fmt::format("{} rows", stored.size()),
-             fmt::format("{} rows", wanted.size()));
+    const EnvironmentTable& first = first_.environment_table;
+    const EnvironmentTable& second = second_.environment_table;
+    if (first.size() != second.size()) {
+      differ("environment.file", fmt::format("{} rows", first.size()),
+             fmt::format("{} rows", second.size()));
       return;
     }
-    const auto [first, second] = std::ranges::mismatch(stored, wanted);
-    if (first == stored.end()) return;
-    differ("environment.file", fmt::format("other values in row {}", first - stored.begin() + 1),
-           fmt::format("those of {}", wanted_.environment_file));
+    const auto position = std::ranges::mismatch(first, second).in1;
+    if (position == first.end()) return;
+    differ("environment.file", fmt::format("other values in row {}", position - first.begin() + 1),
+           fmt::format("those of {}", second_.environment_file));
   }
 
   void compare_dispersions() {
     for (std::size_t i = 0; i < num_drawn; ++i) {
-      const Dispersion& stored = stored_.dispersions[i];
-      const Dispersion& wanted = wanted_.dispersions[i];
-      if (stored.law == Law::table && wanted.law == Law::table) {
+      const Dispersion& first = first_.dispersions[i];
+      const Dispersion& second = second_.dispersions[i];
+      if (first.law == Law::table && second.law == Law::table) {
         compare_column(i);
-      } else if (detail::dispersion_text(stored) != detail::dispersion_text(wanted)) {
-        differ("dispersion." + drawn_names()[i], detail::dispersion_text(stored),
-               detail::dispersion_text(wanted));
+      } else if (detail::dispersion_text(first) != detail::dispersion_text(second)) {
+        differ("dispersion." + drawn_names()[i], detail::dispersion_text(first),
+               detail::dispersion_text(second));
       }
     }
   }
 
   // Values of the runs that both campaigns have.
   void compare_column(std::size_t element) {
-    const std::vector<double>& stored = column_of(stored_, element);
-    const std::vector<double>& wanted = column_of(wanted_, element);
+    const std::vector<double>& first = column_of(first_, element);
+    const std::vector<double>& second = column_of(second_, element);
     const std::uint64_t num_shared =
-        std::min({std::min(stored_.num_runs, wanted_.num_runs), std::uint64_t{stored.size()},
-                  std::uint64_t{wanted.size()}});
+        std::min({std::min(first_.num_runs, second_.num_runs), std::uint64_t{first.size()},
+                  std::uint64_t{second.size()}});
     for (std::size_t run = 0; run < num_shared; ++run) {
-      if (std::bit_cast<std::uint64_t>(stored[run]) == std::bit_cast<std::uint64_t>(wanted[run])) {
+      if (std::bit_cast<std::uint64_t>(first[run]) == std::bit_cast<std::uint64_t>(second[run])) {
         continue;
       }
       differ(fmt::format("dispersion.{} of run {}", drawn_names()[element], run),
-             fmt::format("{}", stored[run]), fmt::format("{}", wanted[run]));
+             fmt::format("{}", first[run]), fmt::format("{}", second[run]));
       return;
     }
   }
@@ -130,15 +130,24 @@ class Comparison {
     return campaign.table_columns[static_cast<std::size_t>(position)];
   }
 
-  const Campaign& stored_;
-  const Campaign& wanted_;
-  std::vector<std::string> differences_;
+  const Campaign& first_;
+  const Campaign& second_;
+  std::vector<DefinitionDifference> differences_;
 };
 
 }  // namespace
 
+std::vector<DefinitionDifference> compare_definitions(const Campaign& first,
+                                                      const Campaign& second) {
+  return Comparison(first, second).run();
+}
+
 std::vector<std::string> definition_differences(const Campaign& stored, const Campaign& wanted) {
-  return Comparison(stored, wanted).run();
+  std::vector<std::string> texts;
+  for (const auto& [field, first, second] : compare_definitions(stored, wanted)) {
+    texts.push_back(fmt::format("{}: {} in the database, {} asked for", field, first, second));
+  }
+  return texts;
 }
 
 }  // namespace proofmass::coordinator
