@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,16 +36,6 @@ void set_plan(Store& store, const StopPlan& plan) {
 }
 
 }  // namespace
-
-Campaign stored_campaign(const Store& store) {
-  std::vector<std::vector<double>> columns;
-  for (std::size_t element = 0; element < num_drawn; ++element) {
-    const std::array elements{element};
-    std::vector<double> column = std::move(store.table_columns(elements).front());
-    if (!column.empty()) columns.push_back(std::move(column));
-  }
-  return parse_stored_campaign(store.definition(), store.environment_table(), std::move(columns));
-}
 
 void extend_to(Store& store, const Campaign& wanted, const std::filesystem::path& database,
                std::string_view remedy) {

@@ -4,15 +4,13 @@
 #include <memory>
 #include <string_view>
 
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 
 namespace proofmass::coordinator {
-
-/// The campaign that a database holds.
-[[nodiscard]] Campaign stored_campaign(const Store& store);
 
 /// Gives a campaign's database as many runs as are wanted.
 ///

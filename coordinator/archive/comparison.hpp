@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "coordinator/archive/archive_error.hpp"
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/store/store.hpp"
+#include "core/campaign/campaign.hpp"
+#include "core/campaign/parameter.hpp"
+#include "core/campaign/run_result.hpp"
+#include "core/statistics/interval.hpp"
+
+namespace proofmass::coordinator {
+
+/// A campaign that is compared with another: 184 bytes a run.
+struct ComparedCampaign {
+  Campaign campaign;
+  std::string model_version;
+  std::string build;
+  std::vector<RunResult> results;  ///< In run order.
+};
+
+/// @throws StoreError or CampaignFileError if the file cannot be read, Interrupted.
+[[nodiscard]] ComparedCampaign read_compared(const Store& store, const IsStopped& is_stopped);
+
+/// |estimate − truth| of one parameter over the runs of one side that are compared, SI.
+struct ComparedAccuracy {
+  double worst = 0.0;
+  double mean = 0.0;
+  double standard_deviation = 0.0;  ///< With n − 1; 0 for a single run.
+};
+
+/// One parameter in two campaigns.
+struct ParameterComparison {
+  ComparedAccuracy first;
+  ComparedAccuracy second;
+  double mean_change = 0.0;          ///< Of |error|: second − first, SI.
+  std::optional<Interval> interval;  ///< Of the mean change; empty if nothing varies.
+  double p_value = 1.0;              ///< That chance alone makes such a change.
+  double adjusted_p_value = 1.0;     ///< The same, in any of the ten parameters.
+};
+
+/// What two campaigns differ in, and what that does to the accuracy.
+struct CampaignComparison {
+  /// Of the definitions, then `model` and `build`.
+  std::vector<DefinitionDifference> differences;
+  /// Why the draws are not the same, run by run; empty if they are, and pairs are compared.
+  std::string why_unpaired;
+  std::size_t num_first = 0;   ///< Runs of the first campaign that are compared.
+  std::size_t num_second = 0;  ///< The same as num_first if paired.
+  /// Why the parameters are not compared; empty if they are.
+  std::string why_not_compared;
+  /// Indexed by `index(parameter)`.
+  std::array<ParameterComparison, num_parameters> parameters{};
+
+  [[nodiscard]] bool is_paired() const { return why_unpaired.empty(); }
+};
+
+/// Compares the runs with an estimate: those that both campaigns have, run by run, if their seed
+/// and the truths of all common runs agree to the last bit, and else all of each. P-values are of
+/// Wilcoxon's signed ranks for pairs and of Welch's t else; intervals are of 95 %.
+[[nodiscard]] CampaignComparison compare_campaigns(const ComparedCampaign& first,
+                                                   const ComparedCampaign& second);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,118 @@
+#include "coordinator/archive/comparison_text.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstddef>
+
+#include "coordinator/report/text_cells.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t line_width = 80;
+constexpr std::size_t label_width = 11;
+constexpr std::size_t unit_width = 9;
+constexpr std::size_t figure_width = 9;
+constexpr std::size_t change_width = 10;
+constexpr double significance = 1.0 - default_confidence;
+
+std::string signed_figure(double value) {
+  const std::string figure = measured_figure(std::abs(value));
+  if (figure == "0") return figure;
+  return (value < 0.0 ? "-" : "+") + figure;
+}
+
+std::string definitions(const CampaignComparison& comparison) {
+  if (comparison.differences.empty()) return "The definitions agree.\n";
+  std::string text = "The definitions differ:\n";
+  for (const auto& [field, first, second] : comparison.differences) {
+    const std::string line = fmt::format("  {}: {} in A, {} in B", field, first, second);
+    text += text_width(line) <= line_width
+                ? line + "\n"
+                : fmt::format("  {}\n    A  {}\n    B  {}\n", field, first, second);
+  }
+  return text;
+}
+
+std::string basis(const CampaignComparison& comparison) {
+  if (!comparison.why_not_compared.empty()) {
+    return fmt::format("The results cannot be compared: {}.\n", comparison.why_not_compared);
+  }
+  if (comparison.is_paired()) {
+    return fmt::format("Compared run by run: {} runs of the same draws.\n", comparison.num_first);
+  }
+  return fmt::format("Compared as a whole, as {}: {} runs of A, {} of B.\n",
+                     comparison.why_unpaired, comparison.num_first, comparison.num_second);
+}
+
+std::string heading(std::initializer_list<std::pair<std::string_view, std::size_t>> titles) {
+  std::string line = left_aligned("parameter", label_width) + left_aligned("unit", unit_width);
+  for (const auto& [title, width] : titles) line += right_aligned(title, width);
+  return line + "\n" + horizontal_rule(text_width(line)) + "\n";
+}
+
+std::string row_label(const ParameterInfo& info) {
+  return left_aligned(info.label, label_width) + left_aligned(info.display_unit, unit_width);
+}
+
+std::string mean_row(const ParameterInfo& info, const ParameterComparison& parameter) {
+  const double scale = info.display_scale;
+  std::string text = row_label(info);
+  for (const double mean : {parameter.first.mean, parameter.second.mean}) {
+    text += right_aligned(measured_figure(mean / scale), figure_width);
+  }
+  text += right_aligned(signed_figure(parameter.mean_change / scale), change_width);
+  const auto& interval = parameter.interval;
+  text += right_aligned(interval ? signed_figure(interval->lower / scale) : "-", change_width);
+  text += right_aligned(interval ? signed_figure(interval->upper / scale) : "-", change_width);
+  text += right_aligned(measured_figure(parameter.adjusted_p_value), figure_width);
+  return text + (parameter.adjusted_p_value < significance ? " *\n" : "\n");
+}
+
+std::string mean_table(const CampaignComparison& comparison) {
+  std::string text = "Mean of |estimate − truth|\n\n" + heading({{"A", figure_width},
+                                                                 {"B", figure_width},
+                                                                 {"change", change_width},
+                                                                 {"from", change_width},
+                                                                 {"to", change_width},
+                                                                 {"p", figure_width}});
+  for (const ParameterInfo& info : parameter_infos()) {
+    text += mean_row(info, comparison.parameters[index(info.parameter)]);
+  }
+  return text + fmt::format(
+                    "from, to: 95 % interval of the change; p: {}, adjusted for ten\n"
+                    "parameters (Holm); *: below {:.2f}\n",
+                    comparison.is_paired() ? "Wilcoxon's signed ranks" : "Welch's t", significance);
+}
+
+std::string scatter_table(const CampaignComparison& comparison) {
+  std::string text =
+      "Worst and standard deviation of |estimate − truth|\n\n" + heading({{"worst A", change_width},
+                                                                          {"worst B", change_width},
+                                                                          {"std A", change_width},
+                                                                          {"std B", change_width}});
+  for (const ParameterInfo& info : parameter_infos()) {
+    const auto& parameter = comparison.parameters[index(info.parameter)];
+    text += row_label(info);
+    for (const double value :
+         {parameter.first.worst, parameter.second.worst, parameter.first.standard_deviation,
+          parameter.second.standard_deviation}) {
+      text += right_aligned(measured_figure(value / info.display_scale), change_width);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string comparison_text(const CampaignComparison& comparison, std::string_view first,
+                            std::string_view second) {
+  std::string text = fmt::format("A  {}\nB  {}\n\n{}{}", first, second, definitions(comparison),
+                                 basis(comparison));
+  if (!comparison.why_not_compared.empty()) return text;
+  return text + "\n" + mean_table(comparison) + "\n" + scatter_table(comparison);
+}
+
+}  // namespace proofmass::coordinator

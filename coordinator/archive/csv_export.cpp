@@ -1,0 +1,52 @@
+#include <fmt/format.h>
+
+#include <iterator>
+#include <optional>
+
+#include "coordinator/archive/export.hpp"
+#include "coordinator/archive/result_columns.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+// No cell has a comma, a quotation mark or a line break, so that none needs quotation marks.
+constexpr std::string_view line_end = "\r\n";
+
+std::string heading() {
+  std::string line = "run_index,status,num_draws,num_rounds";
+  for (const ValueColumn& column : value_columns()) line += "," + column.name;
+  return line.append(line_end);
+}
+
+}  // namespace
+
+void walk_results(const Store& store, const IsStopped& is_stopped,
+                  const std::function<void(const RunResult&)>& visit) {
+  constexpr std::uint64_t visits_between_questions = 1024;
+  std::uint64_t num_visits = 0;
+  store.for_each_result([&](const RunResult& result) {
+    if (num_visits++ % visits_between_questions == 0 && is_stopped()) throw Interrupted();
+    visit(result);
+  });
+}
+
+void export_csv(const Store& store, TextOutput& output, const IsStopped& is_stopped) {
+  output.write(heading());
+  fmt::memory_buffer line;
+  walk_results(store, is_stopped, [&](const RunResult& result) {
+    line.clear();
+    const auto end = std::back_inserter(line);
+    fmt::format_to(end, "{},{},{},{}", result.run.value, name_of(result.status), result.num_draws,
+                   result.num_rounds);
+    for (const ValueColumn& column : value_columns()) {
+      const std::optional<double> value = column.value_in(result);
+      line.push_back(',');
+      if (value) fmt::format_to(end, "{}", *value);
+    }
+    line.append(line_end);
+    output.write({line.data(), line.size()});
+  });
+  output.finish();
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+
+#include "coordinator/archive/archive_error.hpp"
+#include "coordinator/archive/text_output.hpp"
+#include "coordinator/store/store.hpp"
+#include "core/campaign/run_result.hpp"
+
+namespace proofmass::coordinator {
+
+// All results of a campaign file, in run order, in formats that others read. Numbers are SI and
+// keep all bits; columns are named as in the table `run_result`. README.md describes the formats.
+// Memory does not grow with the runs, and a coordinator may write meanwhile: what is exported are
+// the runs that were stored at one instant.
+//
+// All throw ArchiveError if the output cannot be written, StoreError if the file cannot be read,
+// and Interrupted; then no file appears.
+
+/// One line a run after a line of headings, as of RFC 4180; cells without a meaning are empty.
+void export_csv(const Store& store, TextOutput& output, const IsStopped& is_stopped);
+
+/// One object with campaign, columns, runs and digest; each run is an object on a line of its own,
+/// with null where there is no meaning.
+void export_json(const Store& store, TextOutput& output, const IsStopped& is_stopped);
+
+/// A dataset a column, the unit an attribute, NaN where there is no meaning; what defines the
+/// campaign are attributes of the root. A file of this name is replaced.
+void export_hdf5(const Store& store, const std::filesystem::path& file,
+                 const IsStopped& is_stopped);
+
+/// Calls visit(result) for each finished run, in run order.
+/// @throws Interrupted soon after `is_stopped` says so.
+void walk_results(const Store& store, const IsStopped& is_stopped,
+                  const std::function<void(const RunResult&)>& visit);
+
+}  // namespace proofmass::coordinator

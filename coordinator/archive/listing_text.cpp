@@ -1,0 +1,97 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cstddef>
+#include <nlohmann/json.hpp>
+
+#include "coordinator/archive/listing.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "proto/wire/client_codec.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// A heading and its column; text stands left, numbers right.
+struct Column {
+  std::string_view title;
+  std::size_t width;
+  bool is_text = false;
+};
+
+constexpr std::array<Column, 7> columns{{{"file", 18, true},
+                                         {"campaign", 14, true},
+                                         {"phase", 10, true},
+                                         {"done", 9},
+                                         {"runs", 9},
+                                         {"seed", 9},
+                                         {"created", 11}}};
+
+std::string row(const std::array<std::string, columns.size()>& cells) {
+  std::string text;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    // A space at least stays between a column and the next.
+    const auto& [title, width, is_text] = columns[i];
+    const std::string cell = shortened(cells[i], width - 1);
+    text += is_text ? left_aligned(cell, width) : right_aligned(cell, width);
+  }
+  text.erase(text.find_last_not_of(' ') + 1);
+  return text + "\n";
+}
+
+std::string heading() {
+  std::array<std::string, columns.size()> titles;
+  std::size_t width = 0;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    titles[i] = columns[i].title;
+    width += columns[i].width;
+  }
+  return row(titles) + horizontal_rule(width) + "\n";
+}
+
+std::string entry(const ListedCampaign& campaign) {
+  const std::string file = campaign.file.filename().string();
+  if (!campaign.problem.empty()) return file + "\n  " + campaign.problem + "\n";
+  constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10Z.
+  std::string text =
+      row({file, campaign.name, std::string(wire::name_of(campaign.phase)),
+           std::to_string(campaign.num_finished), std::to_string(campaign.num_runs),
+           std::to_string(campaign.seed), campaign.created_utc.substr(0, date_size)});
+  if (campaign.tags.empty()) return text;
+  text += "  tags:";
+  for (const std::string& tag : campaign.tags) text += " " + tag;
+  return text + "\n";
+}
+
+Json json_of(const ListedCampaign& campaign) {
+  const std::string file = campaign.file.string();
+  if (!campaign.problem.empty()) return {{"file", file}, {"problem", campaign.problem}};
+  return {{"file", file},
+          {"problem", nullptr},
+          {"name", campaign.name},
+          {"seed", std::to_string(campaign.seed)},
+          {"phase", wire::name_of(campaign.phase)},
+          {"num_runs", campaign.num_runs},
+          {"num_finished", campaign.num_finished},
+          {"created_utc", campaign.created_utc},
+          {"tags", campaign.tags}};
+}
+
+}  // namespace
+
+std::string listing_text(std::span<const ListedCampaign> campaigns) {
+  if (campaigns.empty()) return "no campaigns\n";
+  std::string text = heading();
+  for (const ListedCampaign& campaign : campaigns) text += entry(campaign);
+  return text;
+}
+
+std::string listing_json(std::span<const ListedCampaign> campaigns) {
+  constexpr int indent = 2;
+  Json json{{"campaigns", Json::array()}};
+  for (const ListedCampaign& campaign : campaigns) json["campaigns"].push_back(json_of(campaign));
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace proofmass::coordinator

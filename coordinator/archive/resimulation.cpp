@@ -1,0 +1,128 @@
+#include "coordinator/archive/resimulation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "coordinator/archive/result_columns.hpp"
+#include "core/simulation/run.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+/// Ends a simulation from within.
+struct Abandoned {};
+
+/// Threads that simulate batches of a campaign until there are none left.
+class Simulation {
+ public:
+  Simulation(const Campaign& campaign, std::span<const RunResult> stored,
+             const IsStopped& is_stopped)
+      : campaign_(campaign), stored_(stored), is_stopped_(is_stopped), plan_(campaign) {}
+
+  std::vector<ResultDifference> run(std::size_t num_threads) {
+    const std::size_t num_batches = (stored_.size() + batch_lanes - 1) / batch_lanes;
+    std::vector<std::thread> others;
+    for (std::size_t i = 1; i < std::min(num_threads, num_batches); ++i) {
+      others.emplace_back([this] { simulate_batches(); });
+    }
+    simulate_batches();
+    for (std::thread& other : others) other.join();
+    if (is_abandoned_) throw Interrupted();
+    std::ranges::stable_sort(differences_, {}, &ResultDifference::run);
+    return std::move(differences_);
+  }
+
+ private:
+  void simulate_batches() {
+    try {
+      while (!is_abandoned_) {
+        const std::size_t first = next_.fetch_add(batch_lanes);
+        if (first >= stored_.size()) return;
+        const std::size_t count = std::min(batch_lanes, stored_.size() - first);
+        simulate(stored_.subspan(first, count));
+      }
+    } catch (const Abandoned&) {
+      is_abandoned_ = true;
+    }
+  }
+
+  void simulate(std::span<const RunResult> batch) {
+    std::vector<RunRequest> requests;
+    for (const RunResult& result : batch) {
+      requests.push_back({result.run, campaign_.table_values(result.run)});
+    }
+    const auto on_progress = [&](int /*num_orbits*/) {
+      if (is_abandoned_ || is_stopped_()) throw Abandoned{};
+    };
+    const std::vector<RunResult> computed =
+        plan_.simulate_batch(requests, best_instruction_set(), on_progress);
+    for (std::size_t i = 0; i < batch.size(); ++i) keep(differences_of(batch[i], computed[i]));
+  }
+
+  void keep(const std::vector<ResultDifference>& differences) {
+    const std::lock_guard lock(mutex_);
+    differences_.insert(differences_.end(), differences.begin(), differences.end());
+  }
+
+  const Campaign& campaign_;
+  std::span<const RunResult> stored_;
+  const IsStopped& is_stopped_;
+  RunPlan plan_;
+  std::atomic<std::size_t> next_ = 0;
+  std::atomic<bool> is_abandoned_ = false;
+  std::mutex mutex_;  ///< Guards what follows.
+  std::vector<ResultDifference> differences_;
+};
+
+}  // namespace
+
+std::vector<RunIndex> chosen_runs(std::span<const RunIndex> runs, double fraction) {
+  if (runs.empty()) return {};
+  const double wanted = std::ceil(fraction * static_cast<double>(runs.size()));
+  const std::size_t count =
+      std::clamp(static_cast<std::size_t>(wanted), std::size_t{1}, runs.size());
+  std::vector<RunIndex> chosen;
+  for (std::size_t i = 0; i < count; ++i) {
+    chosen.push_back(runs[(2 * i + 1) * runs.size() / (2 * count)]);
+  }
+  return chosen;
+}
+
+std::vector<ResultDifference> differences_of(const RunResult& stored, const RunResult& computed) {
+  std::vector<ResultDifference> differences;
+  const auto differ = [&](std::string column, std::string of_stored, std::string of_computed) {
+    differences.push_back(
+        {stored.run, std::move(column), std::move(of_stored), std::move(of_computed)});
+  };
+  if (stored.status != computed.status) {
+    differ("status", std::string(name_of(stored.status)), std::string(name_of(computed.status)));
+    return differences;
+  }
+  if (stored.num_draws != computed.num_draws) {
+    differ("num_draws", std::to_string(stored.num_draws), std::to_string(computed.num_draws));
+  }
+  if (stored.num_rounds != computed.num_rounds) {
+    differ("num_rounds", std::to_string(stored.num_rounds), std::to_string(computed.num_rounds));
+  }
+  for (const ValueColumn& column : value_columns()) {
+    if (column.kind == ValueKind::error) continue;  // It follows from the others.
+    const std::optional<double> a = column.value_in(stored), b = column.value_in(computed);
+    if (!a || have_same_bits(*a, *b)) continue;
+    differ(column.name, fmt::format("{}", *a), fmt::format("{}", *b));
+  }
+  return differences;
+}
+
+std::vector<ResultDifference> simulate_again(const Campaign& campaign,
+                                             std::span<const RunResult> stored,
+                                             std::size_t num_threads, const IsStopped& is_stopped) {
+  return Simulation(campaign, stored, is_stopped).run(num_threads);
+}
+
+}  // namespace proofmass::coordinator

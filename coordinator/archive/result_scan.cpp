@@ -1,0 +1,103 @@
+#include "coordinator/archive/result_scan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <optional>
+#include <span>
+
+#include "coordinator/archive/export.hpp"
+#include "coordinator/archive/result_columns.hpp"
+#include "coordinator/report/digest.hpp"
+#include "core/campaign/draw.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+/// Holds results against what a simulation can yield.
+class Rules {
+ public:
+  Rules(std::uint64_t num_runs, std::int64_t num_rounds_max, ResultScan& scan)
+      : num_runs_(num_runs), num_rounds_max_(num_rounds_max), scan_(scan) {}
+
+  void check(const RunResult& result) {
+    if (result.run.value >= num_runs_) {
+      violate(result.run, fmt::format("must be below num_runs = {}", num_runs_));
+    }
+    check_counts(result);
+    for (const ValueColumn& column : value_columns()) {
+      const std::optional<double> value = column.value_in(result);
+      if (!value || std::isfinite(*value)) continue;
+      violate(result.run, fmt::format("{} = {} (must be finite)", column.name, *value));
+    }
+  }
+
+  void violate(RunIndex run, const std::string& what) {
+    if (scan_.num_violations++ >= violations_named_max) return;
+    scan_.violations.push_back(fmt::format("run {}: {}", run.value, what));
+  }
+
+ private:
+  void check_counts(const RunResult& result) {
+    const bool has_draw = result.status != RunStatus::no_draw;
+    require_between(result, "num_draws", result.num_draws, has_draw ? 1 : num_draws_max,
+                    num_draws_max);
+    const bool used_all_rounds = result.status == RunStatus::not_converged;
+    require_between(result, "num_rounds", result.num_rounds, used_all_rounds ? num_rounds_max_ : 0,
+                    has_draw ? num_rounds_max_ : 0);
+  }
+
+  void require_between(const RunResult& result, std::string_view name, std::int64_t value,
+                       std::int64_t least, std::int64_t most) {
+    if (value >= least && value <= most) return;
+    violate(result.run, fmt::format("{} = {} (must be {} to {} if {})", name, value, least, most,
+                                    name_of(result.status)));
+  }
+
+  std::uint64_t num_runs_;
+  std::int64_t num_rounds_max_;
+  ResultScan& scan_;
+};
+
+std::vector<RunIndex> delivered_runs(const Store& store) {
+  std::vector<RunIndex> runs;
+  for (const RunRange& range : store.finished_runs()) {
+    for (std::uint64_t run = range.first.value; run < range.end(); ++run) runs.push_back({run});
+  }
+  return runs;
+}
+
+std::vector<RunIndex> missing_in(std::span<const RunIndex> those, std::span<const RunIndex> these) {
+  std::vector<RunIndex> missing;
+  std::ranges::set_difference(these, those, std::back_inserter(missing));
+  return missing;
+}
+
+}  // namespace
+
+// A coordinator may write meanwhile: deliveries are read before and after.
+ResultScan scan_results(const Store& store, std::int64_t num_rounds_max,
+                        const IsStopped& is_stopped) {
+  ResultScan scan;
+  Rules rules(store.num_runs(), num_rounds_max, scan);
+  Digest digest;
+  const std::vector<RunIndex> before = delivered_runs(store);
+  walk_results(store, is_stopped, [&](const RunResult& result) {
+    rules.check(result);
+    digest.add(result);
+    scan.runs.push_back(result.run);
+  });
+  const std::vector<RunIndex> after = delivered_runs(store);
+  scan.digest = digest.finish();
+  for (const RunIndex run : missing_in(scan.runs, before)) {
+    rules.violate(run, "has a delivery and no result");
+  }
+  for (const RunIndex run : missing_in(after, scan.runs)) {
+    rules.violate(run, "has a result and no delivery");
+  }
+  return scan;
+}
+
+}  // namespace proofmass::coordinator

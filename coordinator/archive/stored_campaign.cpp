@@ -1,0 +1,22 @@
+#include "coordinator/archive/stored_campaign.hpp"
+
+#include <array>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+
+namespace proofmass::coordinator {
+
+Campaign stored_campaign(const Store& store) {
+  std::vector<std::vector<double>> columns;
+  for (std::size_t element = 0; element < num_drawn; ++element) {
+    const std::array elements{element};
+    std::vector<double> column = std::move(store.table_columns(elements).front());
+    if (!column.empty()) columns.push_back(std::move(column));
+  }
+  return parse_stored_campaign(store.definition(), store.environment_table(), std::move(columns));
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,230 @@
+#include "coordinator/archive/verification.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "coordinator/archive/campaign_mark.hpp"
+#include "coordinator/archive/export.hpp"
+#include "coordinator/archive/resimulation.hpp"
+#include "coordinator/archive/result_scan.hpp"
+#include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/store/store.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t differences_named_max = 10;
+
+/// The checks of one file, each made once, in order.
+class Verification {
+ public:
+  Verification(const std::filesystem::path& file, const VerifyOptions& options,
+               const std::function<void(const Check&)>& report, const IsStopped& is_stopped)
+      : file_(file), options_(options), report_(report), is_stopped_(is_stopped) {}
+
+  bool run() {
+    make("file", [this] { return check_file(); });
+    make("integrity", [this] { return check_integrity(); });
+    make("definition", [this] { return check_definition(); });
+    make("model", [this] { return check_model(); });
+    make("results", [this] { return check_results(); });
+    make("digest", [this] { return check_digest(); });
+    make("simulation", [this] { return check_simulation(); });
+    return holds_;
+  }
+
+ private:
+  template <typename Make>
+  void make(std::string_view name, const Make& make_check) {
+    if (is_stopped_()) throw Interrupted();
+    Check check;
+    try {
+      check = store_ || name == "file" ? make_check() : not_checked("the file cannot be opened");
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error& error) {
+      check = fails(error.what());
+    }
+    check.name = name;
+    holds_ = holds_ && check.verdict != Verdict::fails;
+    report_(check);
+  }
+
+  static Check holds(std::string finding) {
+    return {.name = {}, .verdict = Verdict::holds, .finding = std::move(finding), .details = {}};
+  }
+  static Check fails(std::string finding) {
+    return {.name = {}, .verdict = Verdict::fails, .finding = std::move(finding), .details = {}};
+  }
+  static Check not_checked(std::string finding) {
+    return {
+        .name = {}, .verdict = Verdict::not_checked, .finding = std::move(finding), .details = {}};
+  }
+
+  Check check_file() {
+    store_ = Store::open_read_only(file_);
+    return holds(fmt::format("{}, made {}", store_->name(), store_->created_utc()));
+  }
+
+  Check check_integrity() {
+    store_->check_integrity();
+    return holds("every page, row, index and reference; the schema");
+  }
+
+  Check check_definition() {
+    Campaign campaign = stored_campaign(*store_);
+    std::vector<std::string> details;
+    const auto require_same = [&](std::string_view field, const auto& defined, const auto& stored) {
+      if (defined == stored) return;
+      details.push_back(
+          fmt::format("{} = {} (must be {}, as in the definition)", field, stored, defined));
+    };
+    require_same("name", campaign.name, store_->name());
+    require_same("seed", campaign.seed, store_->seed());
+    require_same("num_runs", campaign.num_runs, store_->num_runs());
+    campaign_ = std::move(campaign);
+    if (details.empty()) {
+      return holds(fmt::format("valid: seed {}, {} runs", campaign_->seed, campaign_->num_runs));
+    }
+    Check check = fails("the file is not of the campaign that it defines");
+    check.details = std::move(details);
+    return check;
+  }
+
+  Check check_model() {
+    const std::string model = store_->model_version();
+    is_same_model_ = model == options_.model_version;
+    if (is_same_model_) return holds(fmt::format("{}; {}", model, store_->build()));
+    return fails(
+        fmt::format("{} made this file and this program has {}: its runs cannot be "
+                    "simulated again",
+                    model, options_.model_version));
+  }
+
+  Check check_results() {
+    if (!campaign_) return not_checked("the definition cannot be read");
+    scan_ = scan_results(*store_, campaign_->scenario.estimation.num_rounds_max, is_stopped_);
+    const std::string counts = fmt::format("{} of {} runs", scan_->runs.size(), store_->num_runs());
+    if (scan_->num_violations == 0) return holds(counts + ": each number obeys its rule");
+    Check check = fails(fmt::format("{}: {} {} broken", counts, scan_->num_violations,
+                                    scan_->num_violations == 1 ? "rule is" : "rules are"));
+    check.details = scan_->violations;
+    if (scan_->num_violations > scan_->violations.size()) {
+      check.details.push_back(
+          fmt::format("and {} more", scan_->num_violations - scan_->violations.size()));
+    }
+    return check;
+  }
+
+  // A coordinator stores the digest when it ends; until then there are newer results.
+  Check check_digest() {
+    if (!scan_) return not_checked("the results cannot be read");
+    const std::optional<Summary> summary = store_->summary();
+    if (!summary) {
+      return not_checked("none is stored: a coordinator has the file, or was killed");
+    }
+    const std::uint64_t num_now = scan_->runs.size();
+    if (num_now > summary->num_finished) {
+      return not_checked(
+          fmt::format("it is of {} runs and {} are finished: a coordinator has the "
+                      "file, or was killed",
+                      summary->num_finished, num_now));
+    }
+    if (num_now < summary->num_finished) {
+      return fails(fmt::format("it is of {} runs, of which {} are in the file",
+                               summary->num_finished, num_now));
+    }
+    if (summary->digest == scan_->digest) {
+      Check check = holds(fmt::format("of {} runs", num_now));
+      check.details = {scan_->digest};
+      return check;
+    }
+    Check check =
+        fails(fmt::format("the results of {} runs are not those it was made of", num_now));
+    check.details = {"stored", "  " + summary->digest, "computed", "  " + scan_->digest};
+    return check;
+  }
+
+  Check check_simulation() {
+    if (!is_same_model_) return not_checked("another model made the file");
+    if (!scan_) return not_checked("the results cannot be read");
+    const std::vector<RunResult> results = chosen_results();
+    if (results.empty()) return not_checked("no run is finished");
+    const std::vector<ResultDifference> differences =
+        simulate_again(*campaign_, results, options_.num_threads, is_stopped_);
+    const std::string runs = fmt::format("{} of {} runs", results.size(), scan_->runs.size());
+    if (differences.empty()) return holds(runs + " simulated again: every bit is the same");
+    return simulation_failure(runs, differences);
+  }
+
+  static Check simulation_failure(const std::string& runs,
+                                  const std::vector<ResultDifference>& differences) {
+    std::uint64_t num_runs = 0;
+    for (std::size_t i = 0; i < differences.size(); ++i) {
+      if (i == 0 || differences[i].run != differences[i - 1].run) ++num_runs;
+    }
+    Check check = fails(fmt::format("{} simulated again, of which {} {}", runs, num_runs,
+                                    num_runs == 1 ? "differs" : "differ"));
+    for (const ResultDifference& difference : differences) {
+      if (&difference - differences.data() == differences_named_max) {
+        check.details.push_back(
+            fmt::format("and {} more", differences.size() - differences_named_max));
+        break;
+      }
+      check.details.push_back(fmt::format("run {}: {}", difference.run.value, difference.column));
+      check.details.push_back("  stored    " + difference.stored);
+      check.details.push_back("  computed  " + difference.computed);
+    }
+    return check;
+  }
+
+  // Results of the runs that are simulated again; one that is none of the campaign's cannot be.
+  std::vector<RunResult> chosen_results() {
+    std::vector<RunIndex> runs = scan_->runs;
+    std::erase_if(runs, [&](RunIndex run) { return run.value >= campaign_->num_runs; });
+    const std::vector<RunIndex> chosen = chosen_runs(runs, options_.fraction);
+    std::vector<RunResult> results;
+    walk_results(*store_, is_stopped_, [&](const RunResult& result) {
+      if (std::ranges::binary_search(chosen, result.run)) results.push_back(result);
+    });
+    return results;
+  }
+
+  const std::filesystem::path& file_;
+  const VerifyOptions& options_;
+  const std::function<void(const Check&)>& report_;
+  const IsStopped& is_stopped_;
+
+  bool holds_ = true;
+  std::optional<Store> store_;
+  std::optional<Campaign> campaign_;
+  bool is_same_model_ = false;
+  std::optional<ResultScan> scan_;
+};
+
+void check_arguments(const std::filesystem::path& file, const VerifyOptions& options) {
+  if (!(options.fraction >= 0.0 && options.fraction <= 1.0)) {
+    throw ArchiveError(fmt::format("fraction = {} (must be in [0, 1])", options.fraction));
+  }
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored)) {
+    throw ArchiveError(fmt::format("campaign file = {} (does not exist)", file.string()));
+  }
+  if (!has_campaign_mark(file)) {
+    throw ArchiveError(
+        fmt::format("campaign file = {} (is not a Proofmass campaign)", file.string()));
+  }
+}
+
+}  // namespace
+
+bool verify(const std::filesystem::path& file, const VerifyOptions& options,
+            const std::function<void(const Check&)>& report, const IsStopped& is_stopped) {
+  check_arguments(file, options);
+  return Verification(file, options, report, is_stopped).run();
+}
+
+}  // namespace proofmass::coordinator

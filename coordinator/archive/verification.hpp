@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "coordinator/archive/archive_error.hpp"
+#include "core/simulation/run.hpp"
+
+namespace proofmass::coordinator {
+
+enum class Verdict : std::uint8_t {
+  holds,
+  fails,
+  not_checked,  ///< Another check failed that it needs, or the file does not tell.
+};
+
+/// One thing that a campaign file was checked for.
+struct Check {
+  std::string_view name;  ///< `integrity`, `digest` ...
+  Verdict verdict = Verdict::holds;
+  std::string finding;               ///< What was found, in a line.
+  std::vector<std::string> details;  ///< Further lines.
+};
+
+/// How much is checked, and against what.
+struct VerifyOptions {
+  double fraction = 0.01;       ///< Of the finished runs, simulated again; in [0, 1], one at least.
+  std::size_t num_threads = 1;  ///< That simulate; at least 1.
+  std::string_view model_version = proofmass::model_version;  ///< That of the simulation.
+};
+
+/// Checks whether a campaign file is whole and holds what its definition yields, in this order:
+/// file, integrity, definition, model, results, digest, simulation. A check that fails ends none of
+/// the others that can still be made. Nothing is written, and a coordinator may write meanwhile.
+///
+/// @param report  Called with each check as soon as it is made.
+/// @return True if no check fails.
+/// @throws ArchiveError if there is no such file, if it is no campaign file or if the fraction is
+///         out of range; Interrupted.
+[[nodiscard]] bool verify(const std::filesystem::path& file, const VerifyOptions& options,
+                          const std::function<void(const Check&)>& report,
+                          const IsStopped& is_stopped);
+
+/// A check as text: a line, then one for each detail; at most 80 characters each unless a detail
+/// has no place to break.
+[[nodiscard]] std::string check_text(const Check& check);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,229 @@
+#include "coordinator/archive/comparison.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "coordinator/archive/comparison_text.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "core/statistics/comparison.hpp"
+#include "tests/coordinator/archive/archive_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// Runs [0, count), whose error of parameter i is ±(i + 1)·(run + 1), by turns.
+ComparedCampaign side(std::uint64_t count) {
+  ComparedCampaign side{.campaign = test::campaign_of(count),
+                        .model_version = "model",
+                        .build = "build",
+                        .results = {}};
+  for (std::uint64_t run = 0; run < count; ++run) {
+    RunResult result{.run = RunIndex{run}, .num_draws = 1, .num_rounds = 2};
+    for (std::size_t i = 0; i < num_parameters; ++i) {
+      result.truth[i] = static_cast<double>(run * i);
+      const double error = static_cast<double>((i + 1) * (run + 1));
+      result.estimate[i] = result.truth[i] + (run % 2 == 0 ? error : -error);
+    }
+    side.results.push_back(result);
+  }
+  return side;
+}
+
+/// Makes the |error| of a parameter larger by `change` in each run.
+void worsen(ComparedCampaign& side, Parameter parameter, double change) {
+  for (RunResult& result : side.results) {
+    result.estimate[index(parameter)] += std::copysign(change, result.error(parameter));
+  }
+}
+
+// |error| of parameter i is (i + 1)·{1, 2, 3, 4}; everything follows by hand.
+TEST(Comparison, OfPairsIsRunByRun) {
+  const ComparedCampaign first = side(4);
+  ComparedCampaign second = side(4);
+  worsen(second, Parameter::a_c12, 0.5);
+  const CampaignComparison comparison = compare_campaigns(first, second);
+  EXPECT_TRUE(comparison.is_paired());
+  EXPECT_EQ(comparison.why_not_compared, "");
+  EXPECT_EQ(comparison.num_first, 4U);
+  EXPECT_EQ(comparison.num_second, 4U);
+  EXPECT_TRUE(comparison.differences.empty());
+  const ParameterComparison& changed = comparison.parameters[index(Parameter::a_c12)];
+  EXPECT_EQ(changed.first.mean, 10.0);
+  EXPECT_EQ(changed.second.mean, 10.5);
+  EXPECT_EQ(changed.first.worst, 16.0);
+  EXPECT_EQ(changed.second.worst, 16.5);
+  EXPECT_NEAR(changed.first.standard_deviation, 4.0 * std::sqrt(5.0 / 3.0), 1e-14);
+  EXPECT_EQ(changed.mean_change, 0.5);
+  ASSERT_TRUE(changed.interval.has_value());
+  EXPECT_EQ(changed.interval->lower, 0.5) << "all pairs change alike";
+  EXPECT_EQ(changed.interval->upper, 0.5);
+  EXPECT_EQ(changed.p_value, 0.125) << "2 of the 2⁴ choices of signs";
+  EXPECT_EQ(changed.adjusted_p_value, 1.0) << "ten times that, at most 1";
+  const ParameterComparison& same = comparison.parameters[index(Parameter::k2d)];
+  EXPECT_EQ(same.mean_change, 0.0);
+  EXPECT_EQ(same.p_value, 1.0);
+}
+
+TEST(Comparison, FindsASmallChangeOfManyRunsAndCorrectsForTenParameters) {
+  const ComparedCampaign first = side(40);
+  ComparedCampaign second = side(40);
+  worsen(second, Parameter::a_c12, 1e-3);
+  const CampaignComparison comparison = compare_campaigns(first, second);
+  const ParameterComparison& changed = comparison.parameters[index(Parameter::a_c12)];
+  EXPECT_LT(changed.p_value, 1e-6);
+  EXPECT_NEAR(changed.adjusted_p_value, 10.0 * changed.p_value, 1e-12 * changed.p_value);
+}
+
+TEST(Comparison, TakesTheRunsThatBothHave) {
+  const ComparedCampaign first = side(7);
+  ComparedCampaign second = side(5);
+  second.results.erase(second.results.begin());      // Runs 1 to 4 are in both.
+  second.results[1].status = RunStatus::not_finite;  // Run 2 has no estimate.
+  const CampaignComparison comparison = compare_campaigns(first, second);
+  EXPECT_TRUE(comparison.is_paired());
+  EXPECT_EQ(comparison.num_first, 3U);
+  EXPECT_EQ(comparison.parameters[0].first.mean, (2.0 + 4.0 + 5.0) / 3.0);
+  EXPECT_EQ(comparison.parameters[0].second.mean, (2.0 + 4.0 + 5.0) / 3.0);
+}
+
+TEST(Comparison, OfOtherSeedsIsOfAllRuns) {
+  const ComparedCampaign first = side(7);
+  ComparedCampaign second = side(5);
+  second.campaign.seed = 2;
+  const CampaignComparison comparison = compare_campaigns(first, second);
+  EXPECT_EQ(comparison.why_unpaired, "the seeds differ");
+  EXPECT_EQ(comparison.num_first, 7U);
+  EXPECT_EQ(comparison.num_second, 5U);
+  const ParameterComparison& parameter = comparison.parameters[1];
+  EXPECT_EQ(parameter.first.mean, 8.0);
+  EXPECT_EQ(parameter.second.mean, 6.0);
+  EXPECT_EQ(parameter.mean_change, -2.0);
+  const std::vector<double> of_first{2, 4, 6, 8, 10, 12, 14}, of_second{2, 4, 6, 8, 10};
+  EXPECT_EQ(parameter.p_value, compare_unpaired(of_first, of_second, 0.95).mean_p_value);
+  ASSERT_EQ(comparison.differences.size(), 1U);
+  EXPECT_EQ(comparison.differences[0].field, "seed");
+  EXPECT_EQ(comparison.differences[0].first, "1");
+  EXPECT_EQ(comparison.differences[0].second, "2");
+}
+
+TEST(Comparison, OfOtherDrawsIsOfAllRuns) {
+  const ComparedCampaign first = side(4);
+  ComparedCampaign second = side(4);
+  second.results[2].truth[9] = std::nextafter(second.results[2].truth[9], 99.0);
+  EXPECT_EQ(compare_campaigns(first, second).why_unpaired, "the draws of run 2 differ");
+  second = side(4);
+  second.results[3].status = RunStatus::no_draw;
+  EXPECT_EQ(compare_campaigns(first, second).why_unpaired, "the draws of run 3 differ");
+}
+
+TEST(Comparison, WithoutACommonRunIsOfAllRuns) {
+  const ComparedCampaign all = side(6);
+  ComparedCampaign first = all, second = all;
+  first.results.resize(3);
+  second.results.erase(second.results.begin(), second.results.begin() + 3);
+  EXPECT_EQ(compare_campaigns(first, second).why_unpaired, "no run is finished in both");
+}
+
+TEST(Comparison, OfTooFewRunsIsOfTheDefinitionsAlone) {
+  ComparedCampaign first = side(5), second = side(1);
+  second.campaign.seed = 2;
+  EXPECT_EQ(compare_campaigns(first, second).why_not_compared,
+            "5 and 1 runs with an estimate (must be at least 2)");
+  first = second = side(2);
+  for (RunResult& result : second.results) result.status = RunStatus::not_finite;
+  const CampaignComparison comparison = compare_campaigns(first, second);
+  EXPECT_EQ(comparison.why_not_compared, "0 and 0 runs with an estimate (must be at least 1)");
+  EXPECT_THAT(comparison_text(comparison, "a", "b"),
+              HasSubstr("The results cannot be compared: 0 and 0 runs"));
+}
+
+TEST(Comparison, NamesOtherModelsAndBuilds) {
+  const ComparedCampaign first = side(2);
+  ComparedCampaign second = side(2);
+  second.model_version = "other model";
+  second.build = "other build";
+  second.campaign.scenario.noise.scale = 2.0;
+  const auto differences = compare_campaigns(first, second).differences;
+  ASSERT_EQ(differences.size(), 3U);
+  EXPECT_EQ(differences[0].field, "noise.scale");
+  EXPECT_EQ(differences[1].field, "model");
+  EXPECT_EQ(differences[1].second, "other model");
+  EXPECT_EQ(differences[2].field, "build");
+}
+
+using ComparedFile = test::StoreTest;
+
+TEST_F(ComparedFile, IsReadWithAllThatCounts) {
+  const auto results = test::results_of_each_status(5);
+  const Store store = test::store_of(file(), test::campaign_of(9), results);
+  const ComparedCampaign read = read_compared(store, test::never_stopped);
+  EXPECT_EQ(read.campaign.num_runs, 9U);
+  EXPECT_EQ(read.model_version, model_version);
+  EXPECT_EQ(read.build, store.build());
+  ASSERT_EQ(read.results.size(), 5U);
+  EXPECT_EQ(read.results[4].estimate, results[4].estimate);
+  EXPECT_THROW((void)read_compared(store, [] { return true; }), Interrupted);
+}
+
+TEST(ComparisonText, FitsATerminalAndMarksWhatIsSignificant) {
+  const ComparedCampaign first = side(40);
+  ComparedCampaign second = side(40);
+  worsen(second, Parameter::a_c12, 1e-3);
+  second.campaign.scenario.noise.scale = 2.0;
+  const std::string text = comparison_text(compare_campaigns(first, second), "one.db", "two.db");
+  EXPECT_THAT(text, HasSubstr("A  one.db\nB  two.db\n"));
+  EXPECT_THAT(text, HasSubstr("  noise.scale: 1 in A, 2 in B\n"));
+  EXPECT_THAT(text, HasSubstr("Compared run by run: 40 runs of the same draws.\n"));
+  std::istringstream lines(text);
+  std::size_t num_marks = 0;
+  for (std::string line; std::getline(lines, line);) {
+    EXPECT_LE(text_width(line), 80U) << line;
+    if (line.ends_with(" *")) ++num_marks;
+  }
+  EXPECT_EQ(num_marks, 1U);
+}
+
+TEST(ComparisonText, SaysWhyRunsAreNotPaired) {
+  ComparedCampaign second = side(3);
+  second.campaign.seed = 2;
+  EXPECT_THAT(comparison_text(compare_campaigns(side(4), second), "a", "b"),
+              HasSubstr("Compared as a whole, as the seeds differ: 4 runs of A, 3 of B.\n"));
+  EXPECT_THAT(comparison_text(compare_campaigns(side(4), side(4)), "a", "b"),
+              HasSubstr("The definitions agree.\n"));
+}
+
+TEST(ComparisonText, BreaksALongDefinition) {
+  ComparedCampaign second = side(3);
+  second.campaign.name = std::string(70, 'n');
+  EXPECT_THAT(comparison_text(compare_campaigns(side(3), second), "a", "b"),
+              HasSubstr("  name\n    A  \"hardy2013\"\n    B  \"nnn"));
+}
+
+TEST(ComparisonJson, HoldsAllNumbers) {
+  const ComparedCampaign first = side(4);
+  ComparedCampaign second = side(4);
+  worsen(second, Parameter::a_c12, 0.5);
+  const auto json =
+      nlohmann::json::parse(comparison_json(compare_campaigns(first, second), "a", "b"));
+  EXPECT_EQ(json["first"], "a");
+  EXPECT_EQ(json["is_paired"], true);
+  EXPECT_TRUE(json["why_unpaired"].is_null());
+  EXPECT_EQ(json["num_first"], 4);
+  ASSERT_EQ(json["parameters"].size(), 10U);
+  EXPECT_EQ(json["parameters"][3]["parameter"], "a_c12");
+  EXPECT_EQ(json["parameters"][3]["unit"], "rad");
+  EXPECT_EQ(json["parameters"][3]["first"]["worst"], 16.0);
+  EXPECT_EQ(json["parameters"][3]["mean_change"], 0.5);
+  EXPECT_EQ(json["parameters"][3]["mean_change_interval"], nlohmann::json({0.5, 0.5}));
+  EXPECT_EQ(json["parameters"][3]["p_value"], 0.125);
+  EXPECT_EQ(json["parameters"][3]["adjusted_p_value"], 1.0);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,66 @@
+#include "coordinator/archive/text_output.hpp"
+
+#include <gmock/gmock.h>
+
+#include "tests/coordinator/archive/archive_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using TextOutputFile = test::StoreTest;
+
+TEST_F(TextOutputFile, AppearsWhenItIsComplete) {
+  const std::string large(1 << 20, 'x');  // More than is kept in memory.
+  TextOutput output(directory() / "a.csv");
+  output.write(large);
+  output.write("end");
+  EXPECT_THAT(file_names(), ElementsAre("a.csv.new"));
+  output.finish();
+  EXPECT_THAT(file_names(), ElementsAre("a.csv"));
+  EXPECT_EQ(test::content_of(directory() / "a.csv"), large + "end");
+}
+
+TEST_F(TextOutputFile, DoesNotAppearUnlessItIsFinished) {
+  { TextOutput(directory() / "a.csv").write("half"); }
+  EXPECT_THAT(file_names(), IsEmpty());
+}
+
+TEST_F(TextOutputFile, LeavesTheOldOneUntilTheNewOneIsComplete) {
+  test::write_file(directory() / "a.csv", "old");
+  { TextOutput(directory() / "a.csv").write("half"); }
+  EXPECT_EQ(test::content_of(directory() / "a.csv"), "old");
+  TextOutput output(directory() / "a.csv");
+  output.write("new");
+  output.finish();
+  EXPECT_EQ(test::content_of(directory() / "a.csv"), "new");
+}
+
+TEST_F(TextOutputFile, NeedsADirectory) {
+  const std::string path = (directory() / "no" / "a.csv").string();
+  EXPECT_EQ(test::error_of([&] { const TextOutput output(path); }),
+            "output = " + path + " (cannot be written: No such file or directory)");
+}
+
+TEST_F(TextOutputFile, SaysWhyItCannotBeWritten) {
+  const std::string path = (directory() / "a.csv").string();
+  const test::FileSizeLimit limit(1000);
+  EXPECT_EQ(test::error_of([&] {
+              TextOutput output(path);
+              output.write(std::string(2000, 'x'));
+              output.finish();
+            }),
+            "output = " + path + " (cannot be written: File too large)");
+  EXPECT_THAT(file_names(), IsEmpty());
+}
+
+TEST_F(TextOutputFile, SaysWhyItCannotGetItsName) {
+  const std::string path = (directory() / "a").string();
+  std::filesystem::create_directories(directory() / "a" / "b");
+  EXPECT_EQ(test::error_of([&] { TextOutput(path).finish(); }),
+            "output = " + path + " (cannot be written: Is a directory)");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
