@@ -23,4 +23,8 @@ void add_report_commands(CLI::App& app, Command& chosen);
 /// @param chosen  As above.
 void add_client_commands(CLI::App& app, Command& chosen);
 
+/// Declares `verify`, `export`, `backup`, `compare`, `list`, `tag` and `note`.
+/// @param chosen  As above.
+void add_archive_commands(CLI::App& app, Command& chosen);
+
 }  // namespace proofmass::coordinator

@@ -1,0 +1,20 @@
+#include "coordinator/cli/archive_stop.hpp"
+
+#include <fmt/format.h>
+
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/stop_signals.hpp"
+
+namespace proofmass::coordinator {
+
+int run_until_stopped(const std::function<int(const IsStopped&)>& work) {
+  const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
+  try {
+    return work([&stop] { return stop != StopRequest::none; });
+  } catch (const Interrupted&) {
+    fmt::print(stderr, "proofmass: interrupted\n");
+    return exit_interrupted;
+  }
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+namespace proofmass::coordinator {
+
+enum class ExportFormat : std::uint8_t { csv, json, hdf5 };
+
+/// What `proofmass export` was asked for.
+struct ExportOptions {
+  std::filesystem::path database;
+  ExportFormat format = ExportFormat::csv;
+  std::filesystem::path output;  ///< Empty for standard output.
+  bool is_forced = false;        ///< Replaces an existing file.
+};
+
+/// Writes all results of a database to a file or to standard output.
+/// @return An ExitCode.
+/// @throws UsageError if the file exists and must not be replaced, or if a format needs one;
+///         StoreError, ArchiveError.
+[[nodiscard]] int export_results(const ExportOptions& options);
+
+}  // namespace proofmass::coordinator

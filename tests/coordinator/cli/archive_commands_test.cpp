@@ -1,0 +1,122 @@
+#include "coordinator/cli/archive_commands.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <functional>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/export_command.hpp"
+#include "coordinator/store/store.hpp"
+#include "tests/coordinator/cli/temporary_directory.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+/// A database without results.
+class ArchiveCommands : public testing::Test {
+ protected:
+  ArchiveCommands() {
+    const Campaign campaign = hardy2013_campaign();
+    (void)Store::create(database_, campaign, canonical_definition(campaign));
+  }
+
+  static std::string printed_by(const std::function<int()>& command) {
+    testing::internal::CaptureStdout();
+    EXPECT_EQ(command(), exit_done);
+    return testing::internal::GetCapturedStdout();
+  }
+  static std::string misuse(const std::function<int()>& command) {
+    try {
+      (void)command();
+    } catch (const UsageError& error) {
+      return error.what();
+    }
+    return {};
+  }
+  [[nodiscard]] std::string printed_tags() const {
+    return printed_by([&] { return tag_database({.database = database_, .tags = {}}); });
+  }
+
+  const test::TemporaryDirectory directory_;
+  const std::filesystem::path database_ = directory_ / "a.db";
+};
+
+TEST_F(ArchiveCommands, AddPrintAndRemoveTags) {
+  EXPECT_EQ(tag_database({database_, TagAction::add, {"thesis", "flight"}}), exit_done);
+  EXPECT_EQ(printed_tags(), "flight\nthesis\n");
+  EXPECT_EQ(tag_database({database_, TagAction::remove, {"thesis"}}), exit_done);
+  EXPECT_EQ(printed_tags(), "flight\n");
+}
+
+TEST_F(ArchiveCommands, NeedATagToAdd) {
+  EXPECT_EQ(misuse([&] {
+              return tag_database({database_, TagAction::add, {}});
+            }),
+            "TAG = (must be given after add and remove)");
+}
+
+TEST_F(ArchiveCommands, AddAndPrintNotes) {
+  EXPECT_EQ(note_database({database_, "first line\nsecond"}), exit_done);
+  const std::string printed = printed_by([&] { return note_database({database_, ""}); });
+  EXPECT_EQ(printed.substr(20), "  first line\n" + std::string(22, ' ') + "second\n");
+  EXPECT_EQ(printed.substr(0, 2), "20");
+}
+
+TEST_F(ArchiveCommands, CopyADatabase) {
+  const auto copy = directory_ / "copy.db";
+  EXPECT_EQ(printed_by([&] { return back_up_database(database_, copy); }),
+            "wrote " + copy.string() + "\n");
+  EXPECT_EQ(Store::open_read_only(copy).id(), Store::open_read_only(database_).id());
+}
+
+TEST_F(ArchiveCommands, DoNotExportOverAFile) {
+  const auto output = directory_ / "a.csv";
+  std::ofstream(output) << "mine";
+  EXPECT_EQ(misuse([&] { return export_results({.database = database_, .output = output}); }),
+            "output = " + output.string() + " (exists already; replace it with --force)");
+  EXPECT_EQ(export_results({.database = database_, .output = output, .is_forced = true}),
+            exit_done);
+  std::string heading;
+  std::ifstream(output) >> heading;
+  EXPECT_EQ(heading.substr(0, 17), "run_index,status,");
+}
+
+TEST_F(ArchiveCommands, ExportHdf5ToAFileOnly) {
+  EXPECT_EQ(
+      misuse([&] {
+        return export_results({.database = database_, .format = ExportFormat::hdf5, .output = {}});
+      }),
+      "output = - (must be a file for hdf5: name it with --output)");
+}
+
+TEST_F(ArchiveCommands, ListAndCompare) {
+  EXPECT_NE(printed_by([&] { return list_databases({.places = {database_}}); }).find("a.db"),
+            std::string::npos);
+  EXPECT_EQ(printed_by([&] {
+              return list_databases({.places = {database_}, .format = AnswerFormat::json});
+            })[0],
+            '{');
+  EXPECT_NE(printed_by([&] {
+              return compare_databases({.first = database_, .second = database_});
+            }).find("The definitions agree."),
+            std::string::npos);
+}
+
+TEST_F(ArchiveCommands, VerifyEndsWithOneIfACheckFails) {
+  const std::string printed = printed_by([&] { return verify_database({.database = database_}); });
+  EXPECT_NE(printed.find("integrity   ok "), std::string::npos) << printed;
+  std::fstream file(database_, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(4096 + 3).write("\xff\xff", 2);  // Number of cells of the second page.
+  file.close();
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(verify_database({.database = database_}), exit_cannot_be_done);
+  EXPECT_NE(testing::internal::GetCapturedStdout().find("file        FAILS"), std::string::npos);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "proofmass: error: " + database_.string() + ": 1 of 7 checks fails\n");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
