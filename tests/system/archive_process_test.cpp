@@ -1,0 +1,117 @@
+// What people do with campaign files, by real processes: while a coordinator writes, with pipes
+// that close, on disks that are full, and interrupted.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sqlite3.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+
+#include <filesystem>
+#include <string>
+
+#include "tests/system/campaign_process.hpp"
+
+namespace proofmass::test {
+namespace {
+
+class ArchiveProcess : public CampaignProcess {
+ protected:
+  void SetUp() override {
+    CampaignProcess::SetUp();
+    ASSERT_EQ(start("done", {"--workers", "2", "--runs", "32"}).wait(), 0) << errors_of("done");
+  }
+
+  [[nodiscard]] Process proofmass(const std::string& name, const Arguments& arguments) const {
+    return Process(directory / "", name, programs + "/proofmass", arguments);
+  }
+  [[nodiscard]] std::string output_of(const std::string& name) const {
+    return read_file(path(name + ".out"));
+  }
+  /// Exit code of a line of shell in the directory.
+  [[nodiscard]] int shell(const std::string& line) const {
+    const std::string command = "cd '" + (directory / "").string() + "' && bash -c '" + line + "'";
+    return WEXITSTATUS(::system(command.c_str()));
+  }
+  void change(const std::string& name, const std::string& sql) const {
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(path(name).c_str(), &database), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+    sqlite3_close(database);
+  }
+};
+
+// Another process, with another thread count than the workers, computes the same bits.
+TEST_F(ArchiveProcess, VerifiesWhatWorkersComputedAndABackupOfIt) {
+  EXPECT_EQ(proofmass("verify", {"verify", "done.db", "--fraction", "1"}).wait(), 0);
+  EXPECT_TRUE(contains(output_of("verify"), "32 of 32 runs simulated again"))
+      << output_of("verify");
+  EXPECT_EQ(proofmass("backup", {"backup", "done.db", "copy.db"}).wait(), 0);
+  EXPECT_EQ(stored_runs(path("copy.db")), stored_runs(path("done.db")));
+  change("copy.db", "UPDATE run_result SET num_rounds = num_rounds + 1 WHERE run_index = 20");
+  EXPECT_EQ(proofmass("again", {"verify", "copy.db", "--fraction", "1"}).wait(), 1);
+  EXPECT_TRUE(contains(output_of("again"), "run 20: num_rounds\n")) << output_of("again");
+  EXPECT_TRUE(contains(errors_of("again"), "copy.db: 2 of 7 checks fail")) << errors_of("again");
+}
+
+TEST_F(ArchiveProcess, WorksOnAFileThatIsBeingServed) {
+  Process run = start("served", {"--workers", "2"});
+  wait_for_runs("served", 2);
+  EXPECT_EQ(proofmass("verify", {"verify", "served.db"}).wait(), 0) << output_of("verify");
+  EXPECT_EQ(proofmass("backup", {"backup", "served.db", "copy.db"}).wait(), 0);
+  EXPECT_EQ(proofmass("tag", {"tag", "served.db", "add", "thesis"}).wait(), 0) << errors_of("tag");
+  EXPECT_EQ(proofmass("note", {"note", "served.db", "while it ran"}).wait(), 0);
+  EXPECT_EQ(proofmass("export", {"export", "served.db"}).wait(), 0);
+  EXPECT_EQ(run.wait(), 0) << errors_of("served");
+  EXPECT_EQ(stored_runs(path("served.db")), reference());
+  const auto of_copy = stored_runs(path("copy.db"));
+  EXPECT_GE(of_copy.size(), 2U);
+  for (const auto& [index, stored] : of_copy) EXPECT_EQ(stored, reference().at(index));
+  EXPECT_EQ(proofmass("list", {"list"}).wait(), 0);
+  EXPECT_TRUE(contains(output_of("list"), "tags: thesis")) << output_of("list");
+}
+
+TEST_F(ArchiveProcess, SaysThatAPipeIsClosedOrADiskIsFull) {
+  const std::string program = programs + "/proofmass";
+  EXPECT_EQ(shell(program + " export done.db 2> pipe.err | true; exit ${PIPESTATUS[0]}"), 1);
+  EXPECT_EQ(read_file(path("pipe.err")),
+            "proofmass: error: output = - (cannot be written: Broken pipe)\n");
+  EXPECT_EQ(shell(program + " export done.db --format json > /dev/full 2> full.err"), 1);
+  EXPECT_EQ(read_file(path("full.err")),
+            "proofmass: error: output = - (cannot be written: No space left on device)\n");
+}
+
+TEST_F(ArchiveProcess, EndsInOrderWhenItIsInterrupted) {
+  // Sessions so long that their simulation is not over before the signal comes.
+  change("done.db",
+         "UPDATE campaign SET definition = replace(definition, 'orbits = 5', "
+         "'orbits = 2000')");
+  Process verify = proofmass("verify", {"verify", "done.db", "--fraction", "1"});
+  wait_until("the simulation", [&] { return contains(output_of("verify"), "digest "); });
+  verify.signal(SIGINT);
+  EXPECT_EQ(verify.wait(), 130);
+  EXPECT_EQ(errors_of("verify"), "proofmass: interrupted\n");
+}
+
+TEST_F(ArchiveProcess, ComparesAndListsCampaigns) {
+  EXPECT_EQ(start("other", {"--seed", "2", "--runs", "16"}).wait(), 0);
+  EXPECT_EQ(proofmass("compare", {"compare", "done.db", "other.db"}).wait(), 0);
+  EXPECT_TRUE(contains(output_of("compare"), "as the seeds differ: 32 runs of A, 16 of B."))
+      << output_of("compare");
+  EXPECT_EQ(proofmass("list", {"list", "--json", "."}).wait(), 0);
+  EXPECT_TRUE(contains(output_of("list"), "\"./other.db\"")) << output_of("list");
+}
+
+TEST_F(ArchiveProcess, RefusesWhatMakesNoSense) {
+  EXPECT_EQ(proofmass("fraction", {"verify", "done.db", "--fraction", "2"}).wait(), 2);
+  EXPECT_EQ(proofmass("format", {"export", "done.db", "--format", "xml"}).wait(), 2);
+  EXPECT_EQ(proofmass("hdf5", {"export", "done.db", "--format", "hdf5"}).wait(), 2);
+  EXPECT_EQ(proofmass("none", {"verify", "none.db"}).wait(), 1);
+  EXPECT_EQ(errors_of("none"), "proofmass: error: campaign file = none.db (does not exist)\n");
+  EXPECT_EQ(proofmass("foreign", {"list", "short.toml"}).wait(), 1);
+  EXPECT_EQ(errors_of("foreign"),
+            "proofmass: error: campaign file = short.toml (is not a Proofmass campaign)\n");
+}
+
+}  // namespace
+}  // namespace proofmass::test
