@@ -22,10 +22,9 @@ void add_format(CLI::App& command, AnswerFormat& format) {
 
 void add_verify(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<VerifyCommandOptions>();
-  CLI::App& command =
-      *app.add_subcommand("verify", "Check a database, and simulate some of its runs again");
+  CLI::App& command = *app.add_subcommand("verify", "Check a database, simulate some runs again");
   command.add_option("DB", options->database, database_text)->required();
-  command.add_option("--fraction", options->fraction, "Of the runs to simulate, one at least")
+  command.add_option("--fraction", options->fraction, "Of the runs to simulate again")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command.callback(
@@ -40,7 +39,7 @@ void add_export(CLI::App& app, Command& chosen) {
   command.add_option("DB", options->database, database_text)->required();
   command.add_option("--format", options->format, "csv (the default), json or hdf5")
       ->transform(CLI::CheckedTransformer(formats).description("{csv,json,hdf5}"));
-  command.add_option("--output", options->output, "File to write; standard output by default");
+  command.add_option("--output", options->output, "File; standard output by default");
   command.add_flag("--force", options->is_forced, "Replace an existing file");
   command.callback([options, &chosen] { chosen = [options] { return export_results(*options); }; });
 }
@@ -61,8 +60,7 @@ void add_backup(CLI::App& app, Command& chosen) {
 
 void add_compare(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<CompareOptions>();
-  CLI::App& command =
-      *app.add_subcommand("compare", "Tell what two campaigns differ in, and which parameters");
+  CLI::App& command = *app.add_subcommand("compare", "Tell what two campaigns differ in");
   command.add_option("A", options->first, database_text)->required();
   command.add_option("B", options->second, database_text)->required();
   add_format(command, options->format);
@@ -73,7 +71,7 @@ void add_compare(CLI::App& app, Command& chosen) {
 void add_list(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<ListOptions>();
   CLI::App& command = *app.add_subcommand("list", "List the campaigns of directories and files");
-  command.add_option("PLACE", options->places, "Directories and databases; this one by default");
+  command.add_option("PLACE", options->places, "Directories, databases; this directory by default");
   add_format(command, options->format);
   command.callback([options, &chosen] { chosen = [options] { return list_databases(*options); }; });
 }
@@ -84,9 +82,9 @@ void add_tag(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<TagOptions>();
   CLI::App& command = *app.add_subcommand("tag", "Add, remove or print tags of a campaign");
   command.add_option("DB", options->database, database_text)->required();
-  command.add_option("ACTION", options->action, "add or remove; prints the tags without")
+  command.add_option("ACTION", options->action, "add or remove; without it prints the tags")
       ->transform(CLI::CheckedTransformer(actions).description("{add,remove}"));
-  command.add_option("TAG", options->tags, "Letters, digits, dots, _ and -, at most 64");
+  command.add_option("TAG", options->tags, "1 to 64 letters, digits, dots, _ and -");
   command.callback([options, &chosen] { chosen = [options] { return tag_database(*options); }; });
 }
 
@@ -94,7 +92,7 @@ void add_note(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<NoteOptions>();
   CLI::App& command = *app.add_subcommand("note", "Add a note to a campaign, or print its notes");
   command.add_option("DB", options->database, database_text)->required();
-  command.add_option("TEXT", options->text, "At most 2,000 bytes; prints the notes without");
+  command.add_option("TEXT", options->text, "Up to 2,000 bytes; without it prints the notes");
   command.callback([options, &chosen] { chosen = [options] { return note_database(*options); }; });
 }
 

@@ -35,10 +35,11 @@ ComparedCampaign side(std::uint64_t count) {
   return side;
 }
 
-/// Makes the |error| of a parameter larger by `change` in each run.
+/// Makes the |error| of a parameter larger by `change`·(run + 1).
 void worsen(ComparedCampaign& side, Parameter parameter, double change) {
   for (RunResult& result : side.results) {
-    result.estimate[index(parameter)] += std::copysign(change, result.error(parameter));
+    const double larger = change * static_cast<double>(result.run.value + 1);
+    result.estimate[index(parameter)] += std::copysign(larger, result.error(parameter));
   }
 }
 
@@ -55,14 +56,16 @@ TEST(Comparison, OfPairsIsRunByRun) {
   EXPECT_TRUE(comparison.differences.empty());
   const ParameterComparison& changed = comparison.parameters[index(Parameter::a_c12)];
   EXPECT_EQ(changed.first.mean, 10.0);
-  EXPECT_EQ(changed.second.mean, 10.5);
+  EXPECT_EQ(changed.second.mean, 11.25);
   EXPECT_EQ(changed.first.worst, 16.0);
-  EXPECT_EQ(changed.second.worst, 16.5);
+  EXPECT_EQ(changed.second.worst, 18.0);
   EXPECT_NEAR(changed.first.standard_deviation, 4.0 * std::sqrt(5.0 / 3.0), 1e-14);
-  EXPECT_EQ(changed.mean_change, 0.5);
+  EXPECT_EQ(changed.mean_change, 1.25);
   ASSERT_TRUE(changed.interval.has_value());
-  EXPECT_EQ(changed.interval->lower, 0.5) << "all pairs change alike";
-  EXPECT_EQ(changed.interval->upper, 0.5);
+  // Student's quantile for 3 degrees of freedom, from tables; the changes are 0.5, 1, 1.5 and 2.
+  const double half_width = 3.182446 * 0.5 * std::sqrt(5.0 / 3.0) / 2.0;
+  EXPECT_NEAR(changed.interval->lower, 1.25 - half_width, 1e-6);
+  EXPECT_NEAR(changed.interval->upper, 1.25 + half_width, 1e-6);
   EXPECT_EQ(changed.p_value, 0.125) << "2 of the 2⁴ choices of signs";
   EXPECT_EQ(changed.adjusted_p_value, 1.0) << "ten times that, at most 1";
   const ParameterComparison& same = comparison.parameters[index(Parameter::k2d)];
@@ -88,8 +91,8 @@ TEST(Comparison, TakesTheRunsThatBothHave) {
   const CampaignComparison comparison = compare_campaigns(first, second);
   EXPECT_TRUE(comparison.is_paired());
   EXPECT_EQ(comparison.num_first, 3U);
-  EXPECT_EQ(comparison.parameters[0].first.mean, (2.0 + 4.0 + 5.0) / 3.0);
-  EXPECT_EQ(comparison.parameters[0].second.mean, (2.0 + 4.0 + 5.0) / 3.0);
+  EXPECT_DOUBLE_EQ(comparison.parameters[0].first.mean, (2.0 + 4.0 + 5.0) / 3.0);
+  EXPECT_DOUBLE_EQ(comparison.parameters[0].second.mean, (2.0 + 4.0 + 5.0) / 3.0);
 }
 
 TEST(Comparison, OfOtherSeedsIsOfAllRuns) {
@@ -219,8 +222,10 @@ TEST(ComparisonJson, HoldsAllNumbers) {
   EXPECT_EQ(json["parameters"][3]["parameter"], "a_c12");
   EXPECT_EQ(json["parameters"][3]["unit"], "rad");
   EXPECT_EQ(json["parameters"][3]["first"]["worst"], 16.0);
-  EXPECT_EQ(json["parameters"][3]["mean_change"], 0.5);
-  EXPECT_EQ(json["parameters"][3]["mean_change_interval"], nlohmann::json({0.5, 0.5}));
+  EXPECT_EQ(json["parameters"][3]["mean_change"], 1.25);
+  ASSERT_EQ(json["parameters"][3]["mean_change_interval"].size(), 2U);
+  EXPECT_LT(json["parameters"][3]["mean_change_interval"][0], 1.25);
+  EXPECT_GT(json["parameters"][3]["mean_change_interval"][1], 1.25);
   EXPECT_EQ(json["parameters"][3]["p_value"], 0.125);
   EXPECT_EQ(json["parameters"][3]["adjusted_p_value"], 1.0);
 }

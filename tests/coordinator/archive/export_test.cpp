@@ -118,7 +118,7 @@ TEST_F(Export, OfJsonHoldsCampaignColumnsRunsAndDigest) {
 
 TEST_F(Export, OfJsonHasALineARun) {
   const std::string text = json();
-  EXPECT_EQ(std::ranges::count(text, '\n'), 10);
+  EXPECT_EQ(std::ranges::count(text, '\n'), 11);
   EXPECT_THAT(text, HasSubstr("\n{\"run_index\":4,\"status\":\"completed\",\"num_draws\":2,"));
 }
 

@@ -1,6 +1,10 @@
 #include "coordinator/archive/text_output.hpp"
 
 #include <gmock/gmock.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <array>
 
 #include "tests/coordinator/archive/archive_fixture.hpp"
 
@@ -60,6 +64,25 @@ TEST_F(TextOutputFile, SaysWhyItCannotGetItsName) {
   std::filesystem::create_directories(directory() / "a" / "b");
   EXPECT_EQ(test::error_of([&] { TextOutput(path).finish(); }),
             "output = " + path + " (cannot be written: Is a directory)");
+}
+
+TEST(TextOutput, SaysThatItsReaderIsGone) {
+  std::array<int, 2> pipe{};
+  ASSERT_EQ(::pipe(pipe.data()), 0);
+  ::close(pipe[0]);
+  ::signal(SIGPIPE, SIG_IGN);
+  const int standard_output = ::dup(1);
+  ::dup2(pipe[1], 1);
+  const std::string error = test::error_of([] {
+    TextOutput output;
+    output.write("text");
+    output.finish();
+  });
+  ::dup2(standard_output, 1);
+  ::close(standard_output);
+  ::close(pipe[1]);
+  ::signal(SIGPIPE, SIG_DFL);
+  EXPECT_EQ(error, "output = - (cannot be written: Broken pipe)");
 }
 
 }  // namespace

@@ -120,12 +120,13 @@ TEST_F(Verification, FindsAPageThatIsOverwritten) {
   make_file();
   std::string bytes = test::content_of(file());
   constexpr std::size_t page = 4096;
-  ASSERT_GT(bytes.size(), 4 * page);
-  for (std::size_t at = 3 * page; at < 4 * page; ++at) bytes[at] = static_cast<char>(at);
+  ASSERT_GT(bytes.size(), 2 * page);
+  // The second page is the first table's.
+  for (std::size_t at = page; at < 2 * page; ++at) bytes[at] = static_cast<char>(at);
   test::write_file(file(), bytes);
   EXPECT_FALSE(verify_all());
   EXPECT_EQ(check("file").verdict, Verdict::fails);
-  EXPECT_THAT(check("file").finding, HasSubstr("(is damaged: "));
+  EXPECT_THAT(check("file").finding, HasSubstr("damaged"));
   EXPECT_THAT(names(Verdict::not_checked),
               ElementsAre("definition", "digest", "integrity", "model", "results", "simulation"));
   EXPECT_EQ(check("digest").finding, "the file cannot be opened");
@@ -180,7 +181,8 @@ TEST_F(Verification, FindsAResultThatIsMissingWithItsDelivery) {
                "DELETE FROM delivery WHERE run_index = 4;"
                "DELETE FROM run_result WHERE run_index = 4");
   EXPECT_FALSE(verify_all());
-  EXPECT_THAT(names(Verdict::fails), ElementsAre("digest"));
+  EXPECT_EQ(check("results").verdict, Verdict::holds);
+  EXPECT_EQ(check("digest").finding, "it is of 18 runs, of which 17 are in the file");
 }
 
 TEST_F(Verification, FindsAResultThatNobodyDelivered) {
@@ -212,7 +214,7 @@ TEST_F(Verification, FindsARunBeyondTheLast) {
                "UPDATE run_result SET run_index = 99 WHERE run_index = 4;"
                "UPDATE delivery SET run_index = 99 WHERE run_index = 4");
   EXPECT_FALSE(verify_all());
-  EXPECT_THAT(names(Verdict::fails), ElementsAre("digest", "results"));
+  EXPECT_EQ(check("digest").verdict, Verdict::fails);
   EXPECT_THAT(check("results").details, ElementsAre("run 99: must be below num_runs = 18"));
   EXPECT_EQ(check("simulation").finding, "17 of 18 runs simulated again: every bit is the same");
 }
@@ -270,14 +272,12 @@ TEST_F(Verification, CanBeInterrupted) {
 
 TEST_F(Verification, CanBeInterruptedWhileItSimulates) {
   make_file();
-  bool is_stopped = false;
   std::string last;
-  const auto report = [&](const Check& check) {
-    last = check.name;
-    is_stopped = check.name == "digest";
-  };
-  EXPECT_THROW((void)verify(file(), {.fraction = 1.0}, report, [&] { return is_stopped; }),
-               Interrupted);
+  int num_questions = 0;
+  const auto report = [&](const Check& check) { last = check.name; };
+  // The first question is asked before the simulation, the second while its results are read.
+  const auto is_stopped = [&] { return last == "digest" && ++num_questions > 2; };
+  EXPECT_THROW((void)verify(file(), {.fraction = 1.0}, report, is_stopped), Interrupted);
   EXPECT_EQ(last, "digest");
 }
 
@@ -317,7 +317,7 @@ TEST(CheckText, BreaksLinesBetweenWords) {
     }
   }
   EXPECT_EQ(num_words, 40U);
-  EXPECT_EQ(num_lines, 7U);  // Six words of eight characters in 55.
+  EXPECT_EQ(num_lines, 6U);  // Seven words and six spaces are 55.
 }
 
 }  // namespace
