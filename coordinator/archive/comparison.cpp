@@ -103,7 +103,7 @@ void adjust_p_values(std::array<ParameterComparison, num_parameters>& parameters
   for (std::size_t i = 0; i < num_parameters; ++i) parameters[i].adjusted_p_value = adjusted[i];
 }
 
-std::vector<DefinitionDifference> differences_of(const ComparedCampaign& first,
+std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
                                                  const ComparedCampaign& second) {
   std::vector<DefinitionDifference> differences =
       compare_definitions(first.campaign, second.campaign);
@@ -136,7 +136,7 @@ ComparedCampaign read_compared(const Store& store, const IsStopped& is_stopped) 
 CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                      const ComparedCampaign& second) {
   CampaignComparison comparison;
-  comparison.differences = differences_of(first, second);
+  comparison.differences = all_differences(first, second);
   const std::vector<Pair> pairs = common_runs(first.results, second.results);
   comparison.why_unpaired = why_unpaired(first, second, pairs);
   for (const ParameterInfo& info : parameter_infos()) {

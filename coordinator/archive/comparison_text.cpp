@@ -81,8 +81,8 @@ std::string mean_table(const CampaignComparison& comparison) {
     text += mean_row(info, comparison.parameters[index(info.parameter)]);
   }
   return text + fmt::format(
-                    "from, to: 95 % interval of the change; p: {}, adjusted for ten\n"
-                    "parameters (Holm); *: below {:.2f}\n",
+                    "from, to: 95 % interval of the change; p: {},\n"
+                    "adjusted for ten parameters (Holm); *: below {:.2f}\n",
                     comparison.is_paired() ? "Wilcoxon's signed ranks" : "Welch's t", significance);
 }
 

@@ -85,7 +85,8 @@ TEST_F(Verification, FindsAnEstimateThatIsOffByItsLastBit) {
   const double changed = std::nextafter(stored, 1e300);
   test::change(file(), flipped_estimate_sql(changed));
   EXPECT_FALSE(verify_all());
-  EXPECT_THAT(names(Verdict::fails), ElementsAre("digest", "simulation"));
+  // Also the list of worst runs, if the run is one of them.
+  EXPECT_THAT(names(Verdict::fails), testing::IsSupersetOf({"digest", "simulation"}));
   EXPECT_EQ(check("digest").finding, "the results of 18 runs are not those it was made of");
   EXPECT_EQ(check("simulation").finding, "18 of 18 runs simulated again, of which 1 differs");
   ASSERT_EQ(check("simulation").details.size(), 3U);
