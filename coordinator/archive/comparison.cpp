@@ -104,7 +104,7 @@ void adjust_p_values(std::array<ParameterComparison, num_parameters>& parameters
 }
 
 std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
-                                                 const ComparedCampaign& second) {
+                                                  const ComparedCampaign& second) {
   std::vector<DefinitionDifference> differences =
       compare_definitions(first.campaign, second.campaign);
   if (first.model_version != second.model_version) {
