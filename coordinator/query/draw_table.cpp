@@ -1,0 +1,293 @@
+#include "coordinator/query/draw_table.hpp"
+
+#include <fmt/format.h>
+#include <sqlite3ext.h>
+
+#include <algorithm>
+#include <array>
+#include <exception>
+#include <memory>
+#include <new>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "coordinator/query/draw_scan.hpp"
+#include "coordinator/query/drawn_campaign.hpp"
+#include "core/error.hpp"
+
+SQLITE_EXTENSION_INIT3
+
+namespace proofmass::coordinator {
+namespace {
+
+enum Column : int { run_index_column, quantity_column, unit_column, value_column, campaign_column };
+
+constexpr const char* declaration =
+    "CREATE TABLE draw(run_index INTEGER, quantity TEXT, unit TEXT, value REAL, "
+    "campaign TEXT HIDDEN)";
+
+/// One for a connection.
+struct DrawTable : sqlite3_vtab {
+  sqlite3* connection = nullptr;
+  DatabaseState state;              // Of the database when `runs` was read.
+  std::shared_ptr<DrawnRuns> runs;  // Its cursors own it too: each stays with what it began with.
+};
+
+/// One for a place in a statement that names the table.
+struct DrawCursor : sqlite3_vtab_cursor {
+  std::shared_ptr<DrawnRuns> runs;
+  DrawScan scan;
+  std::uint64_t run = 0;
+  std::size_t quantity = 0;
+  std::optional<DrawnValues> values;  // Of the run.
+};
+
+DrawTable& table_of(sqlite3_vtab* table) { return *static_cast<DrawTable*>(table); }
+DrawCursor& cursor_of(sqlite3_vtab_cursor* cursor) { return *static_cast<DrawCursor*>(cursor); }
+
+// What goes wrong becomes the error of the statement: no exception passes SQLite.
+template <typename Work>
+int guarded(sqlite3_vtab& table, const Work& work) noexcept {
+  try {
+    work();
+    return SQLITE_OK;
+  } catch (const std::bad_alloc&) {
+    return SQLITE_NOMEM;
+  } catch (const std::exception& error) {
+    sqlite3_free(table.zErrMsg);
+    table.zErrMsg = sqlite3_mprintf("draw: %s", error.what());
+    return SQLITE_ERROR;
+  }
+}
+
+int connect(sqlite3* connection, void*, int, const char* const*, sqlite3_vtab** table, char**) {
+  const int code = sqlite3_declare_vtab(connection, declaration);
+  if (code != SQLITE_OK) return code;
+  auto* made = new (std::nothrow) DrawTable();
+  if (made == nullptr) return SQLITE_NOMEM;
+  made->connection = connection;
+  *table = made;
+  return SQLITE_OK;
+}
+
+int disconnect(sqlite3_vtab* table) {
+  delete &table_of(table);
+  return SQLITE_OK;
+}
+
+/// What a plan may hand to the scan, in the order of its arguments; bit i of the plan's number says
+/// that it does.
+struct Offer {
+  int column;
+  unsigned char comparison;
+  std::optional<RunComparison> run_comparison;
+};
+
+constexpr std::array<Offer, 7> offers{{
+    {campaign_column, SQLITE_INDEX_CONSTRAINT_EQ, {}},
+    {quantity_column, SQLITE_INDEX_CONSTRAINT_EQ, {}},
+    {run_index_column, SQLITE_INDEX_CONSTRAINT_EQ, RunComparison::equal},
+    {run_index_column, SQLITE_INDEX_CONSTRAINT_GT, RunComparison::above},
+    {run_index_column, SQLITE_INDEX_CONSTRAINT_GE, RunComparison::at_least},
+    {run_index_column, SQLITE_INDEX_CONSTRAINT_LT, RunComparison::below},
+    {run_index_column, SQLITE_INDEX_CONSTRAINT_LE, RunComparison::at_most},
+}};
+constexpr int campaign_bit = 1 << 0;
+constexpr int quantity_bit = 1 << 1;
+constexpr int run_bit = 1 << 2;
+constexpr int range_bits = 0b1111 << 3;
+
+// The place of the first usable constraint that fits an offer. Names are compared byte by byte, so
+// that only such a comparison of quantities is one.
+std::optional<int> constraint_for(const Offer& offer, sqlite3_index_info* plan) {
+  for (int i = 0; i < plan->nConstraint; ++i) {
+    const auto& constraint = plan->aConstraint[i];
+    if (constraint.iColumn != offer.column || constraint.op != offer.comparison) continue;
+    if (constraint.usable == 0) continue;
+    const bool is_text = offer.column == quantity_column;
+    if (is_text && std::string_view(sqlite3_vtab_collation(plan, i)) != "BINARY") continue;
+    return i;
+  }
+  return std::nullopt;
+}
+
+// A plan without the name of the campaign, though the statement gives one, would ignore it.
+bool ignores_the_campaign(const sqlite3_index_info& plan) {
+  const std::span constraints(plan.aConstraint, static_cast<std::size_t>(plan.nConstraint));
+  return std::ranges::any_of(constraints, [](const auto& constraint) {
+    return constraint.iColumn == campaign_column && constraint.op == SQLITE_INDEX_CONSTRAINT_EQ &&
+           constraint.usable == 0;
+  });
+}
+
+// A campaign of medium size; a draw costs as much as a dozen rows.
+void estimate_cost(sqlite3_index_info& plan) {
+  const bool has_range = (plan.idxNum & range_bits) != 0;
+  const double runs = (plan.idxNum & run_bit) != 0 ? 1.0 : has_range ? 1e3 : 1e5;
+  const double rows = runs * ((plan.idxNum & quantity_bit) != 0 ? 1.0 : double{num_drawn});
+  plan.estimatedCost = 12.0 * runs + rows;
+  plan.estimatedRows = static_cast<sqlite3_int64>(rows);
+  constexpr int one_row = run_bit | quantity_bit;
+  if ((plan.idxNum & one_row) == one_row) plan.idxFlags = SQLITE_INDEX_SCAN_UNIQUE;
+}
+
+int choose_plan(sqlite3_vtab*, sqlite3_index_info* plan) {
+  if (ignores_the_campaign(*plan)) return SQLITE_CONSTRAINT;
+  int num_arguments = 0;
+  for (std::size_t i = 0; i < offers.size(); ++i) {
+    const std::optional<int> constraint = constraint_for(offers[i], plan);
+    if (!constraint) continue;
+    plan->idxNum |= 1 << i;
+    plan->aConstraintUsage[*constraint].argvIndex = ++num_arguments;
+    plan->aConstraintUsage[*constraint].omit = offers[i].column == campaign_column;
+  }
+  estimate_cost(*plan);
+  plan->orderByConsumed = plan->nOrderBy == 1 && plan->aOrderBy[0].desc == 0 &&
+                          plan->aOrderBy[0].iColumn == run_index_column;
+  return SQLITE_OK;
+}
+
+// Reads the campaign when it is first needed and when the database has changed since.
+std::shared_ptr<DrawnRuns> current_runs(DrawTable& table) {
+  const DatabaseState state = state_of(table.connection);
+  if (!table.runs || !(table.state == state)) {
+    table.runs = std::make_shared<DrawnRuns>(read_campaign_of(table.connection));
+    table.state = state;
+  }
+  return table.runs;
+}
+
+int open(sqlite3_vtab* table, sqlite3_vtab_cursor** cursor) {
+  return guarded(*table, [&] {
+    auto made = std::make_unique<DrawCursor>();
+    made->runs = current_runs(table_of(table));
+    *cursor = made.release();
+  });
+}
+
+int close(sqlite3_vtab_cursor* cursor) {
+  delete &cursor_of(cursor);
+  return SQLITE_OK;
+}
+
+std::string text_of(sqlite3_value* value) {
+  const auto* text = reinterpret_cast<const char*>(sqlite3_value_text(value));
+  return text == nullptr ? std::string()
+                         : std::string(text, static_cast<std::size_t>(sqlite3_value_bytes(value)));
+}
+
+void check_campaign(sqlite3_value* value, std::string_view name) {
+  if (sqlite3_value_type(value) == SQLITE_NULL) return;
+  const std::string given = text_of(value);
+  if (given == name) return;
+  throw InvalidArgument(fmt::format("campaign = {} (the database holds {})", given, name));
+}
+
+// Other types than these compare by rules of SQLite's own, and narrow nothing.
+void narrow(DrawScan& scan, const Offer& offer, sqlite3_value* value) {
+  const int type = sqlite3_value_type(value);
+  if (type == SQLITE_NULL) return scan.leave_none();
+  if (offer.run_comparison && type == SQLITE_INTEGER) {
+    scan.narrow(*offer.run_comparison, std::int64_t{sqlite3_value_int64(value)});
+  } else if (offer.run_comparison && type == SQLITE_FLOAT) {
+    scan.narrow(*offer.run_comparison, sqlite3_value_double(value));
+  } else if (!offer.run_comparison && type == SQLITE_TEXT) {
+    const auto found = std::ranges::find(drawn_names(), text_of(value));
+    if (found == drawn_names().end()) return scan.leave_none();
+    scan.quantity = static_cast<std::size_t>(found - drawn_names().begin());
+  }
+}
+
+// Behind the end there are no values.
+void go_to_run(DrawCursor& cursor, std::uint64_t run) {
+  cursor.run = run;
+  cursor.quantity = cursor.scan.quantity.value_or(0);
+  if (run < cursor.scan.end_run) cursor.values = cursor.runs->values_of(RunIndex{run});
+}
+
+int filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value** values) {
+  DrawCursor& cursor = cursor_of(base);
+  return guarded(*base->pVtab, [&] {
+    cursor.scan = {.first_run = 0, .end_run = cursor.runs->num_runs(), .quantity = {}};
+    for (std::size_t i = 0; i < offers.size(); ++i) {
+      if ((plan & (1 << i)) == 0) continue;
+      sqlite3_value* value = *values++;
+      if (offers[i].column == campaign_column) {
+        check_campaign(value, cursor.runs->campaign_name());
+      } else {
+        narrow(cursor.scan, offers[i], value);
+      }
+    }
+    go_to_run(cursor, cursor.scan.first_run);
+  });
+}
+
+int next(sqlite3_vtab_cursor* base) {
+  DrawCursor& cursor = cursor_of(base);
+  return guarded(*base->pVtab, [&] {
+    ++cursor.quantity;
+    if (cursor.scan.quantity || cursor.quantity == num_drawn) go_to_run(cursor, cursor.run + 1);
+  });
+}
+
+int is_at_end(sqlite3_vtab_cursor* cursor) {
+  return cursor_of(cursor).run >= cursor_of(cursor).scan.end_run ? 1 : 0;
+}
+
+void set_text(sqlite3_context* context, std::string_view text) {
+  sqlite3_result_text(context, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
+}
+
+int column(sqlite3_vtab_cursor* base, sqlite3_context* context, int number) {
+  const DrawCursor& cursor = cursor_of(base);
+  switch (number) {
+    case run_index_column:
+      sqlite3_result_int64(context, static_cast<sqlite3_int64>(cursor.run));
+      break;
+    case quantity_column:
+      set_text(context, drawn_names()[cursor.quantity]);
+      break;
+    case unit_column:
+      set_text(context, drawn_unit(cursor.quantity));
+      break;
+    case value_column:
+      if (cursor.values) sqlite3_result_double(context, (*cursor.values)[cursor.quantity]);
+      break;
+    default:
+      set_text(context, cursor.runs->campaign_name());
+  }
+  return SQLITE_OK;
+}
+
+int row_identifier(sqlite3_vtab_cursor* base, sqlite3_int64* identifier) {
+  const DrawCursor& cursor = cursor_of(base);
+  *identifier = static_cast<sqlite3_int64>(cursor.run * num_drawn + cursor.quantity);
+  return SQLITE_OK;
+}
+
+// Without xCreate the table is there under its own name, and CREATE VIRTUAL TABLE is refused.
+constexpr sqlite3_module draw_module = [] {
+  sqlite3_module module{};
+  module.xConnect = connect;
+  module.xBestIndex = choose_plan;
+  module.xDisconnect = disconnect;
+  module.xOpen = open;
+  module.xClose = close;
+  module.xFilter = filter;
+  module.xNext = next;
+  module.xEof = is_at_end;
+  module.xColumn = column;
+  module.xRowid = row_identifier;
+  return module;
+}();
+
+}  // namespace
+
+int register_draw_table(sqlite3* connection) {
+  return sqlite3_create_module_v2(connection, "draw", &draw_module, nullptr, nullptr);
+}
+
+}  // namespace proofmass::coordinator

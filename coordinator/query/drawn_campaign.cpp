@@ -1,0 +1,142 @@
+#include "coordinator/query/drawn_campaign.hpp"
+
+#include <fmt/format.h>
+#include <sqlite3ext.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "core/campaign/draw.hpp"
+#include "core/error.hpp"
+
+SQLITE_EXTENSION_INIT3
+
+namespace proofmass::coordinator {
+namespace {
+
+/// A statement that reads the main database of a connection.
+class Selection {
+ public:
+  Selection(sqlite3* connection, std::string_view sql) : connection_(connection) {
+    sqlite3_stmt* statement = nullptr;
+    check(sqlite3_prepare_v2(connection, sql.data(), static_cast<int>(sql.size()), &statement,
+                             nullptr));
+    statement_.reset(statement);
+  }
+
+  void bind(const std::string& text) {
+    check(sqlite3_bind_text(statement_.get(), 1, text.c_str(), -1, SQLITE_TRANSIENT));
+  }
+  [[nodiscard]] bool step() {
+    const int code = sqlite3_step(statement_.get());
+    if (code != SQLITE_ROW && code != SQLITE_DONE) check(code);
+    return code == SQLITE_ROW;
+  }
+  void require_row() {
+    if (!step()) throw Error("the database holds no campaign");
+  }
+
+  [[nodiscard]] double real(int column) const {
+    return sqlite3_column_double(statement_.get(), column);
+  }
+  [[nodiscard]] std::int64_t integer(int column) const {
+    return sqlite3_column_int64(statement_.get(), column);
+  }
+  [[nodiscard]] std::string text(int column) const {
+    const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
+    return text == nullptr ? std::string() : std::string(text);
+  }
+
+ private:
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+  };
+
+  void check(int code) const {
+    if (code == SQLITE_OK) return;
+    throw Error(fmt::format("the campaign cannot be read: {}", sqlite3_errmsg(connection_)));
+  }
+
+  sqlite3* connection_;
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+};
+
+EnvironmentTable environment_table_of(sqlite3* connection) {
+  Selection row(connection,
+                "SELECT time_s, linear_x_m_s2, linear_y_m_s2, linear_z_m_s2, angular_x_rad_s2, "
+                "angular_y_rad_s2, angular_z_rad_s2 FROM main.environment_row ORDER BY position");
+  EnvironmentTable table;
+  while (row.step()) {
+    table.push_back({.time_s = row.real(0),
+                     .linear_m_s2 = {row.real(1), row.real(2), row.real(3)},
+                     .angular_rad_s2 = {row.real(4), row.real(5), row.real(6)}});
+  }
+  return table;
+}
+
+// One column for each quantity that has values, in the order of drawn_names().
+std::vector<std::vector<double>> table_columns_of(sqlite3* connection) {
+  std::vector<std::vector<double>> columns;
+  for (const std::string& name : drawn_names()) {
+    Selection row(connection,
+                  "SELECT value FROM main.dispersion_value WHERE name = ? ORDER BY run_index");
+    row.bind(name);
+    std::vector<double> column;
+    while (row.step()) column.push_back(row.real(0));
+    if (!column.empty()) columns.push_back(std::move(column));
+  }
+  return columns;
+}
+
+}  // namespace
+
+Campaign read_campaign_of(sqlite3* connection) {
+  Selection row(connection, "SELECT definition, num_runs FROM main.campaign");
+  row.require_row();
+  Campaign campaign = parse_stored_campaign(row.text(0), environment_table_of(connection),
+                                            table_columns_of(connection));
+  // The definition has the number asked for at first.
+  campaign.num_runs = static_cast<std::uint64_t>(row.integer(1));
+  campaign.validate();
+  return campaign;
+}
+
+DatabaseState state_of(sqlite3* connection) {
+  Selection row(connection, "PRAGMA main.data_version");
+  row.require_row();
+  return {.data_version = row.integer(0), .num_changes = sqlite3_total_changes64(connection)};
+}
+
+DrawnRuns::DrawnRuns(Campaign campaign) : campaign_(std::move(campaign)) {}
+
+const std::optional<DrawnValues>& DrawnRuns::values_of(RunIndex run) {
+  PROOFMASS_EXPECT(run.value < campaign_.num_runs);
+  if (last_run_ == run) return last_values_;
+  const std::vector<double> table_values = campaign_.table_values(run);
+  const AcceptedDraw draw = draw_instrument(campaign_, run, table_values);
+  last_values_.reset();
+  if (draw.instrument) {
+    last_values_ =
+        draw_values(campaign_.dispersions, campaign_.seed, run, draw.num_draws - 1, table_values);
+  }
+  last_run_ = run;
+  return last_values_;
+}
+
+std::string_view drawn_unit(std::size_t quantity) {
+  // A name ends in its unit; `_s2_m` ends in `_m` too, so that the longer come first.
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 5> units{
+      {{"_rad_s2", "rad/s²"}, {"_m_s2", "m/s²"}, {"_s2_m", "s²/m"}, {"_rad", "rad"}, {"_m", "m"}}};
+  const std::string_view name = drawn_names()[quantity];
+  const std::string_view group = name.substr(0, name.find('.'));
+  const auto found =
+      std::ranges::find_if(units, [&](const auto& unit) { return group.ends_with(unit.first); });
+  return found == units.end() ? "1" : found->second;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "core/campaign/campaign.hpp"
+
+struct sqlite3;
+
+namespace proofmass::coordinator {
+
+/// The campaign that a connection's main database holds, read through that connection.
+/// @throws Error if it holds none or a damaged one.
+[[nodiscard]] Campaign read_campaign_of(sqlite3* connection);
+
+/// Counts whatever may have changed the database, by this connection or by others.
+struct DatabaseState {
+  std::int64_t data_version = 0;
+  std::int64_t num_changes = 0;
+
+  bool operator==(const DatabaseState&) const = default;
+};
+
+/// @throws Error if the database cannot be read.
+[[nodiscard]] DatabaseState state_of(sqlite3* connection);
+
+/// What the runs of a campaign draw, computed again when asked for.
+class DrawnRuns {
+ public:
+  explicit DrawnRuns(Campaign campaign);
+
+  [[nodiscard]] std::string_view campaign_name() const { return campaign_.name; }
+  [[nodiscard]] std::uint64_t num_runs() const { return campaign_.num_runs; }
+
+  /// The values of the run's accepted draw, those its simulation begins with; empty if all draws
+  /// were rejected. The reference holds until the next call.
+  /// @pre The run is one of the campaign's.
+  [[nodiscard]] const std::optional<DrawnValues>& values_of(RunIndex run);
+
+ private:
+  Campaign campaign_;
+  std::optional<RunIndex> last_run_;  ///< A join asks for the quantities of a run one by one.
+  std::optional<DrawnValues> last_values_;
+};
+
+/// Unit of a drawn quantity, for people.
+/// @param quantity  Index into drawn_names().
+[[nodiscard]] std::string_view drawn_unit(std::size_t quantity);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,271 @@
+#include "coordinator/query/query.hpp"
+
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "coordinator/query/display_text.hpp"
+#include "coordinator/query/functions.hpp"
+#include "coordinator/query/read_rule.hpp"
+#include "coordinator/store/store.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int busy_timeout_ms = 5000;
+constexpr std::size_t shown_sql_width = 60;
+// So often, counted in steps of SQLite's machine, somebody looks at the clock; a row of draw()
+// takes a few steps, and 10 ms in the worst case.
+constexpr int steps_between_looks = 100;
+
+struct Close {
+  void operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }
+};
+struct Finalize {
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+using Statement = std::unique_ptr<sqlite3_stmt, Finalize>;
+
+// One line of the query, that of the position if there is one.
+std::string shown_sql(std::string_view sql, std::size_t position) {
+  const std::string_view before = sql.substr(0, position);
+  const std::size_t begin = before.rfind('\n') + 1;  // 0 without one.
+  const std::size_t end = std::min(sql.find('\n', position), sql.size());
+  return shortened_text(visible_text(sql.substr(begin, end - begin)), shown_sql_width);
+}
+
+std::string place_text(std::string_view sql, std::size_t position) {
+  const std::string_view before = sql.substr(0, position);
+  const auto line = std::ranges::count(before, '\n') + 1;
+  const std::string_view in_line = before.substr(before.rfind('\n') + 1);
+  const auto starts = [](char c) { return (static_cast<unsigned char>(c) & 0xc0U) != 0x80U; };
+  return fmt::format("line {}, character {}", line, std::ranges::count_if(in_line, starts) + 1);
+}
+
+[[noreturn]] void refuse(std::string_view sql, std::string_view reason) {
+  throw QueryError(
+      fmt::format("sql = {} ({})", shown_sql(sql, sql.find_first_not_of(" \t\r\n")), reason));
+}
+
+/// A read-only connection on which nothing but reading is possible, for some time.
+class Reader {
+ public:
+  Reader(std::filesystem::path file, const QueryLimits& limits);
+
+  /// @throws QueryError unless the text is one statement that reads.
+  [[nodiscard]] Statement prepare(const std::string& sql);
+  /// @returns False after the last row or if the query was interrupted.
+  [[nodiscard]] bool step(sqlite3_stmt* statement, const std::string& sql);
+  [[nodiscard]] bool is_interrupted() const { return is_interrupted_; }
+
+ private:
+  void restrict_connection();
+  void set_limits();
+  static int on_progress(void* reader);
+  void check(int code) const;
+  [[noreturn]] void fail(int code, const std::string& sql) const;
+  [[noreturn]] void fail_query(const std::string& sql) const;
+  void require_one_statement(const std::string& sql, const char* rest);
+
+  std::filesystem::path file_;
+  QueryLimits limits_;
+  Clock::time_point end_;
+  bool is_late_ = false;
+  bool is_interrupted_ = false;
+  ReadRule rule_;
+  std::unique_ptr<sqlite3, Close> connection_;
+};
+
+Reader::Reader(std::filesystem::path file, const QueryLimits& limits)
+    : file_(std::move(file)),
+      limits_(limits),
+      end_(Clock::now() + std::chrono::duration_cast<Clock::duration>(limits.time_limit)) {
+  // An absolute path is never mistaken for `:memory:` or a URI.
+  const std::string name = std::filesystem::absolute(file_).string();
+  sqlite3* connection = nullptr;
+  const int code = sqlite3_open_v2(name.c_str(), &connection, SQLITE_OPEN_READONLY, nullptr);
+  connection_.reset(connection);
+  check(code);
+  sqlite3_extended_result_codes(connection, 1);
+  sqlite3_busy_timeout(connection, busy_timeout_ms);
+  check(register_functions(connection));
+  set_limits();
+  restrict_connection();
+}
+
+// A file from elsewhere is data: nothing in its schema may call a function with side effects, and
+// text in double quotes is a name and never a value.
+void Reader::restrict_connection() {
+  sqlite3* connection = connection_.get();
+  constexpr std::array<std::pair<int, int>, 5> settings{{{SQLITE_DBCONFIG_DEFENSIVE, 1},
+                                                         {SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0},
+                                                         {SQLITE_DBCONFIG_ENABLE_LOAD_EXTENSION, 0},
+                                                         {SQLITE_DBCONFIG_ENABLE_FTS3_TOKENIZER, 0},
+                                                         {SQLITE_DBCONFIG_DQS_DML, 0}}};
+  for (const auto& [setting, value] : settings) {
+    check(sqlite3_db_config(connection, setting, value, nullptr));
+  }
+  check(sqlite3_exec(connection, "PRAGMA cell_size_check = ON; PRAGMA query_only = ON", nullptr,
+                     nullptr, nullptr));
+  rule_.apply_to(connection);
+  sqlite3_progress_handler(connection, steps_between_looks, &Reader::on_progress, this);
+}
+
+void Reader::set_limits() {
+  constexpr std::array<std::pair<int, int>, 8> bounds{
+      {{SQLITE_LIMIT_LENGTH, 64 << 20},
+       {SQLITE_LIMIT_SQL_LENGTH, static_cast<int>(sql_size_max)},
+       {SQLITE_LIMIT_COLUMN, 1000},
+       {SQLITE_LIMIT_EXPR_DEPTH, 500},
+       {SQLITE_LIMIT_COMPOUND_SELECT, 100},
+       {SQLITE_LIMIT_LIKE_PATTERN_LENGTH, 1000},
+       {SQLITE_LIMIT_ATTACHED, 0},
+       {SQLITE_LIMIT_WORKER_THREADS, 0}}};
+  for (const auto& [limit, value] : bounds) sqlite3_limit(connection_.get(), limit, value);
+}
+
+int Reader::on_progress(void* self) {
+  auto& reader = *static_cast<Reader*>(self);
+  reader.is_interrupted_ = reader.is_interrupted_ || reader.limits_.is_interrupted();
+  reader.is_late_ = reader.is_late_ || Clock::now() >= reader.end_;
+  return reader.is_interrupted_ || reader.is_late_ ? 1 : 0;
+}
+
+void Reader::check(int code) const {
+  if (code != SQLITE_OK) fail(code, {});
+}
+
+// What the file is to blame for, what the time, and what the query.
+void Reader::fail(int code, const std::string& sql) const {
+  if (!rule_.refusal().empty()) refuse(sql, rule_.refusal());
+  const char* text = sqlite3_errmsg(connection_.get());
+  switch (code & 0xff) {
+    case SQLITE_INTERRUPT:
+      throw TimeLimitError(fmt::format("timeout = {} (the query did not end in so many seconds)",
+                                       limits_.time_limit.count()));
+    case SQLITE_ERROR:
+    case SQLITE_AUTH:
+    case SQLITE_TOOBIG:
+    case SQLITE_MISMATCH:
+    case SQLITE_RANGE:
+    case SQLITE_READONLY:
+    case SQLITE_SCHEMA:  // What a query without FROM gets for an unknown name.
+      fail_query(sql);
+    default:
+      throw StoreError(fmt::format("campaign file = {} ({})", file_.string(), text));
+  }
+}
+
+void Reader::fail_query(const std::string& sql) const {
+  const char* text = sqlite3_errmsg(connection_.get());
+  const int offset = sqlite3_error_offset(connection_.get());
+  if (offset < 0) refuse(sql, text);
+  const auto position = static_cast<std::size_t>(offset);
+  throw QueryError(fmt::format("sql = {} ({}, at {})", shown_sql(sql, position), text,
+                               place_text(sql, position)));
+}
+
+Statement Reader::prepare(const std::string& sql) {
+  if (sql.size() > sql_size_max) {
+    refuse(sql, fmt::format("must be at most {} bytes", sql_size_max));
+  }
+  if (sql.find('\0') != std::string::npos) refuse(sql, "must not hold a zero byte");
+  sqlite3_stmt* statement = nullptr;
+  const char* rest = nullptr;
+  const int code = sqlite3_prepare_v2(connection_.get(), sql.c_str(), -1, &statement, &rest);
+  Statement prepared(statement);
+  if (code != SQLITE_OK) fail(code, sql);
+  if (!prepared) refuse(sql, "holds no statement");
+  require_one_statement(sql, rest);
+  if (sqlite3_stmt_readonly(statement) == 0) refuse(sql, "only reading is allowed");
+  const int num_parameters = sqlite3_bind_parameter_count(statement);
+  if (num_parameters > 0) {
+    refuse(sql, "has a parameter such as ?, :name or $name, which nothing gives a value");
+  }
+  return prepared;
+}
+
+// Blanks, comments and semicolons are no statement.
+void Reader::require_one_statement(const std::string& sql, const char* rest) {
+  while (*rest != '\0') {
+    sqlite3_stmt* statement = nullptr;
+    const char* begin = rest;
+    const int code = sqlite3_prepare_v2(connection_.get(), begin, -1, &statement, &rest);
+    const Statement prepared(statement);
+    if (code == SQLITE_OK && !prepared) continue;
+    const auto position = static_cast<std::size_t>(begin - sql.c_str());
+    const std::size_t start = std::min(sql.find_first_not_of(" \t\r\n;", position), sql.size());
+    throw QueryError(fmt::format("sql = {} (must be one statement, another begins at {})",
+                                 shown_sql(sql, start), place_text(sql, start)));
+  }
+}
+
+bool Reader::step(sqlite3_stmt* statement, const std::string& sql) {
+  const int code = sqlite3_step(statement);
+  if (code == SQLITE_ROW) return true;
+  if (code == SQLITE_DONE || is_interrupted_) return false;
+  fail(code, sql);
+}
+
+Cell cell_of(sqlite3_stmt* statement, int column) {
+  const auto size = [&] {
+    return static_cast<std::size_t>(sqlite3_column_bytes(statement, column));
+  };
+  switch (sqlite3_column_type(statement, column)) {
+    case SQLITE_INTEGER:
+      return std::int64_t{sqlite3_column_int64(statement, column)};
+    case SQLITE_FLOAT:
+      return sqlite3_column_double(statement, column);
+    case SQLITE_TEXT: {
+      const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement, column));
+      return std::string_view(text, size());
+    }
+    case SQLITE_BLOB: {
+      const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement, column));
+      return Blob{std::string_view(bytes, size())};
+    }
+    default:
+      return std::monostate();
+  }
+}
+
+std::vector<std::string> column_names(sqlite3_stmt* statement) {
+  std::vector<std::string> names;
+  for (int i = 0; i < sqlite3_column_count(statement); ++i) {
+    const char* name = sqlite3_column_name(statement, i);
+    names.emplace_back(name == nullptr ? "" : name);
+  }
+  return names;
+}
+
+}  // namespace
+
+QueryEnd run_query(const std::filesystem::path& file, const std::string& sql,
+                   const QueryLimits& limits, RowWriter& writer) {
+  // It knows a campaign file, an undamaged one, and says what is wrong with others.
+  (void)Store::open_read_only(file);
+  Reader reader(file, limits);
+  const Statement statement = reader.prepare(sql);
+  const std::vector<std::string> names = column_names(statement.get());
+  writer.begin(names);
+  std::vector<Cell> cells(names.size());
+  while (reader.step(statement.get(), sql)) {
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      cells[i] = cell_of(statement.get(), static_cast<int>(i));
+    }
+    writer.row(cells);
+  }
+  if (reader.is_interrupted()) return QueryEnd::interrupted;
+  writer.end();
+  return QueryEnd::complete;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "coordinator/query/row_writer.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+
+/// A query is wrong or asks for more than reading; reads
+/// `sql = SELECT x FROM event (no such column: x, at line 1, character 8)`.
+class QueryError : public InvalidArgument {
+ public:
+  using InvalidArgument::InvalidArgument;
+};
+
+/// A query took too long; reads `timeout = 60 (...)`.
+class TimeLimitError : public Error {
+ public:
+  using Error::Error;
+};
+
+struct QueryLimits {
+  std::chrono::duration<double> time_limit{60.0};
+  /// Asked every few microseconds; the query ends when it says so.
+  std::function<bool()> is_interrupted = [] { return false; };
+};
+
+enum class QueryEnd : std::uint8_t { complete, interrupted };
+
+/// Longest query that is read, bytes.
+inline constexpr std::size_t sql_size_max = 1'000'000;
+
+/// Asks one question of a campaign file, also while a coordinator writes to it. The statement may
+/// read, and nothing else; it sees the file as it was when it began.
+///
+/// @param writer  Has got part of the rows if an exception comes after begin().
+/// @throws QueryError, TimeLimitError; StoreError if the file cannot be read; and what the writer
+///         throws.
+[[nodiscard]] QueryEnd run_query(const std::filesystem::path& file, const std::string& sql,
+                                 const QueryLimits& limits, RowWriter& writer);
+
+}  // namespace proofmass::coordinator

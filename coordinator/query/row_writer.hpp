@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+
+namespace proofmass::coordinator {
+
+/// Bytes that are no text.
+struct Blob {
+  std::string_view bytes;
+};
+
+/// A value of SQL; monostate is NULL. Text and bytes live until the next row.
+using Cell = std::variant<std::monostate, std::int64_t, double, std::string_view, Blob>;
+
+/// What becomes of the rows of a query: begin() once, row() for each, end() once.
+class RowWriter {
+ public:
+  virtual ~RowWriter() = default;
+  /// @throws InvalidArgument if the format cannot hold such columns.
+  virtual void begin(std::span<const std::string> columns) = 0;
+  virtual void row(std::span<const Cell> cells) = 0;
+  virtual void end() = 0;
+};
+
+/// Takes the text of an output, piece by piece.
+using TextSink = std::function<void(std::string_view)>;
+
+enum class RowFormat : std::uint8_t { table, csv, json, markdown };
+
+/// For people: what a table may take.
+struct TableLimits {
+  std::size_t num_rows_max = 1000;         ///< Further rows are announced, but not shown.
+  std::optional<std::size_t> num_columns;  ///< Of the terminal; empty if it is none.
+};
+
+/// A writer of the format, which README.md describes.
+[[nodiscard]] std::unique_ptr<RowWriter> make_row_writer(RowFormat format,
+                                                         const TableLimits& limits, TextSink sink);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,211 @@
+#include "coordinator/query/aggregates.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <initializer_list>
+#include <limits>
+#include <random>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using Row = std::vector<std::optional<double>>;
+
+const Aggregate& aggregate(std::string_view name) {
+  return *std::ranges::find(aggregates(), name,
+                            [](const Aggregate& a) { return std::string_view(a.name); });
+}
+
+std::optional<double> value_of(std::string_view name, const std::vector<Row>& rows) {
+  AggregateRows group(aggregate(name));
+  for (const Row& row : rows) group.add(row);
+  return group.value();
+}
+
+std::vector<Row> rows_of(std::initializer_list<double> values) {
+  std::vector<Row> rows;
+  for (const double value : values) rows.push_back({value});
+  return rows;
+}
+
+std::vector<Row> with(std::vector<Row> rows, std::initializer_list<double> parameters) {
+  for (Row& row : rows) row.insert(row.end(), parameters.begin(), parameters.end());
+  return rows;
+}
+
+std::string error_of(std::string_view name, const std::vector<Row>& rows) {
+  try {
+    (void)value_of(name, rows);
+  } catch (const InvalidArgument& error) {
+    return error.what();
+  }
+  return {};
+}
+
+// Σ(x − 5)² = 32 over 8 values, and Σ(x − 5)³ = 42.
+const std::vector<Row> eight = rows_of({2, 4, 4, 4, 5, 5, 7, 9});
+
+TEST(Aggregates, StdevDividesByOneLessThanTheCount) {
+  EXPECT_DOUBLE_EQ(*value_of("stdev", eight), std::sqrt(32.0 / 7.0));
+  EXPECT_EQ(value_of("stdev", rows_of({3.0, 3.0})), 0.0);
+  EXPECT_FALSE(value_of("stdev", rows_of({3.0})));
+}
+
+TEST(Aggregates, StdevKeepsItsDigitsBesideALargeOffset) {
+  // Multiples of 2⁻²⁰ around 1e8 are doubles, so that only the statistics could round.
+  std::vector<Row> rows;
+  for (int i = -500; i <= 500; ++i) rows.push_back({1e8 + std::ldexp(i, -20)});
+  const double exact = std::ldexp(std::sqrt(1001.0 * 1002.0 / 12.0), -20);
+  EXPECT_NEAR(*value_of("stdev", rows) / exact, 1.0, 1e-15);
+}
+
+TEST(Aggregates, SkewnessIsTheAdjustedOne) {
+  const double plain = (42.0 / 8.0) / std::pow(32.0 / 8.0, 1.5);
+  EXPECT_NEAR(*value_of("skewness", eight), std::sqrt(8.0 * 7.0) / 6.0 * plain, 1e-15);
+  EXPECT_FALSE(value_of("skewness", rows_of({1.0, 2.0})));
+  EXPECT_FALSE(value_of("skewness", rows_of({1.0, 1.0, 1.0})));
+}
+
+TEST(Aggregates, PercentileInterpolatesBetweenNeighbours) {
+  const auto at = [](double p) { return *value_of("percentile", with(eight, {p})); };
+  EXPECT_EQ(at(0.0), 2.0);
+  EXPECT_EQ(at(50.0), 4.5);
+  EXPECT_DOUBLE_EQ(at(95.0), 7.0 + 0.65 * 2.0);  // Place 6.65 of 0 to 7.
+  EXPECT_EQ(at(100.0), 9.0);
+}
+
+TEST(Aggregates, CorrelationIsThatOfAHandComputedCase) {
+  // x = 1..4, y = 1, 3, 2, 4: Σxy about the means 4, Σx² and Σy² 5; the ranks are the values.
+  const std::vector<Row> rows{{1.0, 1.0}, {2.0, 3.0}, {3.0, 2.0}, {4.0, 4.0}};
+  EXPECT_DOUBLE_EQ(*value_of("correlation", rows), 0.8);
+  EXPECT_DOUBLE_EQ(*value_of("rank_correlation", rows), 0.8);
+}
+
+TEST(Aggregates, RankCorrelationOfARisingFunctionIsOne) {
+  std::vector<Row> rows;
+  for (double x = -5.0; x < 5.0; x += 0.5) rows.push_back({x, std::exp(x)});
+  EXPECT_EQ(*value_of("rank_correlation", rows), 1.0);
+  EXPECT_LT(*value_of("correlation", rows), 0.8);
+}
+
+TEST(Aggregates, CorrelationNeedsFourRowsAndColumnsThatVary) {
+  EXPECT_FALSE(value_of("correlation", {{1.0, 1.0}, {2.0, 2.0}, {3.0, 3.0}}));
+  EXPECT_FALSE(value_of("correlation", {{1.0, 1.0}, {2.0, 1.0}, {3.0, 1.0}, {4.0, 1.0}}));
+}
+
+TEST(Aggregates, WilksUpperIsTheLargestOf59For95PercentWith95Percent) {
+  std::vector<Row> rows;
+  for (int i = 1; i <= 58; ++i) rows.push_back({double(i), 0.95, 0.95});
+  EXPECT_FALSE(value_of("wilks_upper", rows));
+  for (int i = 59; i <= 92; ++i) rows.push_back({double(i), 0.95, 0.95});
+  EXPECT_EQ(value_of("wilks_upper", rows), 92.0);
+  rows.push_back({93.0, 0.95, 0.95});  // From 93 on it is the second largest [Wilks1941].
+  EXPECT_EQ(value_of("wilks_upper", rows), 92.0);
+}
+
+TEST(Aggregates, WilksUpperCountsANullAsLargerThanAnyValue) {
+  std::vector<Row> rows;
+  for (int i = 1; i <= 92; ++i) rows.push_back({double(i), 0.95, 0.95});
+  rows.push_back({std::nullopt, 0.95, 0.95});
+  EXPECT_EQ(value_of("wilks_upper", rows), 92.0);
+  rows.push_back({std::nullopt, 0.95, 0.95});
+  EXPECT_FALSE(value_of("wilks_upper", rows));
+}
+
+TEST(Aggregates, OthersLeaveOutRowsWithANull) {
+  std::vector<Row> rows = eight;
+  rows.insert(rows.begin() + 3, Row{std::nullopt});
+  EXPECT_EQ(value_of("stdev", rows), value_of("stdev", eight));
+  const std::vector<Row> pairs{{1.0, 1.0}, {2.0, 3.0}, {3.0, 2.0}, {4.0, 4.0}};
+  std::vector<Row> more = pairs;
+  more.push_back({9.0, std::nullopt});
+  more.push_back({std::nullopt, 9.0});
+  EXPECT_EQ(value_of("correlation", more), value_of("correlation", pairs));
+}
+
+TEST(Aggregates, AreEmptyWithoutAnyValue) {
+  for (const Aggregate& function : aggregates()) {
+    EXPECT_FALSE(AggregateRows(function).value()) << function.name;
+    Row row(function.num_columns);
+    row.resize(function.arguments.size(), 0.5);
+    EXPECT_FALSE(value_of(function.name, {row})) << function.name;
+  }
+}
+
+// The bits, as the sums in another order differ in the last ones.
+TEST(Aggregates, DoNotDependOnTheOrderOfRows) {
+  std::mt19937_64 engine(11);
+  std::vector<Row> rows;
+  for (int i = 0; i < 2000; ++i) {
+    const double x = 1e8 + std::ldexp(static_cast<double>(engine() >> 11U), -53);
+    rows.push_back({x, std::ldexp(static_cast<double>(engine() >> 44U), -30)});
+  }
+  rows.push_back({0.0, -0.0});
+  rows.push_back({-0.0, 0.0});
+  for (const Aggregate& function : aggregates()) {
+    const auto shuffled_bits = [&] {
+      std::ranges::shuffle(rows, engine);
+      AggregateRows group(function);
+      for (Row row : rows) {
+        row.resize(function.num_columns);
+        row.resize(function.arguments.size(), 0.9);
+        group.add(row);
+      }
+      return std::bit_cast<std::uint64_t>(*group.value());
+    };
+    const std::uint64_t first = shuffled_bits();
+    for (int i = 0; i < 20; ++i) EXPECT_EQ(shuffled_bits(), first) << function.name;
+  }
+}
+
+TEST(Aggregates, RefuseParametersThatBreakTheirRule) {
+  EXPECT_EQ(error_of("percentile", with(eight, {101.0})), "p = 101 (must be in [0, 100])");
+  EXPECT_EQ(error_of("percentile", with(eight, {-0.5})), "p = -0.5 (must be in [0, 100])");
+  EXPECT_EQ(error_of("percentile", {{1.0, std::nullopt}}), "p = NULL (must be a number)");
+  EXPECT_EQ(error_of("percentile", {{1.0, 50.0}, {1.0, 60.0}}),
+            "p = 60 (must be the same for all rows, was 50)");
+  EXPECT_EQ(error_of("wilks_upper", with(eight, {95.0, 0.95})),
+            "coverage = 95 (must be in (0, 1))");
+  EXPECT_EQ(error_of("wilks_upper", with(eight, {0.95, 1.0})),
+            "confidence = 1 (must be in (0, 1))");
+}
+
+TEST(Aggregates, RefuseInfinity) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(error_of("stdev", rows_of({1.0, infinity})), "x = inf (must be finite)");
+  EXPECT_EQ(error_of("correlation", {{1.0, -infinity}}), "y = -inf (must be finite)");
+}
+
+TEST(Aggregates, RefuseMoreRowsThanTheyMayCollect) {
+  AggregateRows group(aggregate("stdev"), 2);
+  const Row row{1.0};
+  group.add(row);
+  group.add(row);
+  group.add(Row{std::nullopt});  // Takes no room.
+  try {
+    group.add(row);
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_STREQ(error.what(), "x > 2 rows (too many to collect)");
+  }
+}
+
+TEST(Aggregates, HaveNoValueAfterARowThatWasRefused) {
+  AggregateRows group(aggregate("percentile"));
+  const Row row{1.0, std::nullopt};
+  EXPECT_THROW(group.add(row), InvalidArgument);
+  EXPECT_FALSE(group.value());
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

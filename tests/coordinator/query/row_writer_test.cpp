@@ -1,0 +1,174 @@
+#include "coordinator/query/row_writer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "coordinator/query/cell_text.hpp"
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using Row = std::vector<Cell>;
+constexpr Cell null{};
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+Cell integer(std::int64_t value) { return value; }
+Cell text(std::string_view value) { return value; }
+
+std::string written(RowFormat format, const std::vector<std::string>& columns,
+                    const std::vector<Row>& rows, const TableLimits& limits = {}) {
+  std::string out;
+  const auto writer =
+      make_row_writer(format, limits, [&](std::string_view piece) { out += piece; });
+  writer->begin(columns);
+  for (const Row& row : rows) writer->row(row);
+  writer->end();
+  return out;
+}
+
+TEST(CellText, IsTheShortestThatReadsBack) {
+  EXPECT_EQ(shortest_text(0.1), "0.1");
+  EXPECT_EQ(shortest_text(1.0), "1");
+  EXPECT_EQ(shortest_text(-0.0), "-0");
+  EXPECT_EQ(shortest_text(1.0 / 3.0), "0.3333333333333333");
+  EXPECT_EQ(shortest_text(5e-324), "5e-324");
+  EXPECT_EQ(shortest_text(1.7976931348623157e308), "1.7976931348623157e+308");
+  EXPECT_EQ(shortest_text(infinity), "inf");
+}
+
+TEST(CellText, ReadsBackToTheSameBits) {
+  std::uint64_t state = 1;
+  for (int i = 0; i < 100'000; ++i) {
+    state = state * 6364136223846793005 + 1442695040888963407;
+    const double value = std::bit_cast<double>(state);
+    if (!std::isfinite(value)) continue;
+    const double read = std::strtod(shortest_text(value).c_str(), nullptr);
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(read), state);
+  }
+}
+
+TEST(CsvRows, FollowRfc4180) {
+  EXPECT_EQ(
+      written(RowFormat::csv, {"a", "b, c", "d"},
+              {{integer(1), text("plain"), 0.5},
+               {null, text("say \"x\", y"), -infinity},
+               {integer(std::numeric_limits<std::int64_t>::min()), text("two\nlines"), null}}),
+      "a,\"b, c\",d\r\n"
+      "1,plain,0.5\r\n"
+      ",\"say \"\"x\"\", y\",-inf\r\n"
+      "-9223372036854775808,\"two\nlines\",\r\n");
+}
+
+TEST(CsvRows, TellNullFromEmptyText) {
+  EXPECT_EQ(written(RowFormat::csv, {"a", "b"}, {{null, text("")}}), "a,b\r\n,\"\"\r\n");
+}
+
+TEST(CsvRows, HoldBytesAsSqlWritesThem) {
+  EXPECT_EQ(written(RowFormat::csv, {"a"}, {{Blob{std::string_view("\0\xff\x0a", 3)}}}),
+            "a\r\nx'00ff0a'\r\n");
+}
+
+TEST(JsonRows, AreAListOfObjects) {
+  EXPECT_EQ(written(RowFormat::json, {"a", "b"}, {{integer(1), text("s²/m")}, {0.1, null}}),
+            "[\n {\"a\": 1, \"b\": \"s²/m\"},\n {\"a\": 0.1, \"b\": null}\n]\n");
+  EXPECT_EQ(written(RowFormat::json, {"a"}, {}), "[]\n");
+}
+
+TEST(JsonRows, CanBeReadWhateverTheyHold) {
+  const std::string json =
+      written(RowFormat::json, {"quote \" \n"},
+              {{text("\x1b \" \\ \xff \n")}, {Blob{"\x01"}}, {1e300}, {std::int64_t{1} << 62}});
+  const auto read = nlohmann::json::parse(json);
+  const std::string key = "quote \" \n";
+  EXPECT_EQ(read.at(0).at(key), "\x1b \" \\ \ufffd \n");
+  EXPECT_EQ(read.at(1).at(key), "x'01'");
+  EXPECT_EQ(read.at(2).at(key), 1e300);
+  EXPECT_EQ(read.at(3).at(key), std::int64_t{1} << 62);
+}
+
+TEST(JsonRows, HaveInfinityAsANumberBeyondAll) {
+  EXPECT_EQ(written(RowFormat::json, {"a"}, {{infinity}, {-infinity}}),
+            "[\n {\"a\": 1e999},\n {\"a\": -1e999}\n]\n");
+}
+
+TEST(JsonRows, RefuseTwoColumnsOfOneName) {
+  try {
+    (void)written(RowFormat::json, {"a", "b", "a"}, {});
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_STREQ(error.what(),
+                 "format = json (two columns are called a; name one of them with AS)");
+  }
+}
+
+TEST(TableRows, StandUnderTheirNamesWithNumbersToTheRight) {
+  EXPECT_EQ(written(RowFormat::table, {"parameter", "unit", "worst"},
+                    {{text("k2d"), text("s²/m"), 124.5},
+                     {text("測定"), null, null},
+                     {text("a_c12"), text("rad"), integer(7)}}),
+            "parameter  unit  worst\n"
+            "─────────  ────  ─────\n"
+            "k2d        s²/m  124.5\n"
+            "測定\n"
+            "a_c12      rad       7\n");
+}
+
+TEST(TableRows, AreNamedAlsoIfThereAreNone) {
+  EXPECT_EQ(written(RowFormat::table, {"a", "bc"}, {}), "a  bc\n─  ──\n");
+}
+
+TEST(TableRows, TakeOneLineEachAndSteerNoTerminal) {
+  EXPECT_EQ(written(RowFormat::table, {"a"}, {{text("one\ntwo\x1b[2J")}}),
+            "a\n─────────────────\none\\ntwo\\u001b[2J\n");
+}
+
+TEST(TableRows, EndWithTheCountOfThoseNotShown) {
+  EXPECT_EQ(written(RowFormat::table, {"a"}, {{integer(1)}, {integer(2)}, {integer(3)}},
+                    {.num_rows_max = 2, .num_columns = {}}),
+            "a\n─\n1\n2\n2 of 3 rows (more with --rows-max)\n");
+}
+
+TEST(TableRows, CutTextToFitTheTerminalAndNeverANumber) {
+  const std::vector<Row> rows{{text("a long text that goes on and on"), 0.1234567890123456}};
+  EXPECT_EQ(
+      written(RowFormat::table, {"text", "value"}, rows, {.num_rows_max = 10, .num_columns = 34}),
+      "text                         value\n"
+      "──────────────  ──────────────────\n"
+      "a long text t…  0.1234567890123456\n");
+  EXPECT_EQ(
+      written(RowFormat::table, {"text", "value"}, rows, {.num_rows_max = 10, .num_columns = 10}),
+      "text                   value\n"
+      "────────  ──────────────────\n"
+      "a long …  0.1234567890123456\n");
+}
+
+TEST(TableRows, CutVeryLongText) {
+  const std::string table = written(RowFormat::table, {"a"}, {{text(std::string(1'000'000, 'x'))}});
+  EXPECT_NE(table.find("\n" + std::string(99, 'x') + "…\n"), std::string::npos);
+  EXPECT_LT(table.size(), 600u);
+}
+
+TEST(MarkdownRows, MakeATable) {
+  EXPECT_EQ(written(RowFormat::markdown, {"parameter", "worst"},
+                    {{text("a_c12"), 0.5}, {null, integer(-3)}}),
+            "| parameter | worst |\n| --- | ---: |\n| a_c12 | 0.5 |\n|  | -3 |\n");
+  EXPECT_EQ(written(RowFormat::markdown, {"a", "b"}, {}), "| a | b |\n| --- | --- |\n");
+}
+
+TEST(MarkdownRows, HoldTextThatMarkdownWouldRead) {
+  EXPECT_EQ(written(RowFormat::markdown, {"_a_"}, {{text("a|b\n<i> *x* `y` [z] \\ _c_d_")}}),
+            "| \\_a\\_ |\n| --- |\n"
+            "| a\\|b\\\\n\\<i> \\*x\\* \\`y\\` \\[z\\] \\\\ \\_c_d\\_ |\n");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
