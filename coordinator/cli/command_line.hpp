@@ -15,9 +15,9 @@ using Command = std::function<int()>;
 /// @param chosen  Set while the arguments are parsed; outlives `app`.
 void add_local_commands(CLI::App& app, Command& chosen);
 
-/// Declares `report` and `sensitivity`.
+/// Declares `report`, `sensitivity` and `query`.
 /// @param chosen  As above.
-void add_report_commands(CLI::App& app, Command& chosen);
+void add_analysis_commands(CLI::App& app, Command& chosen);
 
 /// Declares `submit`, `status`, `watch`, `pause`, `resume`, `cancel` and `workers`.
 /// @param chosen  As above.

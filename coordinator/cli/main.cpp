@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
 
   Command chosen;
   add_local_commands(app, chosen);
-  add_report_commands(app, chosen);
+  add_analysis_commands(app, chosen);
   add_archive_commands(app, chosen);
   add_client_commands(app, chosen);
   return run_program(app, argc, argv, [&] { return chosen(); });

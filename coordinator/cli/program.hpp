@@ -17,8 +17,8 @@ namespace proofmass::coordinator {
 inline constexpr const char* exit_codes_text =
     "Exit codes:\n"
     "  0    done\n"
-    "  1    cannot be done: disk, database, address, workers that crash\n"
-    "  2    wrong usage or campaign file\n"
+    "  1    cannot be done: disk, database, address, workers that crash, time limit\n"
+    "  2    wrong usage, campaign file or query\n"
     "  3    a requirement or stop rule is not met\n"
     "  130  interrupted by SIGINT or SIGTERM; what is stored stands";
 

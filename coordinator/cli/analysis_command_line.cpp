@@ -1,12 +1,21 @@
 #include <CLI/CLI.hpp>
+#include <cstddef>
+#include <map>
 #include <memory>
+#include <string>
 
 #include "coordinator/cli/command_line.hpp"
+#include "coordinator/cli/query_command.hpp"
 #include "coordinator/cli/report_command.hpp"
 #include "core/campaign/dispersion.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+constexpr double timeout_s_max = 86'400.0;
+constexpr std::size_t table_rows_max = 1'000'000;
+
+// Each command shares its options with the callback that CLI11 keeps and with the chosen command.
 
 void add_report(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<ReportOptions>();
@@ -32,11 +41,33 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
       [options, &chosen] { chosen = [options] { return print_sensitivity(*options); }; });
 }
 
+void add_query(CLI::App& app, Command& chosen) {
+  static const std::map<std::string, RowFormat> formats{{"table", RowFormat::table},
+                                                        {"csv", RowFormat::csv},
+                                                        {"json", RowFormat::json},
+                                                        {"markdown", RowFormat::markdown}};
+  const auto options = std::make_shared<QueryOptions>();
+  CLI::App& query = *app.add_subcommand("query", "Ask a database a question in SQL");
+  query.add_option("DB", options->database, "Database of a campaign")->required();
+  query.add_option("SQL", options->sql, "One statement that reads; - for standard input")
+      ->required();
+  query.add_option("--format", options->format, "table, csv, json or markdown; table by default")
+      ->transform(CLI::CheckedTransformer(formats).description(""));
+  query.add_option("--timeout", options->timeout_s, "Seconds that it may take")
+      ->check(CLI::Range(0.001, timeout_s_max))
+      ->capture_default_str();
+  query.add_option("--rows-max", options->num_rows_max, "Rows that a table shows")
+      ->check(CLI::Range(std::size_t{1}, table_rows_max))
+      ->capture_default_str();
+  query.callback([options, &chosen] { chosen = [options] { return query_database(*options); }; });
+}
+
 }  // namespace
 
-void add_report_commands(CLI::App& app, Command& chosen) {
+void add_analysis_commands(CLI::App& app, Command& chosen) {
   add_report(app, chosen);
   add_sensitivity(app, chosen);
+  add_query(app, chosen);
 }
 
 }  // namespace proofmass::coordinator

@@ -1,0 +1,67 @@
+#include "coordinator/cli/query_command.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/cli/watch_display.hpp"
+#include "coordinator/query/query.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+std::string read_standard_input() {
+  std::string text;
+  std::array<char, 4096> buffer{};
+  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), stdin)) {
+    text.append(buffer.data(), size);
+    if (text.size() > sql_size_max) {
+      throw UsageError(
+          fmt::format("sql = - (standard input has more than {} bytes)", sql_size_max));
+    }
+  }
+  if (std::ferror(stdin) != 0) {
+    throw Error(fmt::format("standard input: {}", std::strerror(errno)));
+  }
+  return text;
+}
+
+[[noreturn]] void fail_to_write() {
+  throw Error(fmt::format("standard output: {}", std::strerror(errno)));
+}
+
+void write_standard_output(std::string_view text) {
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) fail_to_write();
+}
+
+std::optional<std::size_t> terminal_columns() {
+  if (isatty(fileno(stdout)) == 0) return std::nullopt;
+  return screen_size_of(stdout).columns;
+}
+
+}  // namespace
+
+int query_database(const QueryOptions& options) {
+  // While it waits for input, a signal ends the process at once.
+  const std::string sql = options.sql == "-" ? read_standard_input() : options.sql;
+  const auto& stop = catch_stop_signals(OnTerminate::stop_now);
+  const QueryLimits limits{.time_limit = std::chrono::duration<double>(options.timeout_s),
+                           .is_interrupted = [&] { return stop != StopRequest::none; }};
+  const TableLimits table{.num_rows_max = options.num_rows_max, .num_columns = terminal_columns()};
+  const auto writer = make_row_writer(options.format, table, write_standard_output);
+  const QueryEnd end = run_query(options.database, sql, limits, *writer);
+  if (std::fflush(stdout) != 0) fail_to_write();
+  return end == QueryEnd::complete ? exit_done : exit_interrupted;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,110 @@
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/system/process.hpp"
+
+namespace proofmass::test {
+namespace {
+
+using testing::HasSubstr;
+
+/// `proofmass query` as a process.
+class QueryProcess : public StoreTest {
+ protected:
+  QueryProcess() {
+    const Campaign campaign = campaign_of(4);
+    coordinator::Store store =
+        coordinator::Store::create(file(), campaign, coordinator::canonical_definition(campaign));
+    const coordinator::Entry worker = worker_1();
+    store.write({&worker, 1});
+    store.commit(deliveries_of(0, 3));
+  }
+
+  /// Exit code of the query.
+  int query(const std::vector<std::string>& arguments) {
+    std::vector<std::string> all{"query", file().string()};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    return Process(directory(), "query", program(), all).wait();
+  }
+  /// The same with a shell's redirections.
+  int query_in_shell(const std::string& rest) {
+    const std::string command = program() + " query " + file().string() + " " + rest;
+    return Process(directory(), "query", "/bin/sh", {"-c", command}).wait();
+  }
+  [[nodiscard]] static std::string program() {
+    return std::string(PROOFMASS_PROGRAMS) + "/proofmass";
+  }
+  [[nodiscard]] std::string output() const { return read_file(directory() / "query.out"); }
+  [[nodiscard]] std::string errors() const { return read_file(directory() / "query.err"); }
+};
+
+TEST_F(QueryProcess, PrintsATable) {
+  EXPECT_EQ(query({"SELECT run_index, status FROM run_result"}), 0);
+  EXPECT_EQ(output(),
+            "run_index  status\n"
+            "─────────  ──────\n"
+            "        0       1\n"
+            "        1       1\n"
+            "        2       1\n");
+  EXPECT_EQ(errors(), "");
+}
+
+TEST_F(QueryProcess, PrintsTheFormatThatIsAskedFor) {
+  EXPECT_EQ(query({"SELECT 0.1 AS a", "--format", "csv"}), 0);
+  EXPECT_EQ(output(), "a\r\n0.1\r\n");
+  EXPECT_EQ(query({"SELECT 0.1 AS a", "--format", "json"}), 0);
+  EXPECT_EQ(output(), "[\n {\"a\": 0.1}\n]\n");
+  EXPECT_EQ(query({"SELECT 0.1 AS a", "--format", "markdown"}), 0);
+  EXPECT_EQ(output(), "| a |\n| ---: |\n| 0.1 |\n");
+}
+
+TEST_F(QueryProcess, ReadsTheQueryFromStandardInput) {
+  std::ofstream(directory() / "question.sql")
+      << "SELECT count(*) AS n -- results\nFROM run_result;\n";
+  EXPECT_EQ(query_in_shell("- --format csv < question.sql"), 0);
+  EXPECT_EQ(output(), "n\r\n3\r\n");
+}
+
+TEST_F(QueryProcess, EndsWith2ForAWrongQuery) {
+  EXPECT_EQ(query({"SELECT a FROM nowhere"}), 2);
+  EXPECT_EQ(output(), "");
+  EXPECT_EQ(errors(), "proofmass: error: sql = SELECT a FROM nowhere (no such table: nowhere)\n");
+  EXPECT_EQ(query({"DELETE FROM run_result"}), 2);
+  EXPECT_EQ(query({"SELECT 1", "--format", "xml"}), 2);
+  EXPECT_EQ(query({"SELECT 1 AS a, 2 AS a", "--format", "json"}), 2);
+  EXPECT_EQ(query_in_shell("- < /dev/zero"), 2);
+  EXPECT_EQ(errors(), "proofmass: error: sql = - (standard input has more than 1000000 bytes)\n");
+}
+
+TEST_F(QueryProcess, EndsWith1ForWhatCannotBeDone) {
+  EXPECT_EQ(query({"WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) "
+                   "SELECT max(i) FROM n",
+                   "--timeout", "0.2"}),
+            1);
+  EXPECT_EQ(errors(),
+            "proofmass: error: timeout = 0.2 (the query did not end in so many seconds)\n");
+  EXPECT_EQ(query_in_shell("'SELECT 1' > /dev/full"), 1);
+  EXPECT_EQ(errors(), "proofmass: error: standard output: No space left on device\n");
+  std::filesystem::remove(file());
+  EXPECT_EQ(query({"SELECT 1"}), 1);
+  EXPECT_THAT(errors(), HasSubstr("(does not exist)"));
+}
+
+TEST_F(QueryProcess, EndsWith130WhenItIsInterrupted) {
+  Process query(
+      directory(), "query", program(),
+      {"query", file().string(), "--format", "csv",
+       "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i FROM n"});
+  wait_until("first rows", [&] { return !output().empty(); });
+  query.signal(SIGINT);
+  EXPECT_EQ(query.wait(), 130);
+  EXPECT_EQ(errors(), "");
+}
+
+}  // namespace
+}  // namespace proofmass::test
