@@ -8,15 +8,10 @@
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/archive/campaign_mark.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/run_ranges.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-std::uint64_t count(std::span<const RunRange> ranges) {
-  std::uint64_t num_runs = 0;
-  for (const RunRange& range : ranges) num_runs += range.count;
-  return num_runs;
-}
 
 ListedCampaign listed(const std::filesystem::path& file) {
   try {
@@ -26,7 +21,7 @@ ListedCampaign listed(const std::filesystem::path& file) {
             .name = store.name(),
             .seed = store.seed(),
             .num_runs = store.num_runs(),
-            .num_finished = count(store.finished_runs()),
+            .num_finished = num_runs_in(store.finished_runs()),
             .phase = store.control().phase,
             .created_utc = store.created_utc(),
             .tags = store.tags()};

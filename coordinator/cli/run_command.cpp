@@ -19,6 +19,7 @@
 #include "coordinator/net/service.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "core/campaign/run_ranges.hpp"
 #include "core/simulation/reference_digest.hpp"
 #include "core/simulation/run.hpp"
 
@@ -29,14 +30,8 @@ std::filesystem::path database_of(const RunOptions& options) {
   return options.database.value_or(options.campaign_file.stem().string() + ".db");
 }
 
-std::uint64_t count(std::span<const RunRange> ranges) {
-  std::uint64_t num_runs = 0;
-  for (const RunRange& range : ranges) num_runs += range.count;
-  return num_runs;
-}
-
 std::uint64_t num_missing(const Store& store) {
-  return store.num_runs() - count(store.finished_runs());
+  return store.num_runs() - num_runs_in(store.finished_runs());
 }
 
 /// No more than there are batches: runs of one batch take no longer than one of them.
@@ -123,7 +118,7 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
   const PrivateEndpoint endpoint;
   GrowingFile file;
   const std::uint64_t num_local =
-      num_workers(options, num_runs - count(campaign.store.finished_runs()));
+      num_workers(options, num_runs - num_runs_in(campaign.store.finished_runs()));
   std::vector<ServedCampaign> campaigns;
   campaigns.push_back(std::move(campaign));
   Service service(std::move(campaigns), service_config(endpoint, num_local, file), log_to(display));
@@ -160,7 +155,7 @@ int say_cancelled(const Store& store, std::uint64_t failures_max) {
   fmt::print(stderr,
              "proofmass: error: {} of {} runs given up or without an estimate (at most {} with "
              "--failures); cancelled\n",
-             store.num_without_estimate() + count(store.given_up_runs()), store.num_runs(),
+             store.num_without_estimate() + num_runs_in(store.given_up_runs()), store.num_runs(),
              failures_max);
   return exit_cannot_be_done;
 }
@@ -172,10 +167,7 @@ int run_campaign(const RunOptions& options) {
   const std::filesystem::path database = database_of(options);
   Outcome outcome = compute(open_or_create(campaign, plan_of(options, campaign.num_runs), database),
                             campaign.num_runs, options);
-  // The service has seen to those of a campaign that is finished.
-  if (outcome.store.control().phase != wire::CampaignPhase::finished) {
-    update_statistics(outcome.store, campaign.scenario);
-  }
+  update_statistics(outcome.store, campaign.scenario);
   if (!outcome.is_done) return say_interrupted(outcome.store, database);
   fmt::print("{}", report_text(outcome.store, campaign.scenario));
   if (outcome.store.control().phase == wire::CampaignPhase::cancelled) {

@@ -135,8 +135,8 @@ void log_start(const Service& service, const Log& log) {
 /// @return True if runs were given up.
 bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
   bool has_given_up = false;
-  for (auto& [file, store, definition, has_new_results] : campaigns) {
-    if (has_new_results) update_statistics(store, definition->scenario);
+  for (auto& [file, store, definition] : campaigns) {
+    update_statistics(store, definition->scenario);
     has_given_up = has_given_up || !store.given_up_runs().empty();
   }
   log({.kind = "coordinator_ended", .text = fmt::format("campaigns={}", campaigns.size())});

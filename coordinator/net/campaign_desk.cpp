@@ -351,8 +351,7 @@ std::vector<ServedCampaign> CampaignDesk::close() {
     const CampaignState& campaign = state_.campaigns.at(id);
     campaigns.push_back({.file = served.file,
                          .store = std::move(store),
-                         .definition = campaign.definition,
-                         .has_new_results = campaign.num_committed_here > served.num_summarised});
+                         .definition = campaign.definition});
   }
   served_.clear();
   return campaigns;

@@ -17,7 +17,6 @@ struct ServedCampaign {
   std::filesystem::path file;
   Store store;
   std::shared_ptr<const Campaign> definition;  ///< Shared with the dispatch and its messages.
-  bool has_new_results = false;                ///< Since its statistics were computed.
 };
 
 /// The number of runs that a campaign is to have for now. With a stop rule it is the next at which

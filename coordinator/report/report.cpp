@@ -4,6 +4,7 @@
 
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "core/campaign/run_ranges.hpp"
 
 namespace proofmass::coordinator {
 
@@ -37,10 +38,9 @@ std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_
 
 std::string given_up_text(std::span<const RunRange> given_up) {
   if (given_up.empty()) return "";
-  std::uint64_t num_runs = 0;
-  for (const RunRange& range : given_up) num_runs += range.count;
   constexpr std::size_t columns_max = 76;  // And an ellipsis.
-  std::string line = fmt::format("          {} given up, having crashed workers:", num_runs);
+  std::string line =
+      fmt::format("          {} given up, having crashed workers:", num_runs_in(given_up));
   for (const RunRange& range : given_up) {
     const std::string item = range.count == 1
                                  ? fmt::format(" {}", range.first.value)
@@ -50,6 +50,17 @@ std::string given_up_text(std::span<const RunRange> given_up) {
   }
   return line + "\n";
 }
+
+namespace {
+
+// Results never change: as many of them are the same ones.
+bool are_current(const Store& store) {
+  const std::optional<Summary> summary = store.summary();
+  return summary && summary->num_finished == num_runs_in(store.finished_runs()) &&
+         summary->num_given_up == num_runs_in(store.given_up_runs());
+}
+
+}  // namespace
 
 ReadResults read_results(const Store& store, const Scenario& scenario) {
   ReadResults results{
@@ -65,6 +76,7 @@ ReadResults read_results(const Store& store, const Scenario& scenario) {
 }
 
 void update_statistics(Store& store, const Scenario& scenario) {
+  if (are_current(store)) return;
   write_statistics(store, scenario, read_results(store, scenario));
 }
 

@@ -50,7 +50,8 @@ struct ReadResults {
 /// Stores statistics, their digest, and the budgets that follow from them in the file.
 void write_statistics(Store& store, const Scenario& scenario, const ReadResults& results);
 
-/// Brings the statistics and budgets that are stored in the file up to its results.
+/// Brings the statistics and budgets that are stored in the file up to its results; does nothing
+/// if they are.
 void update_statistics(Store& store, const Scenario& scenario);
 
 }  // namespace proofmass::coordinator

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "coordinator/report/text_cells.hpp"
+#include "core/campaign/run_ranges.hpp"
 #include "core/campaign/statistics.hpp"
 #include "core/error.hpp"
 
@@ -70,8 +71,7 @@ std::vector<RequirementAnswer> check_requirements(const Store& store,
   }
   ParameterArray no_objectives{};
   StatisticsAccumulator accumulator(no_objectives);
-  std::uint64_t num_without_estimate = 0;
-  for (const RunRange& range : store.given_up_runs()) num_without_estimate += range.count;
+  std::uint64_t num_without_estimate = num_runs_in(store.given_up_runs());
   store.for_each_result([&](const RunResult& result) {
     accumulator.add(result);
     if (!result.has_estimate()) ++num_without_estimate;

@@ -15,14 +15,14 @@ namespace proofmass::test {
 namespace {
 
 /// Prints each table and view with its number of columns and of rows, all of which it reads.
-constexpr const char* python_reader = R"(
+constexpr const char* python_reader = R"py(
 import sqlite3, sys
 connection = sqlite3.connect("file:" + sys.argv[1] + "?mode=ro", uri=True)
 kinds = "SELECT name FROM sqlite_schema WHERE type IN ('table', 'view')"
 for (name,) in connection.execute(kinds).fetchall():
     cursor = connection.execute("SELECT * FROM " + name)
     print(name, len(cursor.description), len(cursor.fetchall()))
-)";
+)py";
 
 class StockReader : public FaultTest {
  protected:

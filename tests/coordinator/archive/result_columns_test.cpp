@@ -20,7 +20,8 @@ TEST_F(ResultColumns, AreThoseOfTheTable) {
       const RunResult result = test::result_of(run, static_cast<RunStatus>(row.integer(2)));
       const std::optional<double> value = column.value_in(result);
       EXPECT_EQ(value.has_value(), row.integer(0) == 0) << column.name << " of run " << run;
-      if (value) EXPECT_EQ(test::bits_of(*value), test::bits_of(row.real(1))) << column.name;
+      if (!value) continue;
+      EXPECT_EQ(test::bits_of(*value), test::bits_of(row.real(1))) << column.name;
     }
   }
 }

@@ -301,15 +301,16 @@ TEST_F(Verification, NeedsACampaignFileAndAFraction) {
 TEST(CheckText, IsALineAndItsDetails) {
   EXPECT_EQ(check_text({.name = "digest", .finding = "of 18 runs", .details = {"abc"}}),
             "digest      ok           of 18 runs\n  abc\n");
-  EXPECT_EQ(check_text({.name = "model", .verdict = Verdict::fails, .finding = "no"}),
-            "model       FAILS        no\n");
+  EXPECT_EQ(
+      check_text({.name = "model", .verdict = Verdict::fails, .finding = "no", .details = {}}),
+      "model       FAILS        no\n");
 }
 
 TEST(CheckText, BreaksLinesBetweenWords) {
   std::string finding;
   for (int i = 0; i < 40; ++i) finding += "seven77 ";
-  std::istringstream lines(
-      check_text({.name = "digest", .verdict = Verdict::not_checked, .finding = finding}));
+  std::istringstream lines(check_text(
+      {.name = "digest", .verdict = Verdict::not_checked, .finding = finding, .details = {}}));
   std::size_t num_lines = 0, num_words = 0;
   for (std::string line; std::getline(lines, line); ++num_lines) {
     EXPECT_LE(text_width(line), 80U);
