@@ -63,6 +63,9 @@ class Handle {
 class Writer {
  public:
   explicit Writer(const DraftFile& file) : name_(file.path()) {
+    // After a file that could not be flushed, the library's own end would crash; nothing is left
+    // for it to do, as all files are closed here.
+    (void)H5dont_atexit();
     // Errors are thrown, not printed.
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     file_ = Handle(H5Fcreate(file.draft().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT),

@@ -349,9 +349,8 @@ std::vector<ServedCampaign> CampaignDesk::close() {
     Store store = writer_.close(id);
     store.end_coordinator(start_.epoch);
     const CampaignState& campaign = state_.campaigns.at(id);
-    campaigns.push_back({.file = served.file,
-                         .store = std::move(store),
-                         .definition = campaign.definition});
+    campaigns.push_back(
+        {.file = served.file, .store = std::move(store), .definition = campaign.definition});
   }
   served_.clear();
   return campaigns;
