@@ -17,7 +17,7 @@
 namespace proofmass::coordinator {
 namespace {
 
-constexpr hsize_t chunk_rows = 16384;
+constexpr hsize_t chunk_rows = 2048;
 
 // Called for each entry of the library's stack of errors, the first cause last.
 herr_t keep_last(unsigned /*position*/, const H5E_error2_t* entry, void* text) {
