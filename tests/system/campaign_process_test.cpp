@@ -25,6 +25,16 @@ TEST_F(CampaignProcess, ThreeWorkersGiveTheBitsOfOne) {
   EXPECT_EQ(stored_runs(path("three.db")), reference());
 }
 
+TEST_F(CampaignProcess, LeavesStatisticsOfAllResults) {
+  EXPECT_EQ(start("all", {}).wait(), 0) << errors_of("all");
+  EXPECT_EQ(stored_text(path("all.db"), "SELECT num_finished FROM summary"),
+            std::to_string(num_runs));
+  EXPECT_EQ(
+      stored_text(path("all.db"), "SELECT count(*) FROM parameter_accuracy WHERE num_runs = " +
+                                      std::to_string(num_runs)),
+      "10");
+}
+
 TEST_F(CampaignProcess, AnotherSeedGivesOtherResults) {
   EXPECT_EQ(start("other", {"--seed", "2", "--runs", "1"}).wait(), 0);
   EXPECT_NE(stored_runs(path("other.db")).at(0), reference().at(0));

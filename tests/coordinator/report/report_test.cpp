@@ -1,8 +1,12 @@
 #include "coordinator/report/report.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
+#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -204,6 +208,36 @@ TEST_F(StoredReport, IsThatOfTheResultsInTheFile) {
             summary_text("hardy2013", 1, 12, statistics, digest_of(store)) + "\n" +
                 accuracy_table(scenario, statistics) + "\n" + interval_table(statistics) + "\n" +
                 budget_table(scenario, statistics));
+}
+
+// Every number that is stored, as text of 17 digits, of results with errors that do not add up to
+// the same in every order: 1e8 beside 1e-8.
+TEST_F(StoredReport, IsTheSameBitsInWhateverOrderResultsCome) {
+  std::vector<Delivery> deliveries = test::deliveries_of(0, 500);
+  for (Delivery& delivery : deliveries) {
+    const auto run = static_cast<double>(delivery.result.run.value);
+    delivery.result.truth.fill(0.0);
+    delivery.result.estimate.fill(1e8 * std::sin(run) + 1e-8 * std::cos(1.7 * run));
+  }
+  const auto stored = [&](const std::string& name) {
+    Store store = Store::create(file().replace_filename(name), test::campaign_of(500), "");
+    for (const Delivery& delivery : deliveries) store.commit({&delivery, 1});
+    update_statistics(store, Scenario{});
+    const detail::Database database(file().replace_filename(name), detail::Access::read_only);
+    std::string numbers = store.summary()->digest;
+    for (const char* const table : {"statistic", "budget_entry"}) {
+      const std::string columns =
+          database.text(fmt::format("SELECT group_concat(printf('quote(%s)', name), '||') FROM "
+                                    "pragma_table_info('{}')",
+                                    table));
+      numbers += database.text(fmt::format("SELECT group_concat({}) FROM {}", columns, table));
+    }
+    return numbers;
+  };
+  const std::string in_run_order = stored("ascending.db");
+  EXPECT_GT(in_run_order.size(), 5000U);
+  std::shuffle(deliveries.begin(), deliveries.end(), std::mt19937_64(3));
+  EXPECT_EQ(stored("shuffled.db"), in_run_order);
 }
 
 TEST_F(StoredReport, IsStoredForSql) {
