@@ -33,6 +33,12 @@ bool has(std::span<const RunRequest> requests, std::optional<std::uint64_t> run)
                              [&](const RunRequest& request) { return request.run.value == run; });
 }
 
+/// Ends the process by the signal, also where a sanitizer would catch it.
+void crash() {
+  (void)std::signal(SIGSEGV, SIG_DFL);
+  (void)std::raise(SIGSEGV);
+}
+
 /// Takes the time of a batch, and looks now and then whether it is still wanted.
 void pass_time(double run_time_s, const std::function<void(int)>& progress) {
   for (int orbit = 1; orbit <= num_orbits; ++orbit) {
@@ -47,7 +53,7 @@ worker::PreparedCampaign prepare(const Campaign& campaign, const NullOptions& op
   return {.simulate =
               [seed = campaign.seed, &options](std::span<const RunRequest> requests,
                                                const std::function<void(int)>& progress) {
-                if (has(requests, options.poison)) std::raise(SIGSEGV);
+                if (has(requests, options.poison)) crash();
                 while (has(requests, options.hang)) {
                   std::this_thread::sleep_for(std::chrono::hours(1));
                 }
