@@ -20,7 +20,10 @@ constexpr std::chrono::minutes patience(2);
 
 /// State letter and parent of a process, from the kernel; empty text if there is none.
 std::pair<std::string, pid_t> state_and_parent(pid_t id) {
-  std::string text = read_file(fmt::format("/proc/{}/stat", id));
+  // A process that ends meanwhile makes the read fail, which std::getline() does not throw.
+  std::ifstream stream(fmt::format("/proc/{}/stat", id));
+  std::string text;
+  std::getline(stream, text);
   const auto name_end = text.rfind(')');
   if (name_end == std::string::npos) return {"", 0};
   std::istringstream rest(text.substr(name_end + 1));
