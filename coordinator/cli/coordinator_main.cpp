@@ -49,7 +49,8 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
 int main(int argc, char** argv) {
   CLI::App app(
       "Lends the runs of campaigns to workers and stores their results.\n"
-      "SIGTERM lets workers deliver what they hold; SIGINT, or a second one, does not.");
+      "SIGTERM lets workers deliver what they hold; SIGINT, or a second one, does not.",
+      "proofmass-coordinator");
   app.footer(exit_codes_text);
   app.set_version_flag("--version", "proofmass-coordinator " PROOFMASS_VERSION);
   app.set_config("--config", "", "File with these options, as in\n`bind = \"tcp://*:5555\"`")

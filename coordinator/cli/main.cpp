@@ -4,7 +4,8 @@
 int main(int argc, char** argv) {
   using namespace proofmass::coordinator;
 
-  CLI::App app("Proofmass validates the in-flight calibration of drag-free accelerometers.");
+  CLI::App app("Proofmass validates the in-flight calibration of drag-free accelerometers.",
+               "proofmass");
   app.footer(exit_codes_text);
   app.set_version_flag("--version", "proofmass " PROOFMASS_VERSION);
   app.require_subcommand(1);
