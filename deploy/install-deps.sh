@@ -10,6 +10,7 @@ packages=(
   libzmq3-dev cppzmq-dev libsodium-dev libprotobuf-dev protobuf-compiler
   libsqlite3-dev sqlite3 libhdf5-dev
   libspdlog-dev libfmt-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev
+  libutfcpp-dev
   # Tests only.
   libgtest-dev libgmock-dev libbenchmark-dev qemu-user clang-format
   iproute2 iptables faketime python3-scipy python3-mpmath python3-h5py

@@ -1,6 +1,7 @@
 #include "coordinator/query/display_text.hpp"
 
 #include <fmt/format.h>
+#include <utf8.h>
 
 #include <algorithm>
 #include <array>
@@ -55,29 +56,15 @@ constexpr std::array<CodeRange, 6> dangerous{{{0x0, 0x1f},
                                               {0x2028, 0x202e},
                                               {0x2066, 0x2069}}};
 
-std::size_t size_of(unsigned char lead) {
-  if (lead < 0x80) return 1;
-  if (lead >= 0xc2 && lead < 0xe0) return 2;
-  if (lead >= 0xe0 && lead < 0xf0) return 3;
-  if (lead >= 0xf0 && lead < 0xf5) return 4;
-  return 0;
-}
-
 // @pre The text is not empty.
 Character first_character(std::string_view text) {
-  constexpr std::array<char32_t, 5> smallest{0, 0, 0x80, 0x800, 0x10000};
-  const auto lead = static_cast<unsigned char>(text.front());
-  const std::size_t size = size_of(lead);
-  if (size == 0 || size > text.size()) return {};
-  char32_t code = size == 1 ? lead : lead & (0x7fU >> size);
-  for (std::size_t i = 1; i < size; ++i) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    if ((byte & 0xc0U) != 0x80) return {};
-    code = code << 6U | (byte & 0x3fU);
+  try {
+    const char* at = text.data();
+    const char32_t code = utf8::next(at, text.data() + text.size());
+    return {.code = code, .size = static_cast<std::size_t>(at - text.data()), .is_valid = true};
+  } catch (const utf8::exception&) {
+    return {};
   }
-  const bool is_surrogate = code >= 0xd800 && code <= 0xdfff;
-  if (code < smallest[size] || code > 0x10ffff || is_surrogate) return {};
-  return {.code = code, .size = size, .is_valid = true};
 }
 
 std::size_t width_of(char32_t code) {

@@ -1,9 +1,9 @@
 #include "coordinator/store/detail/annotation_rows.hpp"
 
 #include <fmt/format.h>
+#include <utf8.h>
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
@@ -32,43 +32,14 @@ void check_tag(std::string_view tag) {
                                tag, tag_size_max));
 }
 
-bool is_control_character(char c) {
-  const auto byte = static_cast<unsigned char>(c);
-  return (byte < 0x20 && c != '\n') || byte == 0x7f;
-}
-
-/// The smallest code point that needs so many bytes, by their number; shorter forms are forbidden.
-constexpr std::array<std::uint32_t, 5> code_point_min{0, 0, 0x80, 0x800, 0x10000};
-
-std::size_t size_of_character(unsigned char first) {
-  if (first < 0x80) return 1;
-  if (first >= 0xc2 && first < 0xe0) return 2;
-  if (first >= 0xe0 && first < 0xf0) return 3;
-  if (first >= 0xf0 && first < 0xf5) return 4;
-  return 0;
-}
-
-/// Bytes of the character that a text begins with; 0 if it is not UTF-8 [RFC 3629].
-std::size_t valid_character(std::string_view text) {
-  const std::size_t size = size_of_character(static_cast<unsigned char>(text.front()));
-  if (size <= 1 || size > text.size()) return size <= text.size() ? size : 0;
-  std::uint32_t code_point = static_cast<unsigned char>(text.front()) & (0xffU >> (size + 1));
-  for (const char c : text.substr(1, size - 1)) {
-    const auto byte = static_cast<unsigned char>(c);
-    if ((byte & 0xc0) != 0x80) return 0;
-    code_point = (code_point << 6) | (byte & 0x3fU);
-  }
-  const bool is_surrogate = code_point >= 0xd800 && code_point < 0xe000;
-  const bool is_control = code_point >= 0x80 && code_point < 0xa0;
-  const bool is_good = code_point >= code_point_min[size] && code_point < 0x110000;
-  return is_good && !is_surrogate && !is_control ? size : 0;
+bool is_control_character(std::uint32_t character) {
+  return (character < 0x20 && character != U'\n') || (character >= 0x7f && character < 0xa0);
 }
 
 bool is_printable_utf8(std::string_view text) {
-  while (!text.empty()) {
-    const std::size_t size = is_control_character(text.front()) ? 0 : valid_character(text);
-    if (size == 0) return false;
-    text.remove_prefix(size);
+  if (!utf8::is_valid(text.begin(), text.end())) return false;
+  for (auto at = text.begin(); at != text.end();) {
+    if (is_control_character(utf8::unchecked::next(at))) return false;
   }
   return true;
 }
