@@ -5,18 +5,17 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <exception>
 #include <mutex>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include "coordinator/archive/result_columns.hpp"
 #include "core/simulation/run.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-/// Ends a simulation from within.
-struct Abandoned {};
 
 /// Threads that simulate batches of a campaign until there are none left.
 class Simulation {
@@ -27,13 +26,13 @@ class Simulation {
 
   std::vector<ResultDifference> run(std::size_t num_threads) {
     const std::size_t num_batches = (stored_.size() + batch_lanes - 1) / batch_lanes;
-    std::vector<std::thread> others;
+    std::vector<std::jthread> others;
     for (std::size_t i = 1; i < std::min(num_threads, num_batches); ++i) {
       others.emplace_back([this] { simulate_batches(); });
     }
     simulate_batches();
-    for (std::thread& other : others) other.join();
-    if (is_abandoned_) throw Interrupted();
+    for (std::jthread& other : others) other.join();
+    if (failure_) std::rethrow_exception(failure_);
     std::ranges::stable_sort(differences_, {}, &ResultDifference::run);
     return std::move(differences_);
   }
@@ -41,14 +40,14 @@ class Simulation {
  private:
   void simulate_batches() {
     try {
-      while (!is_abandoned_) {
+      while (!has_failed_) {
         const std::size_t first = next_.fetch_add(batch_lanes);
         if (first >= stored_.size()) return;
         const std::size_t count = std::min(batch_lanes, stored_.size() - first);
         simulate(stored_.subspan(first, count));
       }
-    } catch (const Abandoned&) {
-      is_abandoned_ = true;
+    } catch (...) {
+      fail(std::current_exception());
     }
   }
 
@@ -58,11 +57,18 @@ class Simulation {
       requests.push_back({result.run, campaign_.table_values(result.run)});
     }
     const auto on_progress = [&](int /*num_orbits*/) {
-      if (is_abandoned_ || is_stopped_()) throw Abandoned{};
+      if (has_failed_ || is_stopped_()) throw Interrupted();
     };
     const std::vector<RunResult> computed =
         plan_.simulate_batch(requests, best_instruction_set(), on_progress);
     for (std::size_t i = 0; i < batch.size(); ++i) keep(differences_of(batch[i], computed[i]));
+  }
+
+  /// Of several threads' failures the first counts: the others may follow from it.
+  void fail(std::exception_ptr failure) {
+    const std::lock_guard lock(mutex_);
+    if (!failure_) failure_ = std::move(failure);
+    has_failed_ = true;
   }
 
   void keep(const std::vector<ResultDifference>& differences) {
@@ -75,8 +81,9 @@ class Simulation {
   const IsStopped& is_stopped_;
   RunPlan plan_;
   std::atomic<std::size_t> next_ = 0;
-  std::atomic<bool> is_abandoned_ = false;
+  std::atomic<bool> has_failed_ = false;
   std::mutex mutex_;  ///< Guards what follows.
+  std::exception_ptr failure_;
   std::vector<ResultDifference> differences_;
 };
 

@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <set>
+#include <stdexcept>
 
 #include "tests/coordinator/archive/archive_fixture.hpp"
 
@@ -10,6 +12,7 @@ namespace proofmass::coordinator {
 namespace {
 
 using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
 
 std::vector<RunIndex> first_runs(std::uint64_t count) {
   std::vector<RunIndex> runs;
@@ -86,6 +89,21 @@ TEST(Resimulation, FindsTheSameWithAnyNumberOfThreads) {
     ASSERT_EQ(differences.size(), 2U);
     EXPECT_EQ(differences[0].run, RunIndex{2});
     EXPECT_EQ(differences[1].run, RunIndex{34});
+  }
+}
+
+// The threads that end because another one failed do not hide its reason.
+TEST(Resimulation, EndsWithTheFirstFailureOfAnyThread) {
+  const Campaign campaign = test::quick_campaign(48);
+  const std::vector<RunResult> results = test::simulated(campaign);
+  for (const std::size_t num_threads : {std::size_t{1}, std::size_t{3}}) {
+    std::atomic<int> num_questions = 0;
+    const auto is_stopped = [&]() -> bool {
+      if (++num_questions == 2) throw std::runtime_error("no clock");
+      return false;
+    };
+    EXPECT_THAT([&] { (void)simulate_again(campaign, results, num_threads, is_stopped); },
+                ThrowsMessage<std::runtime_error>("no clock"));
   }
 }
 
