@@ -96,12 +96,10 @@ std::vector<std::vector<double>> table_columns_of(sqlite3* connection) {
 }  // namespace
 
 Campaign read_campaign_of(sqlite3* connection) {
-  Selection row(connection, "SELECT definition, num_runs FROM main.campaign");
+  Selection row(connection, "SELECT definition FROM main.campaign");
   row.require_row();
   Campaign campaign = parse_stored_campaign(row.text(0), environment_table_of(connection),
                                             table_columns_of(connection));
-  // The definition has the number asked for at first.
-  campaign.num_runs = static_cast<std::uint64_t>(row.integer(1));
   campaign.validate();
   return campaign;
 }
