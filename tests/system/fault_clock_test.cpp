@@ -7,6 +7,7 @@
 #include <fstream>
 #include <string>
 
+#include "tests/skip_for_want.hpp"
 #include "tests/system/fault_fixture.hpp"
 
 namespace proofmass::test {

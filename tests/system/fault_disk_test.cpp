@@ -9,6 +9,7 @@
 #include <fstream>
 #include <string>
 
+#include "tests/skip_for_want.hpp"
 #include "tests/system/fault_fixture.hpp"
 #include "tests/system/network_namespace.hpp"
 

@@ -1,7 +1,5 @@
 #include "tests/system/fault_fixture.hpp"
 
-#include <stdlib.h>
-
 #include <algorithm>
 #include <fstream>
 #include <regex>
@@ -17,11 +15,6 @@ void FaultTest::SetUp() {
   write_null_campaign(4000);
   workers_endpoint = "ipc://" + path("workers").string();
   clients_endpoint = "ipc://" + path("clients").string();
-}
-
-void FaultTest::skip_for_want(const std::string& what) {
-  if (getenv("CI") != nullptr) FAIL() << what;
-  GTEST_SKIP() << what;
 }
 
 void FaultTest::write_null_campaign(std::size_t count) {

@@ -19,10 +19,6 @@ class FaultTest : public CampaignProcess {
 
   void SetUp() override;
 
-  /// Skips the test, or fails it where CI is set, as its surroundings lack what it needs. The last
-  /// call of SetUp().
-  static void skip_for_want(const std::string& what);
-
   /// Gives the campaign `null` another number of runs than 4000.
   void write_null_campaign(std::size_t count);
   /// A campaign file NAME.toml with so many runs.

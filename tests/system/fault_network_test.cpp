@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/skip_for_want.hpp"
 #include "tests/system/fault_fixture.hpp"
 #include "tests/system/network_namespace.hpp"
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/skip_for_want.hpp"
 #include "tests/system/fault_fixture.hpp"
 
 namespace proofmass::test {

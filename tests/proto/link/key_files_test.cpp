@@ -14,6 +14,7 @@
 #include "proto/link/security.hpp"
 #include "proto/link/whole_file.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
+#include "tests/skip_for_want.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -107,7 +108,7 @@ TEST(KeyFiles, ThatOthersCanReadAreRefused) {
 }
 
 TEST(KeyFiles, OfSomebodyElseAreRefused) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a file away";
+  if (::geteuid() != 0) return test::skip_for_want("only root can give a file away");
   const ScratchDirectory directory;
   write_key_pair(directory.path(), "worker", KeyRole::worker, make_key_pair());
   const auto file = directory / "worker.key";
