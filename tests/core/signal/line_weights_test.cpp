@@ -8,6 +8,7 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <string>
@@ -183,10 +184,12 @@ TEST(LineWeights, PhasorOfASineIsTheFiltersGainTimesItsAmplitude) {
 }
 
 // A record of so many blocks that their states are found in three steps; summed as it goes, for its
-// 34 million samples. Rounding of as many terms of order one, 1e-8 at most, is averaged likewise.
+// 34 million samples. The frequency and its product with the time are each rounded by ε/2 at most,
+// so that a phase after so many turns is known to ε of them.
 TEST(LineWeights, PhasorOfASineIsTheFiltersGainAfterAHundredDays) {
   constexpr double line_hz = 0.01;
-  const LineWeights weights(line_fit(400 * 84'000, 7000, line_hz));
+  constexpr std::size_t num_turns = 84'000;
+  const LineWeights weights(line_fit(400 * num_turns, 7000, line_hz));
   ASSERT_GT(weights.num_blocks(), 128U * 128U);
   WeightReader reader(weights);
   std::vector<double> values(2 * LineWeights::block_size);
@@ -201,7 +204,8 @@ TEST(LineWeights, PhasorOfASineIsTheFiltersGainAfterAHundredDays) {
   }
   const LineFit fit = line_fit(400, 0, line_hz);
   const std::complex<double> expected = response(fit.filter, line_hz) * std::polar(3.0, 0.4);
-  EXPECT_LT(std::abs(phasor(sums, 0) - expected), 1e-10);
+  const double phase_error_rad = std::numeric_limits<double>::epsilon() * two_pi * num_turns;
+  EXPECT_LT(std::abs(phasor(sums, 0) - expected), phase_error_rad * std::abs(expected));
 }
 
 // Two lines, unequal gains; each line's phasor is that of its own sine.
