@@ -4,8 +4,12 @@
 
 #include <array>
 
+#include "tests/coordinator/cli/display_output.hpp"
+
 namespace proofmass::coordinator {
 namespace {
+
+using test::output_of;
 
 wire::CampaignStatus progress(std::uint64_t num_done, std::uint64_t num_runs, double rate_hz) {
   wire::CampaignStatus status;
@@ -14,21 +18,6 @@ wire::CampaignStatus progress(std::uint64_t num_done, std::uint64_t num_runs, do
   status.rate_hz = rate_hz;
   if (rate_hz > 0.0) status.remaining_s = static_cast<double>(num_runs - num_done) / rate_hz;
   return status;
-}
-
-/// What a display writes.
-template <typename Use>
-std::string output_of(DisplayMode mode, Use use) {
-  std::FILE* const file = std::tmpfile();
-  {
-    ProgressDisplay display(mode, file);
-    use(display);
-  }
-  std::rewind(file);
-  std::string text;
-  for (int c = std::fgetc(file); c != EOF; c = std::fgetc(file)) text += static_cast<char>(c);
-  std::fclose(file);
-  return text;
 }
 
 TEST(Duration, IsWrittenInItsTwoLargestUnits) {
@@ -61,49 +50,54 @@ TEST(ProgressBar, NeverFillsALineOf80Columns) {
 }
 
 TEST(ProgressDisplay, WritesALineEveryTenPercent) {
-  const std::string text = output_of(DisplayMode::lines, [](ProgressDisplay& display) {
-    for (std::uint64_t i = 0; i <= 30; ++i) display.update(progress(i, 30, 0.0));
-  });
+  const std::string text =
+      output_of<ProgressDisplay>(DisplayMode::lines, [](ProgressDisplay& display) {
+        for (std::uint64_t i = 0; i <= 30; ++i) display.update(progress(i, 30, 0.0));
+      });
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 11);
   EXPECT_EQ(text.substr(0, text.find('\n')), "0/30 runs    0 %");
   EXPECT_NE(text.find("\n30/30 runs  100 %\n"), std::string::npos);
 }
 
 TEST(ProgressDisplay, BeginsAgainWhenThereAreMoreRuns) {
-  const std::string text = output_of(DisplayMode::lines, [](ProgressDisplay& display) {
-    display.update(progress(128, 128, 0.0));
-    display.update(progress(128, 128, 0.0));
-    display.update(progress(128, 192, 0.0));
-  });
+  const std::string text =
+      output_of<ProgressDisplay>(DisplayMode::lines, [](ProgressDisplay& display) {
+        display.update(progress(128, 128, 0.0));
+        display.update(progress(128, 128, 0.0));
+        display.update(progress(128, 192, 0.0));
+      });
   EXPECT_EQ(text, "128/128 runs  100 %\n128/192 runs   66 %\n");
 }
 
 TEST(ProgressDisplay, WritesTheBarOverItself) {
-  const std::string text = output_of(DisplayMode::bar, [](ProgressDisplay& display) {
-    display.update(progress(1, 2, 0.0));
-    display.update(progress(1, 2, 0.0));  // Nothing new: not written again.
-    display.update(progress(2, 2, 0.0));
-  });
+  const std::string text =
+      output_of<ProgressDisplay>(DisplayMode::bar, [](ProgressDisplay& display) {
+        display.update(progress(1, 2, 0.0));
+        display.update(progress(1, 2, 0.0));  // Nothing new: not written again.
+        display.update(progress(2, 2, 0.0));
+      });
   EXPECT_EQ(text,
             "\r1/2 runs [###############...............]  50 %\033[K"
             "\r2/2 runs [##############################] 100 %\033[K\n");
 }
 
 TEST(ProgressDisplay, DoesNotTearTheBarWithANote) {
-  const std::string text = output_of(DisplayMode::bar, [](ProgressDisplay& display) {
-    display.update(progress(2, 2, 0.0));
-    display.note("a note");
-    display.update(progress(2, 2, 0.0));
-  });
+  const std::string text =
+      output_of<ProgressDisplay>(DisplayMode::bar, [](ProgressDisplay& display) {
+        display.update(progress(2, 2, 0.0));
+        display.note("a note");
+        display.update(progress(2, 2, 0.0));
+      });
   const std::string bar = "\r2/2 runs [##############################] 100 %\033[K";
   EXPECT_EQ(text, bar + "\r\033[Ka note\n" + bar + "\n");
 }
 
 TEST(ProgressDisplay, ShowsOnlyNotesIfQuiet) {
-  const std::string text = output_of(DisplayMode::quiet, [](ProgressDisplay& display) {
-    display.update(progress(1, 2, 0.0));
-    display.note("a note");
-  });
+  const std::string text =
+      output_of<ProgressDisplay>(DisplayMode::quiet, [](ProgressDisplay& display) {
+        display.update(progress(1, 2, 0.0));
+        display.note("a note");
+      });
   EXPECT_EQ(text, "a note\n");
 }
 

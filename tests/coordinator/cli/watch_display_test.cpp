@@ -4,8 +4,12 @@
 
 #include <algorithm>
 
+#include "tests/coordinator/cli/display_output.hpp"
+
 namespace proofmass::coordinator {
 namespace {
+
+using test::output_of;
 
 wire::StatusReply status_of(const std::string& name, std::uint64_t num_done) {
   wire::CampaignStatus campaign;
@@ -18,19 +22,6 @@ wire::StatusReply status_of(const std::string& name, std::uint64_t num_done) {
           .num_workers = 1,
           .num_slots = 1,
           .campaigns = {campaign}};
-}
-
-/// What a display writes.
-template <typename Use>
-std::string output_of(WatchMode mode, Use use) {
-  std::FILE* const file = std::tmpfile();
-  WatchDisplay display(mode, file);
-  use(display);
-  std::rewind(file);
-  std::string text;
-  for (int c = std::fgetc(file); c != EOF; c = std::fgetc(file)) text += static_cast<char>(c);
-  std::fclose(file);
-  return text;
 }
 
 TEST(Drawing, TakesThePlaceOfTheOneBefore) {
@@ -63,7 +54,7 @@ TEST(ScreenSize, IsTheUsualOneWhereThereIsNoTerminal) {
 }
 
 TEST(WatchDisplay, WritesALineEveryTenPercent) {
-  const std::string text = output_of(WatchMode::lines, [](WatchDisplay& display) {
+  const std::string text = output_of<WatchDisplay>(WatchMode::lines, [](WatchDisplay& display) {
     for (std::uint64_t i = 0; i <= 30; ++i) display.update(status_of("a", i));
   });
   EXPECT_EQ(text,
@@ -74,7 +65,7 @@ TEST(WatchDisplay, WritesALineEveryTenPercent) {
 }
 
 TEST(WatchDisplay, WritesALineWhenSomethingHappens) {
-  const std::string text = output_of(WatchMode::lines, [](WatchDisplay& display) {
+  const std::string text = output_of<WatchDisplay>(WatchMode::lines, [](WatchDisplay& display) {
     wire::StatusReply status = status_of("a", 1);
     for (int i = 0; i < 2; ++i) display.update(status);
     status.campaigns[0].phase = wire::CampaignPhase::paused;
@@ -90,7 +81,7 @@ TEST(WatchDisplay, WritesALineWhenSomethingHappens) {
 }
 
 TEST(WatchDisplay, KeepsCampaignsApart) {
-  const std::string text = output_of(WatchMode::lines, [](WatchDisplay& display) {
+  const std::string text = output_of<WatchDisplay>(WatchMode::lines, [](WatchDisplay& display) {
     wire::StatusReply status = status_of("a", 1);
     status.campaigns.push_back(status_of("b", 2).campaigns[0]);
     for (int i = 0; i < 3; ++i) display.update(status);
@@ -99,14 +90,14 @@ TEST(WatchDisplay, KeepsCampaignsApart) {
 }
 
 TEST(WatchDisplay, DrawsTheTableAgain) {
-  const std::string text = output_of(WatchMode::screen, [](WatchDisplay& display) {
+  const std::string text = output_of<WatchDisplay>(WatchMode::screen, [](WatchDisplay& display) {
     for (int i = 0; i < 2; ++i) display.update(status_of("a", 1));
   });
   EXPECT_EQ(text.find("\033[6A"), text.find("\033[J") + 3);
 }
 
 TEST(WatchDisplay, WritesAnObjectALine) {
-  const std::string text = output_of(WatchMode::json, [](WatchDisplay& display) {
+  const std::string text = output_of<WatchDisplay>(WatchMode::json, [](WatchDisplay& display) {
     for (int i = 0; i < 3; ++i) display.update(status_of("a", 1));
   });
   EXPECT_EQ(std::ranges::count(text, '\n'), 3);

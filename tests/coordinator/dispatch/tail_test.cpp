@@ -38,6 +38,15 @@ class TailTest : public DispatchFixture {
     EXPECT_EQ(lease.runs, (RunRange{{1}, 2}));
     return lease;
   }
+
+  /// Both workers compute 1 and 2, as the first is late with them.
+  void begin_copies() {
+    begin_last_round();
+    now += 15s;
+    heartbeat(second);
+    on_tick(state, now, outbox);
+    (void)take_copies();
+  }
 };
 
 TEST_F(TailTest, AnIdleWorkerGetsWhatWaitsAtOthers) {
@@ -109,11 +118,7 @@ TEST_F(TailTest, ARunOfASuspectWorkerIsCopied) {
 }
 
 TEST_F(TailTest, TheCopyOfALostRunTakesItsPlace) {
-  begin_last_round();
-  now += 15s;
-  heartbeat(second);
-  on_tick(state, now, outbox);
-  (void)take_copies();
+  begin_copies();
   on_bye(state, first, {.reason = LossReason::preempted}, now, outbox);
   EXPECT_EQ(outbox.num_sent(), 0U);
   const auto& lease = state.leases.at(*campaign(one).lent.find({1}));
@@ -124,11 +129,7 @@ TEST_F(TailTest, TheCopyOfALostRunTakesItsPlace) {
 }
 
 TEST_F(TailTest, TheAttemptGrowsAlsoAfterCopiesThatWereLost) {
-  begin_last_round();
-  now += 15s;
-  heartbeat(second);
-  on_tick(state, now, outbox);
-  (void)take_copies();
+  begin_copies();
   on_bye(state, second, {}, now, outbox);
   on_bye(state, first, {}, now, outbox);
   EXPECT_TRUE(campaign(one).pending.contains(Attempt{3}));
@@ -137,11 +138,7 @@ TEST_F(TailTest, TheAttemptGrowsAlsoAfterCopiesThatWereLost) {
 }
 
 TEST_F(TailTest, TheFirstResultCountsAndTheOtherWorkerIsAskedBack) {
-  begin_last_round();
-  now += 15s;
-  heartbeat(second);
-  on_tick(state, now, outbox);
-  (void)take_copies();
+  begin_copies();
   deliver(second, one, {1}, 2);
   EXPECT_EQ(outbox.take_stored(), Runs{{1}});
   EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{1}, 1}}));
@@ -153,11 +150,7 @@ TEST_F(TailTest, TheFirstResultCountsAndTheOtherWorkerIsAskedBack) {
 
 // Otherwise a run that hangs would go from copy to copy, and never be tried alone.
 TEST_F(TailTest, ASuspectHasNoCopies) {
-  begin_last_round();
-  now += 15s;
-  heartbeat(second);
-  on_tick(state, now, outbox);
-  (void)take_copies();
+  begin_copies();
   crash(first);
   EXPECT_EQ(campaign(one).pending_suspects.size(), 2U);
   EXPECT_TRUE(campaign(one).copies.empty());
@@ -166,11 +159,7 @@ TEST_F(TailTest, ASuspectHasNoCopies) {
 }
 
 TEST_F(TailTest, ARunThatCrashedItsCopyIsNotCopiedAgain) {
-  begin_last_round();
-  now += 15s;
-  heartbeat(second);
-  on_tick(state, now, outbox);
-  (void)take_copies();
+  begin_copies();
   crash(second);
   ASSERT_EQ(campaign(one).suspects.size(), 2U);
   outbox.forget();
@@ -181,11 +170,7 @@ TEST_F(TailTest, ARunThatCrashedItsCopyIsNotCopiedAgain) {
 // A heartbeat from before the copies arrived must not make the worker look idle: the suspect would
 // be blamed for what it is computed with.
 TEST_F(TailTest, ACopyThatMayStillArriveKeepsSuspectsAway) {
-  begin_last_round();
-  now += 15s;
-  heartbeat(second);
-  on_tick(state, now, outbox);
-  (void)take_copies();
+  begin_copies();
   crash(first);
   outbox.forget();
   now += 11s;
