@@ -11,7 +11,9 @@ struct RestartConfig {
   using Duration = std::chrono::steady_clock::duration;
 
   Duration delay = std::chrono::seconds(1);  ///< After the first crash; doubles with each other.
-  Duration delay_max = std::chrono::seconds(60);
+  /// Half of what a coordinator waits for a silent worker: the next process says in time whom the
+  /// crash was with; told later, it would count against nobody.
+  Duration delay_max = std::chrono::seconds(30);
   std::size_t num_crashes_max = 10;            ///< Within the window: then it is given up.
   Duration window = std::chrono::minutes(10);  ///< Older crashes do not count any more.
 };

@@ -4,18 +4,25 @@
 
 #include <vector>
 
+#include "coordinator/dispatch/state.hpp"
+
 namespace proofmass::worker {
 namespace {
 
 using namespace std::chrono_literals;
 using Time = std::chrono::steady_clock::time_point;
 
-TEST(RestartPolicy, WaitsTwiceAsLongAfterEachCrashUpToAMinute) {
+TEST(RestartPolicy, WaitsTwiceAsLongAfterEachCrashUpToHalfAMinute) {
   RestartPolicy policy;
   std::vector<RestartConfig::Duration> delays;
   for (int i = 0; i < 9; ++i) delays.push_back(policy.on_crash(Time{} + i * 30s).value());
   EXPECT_EQ(delays,
-            (std::vector<RestartConfig::Duration>{1s, 2s, 4s, 8s, 16s, 32s, 60s, 60s, 60s}));
+            (std::vector<RestartConfig::Duration>{1s, 2s, 4s, 8s, 16s, 30s, 30s, 30s, 30s}));
+}
+
+// Later, and the crash counts against nobody; as long again is for the start and the network.
+TEST(RestartPolicy, StartsAWorkerBeforeItsCoordinatorTakesItForLost) {
+  EXPECT_LE(2 * RestartConfig{}.delay_max, coordinator::DispatchConfig{}.lost_after);
 }
 
 TEST(RestartPolicy, GivesUpAtTheTenthCrashWithinTenMinutes) {
