@@ -61,7 +61,9 @@ TEST_F(Extension, SeesThatACampaignGrew) {
   make_file(campaign_of(2));
   const std::string shell =
       output_of(fmt::format("sqlite3 '{}' \".load '{}'\" 'SELECT max(run_index) FROM draw' "
-                            "'UPDATE campaign SET num_runs = 9' 'SELECT max(run_index) FROM draw'",
+                            "\"UPDATE campaign SET num_runs = 9, "
+                            "definition = replace(definition, 'runs = 2', 'runs = 9')\" "
+                            "'SELECT max(run_index) FROM draw'",
                             file().string(), PROOFMASS_EXTENSION));
   EXPECT_EQ(shell, "1\n8\n");
 }
