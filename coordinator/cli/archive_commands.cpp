@@ -94,8 +94,8 @@ int tag_database(const TagOptions& options) {
 }
 
 int note_database(const NoteOptions& options) {
-  if (!options.text.empty()) {
-    Store::annotate(options.database, AddNote{options.text});
+  if (options.text) {
+    Store::annotate(options.database, AddNote{*options.text});
     return exit_done;
   }
   for (const Note& note : Store::open_read_only(options.database).notes()) {

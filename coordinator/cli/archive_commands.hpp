@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -62,7 +63,7 @@ struct TagOptions {
 
 struct NoteOptions {
   std::filesystem::path database;
-  std::string text;  ///< Empty: prints the notes.
+  std::optional<std::string> text;  ///< Prints the notes if there is none.
 };
 
 /// Adds a note, or prints all, each after its time.

@@ -1,10 +1,15 @@
+#include <map>
+#include <string>
 
+#include "coordinator/cli/option_checks.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/serve_command.hpp"
 
 namespace {
 
 using namespace proofmass::coordinator;
+
+constexpr double drain_time_s_max = 366.0 * 86400.0;
 
 void add_addresses(CLI::App& app, ServeOptions& options) {
   app.add_option("--bind", options.endpoint,
@@ -28,17 +33,14 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
   app.add_flag("--exit-when-done", ends_when_done, "End when every campaign is finished");
   app.add_option("--drain-time", options.drain_time_s,
                  "Seconds that workers have after SIGTERM to\ndeliver what they hold")
-      ->check(CLI::NonNegativeNumber)
+      ->check(in_range(0.0, drain_time_s_max))
       ->capture_default_str();
-  app.add_option_function<std::string>(
-         "--log-format",
-         [&options](const std::string& text) {
-           using proofmass::wire::LogFormat;
-           options.log_format = text == "json" ? LogFormat::json : LogFormat::text;
-         },
-         "Of the log on standard error; text by default")
-      ->envname("PROOFMASS_LOG_FORMAT")
-      ->check(CLI::IsMember({"text", "json"}));
+  using proofmass::wire::LogFormat;
+  static const std::map<std::string, LogFormat> formats{{"json", LogFormat::json},
+                                                        {"text", LogFormat::text}};
+  add_choice(app, "--log-format", options.log_format, formats,
+             "Of the log on standard error; text by default")
+      ->envname("PROOFMASS_LOG_FORMAT");
   // For tests of the program by itself.
   app.add_option("--faults", options.faults)->group("");
   app.add_option("--time-scale", options.time_scale)->group("")->check(CLI::PositiveNumber);

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
+#include <string>
 #include <string_view>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
@@ -33,7 +34,17 @@ inline int run_program(CLI::App& app, int argc, char** argv, const std::function
     return work();
   } catch (const CLI::Success& wish) {
     return app.exit(wish);  // --help or --version.
+  } catch (const CLI::ValidationError& error) {
+    // CLI11 says `name: ` before what a check says.
+    std::string text = error.what();
+    if (const std::size_t colon = text.find(": "); colon != text.npos) text.replace(colon, 1, " =");
+    return fail(text, exit_wrong_usage);
   } catch (const CLI::ParseError& error) {
+    const bool needs_command = app.get_require_subcommand_min() > 0;
+    if (needs_command && app.get_subcommands().empty() && app.remaining_size() > 0) {
+      return fail("command = " + app.remaining().front() + " (must be one that --help lists)",
+                  exit_wrong_usage);
+    }
     return fail(error.what(), exit_wrong_usage);
   } catch (const CampaignFileError& error) {
     return fail(error.what(), exit_wrong_usage);

@@ -16,10 +16,19 @@
 namespace proofmass::coordinator {
 namespace {
 
+std::vector<RequirementAnswer> answers_of(const Store& store,
+                                          const std::vector<std::string>& requirements) {
+  try {
+    return check_requirements(store, requirements);
+  } catch (const ConfigError& error) {
+    throw UsageError(error.what());
+  }
+}
+
 int print_requirements(const Store& store, const std::vector<std::string>& requirements) {
   bool are_met = true;
   std::string_view separator = "";
-  for (const RequirementAnswer& answer : check_requirements(store, requirements)) {
+  for (const RequirementAnswer& answer : answers_of(store, requirements)) {
     fmt::print("{}{}", separator, requirement_text(answer));
     separator = "\n";
     are_met = are_met && answer.check.verdict == Verdict::met;

@@ -17,7 +17,7 @@ struct ReportOptions {
 /// Prints the tables of a database's campaign, finished or not; of requirements, if there are any,
 /// the answers instead.
 /// @return An ExitCode; exit_not_met unless all requirements are met.
-/// @throws StoreError, ConfigError.
+/// @throws StoreError, UsageError.
 [[nodiscard]] int print_report(const ReportOptions& options);
 
 struct SensitivityOptions {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/error.hpp"
 
@@ -12,9 +11,6 @@ namespace proofmass {
 namespace {
 
 constexpr std::size_t name_length_max = 64;
-
-// Campaign files and SQLite hold integers of 63 bits.
-constexpr std::uint64_t seed_max = std::numeric_limits<std::int64_t>::max();
 
 void check_name(const std::string& name) {
   const auto allowed = [](char c) {

@@ -24,4 +24,7 @@ struct RunRange {
 /// Largest number of runs of one campaign; keeps run indices exact in SQLite and in counters.
 inline constexpr std::uint64_t num_runs_max = 1'000'000'000;
 
+/// Largest seed: campaign files and SQLite hold integers of 63 bits.
+inline constexpr std::uint64_t seed_max = (std::uint64_t{1} << 63) - 1;
+
 }  // namespace proofmass

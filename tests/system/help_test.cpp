@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/system/campaign_process.hpp"
@@ -28,8 +29,9 @@ class Help : public testing::Test {
     for (std::string line; std::getline(stream, line);) EXPECT_LE(line.size(), 80U) << line;
   }
 
- private:
   TemporaryDirectory directory_;
+
+ private:
   std::string long_path_ = directory_ / std::string(80, 'p');
 };
 
@@ -55,6 +57,35 @@ TEST_F(Help, FitsATerminal) {
   }
   expect_fits(help_of("proofmass-coordinator", {"--help"}));
   expect_fits(help_of("proofmass-worker", {"--help"}));
+}
+
+class Usage : public Help {
+ protected:
+  /// What `proofmass` says on standard error, having refused its arguments.
+  [[nodiscard]] std::string refusal_of(const Arguments& arguments) const {
+    Process process(directory_ / "", "refused", programs + "/proofmass", arguments);
+    EXPECT_EQ(process.wait(), 2);
+    return read_file(directory_ / "refused.err");
+  }
+};
+
+TEST_F(Usage, IsRefusedWithTheRule) {
+  const std::vector<std::pair<Arguments, std::string>> cases{
+      {{"raport", "a.db"}, "command = raport (must be one that --help lists)"},
+      {{"run", "a.toml", "--runs", "-1"}, "--runs = -1 (must be in [1, 1000000000])"},
+      {{"run", "a.toml", "--seed", "-1"}, "--seed = -1 (must be in [0, 9223372036854775807])"},
+      {{"run", "a.toml", "--failures", "-1"}, "--failures = -1 (must be in [0, 1000000000])"},
+      {{"run", "a.toml", "--audit", "2"}, "--audit = 2 (must be in [0, 1])"},
+      {{"run", "a.toml", "--workers", "0"}, "--workers = 0 (must be in [1, 1024])"},
+      {{"run", "a.toml", "--until", "std(k2c) within 5"},
+       "until = std(k2c) within 5 (must read \"STATISTIC(PARAMETER) within PERCENT%\")"},
+      {{"export", "a.db", "--format", "xml"}, "--format = xml (must be one of csv, hdf5, json)"},
+      {{"tag", "a.db", "delete"}, "ACTION = delete (must be one of add, remove)"},
+      {{"sensitivity", "a.db", "--run", "one"}, "--run = one (must be in [0, 999999999])"},
+  };
+  for (const auto& [arguments, rule] : cases) {
+    EXPECT_EQ(refusal_of(arguments), "proofmass: error: " + rule + "\n");
+  }
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ TEST_F(ArchiveCommands, NeedATagToAdd) {
 
 TEST_F(ArchiveCommands, AddAndPrintNotes) {
   EXPECT_EQ(note_database({database_, "first line\nsecond"}), exit_done);
-  const std::string printed = printed_by([&] { return note_database({database_, ""}); });
+  const std::string printed = printed_by([&] { return note_database({database_, {}}); });
   EXPECT_EQ(printed.substr(20), "  first line\n" + std::string(22, ' ') + "second\n");
   EXPECT_EQ(printed.substr(0, 2), "20");
 }

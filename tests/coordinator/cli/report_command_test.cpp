@@ -70,7 +70,7 @@ TEST_F(ReportCommand, NeedsAllRequirementsMet) {
 }
 
 TEST_F(ReportCommand, RefusesARequirementThatCannotBeRead) {
-  EXPECT_EQ(refusal<Error>([&] { (void)answer("a_c12 is small"); }),
+  EXPECT_EQ(refusal<UsageError>([&] { (void)answer("a_c12 is small"); }),
             "requirement = a_c12 is small (must read \"PARAMETER < LIMIT for COVERAGE% with "
             "CONFIDENCE%\")");
 }

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <map>
+#include <string>
+#include <system_error>
+#include <vector>
+
+namespace proofmass::coordinator {
+
+// What checks say is `value (rule)`; run_program() puts the option's name before it.
+
+/// Takes numbers of a closed range. CLI11 alone would read -1 as the largest number without a sign.
+template <typename Number>
+[[nodiscard]] CLI::Validator in_range(Number minimum, Number maximum) {
+  const auto check = [=](const std::string& text) {
+    Number number{};
+    const char* const end = text.data() + text.size();
+    const auto parsed = std::from_chars(text.data(), end, number);
+    const bool is_number = parsed.ec == std::errc{} && parsed.ptr == end;
+    if (is_number && number >= minimum && number <= maximum) return std::string();
+    return fmt::format("{} (must be in [{}, {}])", text, minimum, maximum);
+  };
+  return CLI::Validator(check, fmt::format("[{}, {}]", minimum, maximum), "in_range");
+}
+
+/// Takes one of some words.
+[[nodiscard]] CLI::Validator one_of(const std::vector<std::string>& words);
+
+/// Declares an option whose words stand for values.
+///
+/// @param choices  Lives as long as the command, as does the target.
+template <typename Value>
+CLI::Option* add_choice(CLI::App& command, const std::string& name, Value& target,
+                        const std::map<std::string, Value>& choices,
+                        const std::string& description) {
+  std::vector<std::string> words;
+  for (const auto& [word, value] : choices) words.push_back(word);
+  return command
+      .add_option_function<std::string>(
+          name, [&target, &choices](const std::string& word) { target = choices.at(word); },
+          description)
+      ->check(one_of(words));
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,50 @@
+#include "coordinator/cli/option_checks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+namespace proofmass::coordinator {
+namespace {
+
+TEST(InRange, TakesBothEndsAndWhatIsBetween) {
+  const CLI::Validator check = in_range(std::uint64_t{1}, std::uint64_t{1024});
+  for (const char* text : {"1", "17", "1024"}) EXPECT_EQ(check(text), "") << text;
+  EXPECT_EQ(in_range(0.0, 1.0)("0.25"), "");
+  EXPECT_EQ(in_range(0.0, 1.0)("1e-3"), "");
+  EXPECT_EQ(in_range(-5, 5)("-5"), "");
+}
+
+TEST(InRange, RefusesOthersWithTheRule) {
+  const CLI::Validator check = in_range(std::uint64_t{0}, std::uint64_t{1024});
+  EXPECT_EQ(check("1025"), "1025 (must be in [0, 1024])");
+  for (const std::string text :
+       {"-1", "18446744073709551617", "1.5", "1e3", "0x10", "one", "7 ", ""}) {
+    EXPECT_EQ(check(text), text + " (must be in [0, 1024])");
+  }
+  for (const std::string text : {"-0.001", "1.001", "nan", "inf", "half"}) {
+    EXPECT_EQ(in_range(0.0, 1.0)(text), text + " (must be in [0, 1])");
+  }
+}
+
+TEST(OneOf, NamesTheWordsThatItTakes) {
+  const CLI::Validator check = one_of({"csv", "json"});
+  EXPECT_EQ(check("json"), "");
+  EXPECT_EQ(check("xml"), "xml (must be one of csv, json)");
+  EXPECT_EQ(check("JSON"), "JSON (must be one of csv, json)");
+}
+
+TEST(Choice, SetsTheValueOfItsWord) {
+  const std::map<std::string, int> choices{{"low", 1}, {"high", 2}};
+  int level = 0;
+  CLI::App app;
+  add_choice(app, "--level", level, choices, "");
+  app.parse("--level high");
+  EXPECT_EQ(level, 2);
+  EXPECT_THROW(app.parse("--level middle"), CLI::ValidationError);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
