@@ -147,6 +147,21 @@ TEST(Statistics, HaveIntervalsOfMeanAndDeviation) {
               accuracy.standard_deviation + 1.96 * deviation_error, 0.3 * deviation_error);
 }
 
+// Errors −500 to 500: of the magnitudes by the bootstrap, of the errors by the chi-square law,
+// which takes them for normal: σ(1 ± 1.96/√2n), to second order in a tenth of that.
+TEST(Statistics, HaveIntervalsOfTheDeviationsOfErrorAndMagnitude) {
+  std::vector<double> errors;
+  for (int i = -500; i <= 500; ++i) errors.push_back(i);
+  const AccuracyStatistic accuracy = statistics_of(errors).accuracy[index(k2c)];
+  const double even = 1.96 * std::sqrt(0.8 / 4.0 / 1001.0);
+  EXPECT_NEAR(accuracy.deviation_interval->lower, accuracy.standard_deviation * (1.0 - even),
+              0.15 * even * accuracy.standard_deviation);
+  const double normal = 1.96 / std::sqrt(2.0 * 1001.0);
+  const double deviation = accuracy.error.standard_deviation;
+  EXPECT_NEAR(accuracy.error.deviation_interval->lower, deviation * (1.0 - normal),
+              0.1 * normal * deviation);
+}
+
 TEST(Statistics, OfASingleRunHaveNoIntervals) {
   const AccuracyStatistic accuracy = statistics_of({-3.0}).accuracy[index(a_c12)];
   EXPECT_FALSE(accuracy.mean_interval.has_value());

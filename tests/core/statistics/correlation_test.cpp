@@ -67,12 +67,21 @@ TEST(RankCorrelation, HasTheIntervalOfBonettAndWright) {
   EXPECT_NEAR(correlation->interval.lower, std::tanh(std::atanh(r) - half_width), 1e-13);
 }
 
+// Around 2⁵³ only even numbers are doubles: the mean, M + 1, is rounded to M.
+TEST(LinearCorrelation, IsZeroOfPatternsWhoseMeanIsNoDouble) {
+  constexpr double m = 0x1p53;
+  const Values x{m, m, m + 2, m + 2};
+  const Values y{m, m + 2, m, m + 2};
+  EXPECT_EQ(linear_correlation(x, y, 0.95)->coefficient, 0.0);
+}
+
 TEST(Correlations, AreEmptyWithoutVariationOrValues) {
   const Values constant(5, 2.0);
   const Values x{1, 2, 3, 4, 5};
   EXPECT_FALSE(linear_correlation(x, constant, 0.95).has_value());
   EXPECT_FALSE(rank_correlation(constant, x, 0.95).has_value());
   EXPECT_FALSE(linear_correlation(Values{1, 2, 3}, Values{3, 1, 2}, 0.95).has_value());
+  EXPECT_FALSE(correlation_of_ranks(Values{1, 2, 3}, Values{3, 1, 2}, 0.95).has_value());
 }
 
 TEST(Correlations, RefuseWhatTheyCannotWorkWith) {

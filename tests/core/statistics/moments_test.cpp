@@ -74,6 +74,10 @@ TEST(Moments, ChangeSignWithTheValues) {
   EXPECT_EQ(moments(values).skewness, -plain.skewness);
 }
 
+TEST(Moments, HaveNoSkewnessOfTwoValues) {
+  EXPECT_EQ(moments(std::vector<double>{1.0, 4.0}).skewness, 0.0);
+}
+
 TEST(Moments, RefuseNoValues) {
   EXPECT_EQ(test::message_of<InvalidArgument>([] { (void)moments({}); }),
             "values = 0 values (must be at least 1)");

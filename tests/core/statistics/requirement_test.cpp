@@ -122,6 +122,7 @@ TEST(CheckRequirement, OfNoRunsSaysHowManyItTakes) {
   EXPECT_EQ(check.verdict, Verdict::undecided);
   EXPECT_FALSE(check.exceedance.has_value());
   EXPECT_EQ(check.num_runs_at_best, 299u);
+  EXPECT_EQ(check.num_runs_at_this_rate, 299u);
 }
 
 // The verdict and the tolerance bound are two ways to say the same.

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/error.hpp"
@@ -66,6 +68,22 @@ TEST(WilksUpper, CountsUnknownValuesAsTheLargest) {
   EXPECT_EQ(wilks_upper(values, {0.95, 0.95}, 2)->value,
             wilks_upper(with_largest, {0.95, 0.95})->value);
   EXPECT_FALSE(wilks_upper(values, {0.95, 0.95}, 6).has_value());
+}
+
+// The third largest of 124 is the bound: with two unknown ones that is the largest of the others,
+// with three it is unknown itself.
+TEST(WilksUpper, IsEmptyOnceUnknownValuesReachItsOrder) {
+  const std::vector<double> values = test::uniform_column(122, {.seed = 5});
+  const auto bound = wilks_upper(values, {0.95, 0.95}, 2);
+  ASSERT_TRUE(bound.has_value());
+  EXPECT_EQ(bound->value, *std::max_element(values.begin(), values.end()));
+  EXPECT_FALSE(wilks_upper(std::span(values).first(121), {0.95, 0.95}, 3).has_value());
+}
+
+TEST(WilksUpper, IsAtTheFirstOfEqualValues) {
+  std::vector<double> values(59, 1.0);
+  values[20] = values[10] = 2.0;
+  EXPECT_EQ(wilks_upper(values, {0.95, 0.95})->index, 10u);
 }
 
 TEST(WilksUpper, IsEmptyWithTooFewValues) {
