@@ -126,6 +126,9 @@ TEST(IntervalTable, TellsWhatTheWorstIsWorth) {
               HasSubstr("worst of 59: with 95 % confidence 95.049 % of all draws"));
   EXPECT_THAT(interval_table(paper_statistics(58)),
               HasSubstr("worst of 58: with 95 % confidence 94.966 % of all draws"));
+  // 95.1297 %, of which no more is claimed than holds.
+  EXPECT_THAT(interval_table(paper_statistics(60)),
+              HasSubstr("worst of 60: with 95 % confidence 95.129 % of all draws"));
 }
 
 TEST(IntervalTable, IsLeftOutWhileNoRunHasAnEstimate) {
@@ -238,6 +241,21 @@ TEST_F(StoredReport, IsTheSameBitsInWhateverOrderResultsCome) {
   EXPECT_GT(in_run_order.size(), 5000U);
   std::shuffle(deliveries.begin(), deliveries.end(), std::mt19937_64(3));
   EXPECT_EQ(stored("shuffled.db"), in_run_order);
+}
+
+TEST_F(StoredReport, IsStoredAgainAfterMoreRuns) {
+  Store store = Store::create(file(), test::campaign_of(10), "");
+  store.commit(test::deliveries_of(0, 5));
+  update_statistics(store, Scenario{});
+  store.commit(test::deliveries_of(5, 9));
+  update_statistics(store, Scenario{});
+  EXPECT_EQ(store.summary()->num_finished, 9U);
+  EXPECT_EQ(store.summary()->digest, digest_of(store));
+
+  const Entry given_up = GivenUpRun{.run = {9}};
+  store.write({&given_up, 1});
+  update_statistics(store, Scenario{});
+  EXPECT_EQ(store.summary()->num_given_up, 1U);
 }
 
 TEST_F(StoredReport, IsStoredForSql) {

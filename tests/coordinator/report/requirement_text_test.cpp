@@ -38,6 +38,13 @@ TEST(RequirementText, SaysHowManyDrawsItTakes) {
                                        "             299 decide if"));
 }
 
+// One in a hundred, as often as allowed: with 473 draws one may exceed it [Wilks1941].
+TEST(RequirementText, SaysThatNoNumberOfDrawsDecides) {
+  EXPECT_THAT(answer_to("a_c12 < 9e-4 for 99% with 95%", 100, 1),
+              testing::HasSubstr("Draws        473 meet it if no further one exceeds it,\n"
+                                 "             no number of decide if"));
+}
+
 TEST(RequirementText, SaysThatItIsNotMet) {
   const std::string text = answer_to("a_c12 < 9e-4 for 99% with 95%", 100, 20);
   EXPECT_THAT(text, testing::HasSubstr("Answer       not met\n"));
@@ -65,6 +72,18 @@ TEST_F(StoredRequirement, CountsRunsWithoutAnEstimateAsExceeding) {
   ASSERT_EQ(answers.size(), 1U);
   EXPECT_EQ(answers[0].check.num_runs, 11U);
   EXPECT_EQ(answers[0].check.num_exceedances, 2U);
+}
+
+TEST_F(StoredRequirement, IsOfErrorsOfEitherSign) {
+  Store store = Store::create(file(), test::campaign_of(10), "");
+  std::vector<Delivery> deliveries = test::deliveries_of(0, 10);
+  for (Delivery& delivery : deliveries) {
+    delivery.result.truth.fill(0.0);
+    delivery.result.estimate.fill(delivery.result.run.value < 4 ? -2.0 : 0.5);
+  }
+  store.commit(deliveries);
+  const std::vector<std::string> texts{"k2c < 1 for 50% with 50%"};
+  EXPECT_EQ(check_requirements(store, texts)[0].check.num_exceedances, 4U);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <random>
 #include <sstream>
 #include <string>
@@ -90,6 +91,40 @@ TEST(ExplanationText, ShowsTheRunsValuesOfWhatDrivesTheError) {
   EXPECT_THAT(lines[4], StartsWith(drawn_names()[7]));
   EXPECT_THAT(lines[4], HasSubstr(" 1.5        99.9"));
   EXPECT_EQ(worst_parameter_of(drawn, {42}), Parameter::a_c11_delta_x);  // All are equal there.
+}
+
+// An error whose sign is that of one quantity and whose magnitude grows with another.
+TEST(ExplanationText, ShowsWhatDrivesTheMagnitudeBeforeWhatDrivesTheError) {
+  DrawnRuns drawn = made_up_runs();
+  for (std::size_t i = 0; i < drawn.runs.size(); ++i) {
+    drawn.errors[index(Parameter::k2c)][i] =
+        std::copysign(2.0 + drawn.columns[20][i], drawn.columns[7][i]);
+  }
+  const auto lines = lines_of(explanation_text(drawn, Parameter::k2c, {42}, 1));
+  EXPECT_THAT(lines[2], StartsWith("drives |error|"));
+  EXPECT_THAT(lines[4], StartsWith(drawn_names()[20]));
+  EXPECT_THAT(lines[6], StartsWith("drives error"));
+  EXPECT_THAT(lines[8], StartsWith(drawn_names()[7]));
+}
+
+TEST(ExplanationText, HasTheUnitsOfTheTables) {
+  DrawnRuns drawn = made_up_runs();
+  drawn.errors[index(Parameter::a_c12)][42] = -3.5;
+  EXPECT_THAT(explanation_text(drawn, Parameter::a_c12, {42}, 1),
+              StartsWith("Run 42: error of a_c12 -3.5e+04 1e-4 rad, rank 1 of 1000\n"));
+}
+
+TEST(ExplanationText, IsOfTheParameterInWhichTheRunIsWorst) {
+  DrawnRuns drawn = made_up_runs();
+  for (auto& errors : drawn.errors) errors[42] = 0.0;
+  drawn.errors[index(Parameter::k2c)][42] = -9.0;
+  EXPECT_EQ(worst_parameter_of(drawn, {42}), Parameter::k2c);
+}
+
+TEST(ExplanationText, RefusesARunBetweenThoseThatAreThere) {
+  DrawnRuns drawn = made_up_runs();
+  for (RunIndex& run : drawn.runs) run.value *= 2;
+  EXPECT_THROW((void)explanation_text(drawn, Parameter::k2c, {5}, 1), InvalidArgument);
 }
 
 TEST(ExplanationText, RefusesARunThatIsNotThere) {

@@ -1,0 +1,82 @@
+#include "coordinator/report/summarise.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <vector>
+
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+class Summarise : public test::StoreTest {
+ protected:
+  /// A finished campaign with this plan, whose errors have these magnitudes in turn and alternate
+  /// in sign; run 3 is without an estimate.
+  Store finished(std::uint64_t num_runs, const StopPlan& plan, double even, double odd) {
+    Store store = Store::create(file(), test::campaign_of(num_runs), "");
+    store.set_stop_plan(plan);
+    std::vector<Delivery> deliveries = test::deliveries_of(0, num_runs);
+    for (Delivery& delivery : deliveries) {
+      delivery.result.truth.fill(0.0);
+      delivery.result.estimate.fill(delivery.result.run.value % 2 == 0 ? even : -odd);
+    }
+    deliveries[3].result.status = RunStatus::no_draw;
+    store.commit(deliveries);
+    return store;
+  }
+
+  std::optional<std::uint64_t> next_runs(Store& store) {
+    return summarise_file(file(), Scenario{},
+                          [&](const std::function<void(Store&)>& action) { action(store); });
+  }
+
+  static StopPlan plan_of(std::uint64_t num_runs_max) {
+    return {.stop_rule = "mean(k2c) within 5%", .num_runs_max = num_runs_max, .failures_max = {}};
+  }
+};
+
+// Magnitudes 1 and 1.01 have a mean within 0.1 %; the mean of the errors themselves is near 0.
+TEST_F(Summarise, EndsOnceTheMagnitudesAreKnownWellEnough) {
+  Store store = finished(128, plan_of(1000), 1.0, 1.01);
+  EXPECT_EQ(next_runs(store), std::nullopt);
+  EXPECT_FALSE(is_rule_missed(store));
+}
+
+// Magnitudes 1 and 3: a mean of 2 ± 1.98/√127, which is 9 %.
+TEST_F(Summarise, AsksForTheRunsOfTheNextCheck) {
+  Store store = finished(128, plan_of(1000), 1.0, 3.0);
+  EXPECT_EQ(next_runs(store), 192U);
+  EXPECT_TRUE(is_rule_missed(store));
+}
+
+TEST_F(Summarise, AsksForNoMoreRunsThanThereMayBe) {
+  Store store = finished(128, plan_of(150), 1.0, 3.0);
+  EXPECT_EQ(next_runs(store), 150U);
+}
+
+TEST_F(Summarise, EndsWithTheLastRunThatThereMayBe) {
+  Store store = finished(150, plan_of(150), 1.0, 3.0);
+  EXPECT_EQ(next_runs(store), std::nullopt);
+  EXPECT_TRUE(is_rule_missed(store));
+}
+
+// Of the runs that were asked for, whether they have an estimate or not.
+TEST_F(Summarise, RecordsAfterHowManyRunsItChecked) {
+  Store store = finished(128, plan_of(1000), 1.0, 3.0);
+  (void)next_runs(store);
+  EXPECT_EQ(store.last_stop_check("mean(k2c)")->num_runs, 128U);
+  EXPECT_EQ(store.summary()->num_finished, 128U);
+  EXPECT_EQ(store.summary()->num_estimated, 127U);
+}
+
+TEST_F(Summarise, WithoutARuleStoresStatisticsAlone) {
+  Store store = finished(10, {}, 1.0, 3.0);
+  EXPECT_EQ(next_runs(store), std::nullopt);
+  EXPECT_EQ(store.summary()->num_estimated, 9U);
+  EXPECT_FALSE(is_rule_missed(store));
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
