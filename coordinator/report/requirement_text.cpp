@@ -53,7 +53,7 @@ std::string bound_line(const RequirementAnswer& answer) {
 std::string needed_line(const RequirementCheck& check) {
   if (check.verdict != Verdict::undecided) return "";
   const auto count = [](const std::optional<std::uint64_t>& num_runs) {
-    return num_runs ? std::to_string(*num_runs) : "no number of";
+    return num_runs ? std::to_string(*num_runs) : "none";
   };
   return fmt::format(
       "Draws        {} meet it if no further one exceeds it,\n"
