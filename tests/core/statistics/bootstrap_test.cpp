@@ -61,6 +61,17 @@ TEST(BootstrapDeviationInterval, OfEqualValuesIsAPoint) {
   EXPECT_EQ(interval->upper, 0.0);
 }
 
+// Of the resamples of these four an eighth has no deviation, a half deviates by 1, and three
+// eighths as the values do, by the most there is: counted by halves, 13/16 lie below. The bias z₀
+// is then Φ⁻¹(13/16) = 0.887, the acceleration 0, and the lower bound the percentile Φ(2z₀ − 1.96)
+// = 0.43.
+TEST(BootstrapDeviationInterval, CountsResamplesThatEqualTheEstimateByHalves) {
+  const auto interval =
+      bootstrap_deviation_interval(std::vector<double>{-1.0, -1.0, 1.0, 1.0}, 0.95);
+  EXPECT_DOUBLE_EQ(interval->lower, 1.0);
+  EXPECT_DOUBLE_EQ(interval->upper, std::sqrt(4.0 / 3.0));
+}
+
 TEST(BootstrapDeviationInterval, NeedsThreeValues) {
   EXPECT_FALSE(bootstrap_deviation_interval(std::vector<double>{1.0, 2.0}, 0.95).has_value());
   EXPECT_TRUE(bootstrap_deviation_interval(std::vector<double>{1.0, 2.0, 4.0}, 0.95).has_value());
