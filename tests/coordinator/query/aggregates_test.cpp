@@ -168,11 +168,17 @@ TEST(Aggregates, DoNotDependOnTheOrderOfRows) {
   }
 }
 
+TEST(Aggregates, HaveNoNegativeZero) {
+  EXPECT_FALSE(std::signbit(*value_of("percentile", with(rows_of({-0.0, -0.0}), {100.0}))));
+}
+
 TEST(Aggregates, RefuseParametersThatBreakTheirRule) {
   EXPECT_EQ(error_of("percentile", with(eight, {101.0})), "p = 101 (must be in [0, 100])");
   EXPECT_EQ(error_of("percentile", with(eight, {-0.5})), "p = -0.5 (must be in [0, 100])");
   EXPECT_EQ(error_of("percentile", {{1.0, std::nullopt}}), "p = NULL (must be a number)");
   EXPECT_EQ(error_of("percentile", {{1.0, 50.0}, {1.0, 60.0}}),
+            "p = 60 (must be the same for all rows, was 50)");
+  EXPECT_EQ(error_of("percentile", {{1.0, 50.0}, {std::nullopt, 60.0}}),
             "p = 60 (must be the same for all rows, was 50)");
   EXPECT_EQ(error_of("wilks_upper", with(eight, {95.0, 0.95})),
             "coverage = 95 (must be in (0, 1))");

@@ -83,6 +83,10 @@ TEST(DrawScan, HoldsWhatSatisfiesAllConditions) {
   scan.narrow(RunComparison::at_most, std::int64_t{4});
   EXPECT_EQ(scan.first_run, 3u);
   EXPECT_EQ(scan.end_run, 5u);
+  scan.narrow(RunComparison::at_least, std::int64_t{1});
+  scan.narrow(RunComparison::below, std::int64_t{6});
+  EXPECT_EQ(scan.first_run, 3u);
+  EXPECT_EQ(scan.end_run, 5u);
   scan.narrow(RunComparison::below, std::int64_t{1});
   EXPECT_EQ(scan.first_run, scan.end_run);
 }

@@ -144,6 +144,9 @@ TEST_F(DrawTable, ComesInTheOrderOfRunsWhicheverIsAskedFor) {
   EXPECT_EQ(std::get<std::string>(
                 rows_of("SELECT quantity FROM draw ORDER BY quantity LIMIT 1").at(0).at(0)),
             "angular_bias_rad_s2.x");
+  EXPECT_EQ(std::get<std::string>(
+                rows_of("SELECT quantity FROM draw ORDER BY run_index, quantity LIMIT 1")[0][0]),
+            "angular_bias_rad_s2.x");
 }
 
 TEST_F(DrawTable, TakesTheNameOfItsCampaign) {
@@ -163,6 +166,19 @@ TEST_F(DrawTable, HasNoValueForARunWhoseDrawsWereAllRejected) {
   make_file(campaign);
   EXPECT_EQ(integer_of("SELECT count(*) FROM draw"), 120);
   EXPECT_EQ(integer_of("SELECT count(value) FROM draw"), 0);
+}
+
+// A scale factor that is far off is never accepted, however the rest is drawn.
+TEST_F(DrawTable, HasNoValueForTheOneRunWhoseDrawsWereAllRejected) {
+  Campaign campaign = campaign_of(3);
+  campaign.dispersions[0] = {.law = Law::table, .file = "scale.csv", .column = "x"};
+  campaign.table_columns = {{0.0, 0.9, 0.0}};
+  make_file(campaign);
+  EXPECT_THAT(
+      rows_of("SELECT run_index, count(value) FROM draw GROUP BY run_index ORDER BY run_index"),
+      ElementsAre(ElementsAre(OwnCell(std::int64_t{0}), OwnCell(std::int64_t{60})),
+                  ElementsAre(OwnCell(std::int64_t{1}), OwnCell(std::int64_t{0})),
+                  ElementsAre(OwnCell(std::int64_t{2}), OwnCell(std::int64_t{60}))));
 }
 
 TEST_F(DrawTable, IsTheCampaignOfTheFileAndNothingIsStored) {
