@@ -42,6 +42,12 @@ TEST(ChosenRuns, AreSpreadEvenlyAndDifferent) {
   }
 }
 
+// The middle of each part, so that the last runs have the chance of the first.
+TEST(ChosenRuns, AreInTheMiddleOfEachPart) {
+  const std::vector<RunIndex> expected{{50}, {150}, {250}, {350}};
+  EXPECT_EQ(chosen_runs(first_runs(400), 0.01), expected);
+}
+
 TEST(ResultDifferences, AreOfBitsThatMeanSomething) {
   const RunResult stored = test::result_of(3, RunStatus::not_finite);
   RunResult computed = stored;

@@ -199,6 +199,9 @@ TEST_F(Verification, FindsNumbersThatNoSimulationYields) {
   results_[1].num_rounds = 51;
   results_[2].status = RunStatus::not_converged;
   results_[2].num_rounds = 49;
+  results_[4].status = RunStatus::no_draw;
+  results_[4].num_draws = 7;
+  results_[4].num_rounds = 5;
   make_file();
   test::change(file(), "UPDATE run_result SET truth_a_c12_rad = 9e999 WHERE run_index = 3");
   EXPECT_FALSE(verify_all());
@@ -206,17 +209,19 @@ TEST_F(Verification, FindsNumbersThatNoSimulationYields) {
               testing::IsSupersetOf({"run 0: num_draws = 0 (must be 1 to 1000 if completed)",
                                      "run 1: num_rounds = 51 (must be 0 to 50 if completed)",
                                      "run 2: num_rounds = 49 (must be 50 to 50 if not_converged)",
-                                     "run 3: truth_a_c12_rad = inf (must be finite)"}));
+                                     "run 3: truth_a_c12_rad = inf (must be finite)",
+                                     "run 4: num_draws = 7 (must be 1000 to 1000 if no_draw)",
+                                     "run 4: num_rounds = 5 (must be 0 to 0 if no_draw)"}));
 }
 
 TEST_F(Verification, FindsARunBeyondTheLast) {
   make_file();
   test::change(file(),
-               "UPDATE run_result SET run_index = 99 WHERE run_index = 4;"
-               "UPDATE delivery SET run_index = 99 WHERE run_index = 4");
+               "UPDATE run_result SET run_index = 18 WHERE run_index = 4;"
+               "UPDATE delivery SET run_index = 18 WHERE run_index = 4");
   EXPECT_FALSE(verify_all());
   EXPECT_EQ(check("digest").verdict, Verdict::fails);
-  EXPECT_THAT(check("results").details, ElementsAre("run 99: must be below num_runs = 18"));
+  EXPECT_THAT(check("results").details, ElementsAre("run 18: must be below num_runs = 18"));
   EXPECT_EQ(check("simulation").finding, "17 of 18 runs simulated again: every bit is the same");
 }
 
