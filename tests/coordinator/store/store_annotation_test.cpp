@@ -59,8 +59,9 @@ TEST_F(StoreAnnotation, TakesTagsThatNeedNoQuotesOnly) {
 TEST_F(StoreAnnotation, KeepsNotesInTheirOrder) {
   annotate(AddNote{"zweite Zeile\nfür K2c: 274 s²/m 🛰"});
   annotate(AddNote{std::string(2000, 'a')});
+  annotate(AddNote{"274\xc2\xa0s²/m"});  // A space that keeps a line together.
   const std::vector<Note> notes = Store::open_read_only(file()).notes();
-  ASSERT_EQ(notes.size(), 2u);
+  ASSERT_EQ(notes.size(), 3u);
   EXPECT_EQ(notes[0].text, "zweite Zeile\nfür K2c: 274 s²/m 🛰");
   EXPECT_EQ(notes[1].text, std::string(2000, 'a'));
   EXPECT_THAT(notes[0].time_utc, MatchesRegex("20[0-9-]+T[0-9:]+Z"));

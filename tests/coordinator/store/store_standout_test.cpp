@@ -107,6 +107,21 @@ TEST_F(StoreStandout, WorstRunsAreKnownAgainWhenAFileIsOpened) {
             "8,7");
 }
 
+// Ten of them are there: a smaller error of a later coordinator's is none, a larger one drops the
+// smallest.
+TEST_F(StoreStandout, WorstRunsAreNoMoreThanTenAfterAFileIsOpened) {
+  {
+    Store store = Store::create(file(), campaign_of(60), "");
+    for (std::uint64_t run = 0; run < 10; ++run) commit(store, delivery_with_error(run, 3.0));
+  }
+  Store store = Store::open(file());
+  commit(store, delivery_with_error(20, 2.0));
+  commit(store, delivery_with_error(21, 4.0));
+  EXPECT_EQ(text("SELECT group_concat(run_index) FROM worst_runs WHERE parameter = 'a_c13'"),
+            "21,0,1,2,3,4,5,6,7,8");
+  store.check_integrity();
+}
+
 TEST_F(StoreStandout, OverrunsAreErrorsAboveTheObjectiveOnly) {
   const double objective = Scenario{}.objectives[4];
   Store store = Store::create(file(), campaign_of(10), "");
