@@ -71,6 +71,38 @@ TEST(CampaignStart, RefusesFewerRunsThanBefore) {
                                                    database.string() + " was asked for)");
 }
 
+// A rule that has not been checked leaves a campaign unfinished.
+TEST(CampaignStart, TakesUpAFinishedCampaignUnderANewStopRule) {
+  const test::TemporaryDirectory directory;
+  const auto database = directory / "a.db";
+  {
+    Store store = open_or_create(campaign_of(128), {}, database).store;
+    const Entry finished = CampaignControl{.phase = wire::CampaignPhase::finished};
+    (void)store.write({&finished, 1});
+  }
+  const StopPlan plan{.stop_rule = "mean(k2c) within 5%", .num_runs_max = 1000, .failures_max = {}};
+  const ServedCampaign served = open_or_create(campaign_of(1000), plan, database);
+  EXPECT_EQ(served.definition->num_runs, 128U);
+  EXPECT_EQ(served.store.stop_plan(), plan);
+  EXPECT_EQ(served.store.control().phase, wire::CampaignPhase::active);
+}
+
+// Its tables have a row for each run, and nobody knows yet how many there will be.
+TEST(CampaignStart, RefusesAStopRuleWithTables) {
+  const test::TemporaryDirectory directory;
+  Campaign campaign = campaign_of(2);
+  campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
+  campaign.table_columns = {{1e-4, 2e-4}};
+  const StopPlan plan{.stop_rule = "mean(k2c) within 5%", .num_runs_max = 2, .failures_max = {}};
+  try {
+    (void)open_or_create(campaign, plan, directory / "a.db");
+    FAIL();
+  } catch (const UsageError& error) {
+    EXPECT_STREQ(error.what(),
+                 "until = mean(k2c) within 5% (must not be with quantities whose law is a table)");
+  }
+}
+
 TEST(CampaignStart, ReadsACampaignWithTablesBack) {
   const test::TemporaryDirectory directory;
   Campaign campaign = campaign_of(3);

@@ -150,6 +150,44 @@ TEST_F(ServiceClients, PauseAndResumeACampaign) {
   EXPECT_EQ(worker.receive<wire::RunLease>().runs.first, RunIndex{0});
 }
 
+TEST_F(ServiceClients, SeeThatACampaignWithAStopRuleIsPaused) {
+  plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
+  start_with({test::campaign_of("a", 3)});
+  EXPECT_EQ(client->done(wire::ControlRequest{ControlAction::pause, "a"}),
+            "campaign a: paused, 3 runs, 0 of them done");
+}
+
+// Its last runs are still under way, and count.
+TEST_F(ServiceClients, LearnThatAPausedCampaignFailsTooOften) {
+  plan = {.stop_rule = "", .num_runs_max = {}, .failures_max = 0};
+  start_with({test::campaign_of("a", 3)});
+  PlayingWorker worker(endpoint.address());
+  const wire::RunLease lease = worker.borrow(1);
+  (void)client->done(wire::ControlRequest{ControlAction::pause, "a"});
+  worker.deliver(lease, RunStatus::no_draw);
+  EXPECT_EQ(wait_for_event("too_many_failures"),
+            "too_many_failures without_estimate=1 failures_max=0");
+}
+
+TEST_F(ServiceClients, SubmitACancelledCampaignAgain) {
+  start_with({test::campaign_of("a", 3)});
+  (void)client->done(wire::ControlRequest{ControlAction::cancel, "a"});
+  EXPECT_EQ(client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 3)}),
+            "campaign a: active, 3 runs, 0 of them done");
+}
+
+// The runs are there already: what is open again is whether they are enough.
+TEST_F(ServiceClients, GiveAFinishedCampaignAnotherRule) {
+  plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 1, .failures_max = {}};
+  start_with({test::campaign_of("a", 1)});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)wait_for_event("campaign_summarised runs=1");
+  const std::string reply = client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 1),
+                                                             .stop_rule = "mean(k2c) within 1%"});
+  EXPECT_EQ(reply, "campaign a: active, 1 runs, 1 of them done");
+}
+
 TEST_F(ServiceClients, FindACampaignPausedAfterARestart) {
   start_with({test::campaign_of("a", 3)});
   (void)client->done(wire::ControlRequest{ControlAction::pause, "a"});

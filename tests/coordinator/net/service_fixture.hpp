@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
+#include <cstddef>
 #include <functional>
 #include <future>
 #include <memory>
@@ -135,6 +136,13 @@ class ServiceTest : public testing::Test {
         changed.wait_for(lock, std::chrono::seconds(20), [&] { return find() != events.end(); });
     if (!is_there) throw Error("no event " + beginning);
     return *find();
+  }
+
+  /// How many lines of events have begun so until now.
+  [[nodiscard]] std::ptrdiff_t num_events(const std::string& beginning) {
+    const std::lock_guard lock(mutex);
+    return std::count_if(events.begin(), events.end(),
+                         [&](const std::string& event) { return event.starts_with(beginning); });
   }
 
   [[nodiscard]] std::size_t num_stored(const std::string& name) const {

@@ -114,6 +114,36 @@ TEST_F(ServiceStop, CancelsACampaignWithMoreFailuresThanItMayHave) {
   end(StopRequest::now);
   EXPECT_EQ(file_of_a().control().phase, CampaignPhase::cancelled);
   EXPECT_EQ(num_stored("a"), 2U);
+  EXPECT_EQ(num_events("too_many_failures"), 1);  // Not again with every review.
+}
+
+TEST_F(ServiceStop, CountsRunsThatAreGivenUpAsFailures) {
+  plan = {.stop_rule = "", .num_runs_max = {}, .failures_max = 1};
+  {
+    Store store = files.open(test::campaign_of("a", 5), plan).store;
+    const Entry given_up = GivenUpRun{.run = {4}};
+    store.write({&given_up, 1});
+  }
+  start({test::campaign_of("a", 5)});
+  test::PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow(1), RunStatus::no_draw);
+  EXPECT_EQ(wait_for_event("too_many_failures"),
+            "too_many_failures without_estimate=2 failures_max=1");
+}
+
+TEST_F(ServiceStop, DoesNotCheckARuleAgainThatItsPredecessorDid) {
+  plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
+  start({test::campaign_of("a", 1)});
+  test::PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)wait_for_event("campaign_summarised runs=1");
+  end(StopRequest::now);
+  start({test::campaign_of("a", 1)});
+  CampaignPhase phase = CampaignPhase::active;
+  in_service([&] { phase = service->campaigns().front().phase; });
+  EXPECT_EQ(phase, CampaignPhase::finished);
+  end(StopRequest::now);
+  EXPECT_EQ(num_events("campaign_summarised"), 1);
 }
 
 TEST_F(ServiceStop, CountsTheFailuresOfItsPredecessor) {
