@@ -67,6 +67,29 @@ TEST_F(AuditTest, GoesToAnotherWorker) {
   outbox.forget();
 }
 
+TEST_F(AuditTest, IsNotDoneByAFirstWorkerThatRepeatsItself) {
+  add_worker(second);
+  deliver(first, one, {0});
+  commit(one);
+  deliver(first, one, {0});
+  EXPECT_EQ(campaign(one).audits.size(), 1U);
+  EXPECT_EQ(campaign(one).num_duplicates, 1U);
+  outbox.forget();
+}
+
+TEST_F(AuditTest, CountsWhatDiffersAmongWhatItCompared) {
+  add_worker(second);
+  deliver(first, one, {0});
+  commit(one);
+  deliver(second, one, {0}, 2);
+  outbox.forget();
+  on_compared(state, one, {0}, second, false, now, outbox);
+  EXPECT_EQ(campaign(one).num_audited, 1U);
+  EXPECT_EQ(campaign(one).num_mismatches, 1U);
+  EXPECT_EQ(campaign(one).phase, coordinator::Phase::finished);
+  outbox.forget();
+}
+
 TEST_F(AuditTest, WaitsForAnotherWorkerThatIsBusy) {
   add_worker(second);
   heartbeat(second, {}, {}, 0);
