@@ -23,6 +23,12 @@ TEST(JsonLine, KeepsQuotedPartsTogether) {
             R"("reason":"told to stop"})");
 }
 
+TEST(JsonLine, KeepsAQuoteThatNothingCloses) {
+  EXPECT_EQ(json_line("malformed_message text=\"", "error", noon),
+            R"({"time":"2026-03-04T12:00:01.234Z","level":"error","event":"malformed_message",)"
+            R"("text":"\""})");
+}
+
 TEST(JsonLine, IsJsonWhateverAPeerSays) {
   EXPECT_EQ(json_line("malformed_message \xff\n\\ =x", "error", noon),
             R"({"time":"2026-03-04T12:00:01.234Z","level":"error","event":"malformed_message",)"
