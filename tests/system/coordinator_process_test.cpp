@@ -80,6 +80,28 @@ TEST_F(CoordinatorProcess, TellsTheInitSystemHowItIs) {
   EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
 }
 
+TEST_F(CoordinatorProcess, HasAWorkerThatTellsTheInitSystemHowItIs) {
+  const NoticeReceiver init_system(path("notify").string());
+  std::string told;
+  const auto wait_for_notice = [&](const std::string& notice) {
+    wait_until(notice, [&] { return contains(told += init_system.receive() + '\n', notice); });
+  };
+  Process worker(directory / "", "worker", "/usr/bin/env",
+                 {"NOTIFY_SOCKET=" + path("notify").string(), "WATCHDOG_USEC=200000",
+                  programs + "/proofmass-worker", "--connect", endpoint(), "--name", "worker"});
+  wait_for_notice("STATUS=not registered, 0 runs at hand");
+  wait_for_notice("WATCHDOG=1\n");
+  EXPECT_FALSE(contains(told, "READY=1"));  // Not before a coordinator knows it.
+  Process coordinator = start_coordinator();
+  wait_for_notice("READY=1\n");
+  EXPECT_FALSE(contains(told, "STOPPING=1"));
+  worker.signal(SIGTERM);
+  wait_for_notice("STOPPING=1\n");
+  EXPECT_EQ(worker.wait(), 0) << errors_of("worker");
+  coordinator.signal(SIGTERM);
+  (void)coordinator.wait();
+}
+
 TEST_F(CoordinatorProcess, ThreeThreadsOfAWorkerGiveTheBitsOfOne) {
   Process worker = start_worker("threads", "3");
   Process coordinator = start_coordinator();
