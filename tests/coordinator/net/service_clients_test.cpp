@@ -169,6 +169,15 @@ TEST_F(ServiceClients, LearnThatAPausedCampaignFailsTooOften) {
             "too_many_failures without_estimate=1 failures_max=0");
 }
 
+TEST_F(ServiceClients, GiveACampaignABudgetOfFailuresThatHoldsAtOnce) {
+  start_with({test::campaign_of("a", 3)});
+  (void)client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 3), .failures_max = 0});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow(1), RunStatus::no_draw);
+  EXPECT_EQ(wait_for_event("too_many_failures"),
+            "too_many_failures without_estimate=1 failures_max=0");
+}
+
 TEST_F(ServiceClients, SubmitACancelledCampaignAgain) {
   start_with({test::campaign_of("a", 3)});
   (void)client->done(wire::ControlRequest{ControlAction::cancel, "a"});
