@@ -10,6 +10,7 @@
 #include <variant>
 
 #include "coordinator/store/store_error.hpp"
+#include "core/error.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -28,8 +29,8 @@ void check_tag(std::string_view tag) {
   const bool is_good = !tag.empty() && tag.size() <= tag_size_max &&
                        std::all_of(tag.begin(), tag.end(), is_tag_character);
   if (is_good) return;
-  throw StoreError(fmt::format("tag = {} (must be 1 to {} of the characters A-Z a-z 0-9 . _ -)",
-                               tag, tag_size_max));
+  throw InvalidArgument(fmt::format(
+      "tag = {} (must be 1 to {} of the characters A-Z a-z 0-9 . _ -)", tag, tag_size_max));
 }
 
 bool is_control_character(std::uint32_t character) {
@@ -46,11 +47,11 @@ bool is_printable_utf8(std::string_view text) {
 
 void check_note(std::string_view text) {
   if (text.empty() || text.size() > note_size_max) {
-    throw StoreError(
+    throw InvalidArgument(
         fmt::format("note = {} bytes (must be 1 to {} bytes)", text.size(), note_size_max));
   }
   if (!is_printable_utf8(text)) {
-    throw StoreError(
+    throw InvalidArgument(
         fmt::format("note = {} bytes (must be UTF-8 without control characters but the end of a "
                     "line)",
                     text.size()));

@@ -4,6 +4,7 @@
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/error.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -23,7 +24,12 @@ class StoreAnnotation : public test::StoreTest {
 
   void annotate(const Annotation& annotation) const { Store::annotate(file(), annotation); }
   [[nodiscard]] std::string error_of(const Annotation& annotation) const {
-    return store_error_of([&] { annotate(annotation); });
+    try {
+      annotate(annotation);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "accepted";
   }
   [[nodiscard]] std::vector<std::string> tags() const {
     return Store::open_read_only(file()).tags();
@@ -52,6 +58,7 @@ TEST_F(StoreAnnotation, TakesTagsThatNeedNoQuotesOnly) {
   EXPECT_EQ(error_of(AddTag{"é"}), "tag = é" + rule);
   EXPECT_EQ(error_of(AddTag{std::string(65, 'a')}), "tag = " + std::string(65, 'a') + rule);
   EXPECT_EQ(error_of(RemoveTag{"'"}), "tag = '" + rule);
+  EXPECT_THROW(annotate(AddTag{"a b"}), InvalidArgument);
   annotate(AddTag{std::string(64, 'a')});
   EXPECT_THAT(tags(), ElementsAre(std::string(64, 'a')));
 }
