@@ -58,7 +58,8 @@ struct TagOptions {
 };
 
 /// Adds or removes tags, or prints them, one a line.
-/// @throws UsageError unless there are tags exactly if there is something to do with them.
+/// @throws UsageError unless there are tags exactly if there is something to do with them;
+///         InvalidArgument for a tag that breaks the rules.
 [[nodiscard]] int tag_database(const TagOptions& options);
 
 struct NoteOptions {
@@ -67,6 +68,7 @@ struct NoteOptions {
 };
 
 /// Adds a note, or prints all, each after its time.
+/// @throws InvalidArgument for a note that breaks the rules.
 [[nodiscard]] int note_database(const NoteOptions& options);
 
 }  // namespace proofmass::coordinator

@@ -60,16 +60,28 @@ TEST_F(CoordinatorProcess, ServesWorkersThatConnectAndLeave) {
   EXPECT_EQ(stored_runs(path("served/hardy2013.db")), reference());
 }
 
-TEST_F(CoordinatorProcess, TellsTheInitSystemHowItIs) {
-  const NoticeReceiver init_system(path("notify").string());
-  std::string told;
-  const auto wait_for_notice = [&](const std::string& notice) {
-    wait_until(notice, [&] { return contains(told += init_system.receive() + '\n', notice); });
-  };
-  Process coordinator(directory / "", "coordinator", "/usr/bin/env",
-                      {"NOTIFY_SOCKET=" + path("notify").string(), "WATCHDOG_USEC=200000",
-                       programs + "/proofmass-coordinator", "--directory", "served", "--bind",
-                       endpoint(), "short.toml"});
+/// Processes with an init system that listens to them.
+class NoticedProcess : public CoordinatorProcess {
+ protected:
+  [[nodiscard]] Process start_noticed(const std::string& name, const Arguments& command) const {
+    Arguments words{"NOTIFY_SOCKET=" + path("notify").string(), "WATCHDOG_USEC=200000"};
+    words.insert(words.end(), command.begin(), command.end());
+    return Process(directory / "", name, "/usr/bin/env", words);
+  }
+  void wait_for_notice(const std::string& notice) {
+    wait_until(notice, [&] { return contains(told += init_system_.receive() + '\n', notice); });
+  }
+
+  std::string told;  ///< All notices so far.
+
+ private:
+  NoticeReceiver init_system_{path("notify").string()};
+};
+
+TEST_F(NoticedProcess, OfTheCoordinatorTellsHowItIs) {
+  Process coordinator =
+      start_noticed("coordinator", {programs + "/proofmass-coordinator", "--directory", "served",
+                                    "--bind", endpoint(), "short.toml"});
   wait_for_notice("READY=1\n");
   EXPECT_TRUE(std::filesystem::exists(path("socket")));
   wait_for_notice("STATUS=1 campaigns to compute\n");
@@ -80,15 +92,9 @@ TEST_F(CoordinatorProcess, TellsTheInitSystemHowItIs) {
   EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
 }
 
-TEST_F(CoordinatorProcess, HasAWorkerThatTellsTheInitSystemHowItIs) {
-  const NoticeReceiver init_system(path("notify").string());
-  std::string told;
-  const auto wait_for_notice = [&](const std::string& notice) {
-    wait_until(notice, [&] { return contains(told += init_system.receive() + '\n', notice); });
-  };
-  Process worker(directory / "", "worker", "/usr/bin/env",
-                 {"NOTIFY_SOCKET=" + path("notify").string(), "WATCHDOG_USEC=200000",
-                  programs + "/proofmass-worker", "--connect", endpoint(), "--name", "worker"});
+TEST_F(NoticedProcess, OfAWorkerTellsHowItIs) {
+  Process worker = start_noticed(
+      "worker", {programs + "/proofmass-worker", "--connect", endpoint(), "--name", "worker"});
   wait_for_notice("STATUS=not registered, 0 runs at hand");
   wait_for_notice("WATCHDOG=1\n");
   EXPECT_FALSE(contains(told, "READY=1"));  // Not before a coordinator knows it.

@@ -8,9 +8,12 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/store/store.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
+#include "tests/message_of.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+using test::message_of;
 
 /// 60 runs whose errors of every parameter are 1, 2, ... 60 times 1e-6.
 class ReportCommand : public testing::Test {
@@ -30,16 +33,6 @@ class ReportCommand : public testing::Test {
 
   [[nodiscard]] int answer(const std::string& requirement) const {
     return print_report({.database = database_, .requirements = {requirement}});
-  }
-
-  template <typename Exception, typename Call>
-  [[nodiscard]] static std::string refusal(const Call& call) {
-    try {
-      call();
-    } catch (const Exception& error) {
-      return error.what();
-    }
-    return "accepted";
   }
 
   test::TemporaryDirectory directory_;
@@ -70,13 +63,13 @@ TEST_F(ReportCommand, NeedsAllRequirementsMet) {
 }
 
 TEST_F(ReportCommand, RefusesARequirementThatCannotBeRead) {
-  EXPECT_EQ(refusal<UsageError>([&] { (void)answer("a_c12 is small"); }),
+  EXPECT_EQ(message_of<UsageError>([&] { (void)answer("a_c12 is small"); }),
             "requirement = a_c12 is small (must read \"PARAMETER < LIMIT for COVERAGE% with "
             "CONFIDENCE%\")");
 }
 
 TEST_F(ReportCommand, RefusesAnUnknownParameter) {
-  EXPECT_EQ(refusal<UsageError>([&] {
+  EXPECT_EQ(message_of<UsageError>([&] {
               (void)print_sensitivity({.database = database_, .parameter = "k2e", .run = {}});
             }),
             "parameter = k2e (must be one of a_c11_delta_x a_c11_delta_z a_c11_delta_y a_c12 "
@@ -84,7 +77,7 @@ TEST_F(ReportCommand, RefusesAnUnknownParameter) {
 }
 
 TEST_F(ReportCommand, RefusesARunWithoutAnEstimate) {
-  EXPECT_EQ(refusal<InvalidArgument>([&] {
+  EXPECT_EQ(message_of<InvalidArgument>([&] {
               (void)print_sensitivity({.database = database_, .parameter = {}, .run = 60});
             }),
             "run = 60 (must be one of the first 60 runs with an estimate)");

@@ -61,7 +61,8 @@ TEST(SensitivityText, NamesTheQuantityThatDrivesAnError) {
   EXPECT_THAT(lines[9], HasSubstr(" +1.00 (+1.00, +1.00)"));
 }
 
-// |error| goes as the magnitude, which no correlation sees.
+// |error| goes as the magnitude, which no correlation sees. Of x² the part 5/bins² is missed, 2 %
+// with the 15 bins of 1,000 runs.
 TEST(SensitivityText, FindsWhatActsThroughItsSquare) {
   const auto lines = lines_of(sensitivity_text(made_up_runs(), Parameter::a_c12, 1));
   EXPECT_THAT(lines[4], StartsWith(drawn_names()[20]));

@@ -6,6 +6,7 @@
 #include "coordinator/store/store.hpp"
 #include "core/error.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/message_of.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -24,12 +25,7 @@ class StoreAnnotation : public test::StoreTest {
 
   void annotate(const Annotation& annotation) const { Store::annotate(file(), annotation); }
   [[nodiscard]] std::string error_of(const Annotation& annotation) const {
-    try {
-      annotate(annotation);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "accepted";
+    return test::message_of<Error>([&] { annotate(annotation); });
   }
   [[nodiscard]] std::vector<std::string> tags() const {
     return Store::open_read_only(file()).tags();

@@ -18,6 +18,7 @@
 
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
+#include "tests/message_of.hpp"
 
 namespace proofmass::test {
 
@@ -104,12 +105,7 @@ inline std::vector<RunResult> results_in(const coordinator::Store& store) {
 
 /// Text of the StoreError that `action` throws; empty if it throws none.
 inline std::string store_error_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const coordinator::StoreError& error) {
-    return error.what();
-  }
-  return {};
+  return message_of<coordinator::StoreError>(action);
 }
 
 /// While it lives, the process has no more rights than an ordinary user: root may write anywhere.

@@ -148,7 +148,9 @@ TEST(Statistics, HaveIntervalsOfMeanAndDeviation) {
 }
 
 // Errors −500 to 500: of the magnitudes by the bootstrap, of the errors by the chi-square law,
-// which takes them for normal: σ(1 ± 1.96/√2n), to second order in a tenth of that.
+// which takes them for normal: σ(1 ± 1.96/√2n), to second order in a tenth of that. Evenly spread
+// magnitudes have σ(1 ± 1.96√((κ − 1)/4n)), κ = 1.8, the bootstrap with the noise of its 1,000
+// resamples in the percentile and twice in the bias, 6 % together, of which 15 % is 2.5 times.
 TEST(Statistics, HaveIntervalsOfTheDeviationsOfErrorAndMagnitude) {
   std::vector<double> errors;
   for (int i = -500; i <= 500; ++i) errors.push_back(i);

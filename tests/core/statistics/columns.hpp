@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "core/random/normal.hpp"
@@ -40,17 +39,6 @@ inline std::vector<double> normal_column(std::size_t count, const Selection& sel
 /// |x| of a normal x: the law of an absolute error.
 inline std::vector<double> half_normal_column(std::size_t count, const Selection& selection) {
   return column_of(count, selection, [](double u) { return std::abs(inverse_normal(u)); });
-}
-
-/// Message of the exception that `action` throws; empty if it throws none of this type.
-template <typename Exception, typename Action>
-std::string message_of(const Action& action) {
-  try {
-    action();
-  } catch (const Exception& error) {
-    return error.what();
-  }
-  return "";
 }
 
 }  // namespace proofmass::test

@@ -8,6 +8,7 @@
 #include "core/error.hpp"
 #include "core/statistics/order.hpp"
 #include "tests/core/statistics/columns.hpp"
+#include "tests/message_of.hpp"
 
 namespace proofmass {
 namespace {

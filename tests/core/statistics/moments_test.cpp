@@ -10,6 +10,7 @@
 #include "core/error.hpp"
 #include "core/statistics/sum.hpp"
 #include "tests/core/statistics/columns.hpp"
+#include "tests/message_of.hpp"
 
 namespace proofmass {
 namespace {

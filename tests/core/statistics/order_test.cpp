@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "tests/core/statistics/columns.hpp"
+#include "tests/message_of.hpp"
 
 namespace proofmass {
 namespace {

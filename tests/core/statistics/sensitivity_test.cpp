@@ -9,6 +9,7 @@
 
 #include "core/error.hpp"
 #include "tests/core/statistics/columns.hpp"
+#include "tests/message_of.hpp"
 
 namespace proofmass {
 namespace {

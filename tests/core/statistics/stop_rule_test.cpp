@@ -10,6 +10,7 @@
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
 #include "tests/core/statistics/columns.hpp"
+#include "tests/message_of.hpp"
 
 namespace proofmass {
 namespace {
