@@ -10,6 +10,7 @@
 
 #include "core/error.hpp"
 #include "core/simulation/run.hpp"
+#include "proto/command_line/option_checks.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::worker {
@@ -56,7 +57,7 @@ void add_work(CLI::App& app, Options& options) {
   app.add_option("--threads", options.num_threads,
                  "Threads that simulate, one a processor by default")
       ->envname("PROOFMASS_THREADS")
-      ->check(CLI::Range(1U, threads_max));
+      ->check(wire::in_range(1U, threads_max));
   app.add_option("--spool", options.spool,
                  "File for results that are not acknowledged\nwhen the worker ends")
       ->envname("PROOFMASS_SPOOL");
@@ -71,14 +72,11 @@ void add_work(CLI::App& app, Options& options) {
 void add_process(CLI::App& app, Options& options) {
   app.set_config("--config", "", "File with these options, as in\n`connect = \"tcp://a:5555\"`");
   app.allow_config_extras(CLI::config_extras_mode::error);
-  app.add_option_function<std::string>(
-         "--log-format",
-         [&options](const std::string& text) {
-           options.log_format = text == "json" ? wire::LogFormat::json : wire::LogFormat::text;
-         },
-         "Of the log on standard error; text by default")
-      ->envname("PROOFMASS_LOG_FORMAT")
-      ->check(CLI::IsMember({"text", "json"}));
+  static const std::map<std::string, wire::LogFormat> formats{{"json", wire::LogFormat::json},
+                                                              {"text", wire::LogFormat::text}};
+  wire::add_choice(app, "--log-format", options.log_format, formats,
+                   "Of the log on standard error; text by default")
+      ->envname("PROOFMASS_LOG_FORMAT");
   app.add_flag_callback(
       "--no-supervisor", [&options] { options.is_supervised = false; },
       "Do not watch the worker from a second process,\nwhich starts it again if it crashes");

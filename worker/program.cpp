@@ -17,6 +17,7 @@
 #include "core/error.hpp"
 #include "core/simulation/reference_digest.hpp"
 #include "core/simulation/run.hpp"
+#include "proto/command_line/option_checks.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
 #include "worker/net/serve.hpp"
@@ -178,8 +179,10 @@ int run_worker(int argc, char** argv, const Program& program) {
   return reporting_errors(program, [&] {
     try {
       app.parse(argc, argv);
+    } catch (const CLI::Success& wish) {
+      return app.exit(wish);  // --help or --version.
     } catch (const CLI::ParseError& error) {
-      return app.exit(error) == 0 ? 0 : exit_usage;
+      throw InvalidArgument(wire::refusal_of(app, error));
     }
     return run(options, program);
   });

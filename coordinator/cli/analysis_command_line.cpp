@@ -6,11 +6,11 @@
 #include <string>
 
 #include "coordinator/cli/command_line.hpp"
-#include "coordinator/cli/option_checks.hpp"
 #include "coordinator/cli/query_command.hpp"
 #include "coordinator/cli/report_command.hpp"
 #include "core/campaign/dispersion.hpp"
 #include "core/campaign/identifiers.hpp"
+#include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -37,9 +37,9 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
   sensitivity.add_option("DB", options->database, "Database of a campaign")->required();
   sensitivity.add_option("--parameter", options->parameter, "Of this parameter; all by default");
   sensitivity.add_option("--run", options->run, "Why this run is as far off as it is")
-      ->check(in_range(std::uint64_t{0}, num_runs_max - 1));
+      ->check(wire::in_range(std::uint64_t{0}, num_runs_max - 1));
   sensitivity.add_option("--rows", options->num_rows, "Quantities to name for each error")
-      ->check(in_range(std::size_t{1}, num_drawn))
+      ->check(wire::in_range(std::size_t{1}, num_drawn))
       ->capture_default_str();
   sensitivity.callback(
       [options, &chosen] { chosen = [options] { return print_sensitivity(*options); }; });
@@ -55,13 +55,13 @@ void add_query(CLI::App& app, Command& chosen) {
   query.add_option("DB", options->database, "Database of a campaign")->required();
   query.add_option("SQL", options->sql, "One statement that reads; - for standard input")
       ->required();
-  add_choice(query, "--format", options->format, formats,
-             "table, csv, json or markdown; table by default");
+  wire::add_choice(query, "--format", options->format, formats,
+                   "table, csv, json or markdown; table by default");
   query.add_option("--timeout", options->timeout_s, "Seconds that it may take")
-      ->check(in_range(0.001, timeout_s_max))
+      ->check(wire::in_range(0.001, timeout_s_max))
       ->capture_default_str();
   query.add_option("--rows-max", options->num_rows_max, "Rows that a table shows")
-      ->check(in_range(std::size_t{1}, table_rows_max))
+      ->check(wire::in_range(std::size_t{1}, table_rows_max))
       ->capture_default_str();
   query.callback([options, &chosen] { chosen = [options] { return query_database(*options); }; });
 }

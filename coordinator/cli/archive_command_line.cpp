@@ -7,7 +7,7 @@
 #include "coordinator/cli/archive_commands.hpp"
 #include "coordinator/cli/command_line.hpp"
 #include "coordinator/cli/export_command.hpp"
-#include "coordinator/cli/option_checks.hpp"
+#include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -26,7 +26,7 @@ void add_verify(CLI::App& app, Command& chosen) {
   CLI::App& command = *app.add_subcommand("verify", "Check a database, simulate some runs again");
   command.add_option("DB", options->database, database_text)->required();
   command.add_option("--fraction", options->fraction, "Of the runs to simulate again")
-      ->check(in_range(0.0, 1.0))
+      ->check(wire::in_range(0.0, 1.0))
       ->capture_default_str();
   command.callback(
       [options, &chosen] { chosen = [options] { return verify_database(*options); }; });
@@ -38,7 +38,8 @@ void add_export(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<ExportOptions>();
   CLI::App& command = *app.add_subcommand("export", "Write all results of a database for others");
   command.add_option("DB", options->database, database_text)->required();
-  add_choice(command, "--format", options->format, formats, "csv (the default), json or hdf5");
+  wire::add_choice(command, "--format", options->format, formats,
+                   "csv (the default), json or hdf5");
   command.add_option("--output", options->output, "File; standard output by default");
   command.add_flag("--force", options->is_forced, "Replace an existing file");
   command.callback([options, &chosen] { chosen = [options] { return export_results(*options); }; });
@@ -82,8 +83,8 @@ void add_tag(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<TagOptions>();
   CLI::App& command = *app.add_subcommand("tag", "Add, remove or print tags of a campaign");
   command.add_option("DB", options->database, database_text)->required();
-  add_choice(command, "ACTION", options->action, actions,
-             "add or remove; without it prints the tags");
+  wire::add_choice(command, "ACTION", options->action, actions,
+                   "add or remove; without it prints the tags");
   command.add_option("TAG", options->tags, "1 to 64 letters, digits, dots, _ and -");
   command.callback([options, &chosen] { chosen = [options] { return tag_database(*options); }; });
 }

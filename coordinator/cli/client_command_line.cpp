@@ -5,12 +5,12 @@
 #include "coordinator/cli/client_options.hpp"
 #include "coordinator/cli/command_line.hpp"
 #include "coordinator/cli/control_command.hpp"
-#include "coordinator/cli/option_checks.hpp"
 #include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/status_command.hpp"
 #include "coordinator/cli/submit_command.hpp"
 #include "coordinator/cli/watch_command.hpp"
 #include "coordinator/cli/workers_command.hpp"
+#include "proto/command_line/option_checks.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -24,7 +24,7 @@ void add_submit(CLI::App& app, Command& chosen) {
   submit.add_option("FILE", options->campaign_file, "Campaign file (TOML)")->required();
   submit.add_option("--name", options->name, "Name of the campaign; the one in FILE by default");
   submit.add_option("--priority", options->priority, "Runs of a higher one are computed first")
-      ->check(in_range(-wire::priority_max, wire::priority_max));
+      ->check(wire::in_range(-wire::priority_max, wire::priority_max));
   add_audit_option(submit, options->audit_fraction);
   add_stop_options(submit, options->stop);
   add_override_options(submit, options->overrides);

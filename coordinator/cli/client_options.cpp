@@ -7,7 +7,7 @@
 #include <cstdio>
 
 #include "coordinator/cli/exit_code.hpp"
-#include "coordinator/cli/option_checks.hpp"
+#include "proto/command_line/option_checks.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
 
@@ -37,7 +37,7 @@ void add_client_options(CLI::App& command, ClientOptions& options) {
             connection.reply_wait = std::chrono::duration<double>(timeout_s);
           },
           "Seconds to wait for an answer; 10 by default")
-      ->check(in_range(timeout_s_min, timeout_s_max));
+      ->check(wire::in_range(timeout_s_min, timeout_s_max));
   command.add_flag_callback(
       "--json", [&options] { options.format = OutputFormat::json; }, "Print JSON");
 }

@@ -1,13 +1,14 @@
 #include <map>
 #include <string>
 
-#include "coordinator/cli/option_checks.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/serve_command.hpp"
+#include "proto/command_line/option_checks.hpp"
 
 namespace {
 
 using namespace proofmass::coordinator;
+namespace wire = proofmass::wire;
 
 constexpr double drain_time_s_max = 366.0 * 86400.0;
 
@@ -33,13 +34,12 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
   app.add_flag("--exit-when-done", ends_when_done, "End when every campaign is finished");
   app.add_option("--drain-time", options.drain_time_s,
                  "Seconds that workers have after SIGTERM to\ndeliver what they hold")
-      ->check(in_range(0.0, drain_time_s_max))
+      ->check(wire::in_range(0.0, drain_time_s_max))
       ->capture_default_str();
-  using proofmass::wire::LogFormat;
-  static const std::map<std::string, LogFormat> formats{{"json", LogFormat::json},
-                                                        {"text", LogFormat::text}};
-  add_choice(app, "--log-format", options.log_format, formats,
-             "Of the log on standard error; text by default")
+  static const std::map<std::string, wire::LogFormat> formats{{"json", wire::LogFormat::json},
+                                                              {"text", wire::LogFormat::text}};
+  wire::add_choice(app, "--log-format", options.log_format, formats,
+                   "Of the log on standard error; text by default")
       ->envname("PROOFMASS_LOG_FORMAT");
   // For tests of the program by itself.
   app.add_option("--faults", options.faults)->group("");

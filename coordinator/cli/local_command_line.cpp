@@ -7,9 +7,9 @@
 #include "coordinator/cli/command_line.hpp"
 #include "coordinator/cli/init_command.hpp"
 #include "coordinator/cli/keygen_command.hpp"
-#include "coordinator/cli/option_checks.hpp"
 #include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/run_command.hpp"
+#include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -28,7 +28,7 @@ void add_run(CLI::App& app, Command& chosen) {
   add_audit_option(run, options->audit_fraction);
   add_stop_options(run, options->stop);
   run.add_option("--workers", options->num_workers, "Worker processes; one a processor by default")
-      ->check(in_range(1U, workers_max));
+      ->check(wire::in_range(1U, workers_max));
   run.add_flag("--quiet", options->is_quiet, "Show no progress");
   run.callback([options, &chosen] { chosen = [options] { return run_campaign(*options); }; });
 }
@@ -54,7 +54,7 @@ void add_bench(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<BenchOptions>();
   CLI::App& bench = *app.add_subcommand("bench", "Measure the speed of this machine");
   bench.add_option("--runs", options->num_runs, "Runs of each instruction set")
-      ->check(in_range(std::uint64_t{1}, bench_runs_max))
+      ->check(wire::in_range(std::uint64_t{1}, bench_runs_max))
       ->capture_default_str();
   bench.add_flag_callback(
       "--json", [options] { options->format = BenchFormat::json; }, "Print JSON");

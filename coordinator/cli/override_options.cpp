@@ -3,18 +3,18 @@
 #include <CLI/CLI.hpp>
 
 #include "coordinator/cli/exit_code.hpp"
-#include "coordinator/cli/option_checks.hpp"
 #include "core/campaign/identifiers.hpp"
 #include "core/error.hpp"
 #include "core/statistics/stop_rule.hpp"
+#include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
 
 void add_override_options(CLI::App& command, Overrides& overrides) {
   command.add_option("--runs", overrides.num_runs, "Number of runs; more than before extends")
-      ->check(in_range(std::uint64_t{1}, num_runs_max));
+      ->check(wire::in_range(std::uint64_t{1}, num_runs_max));
   command.add_option("--seed", overrides.seed, "Seed of the campaign")
-      ->check(in_range(std::uint64_t{0}, seed_max));
+      ->check(wire::in_range(std::uint64_t{0}, seed_max));
   command
       .add_option("--set", overrides.assignments,
                   "Replace a value of the file, e.g.\nnoise.scale=0; may be repeated")
@@ -36,14 +36,14 @@ void add_stop_options(CLI::App& command, StopOptions& options) {
       });
   command
       .add_option("--failures", options.failures_max, "Cancel it when more runs have no estimate")
-      ->check(in_range(std::uint64_t{0}, num_runs_max));
+      ->check(wire::in_range(std::uint64_t{0}, num_runs_max));
 }
 
 void add_audit_option(CLI::App& command, double& audit_fraction) {
   command
       .add_option("--audit", audit_fraction,
                   "Fraction of the runs to compute a second time,\nelsewhere, and compare")
-      ->check(in_range(0.0, 1.0));
+      ->check(wire::in_range(0.0, 1.0));
 }
 
 }  // namespace proofmass::coordinator

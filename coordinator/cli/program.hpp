@@ -12,6 +12,7 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "core/error.hpp"
+#include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
 
@@ -34,18 +35,8 @@ inline int run_program(CLI::App& app, int argc, char** argv, const std::function
     return work();
   } catch (const CLI::Success& wish) {
     return app.exit(wish);  // --help or --version.
-  } catch (const CLI::ValidationError& error) {
-    // CLI11 says `name: ` before what a check says.
-    std::string text = error.what();
-    if (const std::size_t colon = text.find(": "); colon != text.npos) text.replace(colon, 1, " =");
-    return fail(text, exit_wrong_usage);
   } catch (const CLI::ParseError& error) {
-    const bool needs_command = app.get_require_subcommand_min() > 0;
-    if (needs_command && app.get_subcommands().empty() && app.remaining_size() > 0) {
-      return fail("command = " + app.remaining().front() + " (must be one that --help lists)",
-                  exit_wrong_usage);
-    }
-    return fail(error.what(), exit_wrong_usage);
+    return fail(wire::refusal_of(app, error), exit_wrong_usage);
   } catch (const CampaignFileError& error) {
     return fail(error.what(), exit_wrong_usage);
   } catch (const UsageError& error) {

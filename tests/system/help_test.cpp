@@ -61,9 +61,10 @@ TEST_F(Help, FitsATerminal) {
 
 class Usage : public Help {
  protected:
-  /// What `proofmass` says on standard error, having refused its arguments.
-  [[nodiscard]] std::string refusal_of(const Arguments& arguments) const {
-    Process process(directory_ / "", "refused", programs + "/proofmass", arguments);
+  /// What a program says on standard error, having refused its arguments.
+  [[nodiscard]] std::string refusal_of(const std::string& program,
+                                       const Arguments& arguments) const {
+    Process process(directory_ / "", "refused", programs + "/" + program, arguments);
     EXPECT_EQ(process.wait(), 2);
     return read_file(directory_ / "refused.err");
   }
@@ -84,8 +85,16 @@ TEST_F(Usage, IsRefusedWithTheRule) {
       {{"sensitivity", "a.db", "--run", "one"}, "--run = one (must be in [0, 999999999])"},
   };
   for (const auto& [arguments, rule] : cases) {
-    EXPECT_EQ(refusal_of(arguments), "proofmass: error: " + rule + "\n");
+    EXPECT_EQ(refusal_of("proofmass", arguments), "proofmass: error: " + rule + "\n");
   }
+}
+
+TEST_F(Usage, OfTheServicesIsRefusedWithTheRule) {
+  EXPECT_EQ(refusal_of("proofmass-worker", {"--connect", "ipc:///tmp/a", "--threads", "-1"}),
+            "proofmass-worker: error: --threads = -1 (must be in [1, 64])\n");
+  EXPECT_EQ(refusal_of("proofmass-worker", {}), "proofmass-worker: error: --connect is required\n");
+  EXPECT_EQ(refusal_of("proofmass-coordinator", {"--drain-time", "-1"}),
+            "proofmass: error: --drain-time = -1 (must be in [0, 31622400])\n");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "core/error.hpp"
+#include "proto/command_line/option_checks.hpp"
 #include "tests/worker/temporary_directory.hpp"
 
 namespace proofmass::worker {
@@ -19,15 +20,17 @@ Options parsed(std::vector<std::string> arguments) {
   CLI::App app("worker");
   add_options(app, options);
   std::reverse(arguments.begin(), arguments.end());  // As CLI11 wants them.
-  app.parse(arguments);
+  try {
+    app.parse(arguments);
+  } catch (const CLI::ParseError& error) {
+    throw InvalidArgument(wire::refusal_of(app, error));
+  }
   return options;
 }
 
 std::string error_of(const std::vector<std::string>& arguments) {
   try {
     (void)parsed(arguments);
-  } catch (const CLI::ParseError& error) {
-    return error.what();
   } catch (const InvalidArgument& error) {
     return error.what();
   }
@@ -106,8 +109,8 @@ TEST(WorkerOptions, MustBeOfTheKnownKinds) {
   const auto error_with = [&](const std::string& name, const std::string& value) {
     return error_of({"--connect", "ipc:///tmp/a", name, value});
   };
-  EXPECT_EQ(error_with("--threads", "0"), "--threads: Value 0 not in range 1 to 64");
-  EXPECT_EQ(error_with("--log-format", "xml"), "--log-format: xml not in {text,json}");
+  EXPECT_EQ(error_with("--threads", "0"), "--threads = 0 (must be in [1, 64])");
+  EXPECT_EQ(error_with("--log-format", "xml"), "--log-format = xml (must be one of json, text)");
   EXPECT_EQ(error_with("--faults", "drop=2").substr(0, 15), "faults.drop = 2");
   EXPECT_EQ(error_with("--max-walltime", "5x"),
             "max-walltime = 5x (must be 1 or more, in seconds or with s, m, h or d; at most 366d)");

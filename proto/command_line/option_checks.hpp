@@ -9,9 +9,9 @@
 #include <system_error>
 #include <vector>
 
-namespace proofmass::coordinator {
+namespace proofmass::wire {
 
-// What checks say is `value (rule)`; run_program() puts the option's name before it.
+// What checks say is `value (rule)`; refusal_of() puts the option's name before it.
 
 /// Takes numbers of a closed range. CLI11 alone would read -1 as the largest number without a sign.
 template <typename Number>
@@ -46,4 +46,8 @@ CLI::Option* add_choice(CLI::App& command, const std::string& name, Value& targe
       ->check(one_of(words));
 }
 
-}  // namespace proofmass::coordinator
+/// What to tell people whose arguments were refused: `option = value (rule)` where there is a
+/// value.
+[[nodiscard]] std::string refusal_of(const CLI::App& app, const CLI::ParseError& error);
+
+}  // namespace proofmass::wire

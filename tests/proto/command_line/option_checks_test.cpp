@@ -1,4 +1,4 @@
-#include "coordinator/cli/option_checks.hpp"
+#include "proto/command_line/option_checks.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-namespace proofmass::coordinator {
+namespace proofmass::wire {
 namespace {
 
 TEST(InRange, TakesBothEndsAndWhatIsBetween) {
@@ -47,4 +47,4 @@ TEST(Choice, SetsTheValueOfItsWord) {
 }
 
 }  // namespace
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::wire
