@@ -34,6 +34,8 @@ namespace {
 
 constexpr std::chrono::milliseconds tick_interval(100);
 constexpr std::chrono::seconds review_interval(1);
+// Who follows a campaign asks every second, and wants to be told how it ended.
+constexpr std::chrono::seconds follow_up_max(3);
 // So that ticks, completions and clients are not put off by workers that talk much ...
 constexpr int worker_messages_per_turn_max = 1000;
 // ... nor workers by clients that ask much.
@@ -233,7 +235,12 @@ class Service::Parts final : public Outbox {
       on_drain(state_, *this);
     }
     if (drained_until_) return is_quiet(state_) || now() > *drained_until_;
-    return config_.end == ServiceEnd::when_done && desk_.is_all_done();
+    return config_.end == ServiceEnd::when_done && desk_.is_all_done() && !is_followed();
+  }
+
+  /// True if a client that was told of a campaign's progress may not know yet that it is over.
+  [[nodiscard]] bool is_followed() {
+    return told_progress_at_ && now() - *told_progress_at_ < follow_up_max;
   }
 
   void wait() {
@@ -299,7 +306,9 @@ class Service::Parts final : public Outbox {
       return wire::ErrorReply{.text =
                                   fmt::format("key = {} (is not authorized any more)", from.key)};
     }
-    return desk_.answer(request, now(), *this);
+    wire::ClientReply reply = desk_.answer(request, now(), *this);
+    if (!desk_.is_all_done()) told_progress_at_ = now();
+    return reply;
   }
 
   void complete(const Committed& committed) {
@@ -358,6 +367,7 @@ class Service::Parts final : public Outbox {
   WorkerDesk worker_desk_;
   CampaignDesk desk_;
   std::optional<TimePoint> drained_until_;
+  std::optional<TimePoint> told_progress_at_;  ///< To any client.
   TimePoint ticked_at_;
   TimePoint reviewed_at_;
   std::uint64_t num_unsent_logged_ = 0;

@@ -30,7 +30,7 @@ enum class StopRequest : std::uint8_t {
 /// When a service ends that nobody asks to.
 enum class ServiceEnd : std::uint8_t {
   never,
-  when_done,  ///< Every campaign is finished or cancelled.
+  when_done,  ///< Every campaign is finished or cancelled, and clients that follow can know it.
 };
 
 /// Settings of a service.

@@ -258,5 +258,17 @@ TEST_F(ServiceClients, FindTheStatisticsOfAFinishedCampaignUpToDate) {
   end(StopRequest::now);
 }
 
+TEST_F(ServiceClients, AreToldTheEndByAServiceThatEndsWhenAllIsDone) {
+  config.end = ServiceEnd::when_done;
+  start_with({test::campaign_of("a", 1)});
+  EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::active);
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)worker.receive<wire::ResultAck>();
+  (void)wait_for_event("campaign_summarised");
+  EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::finished);
+  wait_for_end();
+}
+
 }  // namespace
 }  // namespace proofmass::coordinator
