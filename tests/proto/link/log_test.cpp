@@ -1,6 +1,10 @@
 #include "proto/link/log.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
+#include <spdlog/spdlog.h>
+
+#include <memory>
+#include <string>
 
 namespace proofmass::wire {
 namespace {
@@ -33,6 +37,50 @@ TEST(JsonLine, IsJsonWhateverAPeerSays) {
   EXPECT_EQ(json_line("malformed_message \xff\n\\ =x", "error", noon),
             R"({"time":"2026-03-04T12:00:01.234Z","level":"error","event":"malformed_message",)"
             "\"text\":\"\xef\xbf\xbd\\n\\\\ =x\"}");
+}
+
+/// Gives the program its former log back.
+class SetUpLog : public testing::Test {
+ protected:
+  ~SetUpLog() override {
+    spdlog::set_default_logger(former_);
+    spdlog::set_level(spdlog::level::info);
+  }
+
+  /// What reaches standard error of an event worth knowing and of one that is wrong.
+  static std::string written() {
+    testing::internal::CaptureStderr();
+    spdlog::info("worker_ended reason=told");
+    spdlog::warn("worker_crashed signal=11");
+    return testing::internal::GetCapturedStderr();
+  }
+
+ private:
+  std::shared_ptr<spdlog::logger> former_ = spdlog::default_logger();
+};
+
+TEST_F(SetUpLog, WritesLinesForPeople) {
+  set_up_log("people", LogFormat::text, LogLevel::info);
+  EXPECT_THAT(written(), testing::MatchesRegex(
+                             "[[][^\n]*[]] [[]people[]] [[]info[]] worker_ended reason=told\n"
+                             "[[][^\n]*[]] [[]people[]] [[]warning[]] worker_crashed signal=11\n"));
+}
+
+TEST_F(SetUpLog, WritesAnObjectALineForPrograms) {
+  set_up_log("programs", LogFormat::json, LogLevel::info);
+  EXPECT_THAT(written(),
+              testing::MatchesRegex(
+                  R"([{]"time":"[^"]*","level":"info","event":"worker_ended","reason":"told"[}])"
+                  "\n"
+                  R"([{]"time":"[^"]*","level":"warning","event":"worker_crashed","signal":"11"[}])"
+                  "\n"));
+}
+
+TEST_F(SetUpLog, LeavesOutWhatIsBelowItsLevel) {
+  set_up_log("quiet", LogFormat::text, LogLevel::warning);
+  const std::string text = written();
+  EXPECT_THAT(text, testing::Not(testing::HasSubstr("worker_ended")));
+  EXPECT_THAT(text, testing::HasSubstr("worker_crashed"));
 }
 
 }  // namespace
