@@ -10,7 +10,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 (
   cd "$root"
   cmake --preset release
-  cmake --build --preset release
+  cmake --build --preset programs
 )
 exec "$root/build/release/bin/proofmass" run "$root/deploy/campaigns/hardy2013.toml" \
   --db hardy2013.db "$@"
