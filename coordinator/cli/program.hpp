@@ -26,8 +26,8 @@ inline constexpr const char* exit_codes_text =
 
 /// Parses the arguments, does the work and turns what goes wrong into a message and an exit code.
 inline int run_program(CLI::App& app, int argc, char** argv, const std::function<int()>& work) {
-  const auto fail = [](std::string_view what, int exit_code) {
-    fmt::print(stderr, "proofmass: error: {}\n", what);
+  const auto fail = [&app](std::string_view what, int exit_code) {
+    fmt::print(stderr, "{}: error: {}\n", app.get_name(), what);
     return exit_code;
   };
   try {

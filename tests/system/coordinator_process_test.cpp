@@ -232,7 +232,7 @@ TEST_F(CoordinatorProcess, IsTheOnlyOneOfItsDirectory) {
                  {"--directory", "served", "--bind", "ipc://" + path("other").string()});
   EXPECT_EQ(second.wait(), 1);
   EXPECT_EQ(errors_of("second"),
-            "proofmass: error: directory = served (another coordinator serves it)\n");
+            "proofmass-coordinator: error: directory = served (another coordinator serves it)\n");
 }
 
 TEST_F(CoordinatorProcess, TakesItsOptionsFromAFileAndTheEnvironment) {

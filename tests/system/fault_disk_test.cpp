@@ -98,7 +98,7 @@ TEST_F(FaultyDisk, IsReadOnly) {
   Process coordinator = this->coordinator("coordinator", {"null.toml"});
   EXPECT_EQ(coordinator.wait(), 1);
   EXPECT_EQ(errors_of("coordinator"),
-            "proofmass: error: directory = served (Read-only file system)\n");
+            "proofmass-coordinator: error: directory = served (Read-only file system)\n");
 }
 
 }  // namespace

@@ -114,8 +114,9 @@ TEST_F(CampaignFiles, ThatAreDamagedAreNotReplaced) {
   fs::resize_file(file_of("null"), 5000);
   Process coordinator = this->coordinator("second", {"null.toml"});
   EXPECT_EQ(coordinator.wait(), 1);
-  EXPECT_TRUE(contains(errors_of("second"),
-                       "proofmass: error: campaign file = served/null.db (is damaged: "))
+  EXPECT_TRUE(
+      contains(errors_of("second"),
+               "proofmass-coordinator: error: campaign file = served/null.db (is damaged: "))
       << errors_of("second");
   EXPECT_EQ(fs::file_size(file_of("null")), 5000U);
 }

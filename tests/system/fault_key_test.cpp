@@ -181,7 +181,8 @@ TEST_F(Keys, ThatOthersCanReadAreRefused) {
   }
   Process coordinator = this->coordinator("coordinator", {"--keys", "keys"});
   EXPECT_EQ(coordinator.wait(), 1);
-  EXPECT_EQ(errors_of("coordinator"), "proofmass: error: key file = keys/coordinator.key" + rule);
+  EXPECT_EQ(errors_of("coordinator"),
+            "proofmass-coordinator: error: key file = keys/coordinator.key" + rule);
   Process worker = start_behind({}, "worker", "proofmass-worker",
                                 {"--connect", "tcp://127.0.0.1:5555", "--keys", "keys"});
   EXPECT_EQ(worker.wait(), 1);

@@ -94,7 +94,7 @@ TEST_F(Usage, OfTheServicesIsRefusedWithTheRule) {
             "proofmass-worker: error: --threads = -1 (must be in [1, 64])\n");
   EXPECT_EQ(refusal_of("proofmass-worker", {}), "proofmass-worker: error: --connect is required\n");
   EXPECT_EQ(refusal_of("proofmass-coordinator", {"--drain-time", "-1"}),
-            "proofmass: error: --drain-time = -1 (must be in [0, 31622400])\n");
+            "proofmass-coordinator: error: --drain-time = -1 (must be in [0, 31622400])\n");
 }
 
 }  // namespace
