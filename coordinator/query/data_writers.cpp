@@ -54,12 +54,13 @@ void CsvWriter::begin(std::span<const std::string> columns) {
   sink_(line + "\r\n");
 }
 
-void CsvWriter::row(std::span<const Cell> cells) {
+bool CsvWriter::row(std::span<const Cell> cells) {
   std::string line;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     line += fmt::format("{}{}", i == 0 ? "" : ",", csv_cell(cells[i]));
   }
   sink_(line + "\r\n");
+  return true;
 }
 
 void JsonWriter::begin(std::span<const std::string> columns) {
@@ -74,13 +75,14 @@ void JsonWriter::begin(std::span<const std::string> columns) {
   sink_("[");
 }
 
-void JsonWriter::row(std::span<const Cell> cells) {
+bool JsonWriter::row(std::span<const Cell> cells) {
   std::string line = has_rows_ ? ",\n {" : "\n {";
   for (std::size_t i = 0; i < cells.size(); ++i) {
     line += fmt::format("{}{}: {}", i == 0 ? "" : ", ", keys_[i], json_cell(cells[i]));
   }
   sink_(line + "}");
   has_rows_ = true;
+  return true;
 }
 
 void JsonWriter::end() { sink_(has_rows_ ? "\n]\n" : "]\n"); }

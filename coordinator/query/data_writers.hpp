@@ -15,7 +15,7 @@ class CsvWriter : public RowWriter {
  public:
   explicit CsvWriter(TextSink sink) : sink_(std::move(sink)) {}
   void begin(std::span<const std::string> columns) override;
-  void row(std::span<const Cell> cells) override;
+  [[nodiscard]] bool row(std::span<const Cell> cells) override;
   void end() override {}
 
  private:
@@ -29,7 +29,7 @@ class JsonWriter : public RowWriter {
   explicit JsonWriter(TextSink sink) : sink_(std::move(sink)) {}
   /// @throws InvalidArgument if two columns have the same name: readers keep one of them.
   void begin(std::span<const std::string> columns) override;
-  void row(std::span<const Cell> cells) override;
+  [[nodiscard]] bool row(std::span<const Cell> cells) override;
   void end() override;
 
  private:

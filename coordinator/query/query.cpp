@@ -261,7 +261,7 @@ QueryEnd run_query(const std::filesystem::path& file, const std::string& sql,
     for (std::size_t i = 0; i < cells.size(); ++i) {
       cells[i] = cell_of(statement.get(), static_cast<int>(i));
     }
-    writer.row(cells);
+    if (!writer.row(cells)) break;
   }
   if (reader.is_interrupted()) return QueryEnd::interrupted;
   writer.end();

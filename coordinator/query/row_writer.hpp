@@ -20,13 +20,15 @@ struct Blob {
 /// A value of SQL; monostate is NULL. Text and bytes live until the next row.
 using Cell = std::variant<std::monostate, std::int64_t, double, std::string_view, Blob>;
 
-/// What becomes of the rows of a query: begin() once, row() for each, end() once.
+/// What becomes of the rows of a query: begin() once, row() for each until it wants no more, end()
+/// once.
 class RowWriter {
  public:
   virtual ~RowWriter() = default;
   /// @throws InvalidArgument if the format cannot hold such columns.
   virtual void begin(std::span<const std::string> columns) = 0;
-  virtual void row(std::span<const Cell> cells) = 0;
+  /// @returns False if it wants no further row.
+  [[nodiscard]] virtual bool row(std::span<const Cell> cells) = 0;
   virtual void end() = 0;
 };
 
@@ -37,7 +39,7 @@ enum class RowFormat : std::uint8_t { table, csv, json, markdown };
 
 /// For people: what a table may take.
 struct TableLimits {
-  std::size_t num_rows_max = 1000;         ///< Further rows are announced, but not shown.
+  std::size_t num_rows_max = 1000;         ///< Whether there are more is said.
   std::optional<std::size_t> num_columns;  ///< Of the terminal; empty if it is none.
 };
 

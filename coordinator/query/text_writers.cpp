@@ -62,8 +62,9 @@ void TableWriter::begin(std::span<const std::string> columns) {
   }
 }
 
-void TableWriter::row(std::span<const Cell> cells) {
-  if (++num_rows_ > limits_.num_rows_max) return;
+bool TableWriter::row(std::span<const Cell> cells) {
+  has_more_ = num_rows_ == limits_.num_rows_max;
+  if (has_more_) return false;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     Column& column = columns_[i];
     const bool is_text = !is_number(cells[i]) && !std::holds_alternative<std::monostate>(cells[i]);
@@ -74,6 +75,8 @@ void TableWriter::row(std::span<const Cell> cells) {
     column.has_text = column.has_text || is_text;
     column.width = std::max(column.width, display_width(column.texts.back()));
   }
+  ++num_rows_;
+  return true;
 }
 
 // Takes from the widest column of text, one at a time.
@@ -119,11 +122,8 @@ void TableWriter::end() {
   if (columns_.empty()) return;
   fit();
   write_names();
-  const std::size_t num_shown = std::min(num_rows_, limits_.num_rows_max);
-  for (std::size_t row = 0; row < num_shown; ++row) write_row(row);
-  if (num_shown < num_rows_) {
-    sink_(fmt::format("{} of {} rows (more with --rows-max)\n", num_shown, num_rows_));
-  }
+  for (std::size_t row = 0; row < num_rows_; ++row) write_row(row);
+  if (has_more_) sink_(fmt::format("the first {} rows (more with --rows-max)\n", num_rows_));
 }
 
 void MarkdownWriter::begin(std::span<const std::string> columns) {
@@ -143,13 +143,14 @@ void MarkdownWriter::write_rule(std::span<const Cell> cells) {
   has_rule_ = true;
 }
 
-void MarkdownWriter::row(std::span<const Cell> cells) {
+bool MarkdownWriter::row(std::span<const Cell> cells) {
   if (!has_rule_) write_rule(cells);
   std::string line = "|";
   for (const Cell& cell : cells) {
     line += fmt::format(" {} |", markdown_text(visible_text(cell_text(cell))));
   }
   sink_(line + "\n");
+  return true;
 }
 
 void MarkdownWriter::end() {

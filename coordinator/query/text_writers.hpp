@@ -16,7 +16,7 @@ class TableWriter : public RowWriter {
  public:
   TableWriter(const TableLimits& limits, TextSink sink);
   void begin(std::span<const std::string> columns) override;
-  void row(std::span<const Cell> cells) override;
+  [[nodiscard]] bool row(std::span<const Cell> cells) override;
   void end() override;
 
  private:
@@ -36,6 +36,7 @@ class TableWriter : public RowWriter {
   TextSink sink_;
   std::vector<Column> columns_;
   std::size_t num_rows_ = 0;
+  bool has_more_ = false;
 };
 
 /// A table of GitHub's Markdown, with all rows; columns whose first value is a number stand to the
@@ -44,7 +45,7 @@ class MarkdownWriter : public RowWriter {
  public:
   explicit MarkdownWriter(TextSink sink) : sink_(std::move(sink)) {}
   void begin(std::span<const std::string> columns) override;
-  void row(std::span<const Cell> cells) override;
+  [[nodiscard]] bool row(std::span<const Cell> cells) override;
   void end() override;
 
  private:

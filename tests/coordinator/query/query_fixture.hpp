@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <filesystem>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -27,13 +29,15 @@ class RecordingWriter : public coordinator::RowWriter {
   std::vector<std::string> columns;
   std::vector<std::vector<OwnCell>> rows;
   bool has_ended = false;
+  std::size_t num_wanted = std::numeric_limits<std::size_t>::max();
 
   void begin(std::span<const std::string> names) override {
     columns.assign(names.begin(), names.end());
   }
-  void row(std::span<const coordinator::Cell> cells) override {
+  [[nodiscard]] bool row(std::span<const coordinator::Cell> cells) override {
     auto& own = rows.emplace_back();
     for (const coordinator::Cell& cell : cells) own.push_back(own_cell(cell));
+    return rows.size() < num_wanted;
   }
   void end() override { has_ended = true; }
 

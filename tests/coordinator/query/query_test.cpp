@@ -130,6 +130,21 @@ TEST_F(Query, EndsWhenItIsInterrupted) {
   EXPECT_FALSE(writer.has_ended);
 }
 
+// As a table does, which shows the first rows of millions. The query would never end by itself.
+TEST_F(Query, ReadsNoFurtherThanItsWriterWants) {
+  make_file(test::campaign_of(2));
+  RecordingWriter writer;
+  writer.num_wanted = 3;
+  const auto end = run_query(file(),
+                             "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) "
+                             "SELECT i FROM n",
+                             {}, writer);
+  EXPECT_EQ(end, QueryEnd::complete);
+  EXPECT_EQ(writer.rows, (std::vector<std::vector<OwnCell>>{
+                             {std::int64_t{1}}, {std::int64_t{2}}, {std::int64_t{3}}}));
+  EXPECT_TRUE(writer.has_ended);
+}
+
 TEST_F(Query, SaysWhatIsWrongWithTheFile) {
   RecordingWriter writer;
   const auto ask = [&] { (void)run_query(file(), "SELECT 1", {}, writer); };

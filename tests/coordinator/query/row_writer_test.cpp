@@ -30,7 +30,9 @@ std::string written(RowFormat format, const std::vector<std::string>& columns,
   const auto writer =
       make_row_writer(format, limits, [&](std::string_view piece) { out += piece; });
   writer->begin(columns);
-  for (const Row& row : rows) writer->row(row);
+  for (const Row& row : rows) {
+    if (!writer->row(row)) break;
+  }
   writer->end();
   return out;
 }
@@ -131,10 +133,13 @@ TEST(TableRows, TakeOneLineEachAndSteerNoTerminal) {
             "a\n─────────────────\none\\ntwo\\u001b[2J\n");
 }
 
-TEST(TableRows, EndWithTheCountOfThoseNotShown) {
+TEST(TableRows, SayThatThereAreMore) {
   EXPECT_EQ(written(RowFormat::table, {"a"}, {{integer(1)}, {integer(2)}, {integer(3)}},
                     {.num_rows_max = 2, .num_columns = {}}),
-            "a\n─\n1\n2\n2 of 3 rows (more with --rows-max)\n");
+            "a\n─\n1\n2\nthe first 2 rows (more with --rows-max)\n");
+  EXPECT_EQ(written(RowFormat::table, {"a"}, {{integer(1)}, {integer(2)}},
+                    {.num_rows_max = 2, .num_columns = {}}),
+            "a\n─\n1\n2\n");
 }
 
 TEST(TableRows, CutTextToFitTheTerminalAndNeverANumber) {
