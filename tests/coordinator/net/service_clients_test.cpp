@@ -258,6 +258,23 @@ TEST_F(ServiceClients, FindTheStatisticsOfAFinishedCampaignUpToDate) {
   end(StopRequest::now);
 }
 
+TEST_F(ServiceClients, HaveStatisticsMadeForNewResultsOnly) {
+  std::atomic<int> num_summaries = 0;
+  files.next_runs = [&](std::uint64_t) -> std::optional<std::uint64_t> {
+    ++num_summaries;
+    return std::nullopt;
+  };
+  start_with({test::campaign_of("a", 1)});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)worker.receive<wire::ResultAck>();
+  (void)wait_for_event("campaign_summarised");
+  (void)client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 1), .priority = 5});
+  end(StopRequest::now);
+  EXPECT_EQ(Store::open_read_only(directory / "a.db").control().priority, 5);
+  EXPECT_EQ(num_summaries, 1);
+}
+
 TEST_F(ServiceClients, AreToldTheEndByAServiceThatEndsWhenAllIsDone) {
   config.end = ServiceEnd::when_done;
   start_with({test::campaign_of("a", 1)});
