@@ -48,6 +48,10 @@ TEST_F(FaultyDisk, IsFullForAWhile) {
   EXPECT_GT(num_before, 0U);
   EXPECT_LT(num_before, num_null_runs);
   EXPECT_NE(status_of("null").at("storage_failure"), nullptr);
+  Process submit = start_behind({}, "submit", "proofmass",
+                                {"submit", "null.toml", "--connect", clients_endpoint});
+  EXPECT_EQ(submit.wait(), 1);
+  EXPECT_TRUE(contains(errors_of("submit"), "(the disk is full; ")) << errors_of("submit");
   enlarge();
   EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
   EXPECT_EQ(one.wait(), 0) << errors_of("one");
