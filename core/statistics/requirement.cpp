@@ -9,7 +9,6 @@
 namespace proofmass {
 namespace {
 
-/// Counts may be fractions, for runs that are still to come.
 Verdict verdict(const Tolerance& tolerance, double num_exceedances, double num_runs) {
   const double allowed_rate = 1.0 - tolerance.coverage;
   if (num_runs <= 0.0) return Verdict::undecided;
@@ -22,36 +21,38 @@ Verdict verdict(const Tolerance& tolerance, double num_exceedances, double num_r
   return Verdict::undecided;
 }
 
-/// Fewest runs that decide if exceedances keep their rate, from a count that does not.
-std::optional<std::uint64_t> runs_to_decide(const Tolerance& tolerance, double rate,
-                                            std::uint64_t num_undecided) {
-  const auto decides = [&](std::uint64_t num_runs) {
-    const auto n = static_cast<double>(num_runs);
-    return verdict(tolerance, rate * n, n) != Verdict::undecided;
+/// The runs that it takes for so many exceedances if they come as often as in those of `check`.
+std::uint64_t runs_with(std::uint64_t num_exceedances, const RequirementCheck& check) {
+  return (num_exceedances * check.num_runs + check.num_exceedances - 1) / check.num_exceedances;
+}
+
+/// Runs that decide, looked for where an exceedance has just come: counts are whole, and there they
+/// keep the rate best. By one exceedance fewer may do, where runs_with() rounds.
+std::optional<std::uint64_t> runs_to_decide(const Tolerance& tolerance,
+                                            const RequirementCheck& check) {
+  const auto decides = [&](std::uint64_t num_exceedances) {
+    const auto num_runs = static_cast<double>(runs_with(num_exceedances, check));
+    return verdict(tolerance, static_cast<double>(num_exceedances), num_runs) != Verdict::undecided;
   };
-  std::uint64_t too_few = num_undecided;
-  std::uint64_t enough = num_undecided;
+  std::uint64_t too_few = check.num_exceedances;
+  std::uint64_t enough = check.num_exceedances;
   do {
-    if (enough >= num_runs_max) return std::nullopt;
     too_few = enough;
-    enough = std::min(2 * enough, num_runs_max);
+    enough *= 2;
+    if (runs_with(too_few + 1, check) > num_runs_max) return std::nullopt;
   } while (!decides(enough));
   while (enough - too_few > 1) {
     const std::uint64_t middle = too_few + (enough - too_few) / 2;
     (decides(middle) ? enough : too_few) = middle;
   }
-  return enough;
+  const std::uint64_t num_runs = runs_with(enough, check);
+  return num_runs <= num_runs_max ? std::optional(num_runs) : std::nullopt;
 }
 
 void add_runs_needed(const Tolerance& tolerance, RequirementCheck& check) {
   check.num_runs_at_best = wilks_num_runs(tolerance, check.num_exceedances + 1);
-  if (check.num_runs == 0) {
-    check.num_runs_at_this_rate = check.num_runs_at_best;
-    return;
-  }
-  const double rate =
-      static_cast<double>(check.num_exceedances) / static_cast<double>(check.num_runs);
-  check.num_runs_at_this_rate = runs_to_decide(tolerance, rate, check.num_runs);
+  check.num_runs_at_this_rate =
+      check.num_exceedances == 0 ? check.num_runs_at_best : runs_to_decide(tolerance, check);
 }
 
 }  // namespace

@@ -43,7 +43,8 @@ struct RequirementCheck {
   /// If undecided: all runs it takes to meet the requirement if none of the further ones exceeds.
   std::optional<std::uint64_t> num_runs_at_best;
   /// If undecided: all runs it takes to decide, either way, if errors go on to exceed as often as
-  /// they did; empty if that is just as often as allowed, or would take more than num_runs_max.
+  /// they did, one in num_runs/num_exceedances; the last of them exceeds. Empty if that is just as
+  /// often as allowed, or would take more than num_runs_max.
   std::optional<std::uint64_t> num_runs_at_this_rate;
 };
 

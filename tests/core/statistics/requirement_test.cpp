@@ -91,10 +91,37 @@ TEST(CheckRequirement, SaysHowManyRunsItTakesAfterAnExceedance) {
   EXPECT_EQ(check.verdict, Verdict::undecided);
   EXPECT_EQ(check.num_exceedances, 1u);  // On the limit exceeds it.
   EXPECT_EQ(check.num_runs_at_best, 473u);
-  // At one of 300 the number is the first n that P(Bin(n, 0.01) ≤ n/300) ≤ 5 % holds for.
-  const auto n = static_cast<double>(*check.num_runs_at_this_rate);
-  EXPECT_LE(binomial_at_most(n / 300.0, n, 0.01), 0.05);
-  EXPECT_GT(binomial_at_most((n - 1.0) / 300.0, n - 1.0, 0.01), 0.05);
+  // At one of 300: P(Bin(600, 0.01) ≤ 2) = 6.1 %, P(Bin(900, 0.01) ≤ 3) = 2.1 % (scipy).
+  EXPECT_EQ(check.num_runs_at_this_rate, 900u);
+}
+
+// Two of 100: P(Bin(400, 0.01) ≥ 8) = 5.02 %, P(Bin(401, 0.01) ≥ 8) = 5.08 %, P(Bin(450, 0.01) ≥ 9)
+// = 3.94 % (scipy). There is no ninth exceedance, nor a part of one, before run 450.
+TEST(CheckRequirement, DecidesWithTheRunsThatItSaysIfTheRateStays) {
+  const RequirementCheck check = check_requirement(a_c12_99_95, errors_with(98, 2), 0);
+  EXPECT_EQ(check.num_runs_at_this_rate, 450u);
+  EXPECT_EQ(check_requirement(a_c12_99_95, errors_with(392, 8), 0).verdict, Verdict::undecided);
+  EXPECT_EQ(check_requirement(a_c12_99_95, errors_with(393, 8), 0).verdict, Verdict::undecided);
+  EXPECT_EQ(check_requirement(a_c12_99_95, errors_with(441, 9), 0).verdict, Verdict::not_met);
+}
+
+// The same for other rates and tolerances, on either side.
+TEST(CheckRequirement, FulfilsWhatItForetells) {
+  for (const Tolerance tolerance : {Tolerance{0.99, 0.95}, Tolerance{0.9, 0.9}}) {
+    const Requirement requirement{Parameter::a_c12, 9e-4, tolerance};
+    for (std::size_t num_runs = 10; num_runs < 200; num_runs += 13) {
+      for (std::size_t num_on_limit = 1; num_on_limit < 8; ++num_on_limit) {
+        const auto check =
+            check_requirement(requirement, errors_with(num_runs - num_on_limit, num_on_limit), 0);
+        if (check.num_runs_at_this_rate.value_or(100'000) >= 100'000) continue;
+        const std::size_t num_then = *check.num_runs_at_this_rate;
+        const std::size_t num_exceedances = num_then * num_on_limit / num_runs;
+        const auto errors = errors_with(num_then - num_exceedances, num_exceedances);
+        EXPECT_NE(check_requirement(requirement, errors, 0).verdict, Verdict::undecided)
+            << num_on_limit << " of " << num_runs;
+      }
+    }
+  }
 }
 
 // P(Bin(100, 0.01) ≥ 3) = 7.9 %, ≥ 4: 1.8 %.
