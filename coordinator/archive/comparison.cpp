@@ -91,7 +91,7 @@ ParameterComparison compared(const Magnitudes& magnitudes, bool is_paired) {
     const UnpairedComparison unpaired = compare_unpaired(first, second, default_confidence);
     comparison.mean_change = unpaired.mean_difference;
     comparison.interval = unpaired.interval;
-    comparison.p_value = unpaired.mean_p_value;
+    comparison.p_value = unpaired.p_value;
   }
   return comparison;
 }

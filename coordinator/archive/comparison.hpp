@@ -62,7 +62,7 @@ struct CampaignComparison {
 
 /// Compares the runs with an estimate: those that both campaigns have, run by run, if their seed
 /// and the truths of all common runs agree to the last bit, and else all of each. P-values are of
-/// Wilcoxon's signed ranks for pairs and of Welch's t else; intervals are of 95 %.
+/// Wilcoxon's signed ranks for pairs and of UnpairedComparison else; intervals are of 95 %.
 [[nodiscard]] CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                                    const ComparedCampaign& second);
 

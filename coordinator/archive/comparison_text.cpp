@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
 #include "coordinator/report/text_cells.hpp"
+#include "core/statistics/comparison.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -70,6 +72,13 @@ std::string mean_row(const ParameterInfo& info, const ParameterComparison& param
   return text + (parameter.adjusted_p_value < significance ? " *\n" : "\n");
 }
 
+std::string_view test_of(const CampaignComparison& comparison) {
+  if (comparison.is_paired()) return "Wilcoxon's signed ranks";
+  return std::min(comparison.num_first, comparison.num_second) < num_welch_min
+             ? "larger of Welch's and Smirnov's test"
+             : "Welch's t";
+}
+
 std::string mean_table(const CampaignComparison& comparison) {
   std::string text = "Mean of |estimate − truth|\n\n" + heading({{"A", figure_width},
                                                                  {"B", figure_width},
@@ -83,7 +92,7 @@ std::string mean_table(const CampaignComparison& comparison) {
   return text + fmt::format(
                     "from, to: 95 % interval of the change; p: {},\n"
                     "adjusted for ten parameters (Holm); *: below {:.2f}\n",
-                    comparison.is_paired() ? "Wilcoxon's signed ranks" : "Welch's t", significance);
+                    test_of(comparison), significance);
 }
 
 std::string scatter_table(const CampaignComparison& comparison) {

@@ -184,6 +184,9 @@ UnpairedComparison compare_unpaired(std::span<const double> first, std::span<con
   comparison.distance = static_cast<double>(distance) / static_cast<double>(first.size()) /
                         static_cast<double>(second.size());
   comparison.law_p_value = law_p_value(first.size(), second.size(), distance);
+  comparison.p_value = std::min(first.size(), second.size()) < num_welch_min
+                           ? std::max(comparison.mean_p_value, comparison.law_p_value)
+                           : comparison.mean_p_value;
   return comparison;
 }
 

@@ -36,7 +36,14 @@ struct UnpairedComparison {
   /// Kolmogorov and Smirnov's test: one law? Exact if the product of both counts is at most
   /// 4 million, else by the limiting law, which is conservative.
   double law_p_value = 1.0;
+  /// Of a change: mean_p_value; with fewer than num_welch_min values on a side the larger of both,
+  /// as Welch's t then finds changes that are not there, the more the less normal the values are.
+  double p_value = 1.0;
 };
+
+/// Fewest values on either side that Welch's t is trusted with alone; README.md has the
+/// measurement.
+inline constexpr std::size_t num_welch_min = 100;
 
 /// @throws InvalidArgument if one has below two values or a value is not finite; confidence must
 /// be in (0, 1).
