@@ -32,13 +32,14 @@ constexpr const char* declaration =
 /// One for a connection.
 struct DrawTable : sqlite3_vtab {
   sqlite3* connection = nullptr;
-  DatabaseState state;              // Of the database when `runs` was read.
-  std::shared_ptr<DrawnRuns> runs;  // Its cursors own it too: each stays with what it began with.
+  DatabaseState state;  // Of the database when `runs` was read.
+  // Its cursors own it too: each stays with what it began with.
+  std::shared_ptr<DrawnCampaign> runs;
 };
 
 /// One for a place in a statement that names the table.
 struct DrawCursor : sqlite3_vtab_cursor {
-  std::shared_ptr<DrawnRuns> runs;
+  std::shared_ptr<DrawnCampaign> runs;
   DrawScan scan;
   std::uint64_t run = 0;
   std::size_t quantity = 0;
@@ -151,10 +152,10 @@ int choose_plan(sqlite3_vtab*, sqlite3_index_info* plan) {
 }
 
 // Reads the campaign when it is first needed and when the database has changed since.
-std::shared_ptr<DrawnRuns> current_runs(DrawTable& table) {
+std::shared_ptr<DrawnCampaign> current_runs(DrawTable& table) {
   const DatabaseState state = state_of(table.connection);
   if (!table.runs || !(table.state == state)) {
-    table.runs = std::make_shared<DrawnRuns>(read_campaign_of(table.connection));
+    table.runs = std::make_shared<DrawnCampaign>(read_campaign_of(table.connection));
     table.state = state;
   }
   return table.runs;

@@ -110,9 +110,9 @@ DatabaseState state_of(sqlite3* connection) {
   return {.data_version = row.integer(0), .num_changes = sqlite3_total_changes64(connection)};
 }
 
-DrawnRuns::DrawnRuns(Campaign campaign) : campaign_(std::move(campaign)) {}
+DrawnCampaign::DrawnCampaign(Campaign campaign) : campaign_(std::move(campaign)) {}
 
-const std::optional<DrawnValues>& DrawnRuns::values_of(RunIndex run) {
+const std::optional<DrawnValues>& DrawnCampaign::values_of(RunIndex run) {
   PROOFMASS_EXPECT(run.value < campaign_.num_runs);
   if (last_run_ == run) return last_values_;
   const std::vector<double> table_values = campaign_.table_values(run);

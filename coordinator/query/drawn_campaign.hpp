@@ -27,9 +27,9 @@ struct DatabaseState {
 [[nodiscard]] DatabaseState state_of(sqlite3* connection);
 
 /// What the runs of a campaign draw, computed again when asked for.
-class DrawnRuns {
+class DrawnCampaign {
  public:
-  explicit DrawnRuns(Campaign campaign);
+  explicit DrawnCampaign(Campaign campaign);
 
   [[nodiscard]] std::string_view campaign_name() const { return campaign_.name; }
   [[nodiscard]] std::uint64_t num_runs() const { return campaign_.num_runs; }

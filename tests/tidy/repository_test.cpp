@@ -31,6 +31,9 @@ TEST(Repository, UsesItsOwnWords) { expect_none(check_words); }
 TEST(Repository, BuildsEverySource) {
   for (const std::string& finding : check_all_built(sources())) ADD_FAILURE() << finding;
 }
+TEST(Repository, DefinesEachTypeOnce) {
+  for (const std::string& finding : check_types_unique(sources())) ADD_FAILURE() << finding;
+}
 
 }  // namespace
 }  // namespace proofmass::test

@@ -266,4 +266,27 @@ Findings check_all_built(const std::vector<SourceFile>& files) {
   return findings;
 }
 
+Findings check_types_unique(const std::vector<SourceFile>& files) {
+  static const std::regex opening("^namespace ([\\w:]+) \\{$");
+  static const std::regex type("^(?:class|struct|enum class) (\\w+)[^;]*\\{");
+  std::map<std::string, std::string> first_of;  // The header of each `namespace::type`.
+  Findings findings;
+  for (const SourceFile& file : files) {
+    if (!file.is_header() || file.is_in("tests")) continue;
+    std::string scope;
+    std::size_t line_number = 0;
+    for (const std::string& line : lines_of(code_of(file.text))) {
+      ++line_number;
+      std::smatch match;
+      if (std::regex_search(line, match, opening)) scope = match[1];
+      if (!std::regex_search(line, match, type)) continue;
+      const auto [entry, is_new] = first_of.emplace(scope + "::" + match[1].str(), file.path);
+      if (!is_new)
+        findings.push_back(
+            finding(file, line_number, entry->first + " is also in " + entry->second));
+    }
+  }
+  return findings;
+}
+
 }  // namespace proofmass::test

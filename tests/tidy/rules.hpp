@@ -35,4 +35,8 @@ using Findings = std::vector<std::string>;
 /// Every .cpp file is named by the CMakeLists.txt of its folder or of one above.
 [[nodiscard]] Findings check_all_built(const std::vector<SourceFile>& files);
 
+/// No two headers of the programs define a type of one name in one namespace: the linker would take
+/// the destructor of either for both.
+[[nodiscard]] Findings check_types_unique(const std::vector<SourceFile>& files);
+
 }  // namespace proofmass::test

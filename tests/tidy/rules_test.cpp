@@ -134,5 +134,16 @@ TEST(CheckAllBuilt, CatchesASourceThatNoCMakeListsNames) {
   EXPECT_THAT(check_all_built({root, {"worker/b.cpp", ""}}), IsEmpty());
 }
 
+TEST(CheckTypesUnique, CatchesTwoOfOneName) {
+  const SourceFile first{"core/a.hpp", "namespace proofmass {\nstruct Draw {\n};\n}\n"};
+  const SourceFile second{"worker/b.hpp", "namespace proofmass {\nclass Draw final : Base {\n"};
+  EXPECT_THAT(check_types_unique({first, second}),
+              ElementsAre("worker/b.hpp:2: proofmass::Draw is also in core/a.hpp"));
+  const SourceFile declaration{"core/c.hpp", "namespace proofmass {\nstruct Draw;\n"};
+  const SourceFile elsewhere{"worker/d.hpp", "namespace proofmass::worker {\nstruct Draw {\n"};
+  const SourceFile of_tests{"tests/e.hpp", "namespace proofmass {\nstruct Draw {\n"};
+  EXPECT_THAT(check_types_unique({first, declaration, elsewhere, of_tests}), IsEmpty());
+}
+
 }  // namespace
 }  // namespace proofmass::test
