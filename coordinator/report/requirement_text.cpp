@@ -33,16 +33,20 @@ std::string exceedance_line(const RequirementCheck& check) {
     line += fmt::format("; {} to {} of all draws (95 % interval)", percent(check.exceedance->lower),
                         percent(check.exceedance->upper));
   }
-  return line + "\n";
+  if (check.num_without_estimate == 0) return line + "\n";
+  return line + fmt::format("\n             {} of them for want of an estimate\n",
+                            check.num_without_estimate);
 }
 
 std::string bound_line(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
   const Tolerance& tolerance = answer.requirement.tolerance;
   if (!check.bound) {
+    // Runs without an estimate are the largest errors.
+    const auto num_runs = wilks_num_runs(tolerance, check.num_without_estimate + 1);
     return fmt::format("Bound        none: {} draws at least, for {} with {}\n",
-                       wilks_num_runs(tolerance, 1).value_or(0), percent(tolerance.coverage),
-                       percent(tolerance.confidence));
+                       num_runs ? std::to_string(*num_runs) : "too many",
+                       percent(tolerance.coverage), percent(tolerance.confidence));
   }
   const ParameterInfo& info = parameter_infos()[index(answer.requirement.parameter)];
   return fmt::format("Bound        {} of all draws below {:.6g}{}{}, with {}\n",

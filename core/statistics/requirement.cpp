@@ -79,6 +79,7 @@ RequirementCheck check_requirement(const Requirement& requirement, std::span<con
   RequirementCheck check;
   check.num_runs = errors.size() + num_without_estimate;
   check.num_exceedances = static_cast<std::uint64_t>(num_above) + num_without_estimate;
+  check.num_without_estimate = num_without_estimate;
   const std::uint64_t order = wilks_order(tolerance, check.num_runs);
   check.num_allowed = order == 0 ? 0 : order - 1;
   check.bound = wilks_upper(errors, tolerance, num_without_estimate);

@@ -32,9 +32,10 @@ enum class Verdict {
 
 struct RequirementCheck {
   Verdict verdict = Verdict::undecided;
-  std::uint64_t num_runs = 0;         ///< Runs with and without an error.
-  std::uint64_t num_exceedances = 0;  ///< Errors at or above the limit, and runs without one.
-  std::uint64_t num_allowed = 0;      ///< Exceedances with which so many runs would meet it.
+  std::uint64_t num_runs = 0;              ///< Runs with and without an error.
+  std::uint64_t num_exceedances = 0;       ///< Errors at or above the limit, and runs without one.
+  std::uint64_t num_without_estimate = 0;  ///< Those runs.
+  std::uint64_t num_allowed = 0;           ///< Exceedances with which so many runs would meet it.
   /// With this confidence at least `coverage` of all errors are below it; empty if runs are too
   /// few. The requirement is met if and only if it is below the limit.
   std::optional<ToleranceBound> bound;

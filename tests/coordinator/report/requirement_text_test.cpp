@@ -51,6 +51,18 @@ TEST(RequirementText, SaysThatItIsNotMet) {
   EXPECT_THAT(text, testing::Not(testing::HasSubstr("Draws")));
 }
 
+// With five unknown draws the sixth largest error is the first that can be a bound; 0.99 with 0.95
+// then takes 1049 draws (scipy: P(Bin(1049, 0.01) ≤ 5) = 4.98 %, of 1048 5.01 %).
+TEST(RequirementText, SaysHowManyDrawsExceedForWantOfAnEstimate) {
+  const Requirement requirement = parse_requirement("a_c12 < 9e-4 for 99% with 95%");
+  const std::vector<double> errors(395, 1e-4);
+  const std::string text = requirement_text(
+      {.text = "", .requirement = requirement, .check = check_requirement(requirement, errors, 5)});
+  EXPECT_THAT(text, testing::HasSubstr("Exceeding    5 of 400 runs; "));
+  EXPECT_THAT(text, testing::HasSubstr("\n             5 of them for want of an estimate\n"));
+  EXPECT_THAT(text, testing::HasSubstr("Bound        none: 1049 draws at least, "));
+}
+
 TEST(RequirementText, LeavesOutTheUnitOfAPureNumber) {
   EXPECT_THAT(answer_to("a_d11_prime < 9e-4 for 95% with 95%", 59, 0),
               testing::HasSubstr(" below 0.0001, with 95 %\n"));
