@@ -34,11 +34,14 @@ std::string heading() {
                      horizontal_rule(right_width));
 }
 
-std::string measured_cells(const AccuracyStatistic& accuracy, double scale) {
+std::string measured_cells(const AccuracyStatistic& accuracy, std::uint64_t num_runs,
+                           double scale) {
   std::string text;
-  for (const double value : {accuracy.worst, accuracy.mean, accuracy.standard_deviation}) {
+  for (const double value : {accuracy.worst, accuracy.mean}) {
     text += right_aligned(measured_figure(value / scale), measured_width);
   }
+  text += right_aligned(num_runs < 2 ? "-" : measured_figure(accuracy.standard_deviation / scale),
+                        measured_width);
   const std::uint64_t beyond = accuracy.num_beyond_objective;
   const std::string count =
       beyond < 1'000'000 ? std::to_string(beyond) : measured_figure(static_cast<double>(beyond));
@@ -71,9 +74,10 @@ std::string accuracy_table(const Scenario& scenario, const CampaignStatistics& s
   text += heading();
   for (const ParameterInfo& info : parameter_infos()) {
     const std::size_t i = index(info.parameter);
-    const std::string cells = statistics.num_estimated == 0
-                                  ? absent_cells()
-                                  : measured_cells(statistics.accuracy[i], info.display_scale);
+    const std::string cells =
+        statistics.num_estimated == 0
+            ? absent_cells()
+            : measured_cells(statistics.accuracy[i], statistics.num_estimated, info.display_scale);
     text += row(info, scenario.objectives[i], cells);
   }
   return text + "beyond: runs whose error exceeds the objective; the paper: Hardy et al. 2013\n";

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 
 #include "coordinator/report/report.hpp"
@@ -22,8 +24,9 @@ std::string triple(std::string_view one, std::string_view two, std::string_view 
          right_aligned(three, figure_width) + " ";
 }
 
+// Of |error|: of few runs the symmetric interval of a mean may begin below 0, where none can lie.
 std::string triple(double value, const std::optional<Interval>& interval, double scale) {
-  const auto figure = [&](double number) { return measured_figure(number / scale); };
+  const auto figure = [&](double number) { return measured_figure(std::max(number, 0.0) / scale); };
   if (!interval) return triple(figure(value), "-", "-");
   return triple(figure(value), figure(interval->lower), figure(interval->upper));
 }
@@ -46,32 +49,47 @@ std::string heading() {
                      rule);
 }
 
-std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy) {
+std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy,
+                std::uint64_t num_runs) {
   const double scale = info.display_scale;
+  const std::string deviation =
+      num_runs < 2 ? triple("-", "-", "-")
+                   : triple(accuracy.standard_deviation, accuracy.deviation_interval, scale);
+  const std::string skewness = num_runs < 3 ? "-" : fmt::format("{:.2f}", accuracy.error.skewness);
   return fmt::format("{}{}│{}│{}{}\n", left_aligned(info.label, label_width),
-                     triple(accuracy.mean, accuracy.mean_interval, scale),
-                     triple(accuracy.standard_deviation, accuracy.deviation_interval, scale),
+                     triple(accuracy.mean, accuracy.mean_interval, scale), deviation,
                      right_aligned(signed_figure(accuracy.error.bias / scale), bias_width),
-                     right_aligned(fmt::format("{:.2f}", accuracy.error.skewness), skewness_width));
+                     right_aligned(skewness, skewness_width));
 }
 
+/// Fewest runs that the bootstrap covers what it says from; core/statistics/README.md.
+constexpr std::uint64_t num_runs_of_bootstrap = 200;
+
 /// What "the worst of n" is worth [Wilks1941].
-std::string worth_of_worst(std::uint64_t num_runs) {
+std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_estimate) {
   const double coverage = std::pow(1.0 - default_confidence, 1.0 / static_cast<double>(num_runs));
   // Rounded down: no more is claimed than holds.
-  return fmt::format("worst of {}: with 95 % confidence {} % of all draws stay below\n", num_runs,
-                     std::floor(coverage * 1e5) / 1e3);
+  const std::string text =
+      fmt::format("worst of {}: with 95 % confidence {} % of all draws stay below", num_runs,
+                  std::floor(coverage * 1e5) / 1e3);
+  if (num_without_estimate == 0) return text + "\n";
+  return text + fmt::format(",\n  of those that have an estimate; {} more {} none\n",
+                            num_without_estimate, num_without_estimate == 1 ? "has" : "have");
 }
 
 }  // namespace
 
-std::string interval_table(const CampaignStatistics& statistics) {
+std::string interval_table(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
   if (statistics.num_estimated == 0) return "";
   std::string text = fmt::format("95 % intervals, in the units above\n\n{}", heading());
   for (const ParameterInfo& info : parameter_infos()) {
-    text += row(info, statistics.accuracy[index(info.parameter)]);
+    text += row(info, statistics.accuracy[index(info.parameter)], statistics.num_estimated);
   }
-  return text + worth_of_worst(statistics.num_estimated);
+  if (statistics.num_estimated < num_runs_of_bootstrap) {
+    text += "std: an interval from fewer than 200 runs is too narrow, see core/statistics\n";
+  }
+  return text + worth_of_worst(statistics.num_estimated,
+                               statistics.num_runs - statistics.num_estimated + num_given_up);
 }
 
 }  // namespace proofmass::coordinator

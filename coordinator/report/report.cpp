@@ -11,11 +11,13 @@ namespace proofmass::coordinator {
 std::string report_text(const Store& store, const Scenario& scenario) {
   const ReadResults results = read_results(store, scenario);
   const CampaignStatistics& statistics = results.statistics;
+  const std::vector<RunRange> given_up = store.given_up_runs();
   std::string text =
       summary_text(store.name(), store.seed(), store.num_runs(), statistics, results.digest) +
-      given_up_text(store.given_up_runs()) + stop_text(store);
-  for (const std::string& table : {accuracy_table(scenario, statistics), interval_table(statistics),
-                                   budget_table(scenario, statistics)}) {
+      given_up_text(given_up) + stop_text(store);
+  for (const std::string& table :
+       {accuracy_table(scenario, statistics), interval_table(statistics, num_runs_in(given_up)),
+        budget_table(scenario, statistics)}) {
     if (!table.empty()) text += "\n" + table;
   }
   return text;

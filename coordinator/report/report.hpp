@@ -32,7 +32,9 @@ namespace proofmass::coordinator {
 
 /// What the draws that were made say about all draws: 95 % intervals of mean and standard
 /// deviation, and the errors' bias and skewness.
-[[nodiscard]] std::string interval_table(const CampaignStatistics& statistics);
+/// @param num_given_up  Runs that have no result, beside those in the statistics.
+[[nodiscard]] std::string interval_table(const CampaignStatistics& statistics,
+                                         std::uint64_t num_given_up);
 
 /// Budget before and after calibration beside [Hardy2013] tab:Budget and tab:Budget_cali.
 [[nodiscard]] std::string budget_table(const Scenario& scenario,
