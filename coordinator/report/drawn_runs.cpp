@@ -34,7 +34,11 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign,
   drawn.names = column_names();
   drawn.columns.resize(drawn.names.size());
   store.for_each_result([&](const RunResult& result) {
-    if (!result.has_estimate() || drawn.runs.size() == num_runs_max) return;
+    if (drawn.runs.size() == num_runs_max) return;
+    if (!result.has_estimate()) {
+      ++drawn.num_without_estimate;
+      return;
+    }
     const DrawnValues values = draw_values(campaign.dispersions, campaign.seed, result.run,
                                            result.num_draws - 1, campaign.table_values(result.run));
     append(result, values, drawn);

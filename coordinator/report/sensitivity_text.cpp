@@ -60,8 +60,16 @@ std::string sensitivity_rows(const DrawnRuns& drawn, std::span<const Sensitivity
 
 std::string noise_line(const std::vector<Sensitivity>& rows) {
   if (rows.empty()) return "";
-  return fmt::format("without influence: above {:.1f} % with 1 of 20 quantities, by chance\n",
-                     100.0 * rows.front().first_order.noise_level);
+  return fmt::format(
+      "±: standard error; without influence above {:.1f} % with 1 of 20, by chance\n",
+      100.0 * rows.front().first_order.noise_level);
+}
+
+std::string header_of(const DrawnRuns& drawn, Parameter parameter) {
+  std::string text =
+      fmt::format("{}: {} runs", parameter_infos()[index(parameter)].label, drawn.runs.size());
+  if (drawn.num_without_estimate == 0) return text;
+  return text + fmt::format("; {} without an estimate left out", drawn.num_without_estimate);
 }
 
 std::span<const Sensitivity> first_of(const std::vector<Sensitivity>& rows, std::size_t num_rows) {
@@ -113,10 +121,10 @@ std::string explanation_rows(const DrawnRuns& drawn, std::span<const Sensitivity
 
 std::string sensitivity_text(const DrawnRuns& drawn, Parameter parameter, std::size_t num_rows) {
   const auto both = sensitivities_of(drawn, parameter);
-  return fmt::format(
-      "{}: {} runs\n\n{}\n{}{}", parameter_infos()[index(parameter)].label, drawn.runs.size(),
-      sensitivity_rows(drawn, first_of(both[1], num_rows), "|error|"),
-      sensitivity_rows(drawn, first_of(both[0], num_rows), "error"), noise_line(both[1]));
+  return fmt::format("{}\n\n{}\n{}{}", header_of(drawn, parameter),
+                     sensitivity_rows(drawn, first_of(both[1], num_rows), "|error|"),
+                     sensitivity_rows(drawn, first_of(both[0], num_rows), "error"),
+                     noise_line(both[1]));
 }
 
 std::string explanation_text(const DrawnRuns& drawn, Parameter parameter, RunIndex run,
@@ -125,11 +133,11 @@ std::string explanation_text(const DrawnRuns& drawn, Parameter parameter, RunInd
   const ParameterInfo& info = parameter_infos()[index(parameter)];
   const std::vector<double>& errors = drawn.errors[index(parameter)];
   const auto both = sensitivities_of(drawn, parameter);
-  return fmt::format("Run {}: error of {} {:.3g} {}, rank {} of {}\n\n{}\n{}", run.value,
-                     info.label, errors[position] / info.display_scale, info.display_unit,
-                     rank_of(errors, position), errors.size(),
-                     explanation_rows(drawn, first_of(both[1], num_rows), position, "|error|"),
-                     explanation_rows(drawn, first_of(both[0], num_rows), position, "error"));
+  return fmt::format(
+      "Run {}: error of {} {:.3g} {}, rank {} of {}\n\n{}\n{}{}", run.value, info.label,
+      errors[position] / info.display_scale, info.display_unit, rank_of(errors, position),
+      errors.size(), explanation_rows(drawn, first_of(both[1], num_rows), position, "|error|"),
+      explanation_rows(drawn, first_of(both[0], num_rows), position, "error"), noise_line(both[1]));
 }
 
 Parameter worst_parameter_of(const DrawnRuns& drawn, RunIndex run) {

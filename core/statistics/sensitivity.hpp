@@ -26,7 +26,9 @@ struct FirstOrderIndex {
 /// correction [Kelley1935]).
 ///
 /// The number of bins is ½√n, from 4 to 64. What the output's conditional mean does inside a bin is
-/// missed: for a linear output a share 1/bins² of the index.
+/// missed: of an input that is uniform a share 1/bins² of the index if the output is linear in it,
+/// 4/bins² if it goes as |x|, as |error| often does, and 5/bins² as x²: up to a fifth with 100
+/// values.
 ///
 /// @returns Empty below 16 values or if a column does not vary.
 /// @throws InvalidArgument if sizes differ or a value is not finite.

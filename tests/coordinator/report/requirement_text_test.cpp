@@ -52,7 +52,7 @@ TEST(RequirementText, SaysThatItIsNotMet) {
 }
 
 // With five unknown draws the sixth largest error is the first that can be a bound; 0.99 with 0.95
-// then takes 1049 draws (scipy: P(Bin(1049, 0.01) ≤ 5) = 4.98 %, of 1048 5.01 %).
+// then takes 1049 draws (scipy: P(Bin(1049, 0.01) ≤ 5) = 4.99 %, of 1048 5.02 %).
 TEST(RequirementText, SaysHowManyDrawsExceedForWantOfAnEstimate) {
   const Requirement requirement = parse_requirement("a_c12 < 9e-4 for 99% with 95%");
   const std::vector<double> errors(395, 1e-4);

@@ -61,6 +61,22 @@ TEST(SensitivityText, NamesTheQuantityThatDrivesAnError) {
   EXPECT_THAT(lines[9], HasSubstr(" +1.00 (+1.00, +1.00)"));
 }
 
+// Fisher's law with 14 and 985 degrees of freedom has 1.7018 at 95 % (scipy), and
+// 1 - 999/(985 + 14·1.7018) = 0.97 %.
+TEST(SensitivityText, SaysWhatChanceAloneShows) {
+  const DrawnRuns drawn = made_up_runs();
+  const auto line = HasSubstr("\n±: standard error; without influence above 1.0 % with 1 of 20, ");
+  EXPECT_THAT(sensitivity_text(drawn, Parameter::k2c, 2), line);
+  EXPECT_THAT(explanation_text(drawn, Parameter::k2c, {42}, 2), line);
+}
+
+TEST(SensitivityText, CountsTheRunsThatItLeavesOut) {
+  DrawnRuns drawn = made_up_runs();
+  drawn.num_without_estimate = 3;
+  EXPECT_THAT(sensitivity_text(drawn, Parameter::k2c, 1),
+              StartsWith("K2c/K1c²: 1000 runs; 3 without an estimate left out\n"));
+}
+
 // |error| goes as the magnitude, which no correlation sees. Of x² the part 5/bins² is missed, 2 %
 // with the 15 bins of 1,000 runs.
 TEST(SensitivityText, FindsWhatActsThroughItsSquare) {
@@ -154,6 +170,7 @@ TEST_F(DrawnRunsTest, AreThoseOfTheSimulation) {
   const DrawnRuns drawn = read_drawn_runs(store, campaign, 40);
 
   ASSERT_EQ(drawn.runs.size(), 40U);
+  EXPECT_EQ(drawn.num_without_estimate, 1U);
   EXPECT_EQ(drawn.names[num_drawn + 1], "truth_a_c11_delta_z_m");
   EXPECT_EQ(drawn.runs[4], RunIndex{5});
   for (std::size_t i = 0; i < drawn.runs.size(); ++i) {
