@@ -10,6 +10,7 @@
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
+#include "core/campaign/run_ranges.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/moments.hpp"
 
@@ -70,6 +71,12 @@ std::vector<double> magnitudes_of(std::span<const RunResult> results, Parameter 
   return magnitudes;
 }
 
+std::uint64_t num_without_estimate(const ComparedCampaign& side) {
+  const auto num_unknown = std::ranges::count_if(
+      side.results, [](const RunResult& result) { return !result.has_estimate(); });
+  return static_cast<std::uint64_t>(num_unknown) + side.num_given_up;
+}
+
 ComparedAccuracy accuracy_of(std::span<const double> magnitudes) {
   const Moments all = moments(magnitudes);
   return {.worst = *std::ranges::max_element(magnitudes),
@@ -127,7 +134,8 @@ ComparedCampaign read_compared(const Store& store, const IsStopped& is_stopped) 
   ComparedCampaign compared{.campaign = stored_campaign(store),
                             .model_version = store.model_version(),
                             .build = store.build(),
-                            .results = {}};
+                            .results = {},
+                            .num_given_up = num_runs_in(store.given_up_runs())};
   walk_results(store, is_stopped,
                [&](const RunResult& result) { compared.results.push_back(result); });
   return compared;
@@ -137,6 +145,8 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                      const ComparedCampaign& second) {
   CampaignComparison comparison;
   comparison.differences = all_differences(first, second);
+  comparison.num_first_without_estimate = num_without_estimate(first);
+  comparison.num_second_without_estimate = num_without_estimate(second);
   const std::vector<Pair> pairs = common_runs(first.results, second.results);
   comparison.why_unpaired = why_unpaired(first, second, pairs);
   for (const ParameterInfo& info : parameter_infos()) {

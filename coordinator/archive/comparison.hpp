@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,7 @@ struct ComparedCampaign {
   std::string model_version;
   std::string build;
   std::vector<RunResult> results;  ///< In run order.
+  std::uint64_t num_given_up = 0;  ///< Runs without a result.
 };
 
 /// @throws StoreError or CampaignFileError if the file cannot be read, Interrupted.
@@ -52,6 +54,10 @@ struct CampaignComparison {
   std::string why_unpaired;
   std::size_t num_first = 0;   ///< Runs of the first campaign that are compared.
   std::size_t num_second = 0;  ///< The same as num_first if paired.
+  /// Finished and given-up runs of each whole campaign that have no estimate: they may be its
+  /// worst.
+  std::uint64_t num_first_without_estimate = 0;
+  std::uint64_t num_second_without_estimate = 0;
   /// Why the parameters are not compared; empty if they are.
   std::string why_not_compared;
   /// Indexed by `index(parameter)`.

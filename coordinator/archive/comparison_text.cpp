@@ -42,10 +42,18 @@ std::string basis(const CampaignComparison& comparison) {
     return fmt::format("The results cannot be compared: {}.\n", comparison.why_not_compared);
   }
   if (comparison.is_paired()) {
-    return fmt::format("Compared run by run: {} runs of the same draws.\n", comparison.num_first);
+    return fmt::format("Compared run by run: {} {} of the same draws.\n", comparison.num_first,
+                       comparison.num_first == 1 ? "run" : "runs");
   }
   return fmt::format("Compared as a whole, as {}: {} runs of A, {} of B.\n",
                      comparison.why_unpaired, comparison.num_first, comparison.num_second);
+}
+
+std::string left_out(const CampaignComparison& comparison) {
+  const std::uint64_t first = comparison.num_first_without_estimate;
+  const std::uint64_t second = comparison.num_second_without_estimate;
+  if (first == 0 && second == 0) return "";
+  return fmt::format("Left out, without an estimate: {} of A's runs, {} of B's.\n", first, second);
 }
 
 std::string heading(std::initializer_list<std::pair<std::string_view, std::size_t>> titles) {
@@ -118,8 +126,8 @@ std::string scatter_table(const CampaignComparison& comparison) {
 
 std::string comparison_text(const CampaignComparison& comparison, std::string_view first,
                             std::string_view second) {
-  std::string text = fmt::format("A  {}\nB  {}\n\n{}{}", first, second, definitions(comparison),
-                                 basis(comparison));
+  std::string text = fmt::format("A  {}\nB  {}\n\n{}{}{}", first, second, definitions(comparison),
+                                 basis(comparison), left_out(comparison));
   if (!comparison.why_not_compared.empty()) return text;
   return text + "\n" + mean_table(comparison) + "\n" + scatter_table(comparison);
 }

@@ -214,6 +214,23 @@ TEST(ComparisonText, FitsATerminalAndMarksWhatIsSignificant) {
   EXPECT_EQ(num_marks, 1U);
 }
 
+// The worst runs of B fail: what is left of it looks no worse than A.
+TEST(ComparisonText, CountsTheRunsThatItLeavesOut) {
+  ComparedCampaign second = side(8);
+  worsen(second, Parameter::k2c, 1.0);
+  for (std::size_t run = 6; run < 8; ++run) second.results[run].status = RunStatus::not_finite;
+  second.num_given_up = 1;
+  const CampaignComparison comparison = compare_campaigns(side(8), second);
+  EXPECT_EQ(comparison.num_first_without_estimate, 0U);
+  EXPECT_EQ(comparison.num_second_without_estimate, 3U);
+  EXPECT_THAT(comparison_text(comparison, "a", "b"),
+              HasSubstr("6 runs of the same draws.\n"
+                        "Left out, without an estimate: 0 of A's runs, 3 of B's.\n"));
+  const auto json = nlohmann::json::parse(comparison_json(comparison, "a", "b"));
+  EXPECT_EQ(json["num_first_without_estimate"], 0);
+  EXPECT_EQ(json["num_second_without_estimate"], 3);
+}
+
 TEST(ComparisonText, SaysWhyRunsAreNotPaired) {
   ComparedCampaign second = side(3);
   second.campaign.seed = 2;
