@@ -58,12 +58,12 @@ std::string stop_text(const Store& store) {
   const StopPlan plan = store.stop_plan();
   const auto check = last_check(store, plan);
   if (!check) return "";
-  const std::string width =
-      check->relative_half_width
-          ? fmt::format("within {:.3g} %", 100.0 * *check->relative_half_width)
-          : std::string("without an interval");
-  return fmt::format("Stopping  {} {} after {} runs; {}: {}\n", statistic_of(plan.stop_rule), width,
-                     check->num_runs, plan.stop_rule,
+  const std::string width = check->relative_half_width
+                                ? fmt::format("within {:.3g} %, half its 95 % interval",
+                                              100.0 * *check->relative_half_width)
+                                : std::string("without an interval");
+  return fmt::format("Stopping  {} {}\n          after {} runs; {}: {}\n",
+                     statistic_of(plan.stop_rule), width, check->num_runs, plan.stop_rule,
                      check->is_reached ? "reached" : "not reached");
 }
 

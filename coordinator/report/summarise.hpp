@@ -21,7 +21,8 @@ std::optional<std::uint64_t> summarise_file(
     const std::filesystem::path& file, const Scenario& scenario,
     const std::function<void(const std::function<void(Store&)>&)>& write);
 
-/// What came of a campaign's stop rule, in a line; empty if there is none or it was not checked.
+/// What came of a campaign's stop rule, in two lines of at most 80 characters; empty if there is
+/// none or it was not checked.
 [[nodiscard]] std::string stop_text(const Store& store);
 
 /// True if a campaign has a stop rule that was checked and not reached.

@@ -51,6 +51,16 @@ TEST_F(Summarise, AsksForTheRunsOfTheNextCheck) {
   EXPECT_TRUE(is_rule_missed(store));
 }
 
+// 64 magnitudes of 1 and 63 of 3 have a mean within 8.8496 % (scipy).
+TEST_F(Summarise, TellsWhatTheRuleAskedForAndWhatItFound) {
+  Store store = finished(128, plan_of(1000), 1.0, 3.0);
+  EXPECT_EQ(stop_text(store), "") << "not checked yet";
+  (void)next_runs(store);
+  EXPECT_EQ(stop_text(store),
+            "Stopping  mean(k2c) within 8.85 %, half its 95 % interval\n"
+            "          after 128 runs; mean(k2c) within 5%: not reached\n");
+}
+
 TEST_F(Summarise, AsksForNoMoreRunsThanThereMayBe) {
   Store store = finished(128, plan_of(150), 1.0, 3.0);
   EXPECT_EQ(next_runs(store), 150U);
