@@ -196,12 +196,14 @@ std::uint64_t Store::seed() const {
   const std::string digits = parts_->database.text("SELECT seed FROM campaign");
   std::uint64_t seed = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), seed);
-  PROOFMASS_EXPECT(error == std::errc() && end == digits.data() + digits.size());
+  if (error != std::errc() || end != digits.data() + digits.size()) {
+    parts_->database.refuse_as_damaged(fmt::format("seed = {}", digits));
+  }
   return seed;
 }
 
 std::uint64_t Store::num_runs() const {
-  return static_cast<std::uint64_t>(parts_->database.integer("SELECT num_runs FROM campaign"));
+  return parts_->database.count("SELECT num_runs FROM campaign");
 }
 
 std::string Store::definition() const {
@@ -260,8 +262,7 @@ std::optional<StoredStopCheck> Store::last_stop_check(std::string_view statistic
 
 std::uint64_t Store::num_without_estimate() const {
   // The index has all that are not completed.
-  return static_cast<std::uint64_t>(
-      parts_->database.integer("SELECT count(*) FROM run_result WHERE status <> 1 AND status > 2"));
+  return parts_->database.count("SELECT count(*) FROM run_result WHERE status <> 1 AND status > 2");
 }
 
 std::vector<std::string> Store::tags() const { return detail::read_tags(parts_->database); }

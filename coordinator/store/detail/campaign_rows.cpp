@@ -16,7 +16,7 @@ namespace {
 constexpr std::int64_t campaign_uid_max = std::numeric_limits<std::int64_t>::max();
 
 std::uint64_t stored_num_runs(const Database& database) {
-  return static_cast<std::uint64_t>(database.integer("SELECT num_runs FROM campaign"));
+  return database.count("SELECT num_runs FROM campaign");
 }
 
 void insert_parameters(Database& database, const ParameterArray& objectives) {

@@ -28,12 +28,16 @@ int open_flags(Access access) {
   return SQLITE_OPEN_READONLY;
 }
 
+std::string damage(std::string_view what) {
+  return fmt::format("is damaged: {}; restore it from a copy", what);
+}
+
 std::string explanation(int code, sqlite3* connection) {
   switch (code & 0xff) {
     case SQLITE_NOTADB:
       return "is not an SQLite database";
     case SQLITE_CORRUPT:
-      return fmt::format("is damaged: {}; restore it from a copy", sqlite3_errmsg(connection));
+      return damage(sqlite3_errmsg(connection));
     case SQLITE_FULL:
       return "the disk is full; what was committed before is safe, free space and try again";
     case SQLITE_BUSY:
@@ -119,7 +123,10 @@ std::int64_t Statement::integer(int column) const {
 
 std::uint64_t Statement::count(int column) const {
   const std::int64_t value = integer(column);
-  PROOFMASS_EXPECT(value >= 0);
+  if (value < 0) {
+    database_->refuse_as_damaged(
+        fmt::format("{} = {}", sqlite3_column_name(statement_.get(), column), value));
+  }
   return static_cast<std::uint64_t>(value);
 }
 
@@ -181,6 +188,12 @@ std::string Database::text(std::string_view sql) const {
   return statement.text(0);
 }
 
+std::uint64_t Database::count(std::string_view sql) const {
+  Statement statement = prepare(sql);
+  PROOFMASS_EXPECT(statement.step());
+  return statement.count(0);
+}
+
 std::int64_t Database::num_changes() const { return sqlite3_changes64(connection_.get()); }
 
 std::int64_t Database::last_row() const { return sqlite3_last_insert_rowid(connection_.get()); }
@@ -207,6 +220,8 @@ std::uint64_t Database::log_size() const {
 void Database::refuse(std::string_view what) const {
   throw StoreError(fmt::format("campaign file = {} ({})", path_.string(), what));
 }
+
+void Database::refuse_as_damaged(std::string_view what) const { refuse(damage(what)); }
 
 void Database::fail(int code) const { refuse(explanation(code, connection_.get())); }
 

@@ -52,7 +52,8 @@ class Statement {
   [[nodiscard]] double real(int column) const;
   [[nodiscard]] std::optional<double> optional_real(int column) const;  ///< Empty: NULL.
   [[nodiscard]] std::int64_t integer(int column) const;
-  [[nodiscard]] std::uint64_t count(int column) const;  ///< @pre The integer is not negative.
+  /// @throws StoreError if the integer is negative: the file is damaged.
+  [[nodiscard]] std::uint64_t count(int column) const;
   [[nodiscard]] std::optional<std::uint64_t> optional_count(int column) const;  ///< Empty: NULL.
   [[nodiscard]] std::string text(int column) const;
 
@@ -84,6 +85,7 @@ class Database {
 
   /// First column of the first row of a query that has one.
   [[nodiscard]] std::int64_t integer(std::string_view sql) const;
+  [[nodiscard]] std::uint64_t count(std::string_view sql) const;  ///< As Statement::count().
   [[nodiscard]] std::string text(std::string_view sql) const;
 
   /// Rows changed by the last INSERT, UPDATE or DELETE.
@@ -100,6 +102,9 @@ class Database {
 
   /// @throws StoreError `campaign file = path (what)`.
   [[noreturn]] void refuse(std::string_view what) const;
+
+  /// @throws StoreError `campaign file = path (is damaged: what; restore it from a copy)`.
+  [[noreturn]] void refuse_as_damaged(std::string_view what) const;
 
   /// @throws StoreError `campaign file = path (what went wrong, with a remedy)`.
   [[noreturn]] void fail(int code) const;

@@ -62,9 +62,7 @@ void check_standouts(const Database& database) {
 
 void check_integrity(const Database& database) {
   const std::string finding = database.text("PRAGMA integrity_check(1)");
-  if (finding != "ok") {
-    database.refuse(fmt::format("is damaged: {}; restore it from a copy", finding));
-  }
+  if (finding != "ok") database.refuse_as_damaged(finding);
   check_schema(database);
   check_references(database);
   check_standouts(database);

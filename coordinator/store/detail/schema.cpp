@@ -50,13 +50,15 @@ void check_campaign_file(const Database& database, const std::filesystem::path& 
     database.refuse("has triggers, which a campaign has none of");
   }
   check_pages(database);
+  const std::int64_t num_campaigns = database.integer("SELECT count(*) FROM campaign");
+  if (num_campaigns != 1) database.refuse_as_damaged(fmt::format("campaigns = {}", num_campaigns));
 }
 
 void check_after_unclean_end(const Database& database) {
   if (database.text("PRAGMA journal_mode") != "wal") return;
   const std::string finding = database.text("PRAGMA quick_check(1)");
   if (finding == "ok") return;
-  database.refuse(fmt::format("is damaged: {}; restore it from a copy", finding));
+  database.refuse_as_damaged(finding);
 }
 
 void check_up_to_date(const Database& database, const std::filesystem::path& path) {

@@ -107,6 +107,37 @@ TEST_F(StoreRefusal, OfAFileWithAWrongRowAfterACoordinatorWasKilled) {
             message("is damaged: CHECK constraint failed in campaign; restore it from a copy"));
 }
 
+TEST_F(StoreRefusal, OfAFileWithoutItsCampaign) {
+  create();
+  Database(file(), Access::read_write).execute("DELETE FROM campaign");
+  const std::string expected = message("is damaged: campaigns = 0; restore it from a copy");
+  EXPECT_EQ(error_of_open(), expected);
+  EXPECT_EQ(error_of_open_read_only(), expected);
+}
+
+// Pages are sound, but no program that holds to the schema wrote these.
+TEST_F(StoreRefusal, OfValuesThatTheSchemaForbids) {
+  const auto error_of = [&](const std::string& assignment, const auto& read) {
+    std::filesystem::remove(file());
+    create();
+    Database(file(), Access::read_write)
+        .execute("PRAGMA ignore_check_constraints = ON; UPDATE campaign SET " + assignment);
+    const Store store = Store::open_read_only(file());
+    return store_error_of([&] { read(store); });
+  };
+  const auto damage = [&](const std::string& what) {
+    return message("is damaged: " + what + "; restore it from a copy");
+  };
+  EXPECT_EQ(error_of("seed = '12x'", [](const Store& store) { (void)store.seed(); }),
+            damage("seed = 12x"));
+  EXPECT_EQ(error_of("num_runs = -1", [](const Store& store) { (void)store.num_runs(); }),
+            damage("num_runs = -1"));
+  EXPECT_EQ(error_of("phase = 'begun'", [](const Store& store) { (void)store.control(); }),
+            damage("phase = begun"));
+  EXPECT_EQ(error_of("failures_max = -2", [](const Store& store) { (void)store.stop_plan(); }),
+            damage("failures_max = -2"));
+}
+
 // Zeros in the middle of the pages of results: the header and the schema are still good.
 TEST_F(StoreRefusal, OfADamagedFile) {
   Store::create(file(), campaign_of(1000), "").commit(deliveries_of(0, 1000));

@@ -50,6 +50,9 @@ TEST_F(SchemaTest, MarksTheFileAsACampaign) {
   Database database(file(), Access::create);
   database.execute(std::string(migrations()[0]));
   EXPECT_EQ(database.integer("PRAGMA application_id"), application_id);
+  database.execute(
+      "INSERT INTO campaign (name, seed, num_runs, definition, model_version)"
+      " VALUES ('a', '1', 1, '', 'm')");
   check_campaign_file(database, file());
 }
 
