@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <csignal>
+#include <string_view>
 
+#include "coordinator/archive/campaign_mark.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/cli/archive_stop.hpp"
 #include "coordinator/cli/exit_code.hpp"
@@ -12,15 +14,27 @@
 namespace proofmass::coordinator {
 namespace {
 
+bool is_standard_output(const std::filesystem::path& output) {
+  return output.empty() || output == "-";
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& output, std::string_view why) {
+  throw UsageError(fmt::format("output = {} ({})", output.string(), why));
+}
+
+// The output takes the place of what has its name: a device or a campaign would be lost.
 void check(const ExportOptions& options) {
-  if (options.output.empty()) {
+  const std::filesystem::path& output = options.output;
+  if (is_standard_output(output)) {
     if (options.format != ExportFormat::hdf5) return;
-    throw UsageError("output = - (must be a file for hdf5: name it with --output)");
+    refuse("-", "must be a file for hdf5: name it with --output");
   }
-  if (!options.is_forced && std::filesystem::exists(options.output)) {
-    throw UsageError(fmt::format("output = {} (exists already; replace it with --force)",
-                                 options.output.string()));
+  if (!std::filesystem::exists(output)) return;
+  if (!options.is_forced) refuse(output, "exists already; replace it with --force");
+  if (!std::filesystem::is_regular_file(output)) {
+    refuse(output, "is no file; leave --output out to write to a pipe or device");
   }
+  if (has_campaign_mark(output)) refuse(output, "is a campaign, which --force does not replace");
 }
 
 void write_text(const ExportOptions& options, const Store& store, TextOutput& output,
@@ -36,7 +50,7 @@ void write(const ExportOptions& options, const IsStopped& is_stopped) {
   const Store store = Store::open_read_only(options.database);
   if (options.format == ExportFormat::hdf5) {
     export_hdf5(store, options.output, is_stopped);
-  } else if (options.output.empty()) {
+  } else if (is_standard_output(options.output)) {
     TextOutput output;
     write_text(options, store, output, is_stopped);
   } else {

@@ -11,7 +11,7 @@ enum class ExportFormat : std::uint8_t { csv, json, hdf5 };
 struct ExportOptions {
   std::filesystem::path database;
   ExportFormat format = ExportFormat::csv;
-  std::filesystem::path output;  ///< Empty for standard output.
+  std::filesystem::path output;  ///< Empty or `-` for standard output.
   bool is_forced = false;        ///< Replaces an existing file.
 };
 

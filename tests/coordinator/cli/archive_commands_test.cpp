@@ -1,6 +1,7 @@
 #include "coordinator/cli/archive_commands.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <functional>
@@ -81,6 +82,37 @@ TEST_F(ArchiveCommands, DoNotExportOverAFile) {
   std::string heading;
   std::ifstream(output) >> heading;
   EXPECT_EQ(heading.substr(0, 17), "run_index,status,");
+}
+
+// Also by another name of it.
+TEST_F(ArchiveCommands, ExportOverNoCampaign) {
+  const auto link = directory_ / "link.csv";
+  std::filesystem::create_symlink(database_, link);
+  for (const auto& output : {database_, link}) {
+    EXPECT_EQ(misuse([&] {
+                return export_results({.database = database_, .output = output, .is_forced = true});
+              }),
+              "output = " + output.string() + " (is a campaign, which --force does not replace)");
+  }
+  EXPECT_EQ(Store::open_read_only(database_).name(), "hardy2013");
+}
+
+TEST_F(ArchiveCommands, ExportOverNoDevice) {
+  const auto pipe = directory_ / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(misuse([&] {
+              return export_results({.database = database_, .output = pipe, .is_forced = true});
+            }),
+            "output = " + pipe.string() +
+                " (is no file; leave --output out to write to a pipe or device)");
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+}
+
+TEST_F(ArchiveCommands, ExportToStandardOutputByItsUsualName) {
+  const std::string printed =
+      printed_by([&] { return export_results({.database = database_, .output = "-"}); });
+  EXPECT_EQ(printed.substr(0, 17), "run_index,status,");
+  EXPECT_FALSE(std::filesystem::exists("-"));
 }
 
 TEST_F(ArchiveCommands, ExportHdf5ToAFileOnly) {
