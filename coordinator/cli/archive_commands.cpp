@@ -12,6 +12,7 @@
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/archive_stop.hpp"
 #include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {
@@ -42,8 +43,8 @@ int verify_database(const VerifyCommandOptions& options) {
     const auto report = [&](const Check& check) {
       ++num_checks;
       if (check.verdict == Verdict::fails) ++num_failing;
-      fmt::print("{}", check_text(check));
-      std::fflush(stdout);  // The simulation may take long.
+      print_lines(check_text(check));
+      flush_standard_output();  // The simulation may take long.
     };
     if (verify(options.database, how, report, is_stopped)) return exit_done;
     fmt::print(stderr, "proofmass: error: {}: {} of {} checks {}\n", options.database.string(),
@@ -57,7 +58,7 @@ int compare_databases(const CompareOptions& options) {
     const CampaignComparison comparison = compare_campaigns(read_file(options.first, is_stopped),
                                                             read_file(options.second, is_stopped));
     const auto print = options.format == AnswerFormat::json ? comparison_json : comparison_text;
-    fmt::print("{}", print(comparison, options.first.string(), options.second.string()));
+    print_lines(print(comparison, options.first.string(), options.second.string()));
     return exit_done;
   });
 }
@@ -66,21 +67,21 @@ int list_databases(const ListOptions& options) {
   const std::vector<std::filesystem::path> here{"."};
   const auto campaigns = list_campaigns(options.places.empty() ? here : options.places);
   const auto print = options.format == AnswerFormat::json ? listing_json : listing_text;
-  fmt::print("{}", print(campaigns));
+  print_lines(print(campaigns));
   return exit_done;
 }
 
 int back_up_database(const std::filesystem::path& database,
                      const std::filesystem::path& destination) {
   Store::open_read_only(database).back_up(destination);
-  fmt::print("wrote {}\n", destination.string());
+  print_lines(fmt::format("wrote {}\n", destination.string()));
   return exit_done;
 }
 
 int tag_database(const TagOptions& options) {
   if (options.action == TagAction::print) {
     for (const std::string& tag : Store::open_read_only(options.database).tags()) {
-      fmt::print("{}\n", tag);
+      print_lines(tag + "\n");
     }
     return exit_done;
   }
@@ -99,7 +100,7 @@ int note_database(const NoteOptions& options) {
     return exit_done;
   }
   for (const Note& note : Store::open_read_only(options.database).notes()) {
-    fmt::print("{}", text_of(note));
+    print_lines(text_of(note));
   }
   return exit_done;
 }

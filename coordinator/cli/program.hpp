@@ -6,11 +6,13 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
+#include <iostream>
 #include <string>
 #include <string_view>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 
@@ -27,14 +29,18 @@ inline constexpr const char* exit_codes_text =
 /// Parses the arguments, does the work and turns what goes wrong into a message and an exit code.
 inline int run_program(CLI::App& app, int argc, char** argv, const std::function<int()>& work) {
   const auto fail = [&app](std::string_view what, int exit_code) {
-    fmt::print(stderr, "{}: error: {}\n", app.get_name(), what);
+    fmt::print(stderr, "{}: error: {}\n", app.get_name(), visible_lines(what));
     return exit_code;
   };
   try {
     app.parse(argc, argv);
-    return work();
+    const int exit_code = work();
+    flush_standard_output();
+    return exit_code;
   } catch (const CLI::Success& wish) {
-    return app.exit(wish);  // --help or --version.
+    const int exit_code = app.exit(wish);  // --help or --version.
+    if (std::cout.flush()) return exit_code;
+    return fail("standard output: cannot be written", exit_cannot_be_done);
   } catch (const CLI::ParseError& error) {
     return fail(wire::refusal_of(app, error), exit_wrong_usage);
   } catch (const CampaignFileError& error) {

@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/cli/watch_display.hpp"
 #include "coordinator/query/query.hpp"
@@ -36,14 +37,6 @@ std::string read_standard_input() {
   return text;
 }
 
-[[noreturn]] void fail_to_write() {
-  throw Error(fmt::format("standard output: {}", std::strerror(errno)));
-}
-
-void write_standard_output(std::string_view text) {
-  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) fail_to_write();
-}
-
 std::optional<std::size_t> terminal_columns() {
   if (isatty(fileno(stdout)) == 0) return std::nullopt;
   return screen_size_of(stdout).columns;
@@ -60,7 +53,7 @@ int query_database(const QueryOptions& options) {
   const TableLimits table{.num_rows_max = options.num_rows_max, .num_columns = terminal_columns()};
   const auto writer = make_row_writer(options.format, table, write_standard_output);
   const QueryEnd end = run_query(options.database, sql, limits, *writer);
-  if (std::fflush(stdout) != 0) fail_to_write();
+  flush_standard_output();
   return end == QueryEnd::complete ? exit_done : exit_interrupted;
 }
 

@@ -8,6 +8,7 @@
 #include "coordinator/campaign_file/nearest_name.hpp"
 #include "coordinator/cli/campaign_start.hpp"
 #include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/requirement_text.hpp"
 #include "coordinator/report/sensitivity_text.hpp"
@@ -29,7 +30,7 @@ int print_requirements(const Store& store, const std::vector<std::string>& requi
   bool are_met = true;
   std::string_view separator = "";
   for (const RequirementAnswer& answer : answers_of(store, requirements)) {
-    fmt::print("{}{}", separator, requirement_text(answer));
+    print_lines(fmt::format("{}{}", separator, requirement_text(answer)));
     separator = "\n";
     are_met = are_met && answer.check.verdict == Verdict::met;
   }
@@ -50,7 +51,7 @@ Parameter parameter_named(std::string_view name) {
 int print_report(const ReportOptions& options) {
   const Store store = Store::open_read_only(options.database);
   if (!options.requirements.empty()) return print_requirements(store, options.requirements);
-  fmt::print("{}", report_text(store, stored_campaign(store).scenario));
+  print_lines(report_text(store, stored_campaign(store).scenario));
   return exit_done;
 }
 
@@ -63,7 +64,7 @@ int print_sensitivity(const SensitivityOptions& options) {
     const RunIndex run{*options.run};
     const Parameter parameter =
         parameters.empty() ? worst_parameter_of(drawn, run) : parameters.front();
-    fmt::print("{}", explanation_text(drawn, parameter, run, options.num_rows));
+    print_lines(explanation_text(drawn, parameter, run, options.num_rows));
     return exit_done;
   }
   if (parameters.empty()) {
@@ -71,7 +72,8 @@ int print_sensitivity(const SensitivityOptions& options) {
   }
   std::string_view separator = "";
   for (const Parameter parameter : parameters) {
-    fmt::print("{}{}", separator, sensitivity_text(drawn, parameter, options.num_rows));
+    print_lines(
+        fmt::format("{}{}", separator, sensitivity_text(drawn, parameter, options.num_rows)));
     separator = "\n";
   }
   return exit_done;

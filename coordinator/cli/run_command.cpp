@@ -14,6 +14,7 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/local_workers.hpp"
 #include "coordinator/cli/progress_display.hpp"
+#include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/net/private_endpoint.hpp"
 #include "coordinator/net/service.hpp"
@@ -169,7 +170,7 @@ int run_campaign(const RunOptions& options) {
                             campaign.num_runs, options);
   update_statistics(outcome.store, campaign.scenario);
   if (!outcome.is_done) return say_interrupted(outcome.store, database);
-  fmt::print("{}", report_text(outcome.store, campaign.scenario));
+  print_lines(report_text(outcome.store, campaign.scenario));
   if (outcome.store.control().phase == wire::CampaignPhase::cancelled) {
     return say_cancelled(outcome.store, options.stop.failures_max.value_or(0));
   }

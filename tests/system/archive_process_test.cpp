@@ -81,6 +81,18 @@ TEST_F(ArchiveProcess, SaysThatAPipeIsClosedOrADiskIsFull) {
             "proofmass: error: output = - (cannot be written: No space left on device)\n");
 }
 
+TEST_F(ArchiveProcess, SaysThatItsAnswerIsLost) {
+  for (const std::string command :
+       {"report done.db", "verify done.db", "compare done.db done.db", "list", "list --json",
+        "tag done.db", "note done.db", "--help", "--version"}) {
+    if (command.starts_with("tag")) change("done.db", "INSERT INTO tag (tag) VALUES (1)");
+    if (command.starts_with("note")) change("done.db", "INSERT INTO note (text) VALUES (1)");
+    EXPECT_EQ(shell(programs + "/proofmass " + command + " > /dev/full 2> full.err"), 1) << command;
+    EXPECT_TRUE(read_file(path("full.err")).starts_with("proofmass: error: standard output: "))
+        << command << ": " << read_file(path("full.err"));
+  }
+}
+
 TEST_F(ArchiveProcess, EndsInOrderWhenItIsInterrupted) {
   // Sessions so long that their simulation is not over before the signal comes.
   change("done.db",

@@ -1,6 +1,7 @@
 #include "coordinator/cli/archive_commands.hpp"
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 #include <sys/stat.h>
 
 #include <fstream>
@@ -113,6 +114,22 @@ TEST_F(ArchiveCommands, ExportToStandardOutputByItsUsualName) {
       printed_by([&] { return export_results({.database = database_, .output = "-"}); });
   EXPECT_EQ(printed.substr(0, 17), "run_index,status,");
   EXPECT_FALSE(std::filesystem::exists("-"));
+}
+
+// A name, a tag or a note of a file from elsewhere cannot steer the terminal.
+TEST_F(ArchiveCommands, MakeVisibleWhatAFileSays) {
+  sqlite3* connection = nullptr;
+  ASSERT_EQ(sqlite3_open(database_.c_str(), &connection), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(connection,
+                         "INSERT INTO tag (tag) VALUES (char(27) || '[2J');"
+                         "UPDATE campaign SET name = char(27) || '[31m'",
+                         nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  sqlite3_close(connection);
+  EXPECT_EQ(printed_tags(), "\\u001b[2J\n");
+  const std::string listed = printed_by([&] { return list_databases({.places = {database_}}); });
+  EXPECT_EQ(listed.find('\x1b'), std::string::npos) << listed;
+  EXPECT_NE(listed.find("\\u001b[31m"), std::string::npos) << listed;
 }
 
 TEST_F(ArchiveCommands, ExportHdf5ToAFileOnly) {

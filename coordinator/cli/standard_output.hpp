@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace proofmass::coordinator {
+
+/// Lines that are safe on a terminal: as visible_text(), but for the ends of lines.
+[[nodiscard]] std::string visible_lines(std::string_view text);
+
+/// Prints lines, which may hold text of a file from elsewhere, made visible.
+/// @throws Error `standard output: No space left on device`.
+void print_lines(std::string_view text);
+
+/// Writes bytes as they are.
+/// @throws Error as print_lines().
+void write_standard_output(std::string_view text);
+
+/// Writes what is still buffered; without it a full disk goes unnoticed.
+/// @throws Error as print_lines().
+void flush_standard_output();
+
+}  // namespace proofmass::coordinator
