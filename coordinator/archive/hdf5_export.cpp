@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -25,10 +26,21 @@ herr_t keep_last(unsigned /*position*/, const H5E_error2_t* entry, void* text) {
   return 0;
 }
 
+// Of `file write failed: time = ..., error message = 'No space left on device', buf = ...` what
+// people need; of other descriptions all.
+std::string cause_in(const std::string& description) {
+  constexpr std::string_view mark = "error message = '";
+  const std::size_t found = description.find(mark);
+  if (found == description.npos) return description;
+  const std::size_t begin = found + mark.size();
+  return description.substr(begin, description.find('\'', begin) - begin);
+}
+
 [[noreturn]] void fail(const std::filesystem::path& file) {
   std::string text = "HDF5 says nothing";
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_DOWNWARD, keep_last, &text);
-  throw ArchiveError(fmt::format("output = {} (cannot be written: {})", file.string(), text));
+  throw ArchiveError(
+      fmt::format("output = {} (cannot be written: {})", file.string(), cause_in(text)));
 }
 
 /// Closes what the library opened.
