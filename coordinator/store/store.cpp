@@ -43,9 +43,10 @@ void configure(Database& database) {
 
 void check_presence(const std::filesystem::path& path) {
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored)) {
-    throw StoreError(fmt::format("campaign file = {} (does not exist)", path.string()));
-  }
+  if (std::filesystem::is_regular_file(path, ignored)) return;
+  throw StoreError(
+      fmt::format("campaign file = {} ({})", path.string(),
+                  std::filesystem::exists(path, ignored) ? "is no file" : "does not exist"));
 }
 
 // Lock and log go by the name of the file: by another name it has others, and both would write.

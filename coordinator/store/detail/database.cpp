@@ -124,8 +124,7 @@ std::int64_t Statement::integer(int column) const {
 std::uint64_t Statement::count(int column) const {
   const std::int64_t value = integer(column);
   if (value < 0) {
-    database_->refuse_as_damaged(
-        fmt::format("{} = {}", sqlite3_column_name(statement_.get(), column), value));
+    refuse_as_damaged(fmt::format("{} = {}", sqlite3_column_name(statement_.get(), column), value));
   }
   return static_cast<std::uint64_t>(value);
 }
@@ -144,6 +143,10 @@ std::string Statement::text(int column) const {
   const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
   const int size = sqlite3_column_bytes(statement_.get(), column);
   return text == nullptr ? std::string() : std::string(text, static_cast<std::size_t>(size));
+}
+
+void Statement::refuse_as_damaged(std::string_view what) const {
+  database_->refuse_as_damaged(what);
 }
 
 void Database::Close::operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }

@@ -57,6 +57,8 @@ class Statement {
   [[nodiscard]] std::optional<std::uint64_t> optional_count(int column) const;  ///< Empty: NULL.
   [[nodiscard]] std::string text(int column) const;
 
+  [[noreturn]] void refuse_as_damaged(std::string_view what) const;  ///< As that of the Database.
+
  private:
   friend class Database;
   struct Finalize {

@@ -68,6 +68,14 @@ void check_finite(const RunResult& result, std::string_view kind, const Paramete
                                info.unit_suffix, value, result.run.value));
 }
 
+RunStatus read_status(const Statement& row) {
+  const std::int64_t status = row.integer(1);
+  const bool is_known = status >= static_cast<std::int64_t>(RunStatus::completed) &&
+                        status <= static_cast<std::int64_t>(RunStatus::no_draw);
+  if (is_known) return static_cast<RunStatus>(status);
+  row.refuse_as_damaged(fmt::format("status = {} of run {}", status, row.count(0)));
+}
+
 }  // namespace
 
 ResultRows::ResultRows(const Database& database)
@@ -105,7 +113,7 @@ Statement select_results(const Database& database) {
 
 RunResult read_result(const Statement& row) {
   RunResult result{.run = RunIndex{row.count(0)},
-                   .status = static_cast<RunStatus>(row.integer(1)),
+                   .status = read_status(row),
                    .num_draws = static_cast<std::uint32_t>(row.integer(2)),
                    .num_rounds = static_cast<std::uint32_t>(row.integer(3))};
   for (const ParameterInfo& info : parameter_infos()) {

@@ -138,6 +138,21 @@ TEST_F(StoreRefusal, OfValuesThatTheSchemaForbids) {
             damage("failures_max = -2"));
 }
 
+TEST_F(StoreRefusal, OfAResultWithAStatusThatThereIsNot) {
+  Store::create(file(), campaign_of(1), "").commit(deliveries_of(0, 1));
+  Database(file(), Access::read_write)
+      .execute("PRAGMA ignore_check_constraints = ON; UPDATE run_result SET status = 5");
+  const Store store = Store::open_read_only(file());
+  EXPECT_EQ(store_error_of([&] { store.for_each_result([](const RunResult&) {}); }),
+            message("is damaged: status = 5 of run 0; restore it from a copy"));
+}
+
+TEST_F(StoreRefusal, OfWhatIsNoFile) {
+  std::filesystem::create_directory(file());
+  EXPECT_EQ(error_of_open(), message("is no file"));
+  EXPECT_EQ(error_of_open_read_only(), message("is no file"));
+}
+
 // Zeros in the middle of the pages of results: the header and the schema are still good.
 TEST_F(StoreRefusal, OfADamagedFile) {
   Store::create(file(), campaign_of(1000), "").commit(deliveries_of(0, 1000));
