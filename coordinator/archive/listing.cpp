@@ -39,7 +39,7 @@ std::vector<std::filesystem::path> campaign_files_in(const std::filesystem::path
   std::vector<std::filesystem::path> files;
   for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
        entry.increment(error)) {
-    if (entry->path().extension() != ".db" || !has_campaign_mark(entry->path())) continue;
+    if (entry->path().extension() != ".db" || !may_be_campaign(entry->path())) continue;
     files.push_back(entry->path());
   }
   if (error) {
@@ -61,7 +61,7 @@ std::vector<ListedCampaign> list_campaigns(std::span<const std::filesystem::path
       continue;
     }
     if (!std::filesystem::exists(place, ignored)) refuse(place, "does not exist");
-    if (!has_campaign_mark(place)) refuse(place, "is not a Proofmass campaign");
+    if (!may_be_campaign(place)) refuse(place, "is not a Proofmass campaign");
     campaigns.push_back(listed(place));
   }
   return campaigns;

@@ -25,7 +25,7 @@ struct ListedCampaign {
 
 /// The campaigns of some files, and of the files *.db of some directories (not of those below), by
 /// name within each. Files of other kinds are left out of directories; campaign files that are
-/// damaged, older or newer than this program are listed with the reason.
+/// damaged, older or newer than this program, or may not be read, are listed with the reason.
 ///
 /// @throws ArchiveError if a place does not exist, cannot be read, or is a file of another kind.
 [[nodiscard]] std::vector<ListedCampaign> list_campaigns(

@@ -50,6 +50,21 @@ std::string heading() {
   return row(titles) + horizontal_rule(width) + "\n";
 }
 
+std::string tag_lines(std::span<const std::string> tags) {
+  if (tags.empty()) return "";
+  constexpr std::size_t columns_max = 80;
+  std::string text, line = "  tags:";
+  const std::string indent(line.size(), ' ');
+  for (const std::string& tag : tags) {
+    if (line.size() + 1 + tag.size() > columns_max) {
+      text += line + "\n";
+      line = indent;
+    }
+    line += " " + tag;
+  }
+  return text + line + "\n";
+}
+
 std::string entry(const ListedCampaign& campaign) {
   const std::string file = campaign.file.filename().string();
   if (!campaign.problem.empty()) return file + "\n  " + campaign.problem + "\n";
@@ -58,10 +73,7 @@ std::string entry(const ListedCampaign& campaign) {
       row({file, campaign.name, std::string(wire::name_of(campaign.phase)),
            std::to_string(campaign.num_finished), std::to_string(campaign.num_runs),
            std::to_string(campaign.seed), campaign.created_utc.substr(0, date_size)});
-  if (campaign.tags.empty()) return text;
-  text += "  tags:";
-  for (const std::string& tag : campaign.tags) text += " " + tag;
-  return text + "\n";
+  return text + tag_lines(campaign.tags);
 }
 
 Json json_of(const ListedCampaign& campaign) {

@@ -210,10 +210,10 @@ void check_arguments(const std::filesystem::path& file, const VerifyOptions& opt
     throw ArchiveError(fmt::format("fraction = {} (must be in [0, 1])", options.fraction));
   }
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(file, ignored)) {
+  if (!std::filesystem::exists(file, ignored)) {
     throw ArchiveError(fmt::format("campaign file = {} (does not exist)", file.string()));
   }
-  if (!has_campaign_mark(file)) {
+  if (!may_be_campaign(file)) {
     throw ArchiveError(
         fmt::format("campaign file = {} (is not a Proofmass campaign)", file.string()));
   }

@@ -1,6 +1,7 @@
 #include "coordinator/archive/listing.hpp"
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -60,6 +61,7 @@ TEST_F(Listing, LeavesOtherFilesOutOfDirectories) {
   test::write_file(directory() / "text.db", "text");
   test::write_file(directory() / "empty.db", "");
   std::filesystem::create_directory(directory() / "directory.db");
+  ASSERT_EQ(::mkfifo((directory() / "pipe.db").c_str(), 0600), 0);  // Nobody writes to it.
   test::change(directory() / "a.db", "VACUUM INTO '" + (directory() / "foreign.db").string() + "'");
   test::change(directory() / "foreign.db", "PRAGMA application_id = 7");
   EXPECT_EQ(list().size(), 1U);
@@ -104,6 +106,19 @@ TEST_F(Listing, SaysWhichDirectoryItCannotRead) {
   EXPECT_EQ(error, "directory = " + closed.string() + " (cannot be read: Permission denied)");
 }
 
+TEST_F(Listing, NamesAFileThatItMayNotRead) {
+  const auto closed = make("closed.db");
+  std::filesystem::permissions(directory(), std::filesystem::perms::all);
+  std::filesystem::permissions(closed, std::filesystem::perms::none);
+  const test::OrdinaryUser user;
+  for (const auto& place : {directory(), closed}) {
+    const auto campaigns = list_campaigns({&place, 1});
+    ASSERT_EQ(campaigns.size(), 1U);
+    EXPECT_EQ(campaigns[0].problem, "campaign file = " + closed.string() +
+                                        " (unable to open database file: Permission denied)");
+  }
+}
+
 TEST_F(Listing, NamesDamagedFilesThatAreNamed) {
   make("a.db");
   const std::string whole = test::content_of(directory() / "a.db");
@@ -137,6 +152,14 @@ TEST(ListingText, FitsATerminal) {
   EXPECT_THAT(text, HasSubstr("a-file-with-a-ra… "));
   EXPECT_THAT(text, HasSubstr("cancelled"));
   EXPECT_THAT(text, HasSubstr("2024-02-29\n  tags: a thesis\n"));
+}
+
+TEST(ListingText, BreaksTagsBetweenLines) {
+  ListedCampaign campaign = extreme;
+  const std::string longest(64, 'a');
+  campaign.tags = {longest, "bcdefg", "h", longest};
+  EXPECT_THAT(listing_text({&campaign, 1}),
+              HasSubstr("\n  tags: " + longest + " bcdefg\n        h " + longest + "\n"));
 }
 
 TEST(ListingJson, IsComplete) {
