@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <thread>
+#include <vector>
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/comparison_text.hpp"
@@ -86,17 +87,21 @@ int tag_database(const TagOptions& options) {
     return exit_done;
   }
   if (options.tags.empty()) throw UsageError("TAG = (must be given after add and remove)");
+  std::vector<Annotation> annotations;
   for (const std::string& tag : options.tags) {
-    Store::annotate(options.database, options.action == TagAction::add
-                                          ? Annotation(AddTag{tag})
-                                          : Annotation(RemoveTag{tag}));
+    if (options.action == TagAction::add) {
+      annotations.emplace_back(AddTag{tag});
+    } else {
+      annotations.emplace_back(RemoveTag{tag});
+    }
   }
+  Store::annotate(options.database, annotations);
   return exit_done;
 }
 
 int note_database(const NoteOptions& options) {
   if (options.text) {
-    Store::annotate(options.database, AddNote{*options.text});
+    Store::annotate(options.database, {AddNote{*options.text}});
     return exit_done;
   }
   for (const Note& note : Store::open_read_only(options.database).notes()) {

@@ -173,7 +173,8 @@ Store Store::open_read_only(const std::filesystem::path& path) {
   return Store(std::make_unique<Parts>(path));
 }
 
-void Store::annotate(const std::filesystem::path& path, const Annotation& annotation) {
+void Store::annotate(const std::filesystem::path& path,
+                     const std::vector<Annotation>& annotations) {
   check_presence(path);
   check_that_name_is_the_only_one(path);
   detail::check_directory_of(path);
@@ -182,7 +183,7 @@ void Store::annotate(const std::filesystem::path& path, const Annotation& annota
   detail::check_campaign_file(database, path);
   detail::check_up_to_date(database, path);
   Transaction transaction(database);
-  detail::write_annotation(database, annotation);
+  for (const Annotation& annotation : annotations) detail::write_annotation(database, annotation);
   transaction.commit();
 }
 

@@ -49,12 +49,13 @@ class Store {
   ///         older than this program.
   static Store open_read_only(const std::filesystem::path& path);
 
-  /// Adds a tag or a note, or removes a tag, also while a coordinator serves the file. A tag that
-  /// is there already stays as it is. At most 100 tags and 1,000 notes.
+  /// Adds tags and notes or removes tags, all or none of them, also while a coordinator serves the
+  /// file. A tag that is there already stays as it is. At most 100 tags and 1,000 notes.
   /// @throws InvalidArgument `tag = x (rule)`, `note = x (rule)`.
   /// @throws StoreError as open() does, but for the lock; if the file is older than this program,
   ///         has no such tag or too many.
-  static void annotate(const std::filesystem::path& path, const Annotation& annotation);
+  static void annotate(const std::filesystem::path& path,
+                       const std::vector<Annotation>& annotations);
 
   /// Closes the file. Of a coordinator's, no other file (log, lock) remains unless somebody reads.
   ~Store();

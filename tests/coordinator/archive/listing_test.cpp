@@ -39,7 +39,7 @@ class Listing : public test::StoreTest {
 TEST_F(Listing, TellsWhereEachCampaignStands) {
   const auto path = make("b.db", 3);
   make("a.db");
-  Store::annotate(path, AddTag{"thesis"});
+  Store::annotate(path, {AddTag{"thesis"}});
   const auto campaigns = list();
   ASSERT_EQ(campaigns.size(), 2U);
   EXPECT_EQ(campaigns[0].file, directory() / "a.db");

@@ -52,6 +52,16 @@ TEST_F(ArchiveCommands, AddPrintAndRemoveTags) {
   EXPECT_EQ(printed_tags(), "flight\n");
 }
 
+TEST_F(ArchiveCommands, AddAndRemoveAllTagsOrNone) {
+  EXPECT_THROW((void)tag_database({database_, TagAction::add, {"flight", "not one"}}),
+               InvalidArgument);
+  EXPECT_EQ(printed_tags(), "");
+  EXPECT_EQ(tag_database({database_, TagAction::add, {"flight"}}), exit_done);
+  EXPECT_THROW((void)tag_database({database_, TagAction::remove, {"flight", "thesis"}}),
+               StoreError);
+  EXPECT_EQ(printed_tags(), "flight\n");
+}
+
 TEST_F(ArchiveCommands, NeedATagToAdd) {
   EXPECT_EQ(misuse([&] {
               return tag_database({database_, TagAction::add, {}});

@@ -23,7 +23,7 @@ class StoreAnnotation : public test::StoreTest {
  protected:
   void SetUp() override { Store::create(file(), campaign_of(10), ""); }
 
-  void annotate(const Annotation& annotation) const { Store::annotate(file(), annotation); }
+  void annotate(const Annotation& annotation) const { Store::annotate(file(), {annotation}); }
   [[nodiscard]] std::string error_of(const Annotation& annotation) const {
     return test::message_of<Error>([&] { annotate(annotation); });
   }
@@ -126,7 +126,7 @@ TEST_F(StoreAnnotation, LeavesOneFile) {
 
 TEST_F(StoreAnnotation, RefusesFilesThatAreNotUpToDate) {
   const std::filesystem::path missing = directory() / "missing.db";
-  EXPECT_EQ(store_error_of([&] { Store::annotate(missing, AddTag{"a"}); }),
+  EXPECT_EQ(store_error_of([&] { Store::annotate(missing, {AddTag{"a"}}); }),
             "campaign file = " + missing.string() + " (does not exist)");
   Database(file(), Access::read_write).execute("PRAGMA user_version = 4");
   EXPECT_EQ(error_of(AddTag{"a"}),
