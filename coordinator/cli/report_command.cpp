@@ -13,6 +13,7 @@
 #include "coordinator/report/requirement_text.hpp"
 #include "coordinator/report/sensitivity_text.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/statistics/sensitivity.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -60,6 +61,10 @@ int print_sensitivity(const SensitivityOptions& options) {
   if (options.parameter) parameters.push_back(parameter_named(*options.parameter));
   const Store store = Store::open_read_only(options.database);
   const DrawnRuns drawn = read_drawn_runs(store, stored_campaign(store), sensitivity_runs_max);
+  if (drawn.runs.size() < sensitivity_values_min) {
+    throw Error(fmt::format("runs with an estimate = {} (sensitivities need {} at least)",
+                            drawn.runs.size(), sensitivity_values_min));
+  }
   if (options.run) {
     const RunIndex run{*options.run};
     const Parameter parameter =

@@ -12,7 +12,6 @@
 namespace proofmass {
 namespace {
 
-constexpr std::size_t num_values_min = 16;
 constexpr double noise_probability = 0.05;
 
 std::size_t num_bins_for(std::size_t num_values) {
@@ -71,7 +70,7 @@ double noise_level_of(double n, double bins) {
   return 1.0 - (n - 1.0) / (n - bins + (bins - 1.0) * ratio);
 }
 
-/// @pre Both columns vary and have num_values_min values.
+/// @pre Both columns vary and have sensitivity_values_min values.
 FirstOrderIndex index_of(std::span<const std::size_t> order, Column output, double noise_level) {
   const auto n = static_cast<double>(order.size());
   const std::size_t num_bins = num_bins_for(order.size());
@@ -98,7 +97,7 @@ std::vector<std::vector<double>> ranks_of(std::span<const Column> outputs) {
   std::vector<std::vector<double>> ranks(outputs.size());
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     detail::check_same_size("output", outputs[i], outputs.front());
-    detail::check_values("output", outputs[i], num_values_min);
+    detail::check_values("output", outputs[i], sensitivity_values_min);
     if (varies(outputs[i])) ranks[i] = average_ranks(outputs[i]);
   }
   return ranks;
@@ -111,7 +110,8 @@ std::optional<FirstOrderIndex> first_order_index(std::span<const double> input,
   detail::check_same_size("output", output, input);
   detail::check_values("input", input, 0);
   detail::check_values("output", output, 0);
-  if (input.size() < num_values_min || !varies(input) || !varies(output)) return std::nullopt;
+  if (input.size() < sensitivity_values_min || !varies(input) || !varies(output))
+    return std::nullopt;
   return index_of(ascending_order(input), output, noise_level_for(input.size()));
 }
 
@@ -124,7 +124,7 @@ std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inpu
   const double noise_level = noise_level_for(outputs.front().size());
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     detail::check_same_size("input", inputs[i], outputs.front());
-    detail::check_values("input", inputs[i], num_values_min);
+    detail::check_values("input", inputs[i], sensitivity_values_min);
     if (!varies(inputs[i])) continue;
     const std::vector<std::size_t> order = ascending_order(inputs[i]);
     const std::vector<double> ranks = average_ranks(inputs[i]);

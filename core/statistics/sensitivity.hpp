@@ -20,6 +20,9 @@ struct FirstOrderIndex {
   std::size_t num_bins = 0;
 };
 
+/// Below so many values no sensitivity can be told.
+inline constexpr std::size_t sensitivity_values_min = 16;
+
 /// Estimates a first-order index from runs as they are, each with all of its inputs drawn anew: the
 /// input's values are cut into bins of equal counts, and the output's variance is split into that
 /// of the bins' means and that within them (the correlation ratio of [Pearson1905] with Kelley's
@@ -30,7 +33,7 @@ struct FirstOrderIndex {
 /// 4/bins² if it goes as |x|, as |error| often does, and 5/bins² as x²: up to a fifth with 100
 /// values.
 ///
-/// @returns Empty below 16 values or if a column does not vary.
+/// @returns Empty below sensitivity_values_min or if a column does not vary.
 /// @throws InvalidArgument if sizes differ or a value is not finite.
 [[nodiscard]] std::optional<FirstOrderIndex> first_order_index(std::span<const double> input,
                                                                std::span<const double> output);
@@ -52,7 +55,7 @@ using Column = std::span<const double>;
 ///
 /// Takes some 0.1 s for a million runs, an input and an output.
 ///
-/// @throws InvalidArgument if columns differ in size, have below 16 values or one is not finite.
+/// @throws InvalidArgument if columns differ in size, have too few values or one is not finite.
 [[nodiscard]] std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inputs,
                                                                   std::span<const Column> outputs,
                                                                   double confidence);

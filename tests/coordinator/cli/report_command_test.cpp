@@ -18,10 +18,12 @@ using test::message_of;
 /// 60 runs whose errors of every parameter are 1, 2, ... 60 times 1e-6.
 class ReportCommand : public testing::Test {
  protected:
-  void SetUp() override {
+  void SetUp() override { make(database_, 60); }
+
+  static void make(const std::filesystem::path& database, std::uint64_t num_runs) {
     Campaign campaign = hardy2013_campaign();
-    campaign.num_runs = 60;
-    Store store = Store::create(database_, campaign, canonical_definition(campaign));
+    campaign.num_runs = num_runs;
+    Store store = Store::create(database, campaign, canonical_definition(campaign));
     std::vector<Delivery> deliveries;
     for (std::uint64_t run = 0; run < campaign.num_runs; ++run) {
       Delivery delivery{.result = {.run = {run}, .num_draws = 1}, .worker = {1}, .attempt = {1}};
@@ -74,6 +76,17 @@ TEST_F(ReportCommand, RefusesAnUnknownParameter) {
             }),
             "parameter = k2e (must be one of a_c11_delta_x a_c11_delta_z a_c11_delta_y a_c12 "
             "a_c13 a_d11_prime a_d12 a_d13 k2d k2c)");
+}
+
+// A campaign as it is, not a wrong question; with one run more there is an answer.
+TEST_F(ReportCommand, SaysWhenRunsAreTooFewForSensitivities) {
+  const auto few = directory_ / "few.db", enough = directory_ / "enough.db";
+  make(few, 15);
+  make(enough, 16);
+  EXPECT_EQ(message_of<Error>(
+                [&] { (void)print_sensitivity({.database = few, .parameter = {}, .run = {}}); }),
+            "runs with an estimate = 15 (sensitivities need 16 at least)");
+  EXPECT_EQ(print_sensitivity({.database = enough, .parameter = "k2c", .run = {}}), exit_done);
 }
 
 TEST_F(ReportCommand, RefusesARunWithoutAnEstimate) {
