@@ -26,6 +26,9 @@ std::string_view name_of(Verdict verdict) {
 
 std::string percent(double fraction) { return fmt::format("{:.4g} %", 100.0 * fraction); }
 
+// As it was asked for: 99.9999 % is not 100 %.
+std::string given_percent(double fraction) { return fmt::format("{:.12g} %", 100.0 * fraction); }
+
 std::string exceedance_line(const RequirementCheck& check) {
   std::string line =
       fmt::format("Exceeding    {} of {} runs", check.num_exceedances, check.num_runs);
@@ -43,15 +46,16 @@ std::string bound_line(const RequirementAnswer& answer) {
   const Tolerance& tolerance = answer.requirement.tolerance;
   if (!check.bound) {
     // Runs without an estimate are the largest errors.
-    const auto num_runs = wilks_num_runs(tolerance, check.num_without_estimate + 1);
-    return fmt::format("Bound        none: {} draws at least, for {} with {}\n",
-                       num_runs ? std::to_string(*num_runs) : "too many",
-                       percent(tolerance.coverage), percent(tolerance.confidence));
+    const auto least = wilks_num_runs(tolerance, check.num_without_estimate + 1);
+    return fmt::format("Bound        none: {} for {} with {}\n",
+                       least ? fmt::format("{} draws at least,", *least) : "no number of draws",
+                       given_percent(tolerance.coverage), given_percent(tolerance.confidence));
   }
   const ParameterInfo& info = parameter_infos()[index(answer.requirement.parameter)];
   return fmt::format("Bound        {} of all draws below {:.6g}{}{}, with {}\n",
-                     percent(tolerance.coverage), check.bound->value, info.unit == "1" ? "" : " ",
-                     info.unit == "1" ? "" : info.unit, percent(tolerance.confidence));
+                     given_percent(tolerance.coverage), check.bound->value,
+                     info.unit == "1" ? "" : " ", info.unit == "1" ? "" : info.unit,
+                     given_percent(tolerance.confidence));
 }
 
 std::string needed_line(const RequirementCheck& check) {

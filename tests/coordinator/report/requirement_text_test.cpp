@@ -38,6 +38,13 @@ TEST(RequirementText, SaysHowManyDrawsItTakes) {
                                        "             299 decide if"));
 }
 
+// 1 − 1e-9 with 1 − 1e-9 takes 2e10 draws, which is more than a campaign may have.
+TEST(RequirementText, SaysThatNoNumberOfDrawsGivesABound) {
+  EXPECT_THAT(answer_to("k2c < 1000 for 99.9999999% with 99.9999999%", 100, 0),
+              testing::HasSubstr(
+                  "Bound        none: no number of draws for 99.9999999 % with 99.9999999 %\n"));
+}
+
 // One in a hundred, as often as allowed: with 473 draws one may exceed it [Wilks1941].
 TEST(RequirementText, SaysThatNoNumberOfDrawsDecides) {
   EXPECT_THAT(answer_to("a_c12 < 9e-4 for 99% with 95%", 100, 1),
