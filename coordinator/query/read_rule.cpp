@@ -70,7 +70,10 @@ int ReadRule::decide(int action, std::string_view first, std::string_view second
       return refuse(fmt::format("the function {} is not allowed", second));
     case SQLITE_PRAGMA:
       if (is_harmless_pragma(in_small_letters(first), !second.empty())) return SQLITE_OK;
-      return refuse(fmt::format("PRAGMA {} is not allowed", first));
+      return refuse(fmt::format("PRAGMA {} {}", first,
+                                is_harmless_pragma(in_small_letters(first), false)
+                                    ? "may be read, not set"
+                                    : "is not allowed"));
     default:
       return refuse("only reading is allowed");
   }
