@@ -67,6 +67,12 @@ void check_absence(const std::filesystem::path& path) {
   }
 }
 
+// Lock and draft are named after the file, and would be made in a directory without it.
+void check_name(const std::filesystem::path& path) {
+  if (path.has_filename()) return;
+  throw StoreError(fmt::format("campaign file = {} (names no file)", path.string()));
+}
+
 // Removes an unfinished file, its rollback journal with it.
 void remove_draft(const std::filesystem::path& draft) {
   std::error_code ignored;
@@ -153,6 +159,7 @@ Store& Store::operator=(Store&&) noexcept = default;
 
 Store Store::create(const std::filesystem::path& path, const Campaign& campaign,
                     std::string_view definition) {
+  check_name(path);
   detail::check_directory_of(path);
   auto lock = std::make_unique<detail::StoreLock>(path);
   check_absence(path);
@@ -356,6 +363,7 @@ std::uint64_t Store::log_size() const { return parts_->database.log_size(); }
 void Store::check_integrity() const { detail::check_integrity(parts_->database); }
 
 void Store::back_up(const std::filesystem::path& destination) const {
+  check_name(destination);
   const detail::StoreLock lock(destination);
   check_absence(destination);
   appear_complete(destination, [&](const std::filesystem::path& draft) {

@@ -147,6 +147,17 @@ TEST_F(StoreRefusal, OfAResultWithAStatusThatThereIsNot) {
             message("is damaged: status = 5 of run 0; restore it from a copy"));
 }
 
+TEST_F(StoreRefusal, ToMakeAFileWithoutAName) {
+  const std::string folder = (directory() / "").string();
+  const std::string expected = "campaign file = " + folder + " (names no file)";
+  EXPECT_EQ(store_error_of([&] { Store::create(folder, campaign_of(1), ""); }), expected);
+  create();
+  EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(folder); }), expected);
+  EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(""); }),
+            "campaign file =  (names no file)");
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+}
+
 TEST_F(StoreRefusal, OfWhatIsNoFile) {
   std::filesystem::create_directory(file());
   EXPECT_EQ(error_of_open(), message("is no file"));
