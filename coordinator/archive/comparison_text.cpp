@@ -39,7 +39,7 @@ std::string definitions(const CampaignComparison& comparison) {
 
 std::string basis(const CampaignComparison& comparison) {
   if (!comparison.why_not_compared.empty()) {
-    return fmt::format("The results cannot be compared: {}.\n", comparison.why_not_compared);
+    return line_of("The results cannot be compared:", comparison.why_not_compared + ".", 0);
   }
   if (comparison.is_paired()) {
     return fmt::format("Compared run by run: {} {} of the same draws.\n", comparison.num_first,

@@ -30,14 +30,18 @@ std::string percent(double fraction) { return fmt::format("{:.4g} %", 100.0 * fr
 std::string given_percent(double fraction) { return fmt::format("{:.12g} %", 100.0 * fraction); }
 
 std::string exceedance_line(const RequirementCheck& check) {
-  std::string line =
+  const std::string counts =
       fmt::format("Exceeding    {} of {} runs", check.num_exceedances, check.num_runs);
+  constexpr std::size_t margin = 13;
+  std::string text = counts + "\n";
   if (check.exceedance) {
-    line += fmt::format("; {} to {} of all draws (95 % interval)", percent(check.exceedance->lower),
-                        percent(check.exceedance->upper));
+    text = line_of(counts + ";",
+                   fmt::format("{} to {} of all draws (95 % interval)",
+                               percent(check.exceedance->lower), percent(check.exceedance->upper)),
+                   margin);
   }
-  if (check.num_without_estimate == 0) return line + "\n";
-  return line + fmt::format("\n             {} of them for want of an estimate\n",
+  if (check.num_without_estimate == 0) return text;
+  return text + fmt::format("{:{}}{} of them for want of an estimate\n", "", margin,
                             check.num_without_estimate);
 }
 

@@ -45,6 +45,13 @@ std::string shortened(std::string_view text, std::size_t width) {
   return std::string(text.substr(0, size)) + "…";
 }
 
+std::string line_of(std::string_view first, std::string_view second, std::size_t margin) {
+  constexpr std::size_t columns_max = 80;
+  const bool fits = text_width(first) + 1 + text_width(second) <= columns_max;
+  return fits ? fmt::format("{} {}\n", first, second)
+              : fmt::format("{}\n{:{}}{}\n", first, "", margin, second);
+}
+
 std::string horizontal_rule(std::size_t count) {
   std::string rule;
   for (std::size_t i = 0; i < count; ++i) rule += "─";

@@ -18,6 +18,11 @@ namespace proofmass::coordinator {
 /// Text cut to `width` characters, the last of them `…` if something is missing.
 [[nodiscard]] std::string shortened(std::string_view text, std::size_t width);
 
+/// Two parts of a line with a space between; below each other, the second behind `margin` spaces,
+/// if they take more than the 80 columns of a terminal.
+[[nodiscard]] std::string line_of(std::string_view first, std::string_view second,
+                                  std::size_t margin);
+
 /// `count` times the line ─.
 [[nodiscard]] std::string horizontal_rule(std::size_t count);
 

@@ -165,7 +165,8 @@ TEST(Comparison, OfTooFewRunsIsOfTheDefinitionsAlone) {
   const CampaignComparison comparison = compare_campaigns(first, second);
   EXPECT_EQ(comparison.why_not_compared, "0 and 0 runs with an estimate (must be at least 1)");
   EXPECT_THAT(comparison_text(comparison, "a", "b"),
-              HasSubstr("The results cannot be compared: 0 and 0 runs"));
+              HasSubstr("The results cannot be compared:\n0 and 0 runs with an estimate (must be "
+                        "at least 1).\n"));
 }
 
 TEST(Comparison, NamesOtherModelsAndBuilds) {

@@ -38,6 +38,12 @@ TEST(RequirementText, SaysHowManyDrawsItTakes) {
                                        "             299 decide if"));
 }
 
+TEST(RequirementText, BreaksALineOfManyRuns) {
+  EXPECT_THAT(answer_to("a_c12 < 9e-4 for 99% with 95%", 1'000'000, 909'905),
+              testing::HasSubstr("Exceeding    909905 of 1000000 runs;\n             90.93 % to "
+                                 "91.05 % of all draws (95 % interval)\n"));
+}
+
 // 1 − 1e-9 with 1 − 1e-9 takes 2e10 draws, which is more than a campaign may have.
 TEST(RequirementText, SaysThatNoNumberOfDrawsGivesABound) {
   EXPECT_THAT(answer_to("k2c < 1000 for 99.9999999% with 99.9999999%", 100, 0),

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 
 namespace proofmass::coordinator {
 namespace {
@@ -32,6 +33,14 @@ TEST(ShortenedText, EndsWithAMarkIfSomethingIsMissing) {
   EXPECT_EQ(shortened("abcdef", 5), "abcd…");
   EXPECT_EQ(shortened("─────", 3), "──…");
   EXPECT_EQ(shortened("ab", 1), "…");
+}
+
+TEST(LineOf, BreaksWhatATerminalHasNoRoomFor) {
+  const std::string first(40, 'a');
+  EXPECT_EQ(line_of(first, std::string(37, 'b') + "² ", 4),
+            first + " " + std::string(37, 'b') + "² \n");
+  EXPECT_EQ(line_of(first, std::string(40, 'b'), 4),
+            first + "\n    " + std::string(40, 'b') + "\n");
 }
 
 TEST(MeasuredFigure, HasThreeSignificantDigits) {
