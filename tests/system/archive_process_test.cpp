@@ -118,6 +118,14 @@ TEST_F(ArchiveProcess, RefusesWhatMakesNoSense) {
   EXPECT_EQ(proofmass("fraction", {"verify", "done.db", "--fraction", "2"}).wait(), 2);
   EXPECT_EQ(proofmass("format", {"export", "done.db", "--format", "xml"}).wait(), 2);
   EXPECT_EQ(proofmass("hdf5", {"export", "done.db", "--format", "hdf5"}).wait(), 2);
+  EXPECT_EQ(proofmass("extra", {"report", "done.db", "--all"}).wait(), 2);
+  EXPECT_EQ(errors_of("extra"),
+            "proofmass: error: argument = --all (not expected; --help tells what is)\n");
+  EXPECT_EQ(proofmass("config", {"--config", "none.toml", "list"}).wait(), 2);
+  EXPECT_EQ(errors_of("config"), "proofmass: error: config = none.toml (cannot be read)\n");
+  std::ofstream(path("options.toml")) << "[query]\nrows = 3\n";
+  EXPECT_EQ(proofmass("option", {"--config", "options.toml", "list"}).wait(), 2);
+  EXPECT_EQ(errors_of("option"), "proofmass: error: config = query.rows (is no option)\n");
   EXPECT_EQ(proofmass("none", {"verify", "none.db"}).wait(), 1);
   EXPECT_EQ(errors_of("none"), "proofmass: error: campaign file = none.db (does not exist)\n");
   EXPECT_EQ(proofmass("foreign", {"list", "short.toml"}).wait(), 1);
