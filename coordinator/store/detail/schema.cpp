@@ -61,6 +61,14 @@ void check_after_unclean_end(const Database& database) {
   database.refuse_as_damaged(finding);
 }
 
+void check_deliveries(const Database& database) {
+  const std::uint64_t num_results = database.count("SELECT count(*) FROM run_result");
+  const std::uint64_t num_deliveries = database.count("SELECT count(*) FROM delivery");
+  if (num_results == num_deliveries) return;
+  database.refuse_as_damaged(
+      fmt::format("results = {}, deliveries = {}", num_results, num_deliveries));
+}
+
 void check_up_to_date(const Database& database, const std::filesystem::path& path) {
   const std::int64_t version = database.integer("PRAGMA user_version");
   if (version == schema_version()) return;

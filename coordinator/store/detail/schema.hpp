@@ -44,4 +44,8 @@ void check_up_to_date(const Database& database, const std::filesystem::path& pat
 /// Brings the schema up to date, step by step. @pre Inside a transaction.
 void migrate(Database& database);
 
+/// A run without a delivery would be lent again and come back as a second result.
+/// @pre Nobody else writes. @throws StoreError if results and deliveries differ in number.
+void check_deliveries(const Database& database);
+
 }  // namespace proofmass::coordinator::detail

@@ -138,6 +138,15 @@ TEST_F(StoreRefusal, OfValuesThatTheSchemaForbids) {
             damage("failures_max = -2"));
 }
 
+// It may be read, and `proofmass verify` names the runs.
+TEST_F(StoreRefusal, ToResumeWithAResultThatNobodyDelivered) {
+  Store::create(file(), campaign_of(2), "").commit(deliveries_of(0, 2));
+  Database(file(), Access::read_write).execute("DELETE FROM delivery WHERE run_index = 1");
+  EXPECT_EQ(error_of_open(),
+            message("is damaged: results = 2, deliveries = 1; restore it from a copy"));
+  EXPECT_EQ(error_of_open_read_only(), "");
+}
+
 TEST_F(StoreRefusal, OfAResultWithAStatusThatThereIsNot) {
   Store::create(file(), campaign_of(1), "").commit(deliveries_of(0, 1));
   Database(file(), Access::read_write)
