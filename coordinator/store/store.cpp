@@ -137,7 +137,7 @@ Store::Parts::Parts(const std::filesystem::path& path, std::unique_ptr<detail::S
   Transaction transaction(database);
   detail::migrate(database);
   transaction.commit();
-  detail::check_deliveries(database);
+  detail::check_results(database);
 }
 
 // Readers cannot open a file in WAL mode on read-only media, so that a closed one is in the other.

@@ -119,12 +119,18 @@ std::vector<RunRange> read_runs(const Database& database, std::string_view sql) 
 std::vector<BlamedRun> read_blamed_runs(const Database& database) {
   RunLookup results(database, "run_result");
   RunLookup failures(database, "run_failure");
+  const std::uint64_t num_runs = database.count("SELECT num_runs FROM campaign");
   Statement select =
       database.prepare("SELECT first_run, num_runs, attempt FROM attempt WHERE is_blamed");
   std::map<RunIndex, BlamedRun> blamed;
   while (select.step()) {
     const std::uint64_t first = select.count(0);
-    for (std::uint64_t run = first; run < first + select.count(1); ++run) {
+    const std::uint64_t end = first + select.count(1);
+    if (end > num_runs) {
+      database.refuse_as_damaged(
+          fmt::format("attempt at runs {} to {}, of {} there are", first, end - 1, num_runs));
+    }
+    for (std::uint64_t run = first; run < end; ++run) {
       if (results.contains(run) || failures.contains(run)) continue;
       BlamedRun& entry = blamed[RunIndex{run}];
       entry.run = RunIndex{run};

@@ -61,7 +61,12 @@ void check_after_unclean_end(const Database& database) {
   database.refuse_as_damaged(finding);
 }
 
-void check_deliveries(const Database& database) {
+void check_results(const Database& database) {
+  const std::uint64_t num_runs = database.count("SELECT num_runs FROM campaign");
+  const std::uint64_t end = database.count("SELECT ifnull(max(run_index) + 1, 0) FROM run_result");
+  if (end > num_runs) {
+    database.refuse_as_damaged(fmt::format("result of run {}, of {} there are", end - 1, num_runs));
+  }
   const std::uint64_t num_results = database.count("SELECT count(*) FROM run_result");
   const std::uint64_t num_deliveries = database.count("SELECT count(*) FROM delivery");
   if (num_results == num_deliveries) return;

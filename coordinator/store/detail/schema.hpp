@@ -44,8 +44,10 @@ void check_up_to_date(const Database& database, const std::filesystem::path& pat
 /// Brings the schema up to date, step by step. @pre Inside a transaction.
 void migrate(Database& database);
 
-/// A run without a delivery would be lent again and come back as a second result.
-/// @pre Nobody else writes. @throws StoreError if results and deliveries differ in number.
-void check_deliveries(const Database& database);
+/// A run without a delivery would be lent again and come back as a second result, and a result of a
+/// run that there is not would stand for one that is missing.
+/// @pre Nobody else writes.
+/// @throws StoreError if results and deliveries differ in number, or for such a result.
+void check_results(const Database& database);
 
 }  // namespace proofmass::coordinator::detail

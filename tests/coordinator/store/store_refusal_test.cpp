@@ -100,7 +100,7 @@ TEST_F(StoreRefusal, OfAFileThatActsByItself) {
 TEST_F(StoreRefusal, OfAFileWithAWrongRowAfterACoordinatorWasKilled) {
   create();
   Database(file(), Access::read_write)
-      .execute("PRAGMA ignore_check_constraints = ON; UPDATE campaign SET num_runs = -1");
+      .execute("PRAGMA ignore_check_constraints = ON; UPDATE campaign SET failures_max = -2");
   EXPECT_EQ(error_of_open(), "");
   Database(file(), Access::read_write).execute("PRAGMA journal_mode = WAL");
   EXPECT_EQ(error_of_open(),
@@ -145,6 +145,30 @@ TEST_F(StoreRefusal, ToResumeWithAResultThatNobodyDelivered) {
   EXPECT_EQ(error_of_open(),
             message("is damaged: results = 2, deliveries = 1; restore it from a copy"));
   EXPECT_EQ(error_of_open_read_only(), "");
+}
+
+TEST_F(StoreRefusal, ToResumeWithAResultOfARunThatThereIsNot) {
+  Store::create(file(), campaign_of(2), "").commit(deliveries_of(0, 2));
+  Database(file(), Access::read_write)
+      .execute(
+          "UPDATE run_result SET run_index = 7 WHERE run_index = 1;"
+          "UPDATE delivery SET run_index = 7 WHERE run_index = 1");
+  EXPECT_EQ(error_of_open(),
+            message("is damaged: result of run 7, of 2 there are; restore it from a copy"));
+  EXPECT_EQ(error_of_open_read_only(), "");
+}
+
+// A count of 10^18 would keep a coordinator busy for years.
+TEST_F(StoreRefusal, OfAnAttemptAtRunsThatThereAreNot) {
+  create();
+  Database(file(), Access::read_write)
+      .execute(
+          "INSERT INTO attempt (first_run, num_runs, attempt, worker, reason, is_blamed,"
+          " lost_unix_s) VALUES (1, 1000000000000000000, 0, 1, 'crashed', 1, 0)");
+  const Store store = Store::open_read_only(file());
+  EXPECT_EQ(store_error_of([&] { (void)store.blamed_runs(); }),
+            message("is damaged: attempt at runs 1 to 1000000000000000000, of 1 there are; "
+                    "restore it from a copy"));
 }
 
 TEST_F(StoreRefusal, OfAResultWithAStatusThatThereIsNot) {
