@@ -26,7 +26,8 @@ int synchronise(const std::filesystem::path& path) {
 }  // namespace
 
 DraftFile::DraftFile(std::filesystem::path path)
-    : path_(std::move(path)), draft_(std::filesystem::path(path_).concat(".new")) {}
+    : path_(std::move(path)),
+      draft_(std::filesystem::path(path_).concat(fmt::format(".{}.new", ::getpid()))) {}
 
 DraftFile::~DraftFile() {
   std::error_code ignored;

@@ -5,7 +5,7 @@
 namespace proofmass::coordinator {
 
 /// A file that appears under its name complete, or not at all: it is written beside it, as
-/// `<name>.new`, and gets its name at the end.
+/// `<name>.PROCESS.new`, and gets its name at the end.
 class DraftFile {
  public:
   /// @param path  Name that the file is to have; a file that has it already is replaced.

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <string>
 
 #include "tests/coordinator/archive/archive_fixture.hpp"
 
@@ -20,7 +21,7 @@ TEST_F(TextOutputFile, AppearsWhenItIsComplete) {
   TextOutput output(directory() / "a.csv");
   output.write(large);
   output.write("end");
-  EXPECT_THAT(file_names(), ElementsAre("a.csv.new"));
+  EXPECT_THAT(file_names(), ElementsAre("a.csv." + std::to_string(::getpid()) + ".new"));
   output.finish();
   EXPECT_THAT(file_names(), ElementsAre("a.csv"));
   EXPECT_EQ(test::content_of(directory() / "a.csv"), large + "end");
@@ -39,6 +40,15 @@ TEST_F(TextOutputFile, LeavesTheOldOneUntilTheNewOneIsComplete) {
   output.write("new");
   output.finish();
   EXPECT_EQ(test::content_of(directory() / "a.csv"), "new");
+}
+
+// Nor what another program of ours is writing to the same name.
+TEST_F(TextOutputFile, LeavesSomebodysFileOfALikeName) {
+  test::write_file(directory() / "a.csv.new", "somebody's");
+  TextOutput output(directory() / "a.csv");
+  output.write("text");
+  output.finish();
+  EXPECT_EQ(test::content_of(directory() / "a.csv.new"), "somebody's");
 }
 
 TEST_F(TextOutputFile, NeedsADirectory) {
