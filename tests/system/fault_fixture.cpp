@@ -1,6 +1,7 @@
 #include "tests/system/fault_fixture.hpp"
 
 #include <algorithm>
+#include <exception>
 #include <fstream>
 #include <regex>
 #include <sstream>
@@ -81,7 +82,12 @@ nlohmann::json FaultTest::status_of(const std::string& campaign) const {
 }
 
 void FaultTest::wait_for_log(const std::string& name, const std::string& text) const {
-  wait_until(text + " in the log of " + name, [&] { return contains(errors_of(name), text); });
+  try {
+    wait_until(text + " in the log of " + name, [&] { return contains(errors_of(name), text); });
+  } catch (const std::exception&) {
+    ADD_FAILURE() << errors_of(name);
+    throw;
+  }
 }
 
 std::size_t FaultTest::num_log_lines(const std::string& name, const std::string& text) const {
