@@ -110,8 +110,8 @@ std::optional<FirstOrderIndex> first_order_index(std::span<const double> input,
   detail::check_same_size("output", output, input);
   detail::check_values("input", input, 0);
   detail::check_values("output", output, 0);
-  if (input.size() < sensitivity_values_min || !varies(input) || !varies(output))
-    return std::nullopt;
+  if (input.size() < sensitivity_values_min) return std::nullopt;
+  if (!varies(input) || !varies(output)) return std::nullopt;
   return index_of(ascending_order(input), output, noise_level_for(input.size()));
 }
 

@@ -281,9 +281,8 @@ Findings check_types_unique(const std::vector<SourceFile>& files) {
       if (std::regex_search(line, match, opening)) scope = match[1];
       if (!std::regex_search(line, match, type)) continue;
       const auto [entry, is_new] = first_of.emplace(scope + "::" + match[1].str(), file.path);
-      if (!is_new)
-        findings.push_back(
-            finding(file, line_number, entry->first + " is also in " + entry->second));
+      if (is_new) continue;
+      findings.push_back(finding(file, line_number, entry->first + " is also in " + entry->second));
     }
   }
   return findings;
