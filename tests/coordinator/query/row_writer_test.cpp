@@ -142,6 +142,15 @@ TEST(TableRows, SayThatThereAreMore) {
             "a\n─\n1\n2\n");
 }
 
+TEST(TableRows, WantNoneBeyondTheFirstThatIsNotShown) {
+  const auto writer =
+      make_row_writer(RowFormat::table, {.num_rows_max = 2, .num_columns = {}}, [](auto) {});
+  writer->begin(std::vector<std::string>{"a"});
+  EXPECT_TRUE(writer->row(Row{null}));
+  EXPECT_TRUE(writer->row(Row{null}));
+  EXPECT_FALSE(writer->row(Row{null}));
+}
+
 TEST(TableRows, CutTextToFitTheTerminalAndNeverANumber) {
   const std::vector<Row> rows{{text("a long text that goes on and on"), 0.1234567890123456}};
   EXPECT_EQ(

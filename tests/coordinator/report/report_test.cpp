@@ -251,6 +251,18 @@ TEST_F(StoredReport, IsThatOfTheResultsInTheFile) {
                 budget_table(scenario, statistics));
 }
 
+// One of nine finished runs has no estimate, nor has the one that was given up.
+TEST_F(StoredReport, CountsWhatWasGivenUpAsWithoutAnEstimate) {
+  Store store = Store::create(file(), test::campaign_of(10), "");
+  std::vector<Delivery> deliveries = test::deliveries_of(0, 9);
+  deliveries[4].result.status = RunStatus::no_draw;
+  store.commit(deliveries);
+  const Entry given_up = GivenUpRun{.run = {9}};
+  store.write({&given_up, 1});
+  EXPECT_THAT(report_text(store, Scenario{}), HasSubstr("worst of 8: "));
+  EXPECT_THAT(report_text(store, Scenario{}), HasSubstr(" have an estimate; 2 more have none\n"));
+}
+
 // Every number that is stored, as text of 17 digits, of results with errors that do not add up to
 // the same in every order: 1e8 beside 1e-8.
 TEST_F(StoredReport, IsTheSameBitsInWhateverOrderResultsCome) {
