@@ -42,10 +42,6 @@ class ClockJump : public FaultTest {
             "FAKETIME_TIMESTAMP_FILE=" + path("clock").string(), "FAKETIME_NO_CACHE=1",
             "FAKETIME_DONT_FAKE_MONOTONIC=1"};
   }
-  void extend(std::size_t count) {
-    write_null_campaign(count);
-    (void)told({"submit", "null.toml"});
-  }
 };
 
 // The campaign is extended after each jump: however late that comes, there are runs after it.
@@ -56,10 +52,10 @@ TEST_F(ClockJump, ChangesNothingButTheTimesThatAreWritten) {
   const Process two = null_worker("two", {}, clock());
   wait_for_done("null", 500);
   set_clock("+365d");
-  extend(3000);
+  extend_null_campaign(3000);
   wait_for_done("null", 2000);
   set_clock("-365d");
-  extend(4500);
+  extend_null_campaign(4500);
   wait_for_done("null", 4500);
   coordinator.signal(SIGTERM);
   EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");

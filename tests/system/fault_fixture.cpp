@@ -23,6 +23,11 @@ void FaultTest::write_null_campaign(std::size_t count) {
   write_campaign("null", count);
 }
 
+void FaultTest::extend_null_campaign(std::size_t count) {
+  write_null_campaign(count);
+  (void)told({"submit", "null.toml"});
+}
+
 void FaultTest::write_campaign(const std::string& name, std::size_t count) const {
   std::string text = read_file(path("short.toml"));
   text = std::regex_replace(text, std::regex("\nname = \"[^\"]*\""), "\nname = \"" + name + "\"",
