@@ -18,8 +18,7 @@ except ImportError as error:
 
 mpmath.mp.dps = 40
 
-STATISTIC = 1e-12  # Relative tolerance of statistics of columns.
-LAW = 1e-9         # Of intervals and p-values.
+TOLERANCE = 1e-12  # Relative.
 
 columns = {}
 
@@ -81,6 +80,26 @@ def student_quantile(probability, degrees):
     return start
 
 
+def chi_square_quantile(probability, degrees):
+    """The same with scipy's, which is good to 5e-12; in the square root, without the pole at 0."""
+    probability, degrees = mpmath.mpf(probability), mpmath.mpf(degrees)
+    start = mpmath.sqrt(scipy.stats.chi2.ppf(float(probability), float(degrees)))
+    scale = (1 - degrees / 2) * mpmath.log(2) - mpmath.loggamma(degrees / 2)
+
+    def density(root):
+        return mpmath.exp(scale + (degrees - 1) * mpmath.log(root) - root * root / 2)
+
+    # A chi deviate scatters by less than 1 around its mode, wherever that is.
+    is_lower = probability < 0.5
+    tail = probability if is_lower else 1 - probability
+    for _ in range(3):
+        ends = [start + (-k if is_lower else k) for k in (0, 1, 2, 4, 8, 16, 32)]
+        ends = [end for end in ends if end > 0] + ([mpmath.mpf(0)] if min(ends) <= 0 else [])
+        excess = abs(mpmath.quad(density, ends)) - tail
+        start -= (1 if is_lower else -1) * excess / density(start)
+    return start * start
+
+
 # ---- functions of one column ----------------------------------------------------------------------
 
 
@@ -107,8 +126,8 @@ def normal_deviation_interval(name, confidence):
     deviation = exact_moments(columns[name])[1]
     degrees = len(columns[name]) - 1
     tail = 0.5 - 0.5 * float(confidence)
-    upper, lower = scipy.stats.chi2.ppf([tail, 1 - tail], degrees)
-    return deviation * math.sqrt(degrees / lower), deviation * math.sqrt(degrees / upper)
+    upper, lower = chi_square_quantile(tail, degrees), chi_square_quantile(1 - tail, degrees)
+    return deviation * mpmath.sqrt(degrees / lower), deviation * mpmath.sqrt(degrees / upper)
 
 
 def lower_bound(ascending, level, confidence):
@@ -213,21 +232,20 @@ def rank_correlation(x, y, confidence):
 
 def first_order_index(x, y):
     order = np.argsort(columns[x], kind="stable")
-    # Central values of a column with an offset must come from the exact mean.
     mean = exact_moments(columns[y])[0]
-    y = np.array([float(mpmath.mpf(float(v)) - mean) for v in columns[y]])[order]
+    y = [mpmath.mpf(float(v)) - mean for v in columns[y][order]]
     n = len(y)
     bins = min(max(math.isqrt(n) // 2, 4), 64)
     edges = [b * n // bins for b in range(bins + 1)]
-    residuals = np.concatenate([y[a:b] - y[a:b].mean() for a, b in zip(edges, edges[1:])])
-    within = (residuals**2).sum() / (n - bins)
-    variance = (y**2).sum() / (n - 1)
+    residuals = [v - sum(y[a:b]) / (b - a) for a, b in zip(edges, edges[1:]) for v in y[a:b]]
+    within = sum(r * r for r in residuals) / (n - bins)
+    variance = sum(v * v for v in y) / (n - 1)
     index = 1 - within / variance
-    influence = ((1 - index) * y**2 - residuals**2) / variance
-    error = math.sqrt((influence**2).sum() / n**2 + 2 * (bins - 1) * (1 - index) ** 2 / n**2)
-    f = scipy.stats.f.ppf(0.95, bins - 1, n - bins)
+    influence = sum((((1 - index) * v * v - r * r) / variance) ** 2 for v, r in zip(y, residuals))
+    error = mpmath.sqrt(influence / n**2 + 2 * (bins - 1) * (1 - index) ** 2 / mpmath.mpf(n) ** 2)
+    f = fisher_quantile(0.95, bins - 1, n - bins)
     between = (bins - 1) * f / (n - bins)  # Of the sum of squares within.
-    noise = 1 - (1 / (n - bins)) / ((1 + between) / (n - 1))
+    noise = 1 - (n - 1) / ((n - bins) * (1 + between))
     return index, error, noise, bins
 
 
@@ -266,9 +284,8 @@ def holm_adjusted(name):
 # ---- laws -----------------------------------------------------------------------------------------
 
 
-def beta_tails(a, b, x):
+def beta_law(a, b, x):
     """Both tails by integrating the density, exact logarithms of Γ."""
-    a, b, x = mpmath.mpf(a), mpmath.mpf(b), mpmath.mpf(float.fromhex(x))
     if min(a, b) < 1:
         lower = mpmath.betainc(a, b, 0, x, regularized=True) if max(a, b) < 1e5 else None
         return None if lower is None else (lower, 1 - lower)
@@ -289,6 +306,10 @@ def beta_tails(a, b, x):
     lower = mpmath.quad(density, [p for p in points if p < x] + [x])
     upper = mpmath.quad(density, [x] + [p for p in points if p > x])
     return lower * mpmath.exp(unit), upper * mpmath.exp(unit)
+
+
+def beta_tails(a, b, x):
+    return beta_law(mpmath.mpf(a), mpmath.mpf(b), mpmath.mpf(float.fromhex(x)))
 
 
 def gamma_tails(a, x):
@@ -323,15 +344,12 @@ def binomial(k, n, p):
 def fisher_quantile(probability, numerator, denominator):
     """By the exact incomplete beta function, from scipy's quantile."""
     a, b = mpmath.mpf(numerator) / 2, mpmath.mpf(denominator) / 2
-    start = scipy.stats.f.ppf(probability, numerator, denominator)
-    if denominator > 1e4:
-        return start
 
     def excess(f):
         x = numerator * f / (numerator * f + denominator)
-        return mpmath.betainc(a, b, 0, x, regularized=True) - mpmath.mpf(probability)
+        return beta_law(a, b, x)[0] - mpmath.mpf(probability)
 
-    return mpmath.findroot(excess, start)
+    return mpmath.findroot(excess, scipy.stats.f.ppf(probability, numerator, denominator))
 
 
 def of_numbers(function):
@@ -341,27 +359,27 @@ def of_numbers(function):
 # ---- comparison -----------------------------------------------------------------------------------
 
 CHECKS = {  # function: (values, relative tolerance)
-    "moments": (moments, STATISTIC),
+    "moments": (moments, TOLERANCE),
     "ranks": (ranks, 0.0),
-    "percentile": (percentile, STATISTIC),
-    "mean_interval": (mean_interval, LAW),
-    "normal_deviation_interval": (normal_deviation_interval, LAW),
-    "percentile_interval": (percentile_interval, LAW),
-    "bootstrap_deviation_interval": (bootstrap_deviation_interval, LAW),
-    "linear_correlation": (linear_correlation, LAW),
-    "rank_correlation": (rank_correlation, LAW),
-    "first_order_index": (first_order_index, LAW),
-    "compare_paired": (compare_paired, LAW),
-    "compare_unpaired": (compare_unpaired, LAW),
-    "holm_adjusted": (holm_adjusted, STATISTIC),
-    "student_quantile": (of_numbers(student_quantile), LAW),
-    "student_two_sided": (of_numbers(lambda t, n: 2 * scipy.stats.t.sf(abs(t), n)), LAW),
-    "chi_square_quantile": (of_numbers(scipy.stats.chi2.ppf), LAW),
-    "fisher_quantile": (of_numbers(fisher_quantile), LAW),
-    "beta_quantile": (of_numbers(scipy.stats.beta.ppf), LAW),
-    "normal_cumulative": (of_numbers(scipy.special.ndtr), STATISTIC),
-    "kolmogorov_upper": (of_numbers(scipy.special.kolmogorov), STATISTIC),
-    "binomial": (binomial, LAW),
+    "percentile": (percentile, TOLERANCE),
+    "mean_interval": (mean_interval, TOLERANCE),
+    "normal_deviation_interval": (normal_deviation_interval, TOLERANCE),
+    "percentile_interval": (percentile_interval, TOLERANCE),
+    "bootstrap_deviation_interval": (bootstrap_deviation_interval, TOLERANCE),
+    "linear_correlation": (linear_correlation, TOLERANCE),
+    "rank_correlation": (rank_correlation, TOLERANCE),
+    "first_order_index": (first_order_index, TOLERANCE),
+    "compare_paired": (compare_paired, TOLERANCE),
+    "compare_unpaired": (compare_unpaired, TOLERANCE),
+    "holm_adjusted": (holm_adjusted, TOLERANCE),
+    "student_quantile": (of_numbers(student_quantile), TOLERANCE),
+    "student_two_sided": (of_numbers(lambda t, n: 2 * scipy.stats.t.sf(abs(t), n)), TOLERANCE),
+    "chi_square_quantile": (of_numbers(chi_square_quantile), TOLERANCE),
+    "fisher_quantile": (of_numbers(fisher_quantile), TOLERANCE),
+    "beta_quantile": (of_numbers(scipy.stats.beta.ppf), TOLERANCE),
+    "normal_cumulative": (of_numbers(scipy.special.ndtr), TOLERANCE),
+    "kolmogorov_upper": (of_numbers(scipy.special.kolmogorov), TOLERANCE),
+    "binomial": (binomial, TOLERANCE),
     "regularised_beta": (beta_tails, None),
     "regularised_gamma": (gamma_tails, None),
     "wilks_num_runs": (wilks_num_runs, 0.0),
