@@ -59,7 +59,8 @@ bool CsvWriter::row(std::span<const Cell> cells) {
   for (std::size_t i = 0; i < cells.size(); ++i) {
     line += fmt::format("{}{}", i == 0 ? "" : ",", csv_cell(cells[i]));
   }
-  sink_(line + "\r\n");
+  // Readers pass over empty lines.
+  sink_((line.empty() ? "\"\"" : line) + "\r\n");
   return true;
 }
 

@@ -74,6 +74,10 @@ TEST(CsvRows, TellNullFromEmptyText) {
   EXPECT_EQ(written(RowFormat::csv, {"a", "b"}, {{null, text("")}}), "a,b\r\n,\"\"\r\n");
 }
 
+TEST(CsvRows, AreNeverEmptyLines) {
+  EXPECT_EQ(written(RowFormat::csv, {"a"}, {{null}, {0.5}}), "a\r\n\"\"\r\n0.5\r\n");
+}
+
 TEST(CsvRows, HoldBytesAsSqlWritesThem) {
   EXPECT_EQ(written(RowFormat::csv, {"a"}, {{Blob{std::string_view("\0\xff\x0a", 3)}}}),
             "a\r\nx'00ff0a'\r\n");
