@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -74,6 +76,10 @@ int list_databases(const ListOptions& options) {
 
 int back_up_database(const std::filesystem::path& database,
                      const std::filesystem::path& destination) {
+  std::error_code ignored;
+  if (std::filesystem::exists(destination, ignored)) {
+    throw UsageError(fmt::format("destination = {} (exists already)", destination.string()));
+  }
   Store::open_read_only(database).back_up(destination);
   print_lines(fmt::format("wrote {}\n", destination.string()));
   return exit_done;

@@ -4,6 +4,7 @@
 
 #include <csignal>
 #include <string_view>
+#include <system_error>
 
 #include "coordinator/archive/campaign_mark.hpp"
 #include "coordinator/archive/export.hpp"
@@ -29,7 +30,8 @@ void check(const ExportOptions& options) {
     if (options.format != ExportFormat::hdf5) return;
     refuse("-", "must be a file for hdf5: name it with --output");
   }
-  if (!std::filesystem::exists(output)) return;
+  std::error_code ignored;
+  if (!std::filesystem::exists(output, ignored)) return;
   if (!options.is_forced) refuse(output, "exists already; replace it with --force");
   if (!std::filesystem::is_regular_file(output)) {
     refuse(output, "is no file; leave --output out to write to a pipe or device");

@@ -83,6 +83,14 @@ TEST_F(ArchiveCommands, CopyADatabase) {
   EXPECT_EQ(Store::open_read_only(copy).id(), Store::open_read_only(database_).id());
 }
 
+TEST_F(ArchiveCommands, DoNotBackUpOverAFile) {
+  const auto copy = directory_ / "copy.db";
+  std::ofstream(copy) << "mine";
+  EXPECT_EQ(misuse([&] { return back_up_database(database_, copy); }),
+            "destination = " + copy.string() + " (exists already)");
+  EXPECT_EQ(std::filesystem::file_size(copy), 4U);
+}
+
 TEST_F(ArchiveCommands, DoNotExportOverAFile) {
   const auto output = directory_ / "a.csv";
   std::ofstream(output) << "mine";
