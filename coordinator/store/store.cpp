@@ -96,7 +96,7 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
 // A file appears under its name complete, or not at all.
 void appear_complete(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path&)>& write) {
-  const std::filesystem::path draft = std::filesystem::path(path).concat(".new");
+  const std::filesystem::path draft = std::filesystem::path(path).concat(".unfinished");
   remove_draft(draft);
   try {
     write(draft);

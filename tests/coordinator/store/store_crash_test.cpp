@@ -48,8 +48,8 @@ TEST_F(StoreCrash, InTheMiddleOfReadingHoldsNobodyBack) {
 
 // A process killed in create() leaves such files; what they hold is of no interest.
 TEST_F(StoreCrash, WhileCreatingIsRepairedByCreatingAgain) {
-  test::write_file(file().concat(".new"), "half a database");
-  test::write_file(file().concat(".new-journal"), "half a journal");
+  test::write_file(file().concat(".unfinished"), "half a database");
+  test::write_file(file().concat(".unfinished-journal"), "half a journal");
   test::write_file(file().concat(".lock"), "process 1 on nowhere\n");
   Store::create(file(), campaign_of(3), "");
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));

@@ -134,7 +134,7 @@ TEST_F(StoreBackup, LeavesNothingIfTheDiskIsFull) {
     const test::FileSizeLimit limit(100'000);
     EXPECT_EQ(store_error_of([&] { store.back_up(copy()); }),
               "campaign file = " + copy().string() +
-                  ".new (disk I/O error; what was committed before is safe)");
+                  ".unfinished (disk I/O error; what was committed before is safe)");
   }
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
   store.back_up(copy());
