@@ -1,6 +1,7 @@
 #include "tests/system/fault_fixture.hpp"
 
 #include <algorithm>
+#include <csignal>
 #include <exception>
 #include <fstream>
 #include <regex>
@@ -115,6 +116,15 @@ std::size_t FaultTest::num_done(const std::string& campaign) const {
 
 void FaultTest::wait_for_done(const std::string& campaign, std::size_t count) const {
   wait_until("stored runs", [&] { return num_done(campaign) >= count; });
+}
+
+void FaultTest::end_when_done(Process& coordinator, const std::string& name,
+                              std::size_t num_registered) {
+  wait_until("registered workers",
+             [&] { return num_log_lines(name, "worker_registered") >= num_registered; });
+  wait_for_done("null", num_null_runs);
+  coordinator.signal(SIGTERM);
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of(name);
 }
 
 std::string FaultTest::digest(const std::string& campaign) const {

@@ -53,6 +53,10 @@ class FaultTest : public CampaignProcess {
   /// Runs that are stored; 0 if the campaign is not there yet.
   [[nodiscard]] std::size_t num_done(const std::string& campaign) const;
   void wait_for_done(const std::string& campaign, std::size_t count) const;
+  /// Ends a coordinator without --exit-when-done when all runs of `null` are stored, and with it
+  /// the workers that know it: before that so many must have registered, as one that is still on
+  /// its way would wait for another coordinator.
+  void end_when_done(Process& coordinator, const std::string& name, std::size_t num_registered);
   [[nodiscard]] std::string digest(const std::string& campaign) const;
   /// Of the same campaign, computed by one worker without any fault.
   [[nodiscard]] std::string undisturbed_digest(const std::string& campaign) const;
