@@ -13,7 +13,7 @@ ConfigError::ConfigError(std::string_view field, std::string_view value, std::st
 namespace detail {
 
 void expectation_failed(const char* condition, const char* file, int line) {
-  fmt::print(stderr, "{}:{}: internal invariant broken: {}\n", file, line, condition);
+  (void)std::fprintf(stderr, "%s:%d: internal invariant broken: %s\n", file, line, condition);
   std::abort();
 }
 

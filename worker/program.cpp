@@ -18,6 +18,7 @@
 #include "core/simulation/reference_digest.hpp"
 #include "core/simulation/run.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/command_line/standard_error.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
 #include "worker/net/serve.hpp"
@@ -124,7 +125,7 @@ int work(const Options& options, const Program& program, ServeConfig config,
 /// Turns what goes wrong into a message and an exit code.
 int reporting_errors(const Program& program, const std::function<int()>& what) {
   const auto fail = [&](const std::exception& error, int exit_code) {
-    fmt::print(stderr, "{}: error: {}\n", program.name, error.what());
+    wire::say(fmt::format("{}: error: {}\n", program.name, error.what()));
     return exit_code;
   };
   try {

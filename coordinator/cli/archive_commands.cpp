@@ -17,6 +17,7 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/store/store.hpp"
+#include "proto/command_line/standard_error.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -50,8 +51,8 @@ int verify_database(const VerifyCommandOptions& options) {
       flush_standard_output();  // The simulation may take long.
     };
     if (verify(options.database, how, report, is_stopped)) return exit_done;
-    fmt::print(stderr, "proofmass: error: {}: {} of {} checks {}\n", options.database.string(),
-               num_failing, num_checks, num_failing == 1 ? "fails" : "fail");
+    wire::say(fmt::format("proofmass: error: {}: {} of {} checks {}\n", options.database.string(),
+                          num_failing, num_checks, num_failing == 1 ? "fails" : "fail"));
     return exit_cannot_be_done;
   });
 }

@@ -1,9 +1,8 @@
 #include "coordinator/cli/archive_stop.hpp"
 
-#include <fmt/format.h>
-
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/stop_signals.hpp"
+#include "proto/command_line/standard_error.hpp"
 
 namespace proofmass::coordinator {
 
@@ -12,7 +11,7 @@ int run_until_stopped(const std::function<int(const IsStopped&)>& work) {
   try {
     return work([&stop] { return stop != StopRequest::none; });
   } catch (const Interrupted&) {
-    fmt::print(stderr, "proofmass: interrupted\n");
+    wire::say("proofmass: interrupted\n");
     return exit_interrupted;
   }
 }

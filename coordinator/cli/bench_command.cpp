@@ -15,6 +15,7 @@
 #include "coordinator/cli/bench_report.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "core/session/session_signals.hpp"
+#include "proto/command_line/standard_error.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -92,7 +93,7 @@ int run_bench(const BenchOptions& options) {
   const bool is_table = options.format == BenchFormat::table;
   fmt::print("{}", is_table ? bench_table(figures) : bench_json(figures));
   if (all_bits_agree(figures)) return exit_done;
-  fmt::print(stderr, "proofmass: error: instruction sets give different results\n");
+  wire::say("proofmass: error: instruction sets give different results\n");
   return exit_cannot_be_done;
 }
 

@@ -8,6 +8,7 @@
 
 #include "coordinator/cli/exit_code.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/command_line/standard_error.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
 
@@ -45,10 +46,10 @@ void add_client_options(CLI::App& command, ClientOptions& options) {
 void warn_if_plain(const ClientOptions& options) {
   const ClientConnectionConfig& connection = options.connection;
   if (connection.keys || wire::is_local(connection.endpoint)) return;
-  fmt::print(stderr,
-             "proofmass: warning: connect = {} (--insecure-plain: anybody on the way can read and "
-             "change what is said)\n",
-             connection.endpoint);
+  wire::say(fmt::format(
+      "proofmass: warning: connect = {} (--insecure-plain: anybody on the way can read and "
+      "change what is said)\n",
+      connection.endpoint));
 }
 
 int with_connection(const ClientOptions& options, const std::function<int(const Ask&)>& work) {

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <exception>
 #include <functional>
 #include <iostream>
@@ -15,6 +14,7 @@
 #include "coordinator/cli/standard_output.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/command_line/standard_error.hpp"
 
 namespace proofmass::coordinator {
 
@@ -29,7 +29,7 @@ inline constexpr const char* exit_codes_text =
 /// Parses the arguments, does the work and turns what goes wrong into a message and an exit code.
 inline int run_program(CLI::App& app, int argc, char** argv, const std::function<int()>& work) {
   const auto fail = [&app](std::string_view what, int exit_code) {
-    fmt::print(stderr, "{}: error: {}\n", app.get_name(), visible_lines(what));
+    wire::say(fmt::format("{}: error: {}\n", app.get_name(), visible_lines(what)));
     return exit_code;
   };
   try {

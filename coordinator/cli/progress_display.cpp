@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "proto/command_line/standard_error.hpp"
+
 namespace proofmass::coordinator {
 namespace {
 
@@ -69,7 +71,7 @@ ProgressDisplay::ProgressDisplay(DisplayMode mode, std::FILE* stream)
     : mode_(mode), stream_(stream) {}
 
 ProgressDisplay::~ProgressDisplay() {
-  if (has_bar_) fmt::print(stream_, "\n");
+  if (has_bar_) wire::say_on(stream_, "\n");
 }
 
 void ProgressDisplay::update(const wire::CampaignStatus& status) {
@@ -79,22 +81,22 @@ void ProgressDisplay::update(const wire::CampaignStatus& status) {
   if (status.num_runs == num_runs_shown_ && tenths <= tenths_shown_) return;
   num_runs_shown_ = status.num_runs;
   tenths_shown_ = tenths;
-  fmt::print(stream_, "{}\n", progress_line(status));
+  wire::say_on(stream_, progress_line(status) + "\n");
 }
 
 void ProgressDisplay::show_bar(const wire::CampaignStatus& status) {
   std::string line = progress_bar(status);
   if (has_bar_ && line == shown_) return;
   // The longer line before it is wiped by the erasure to the end of the line.
-  fmt::print(stream_, "\r{}\033[K", line);
+  wire::say_on(stream_, fmt::format("\r{}\033[K", line));
   std::fflush(stream_);
   has_bar_ = true;
   shown_ = std::move(line);
 }
 
 void ProgressDisplay::note(std::string_view text) {
-  if (has_bar_) fmt::print(stream_, "\r\033[K");
-  fmt::print(stream_, "{}\n", text);
+  if (has_bar_) wire::say_on(stream_, "\r\033[K");
+  wire::say_on(stream_, fmt::format("{}\n", text));
   has_bar_ = false;
 }
 

@@ -23,6 +23,7 @@
 #include "core/campaign/run_ranges.hpp"
 #include "core/simulation/reference_digest.hpp"
 #include "core/simulation/run.hpp"
+#include "proto/command_line/standard_error.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -136,28 +137,28 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
 
 int say_interrupted(const Store& store, const std::filesystem::path& database) {
   const std::uint64_t num_runs = store.num_runs();
-  fmt::print(stderr,
-             "proofmass: interrupted; {} of {} runs are in {}\n"
-             "proofmass: the same command computes the others\n",
-             num_runs - num_missing(store), num_runs, database.string());
+  wire::say(
+      fmt::format("proofmass: interrupted; {} of {} runs are in {}\n"
+                  "proofmass: the same command computes the others\n",
+                  num_runs - num_missing(store), num_runs, database.string()));
   return exit_interrupted;
 }
 
 int say_given_up(std::span<const RunRange> given_up, std::uint64_t num_runs) {
   const RunSet runs(given_up);
-  fmt::print(stderr,
-             "proofmass: error: {} of {} runs given up, having crashed their workers: {}\n"
-             "proofmass: the same command tries them again\n",
-             runs.size(), num_runs, to_text(runs));
+  wire::say(
+      fmt::format("proofmass: error: {} of {} runs given up, having crashed their workers: {}\n"
+                  "proofmass: the same command tries them again\n",
+                  runs.size(), num_runs, to_text(runs)));
   return exit_cannot_be_done;
 }
 
 int say_cancelled(const Store& store, std::uint64_t failures_max) {
-  fmt::print(stderr,
-             "proofmass: error: {} of {} runs given up or without an estimate (at most {} with "
-             "--failures); cancelled\n",
-             store.num_without_estimate() + num_runs_in(store.given_up_runs()), store.num_runs(),
-             failures_max);
+  wire::say(fmt::format(
+      "proofmass: error: {} of {} runs given up or without an estimate (at most {} with "
+      "--failures); cancelled\n",
+      store.num_without_estimate() + num_runs_in(store.given_up_runs()), store.num_runs(),
+      failures_max));
   return exit_cannot_be_done;
 }
 

@@ -93,6 +93,17 @@ TEST_F(ArchiveProcess, SaysThatItsAnswerIsLost) {
   }
 }
 
+TEST_F(ArchiveProcess, NeedsNobodyToHearItsMessages) {
+  const std::string program = programs + "/proofmass ";
+  for (const std::string command : {"report done.db", "verify done.db", "list", "--help"}) {
+    EXPECT_EQ(shell(program + command + " > /dev/full 2>&1"), 1) << command;
+  }
+  EXPECT_EQ(shell(program + "query done.db selec 2> /dev/full"), 2);
+  EXPECT_EQ(shell(programs + "/proofmass-worker --threads 0 2> /dev/full"), 2);
+  EXPECT_EQ(shell(program + "run short.toml --db silent.db > /dev/null 2> /dev/full"), 0);
+  EXPECT_EQ(stored_runs(path("silent.db")), reference());
+}
+
 TEST_F(ArchiveProcess, EndsInOrderWhenItIsInterrupted) {
   // Sessions so long that their simulation is not over before the signal comes.
   change("done.db",
