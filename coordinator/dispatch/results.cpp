@@ -15,10 +15,10 @@ namespace {
 
 using RunsToAcknowledge = std::map<WorkerId, std::vector<RunIndex>>;
 
-void add_run_time(double compute_s, double& mean_s) {
+void add_run_time(double elapsed_s, double& mean_s) {
   constexpr double weight = 0.2;          // Of the newest run: the mean spans about the last ten.
-  compute_s = std::max(compute_s, 1e-9);  // 0 means that nothing is known.
-  mean_s = mean_s > 0.0 ? mean_s + weight * (compute_s - mean_s) : compute_s;
+  elapsed_s = std::max(elapsed_s, 1e-9);  // 0 means that nothing is known.
+  mean_s = mean_s > 0.0 ? mean_s + weight * (elapsed_s - mean_s) : elapsed_s;
 }
 
 void send_acks(const State& state, CampaignId id, const RunsToAcknowledge& runs_by_worker,
@@ -108,8 +108,8 @@ void count_results(State& state, Worker& worker, CampaignId id, const wire::Resu
   double& own_s = worker.run_time_s[id];
   const auto unleased = worker.unleased.find(id);
   for (const wire::ComputedRun& computed : batch.results) {
-    add_run_time(computed.compute_s, own_s);
-    add_run_time(computed.compute_s, campaign.run_time_s);
+    add_run_time(computed.elapsed_s, own_s);
+    add_run_time(computed.elapsed_s, campaign.run_time_s);
     if (unleased != worker.unleased.end()) unleased->second.remove(computed.result.run);
   }
   if (unleased != worker.unleased.end() && unleased->second.empty()) {

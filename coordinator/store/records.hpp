@@ -20,7 +20,7 @@ struct Delivery {
   RunResult result;
   wire::SessionId worker;
   wire::Attempt attempt;   ///< Under which the run was computed.
-  double compute_s = 0.0;  ///< Time that the worker spent on the run.
+  double compute_s = 0.0;  ///< Time of a thread of the worker: the run's share of its batch.
 };
 
 /// A second result of a run that is stored: to be compared, and not to be kept.

@@ -98,6 +98,7 @@ void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
     message.mutable_estimate()->Assign(result.estimate.begin(), result.estimate.end());
   }
   message.set_compute_s(computed.compute_s);
+  message.set_elapsed_s(computed.elapsed_s);
 }
 
 void write(const ResultBatch& batch, proto::Envelope& envelope) {

@@ -173,7 +173,9 @@ ComputedRun read_run(const proto::ComputedRun& message) {
   result.num_rounds = message.num_rounds();
   result.truth = read_parameters(message.truth(), result.has_truth(), "truth");
   result.estimate = read_parameters(message.estimate(), result.has_estimate(), "estimate");
-  return {.result = result, .compute_s = checked_magnitude(message.compute_s(), "compute_s")};
+  return {.result = result,
+          .compute_s = checked_magnitude(message.compute_s(), "compute_s"),
+          .elapsed_s = checked_magnitude(message.elapsed_s(), "elapsed_s")};
 }
 
 Message read(const proto::ResultBatch& message) {

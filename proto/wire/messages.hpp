@@ -17,7 +17,7 @@
 namespace proofmass::wire {
 
 /// Grows with every change that an older peer would misunderstand.
-inline constexpr std::uint32_t protocol_version = 2;
+inline constexpr std::uint32_t protocol_version = 3;
 
 inline constexpr std::uint32_t runs_per_lease_max = 4096;  ///< Also of a batch of results.
 inline constexpr std::size_t ranges_per_message_max = 4096;
@@ -174,7 +174,8 @@ struct GiveBack {
 /// A result and what it took.
 struct ComputedRun {
   RunResult result;
-  double compute_s = 0.0;  ///< ≥ 0.
+  double compute_s = 0.0;  ///< Time of a thread: its share of the batch it was in; ≥ 0.
+  double elapsed_s = 0.0;  ///< From its beginning to its end: the time of that batch; ≥ 0.
 };
 
 /// Worker → coordinator: results, repeated until acknowledged.

@@ -170,7 +170,7 @@ def measure_one_by_one(service, num_runs, num_workers):
     """Each worker has one run at a time: a lease, a result and an acknowledgement for every run."""
     # A worker that says that its runs are long is lent no more than it asks for.
     swarm = service.add("proofmass-swarm", "--workers", num_workers, "--runs-held", 1,
-                        "--compute-s", 10, stream="stdout")
+                        "--elapsed-s", 10, stream="stdout")
     swarm.wait_for(lambda line: line["num_registered"] == num_workers)
     start = time.monotonic()
     figures = service.run_campaign(num_runs)

@@ -49,7 +49,7 @@ std::vector<worker::FinishedRun> NullExecution::take_finished() {
 void NullExecution::finish(wire::CampaignId campaign, RunIndex run) {
   finished_.push_back(
       {.campaign = campaign,
-       .computed = {.result = null_result(seeds_.at(campaign), run), .compute_s = compute_s_}});
+       .computed = {.result = null_result(seeds_.at(campaign), run), .elapsed_s = elapsed_s_}});
 }
 
 }  // namespace proofmass::test

@@ -16,8 +16,8 @@ namespace proofmass::test {
 /// Finishes every run the moment it knows the run's campaign.
 class NullExecution final : public worker::Execution {
  public:
-  /// @param compute_s  What each run is said to have taken: the coordinator lends by it.
-  explicit NullExecution(double compute_s) : compute_s_(compute_s) {}
+  /// @param elapsed_s  What each run is said to have taken: the coordinator lends by it.
+  explicit NullExecution(double elapsed_s) : elapsed_s_(elapsed_s) {}
 
   [[nodiscard]] bool is_defined(wire::CampaignId campaign) const override {
     return seeds_.contains(campaign);
@@ -40,7 +40,7 @@ class NullExecution final : public worker::Execution {
  private:
   void finish(wire::CampaignId campaign, RunIndex run);
 
-  double compute_s_;
+  double elapsed_s_;
   std::map<wire::CampaignId, std::uint64_t> seeds_;
   std::map<wire::CampaignId, std::set<RunIndex>> waiting_;  ///< For their campaign's definition.
   std::vector<worker::FinishedRun> finished_;

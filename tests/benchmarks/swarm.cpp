@@ -188,7 +188,7 @@ int run(int argc, char** argv) {
   app.add_option("--slots", options.worker.num_slots, "Of each")->check(CLI::Range(1, 1024));
   app.add_option("--runs-held", options.worker.runs_held_max, "Most runs that each has at a time")
       ->check(CLI::Range(1, 4096));
-  app.add_option("--compute-s", options.worker.compute_s, "What they say that a run takes")
+  app.add_option("--elapsed-s", options.worker.elapsed_s, "What they say that a run takes")
       ->check(CLI::NonNegativeNumber);
   CLI11_PARSE(app, argc, argv);
   raise_descriptor_limit();

@@ -33,7 +33,7 @@ SwarmWorker::SwarmWorker(zmq::context_t& context, const SwarmWorkerConfig& confi
                          TimePoint now)
     : runs_held_max_(config.runs_held_max),
       count_(count),
-      execution_(config.compute_s),
+      execution_(config.elapsed_s),
       socket_(connected_dealer(context, config.endpoint)),
       conversation_(
           session, std::move(hello), execution_,

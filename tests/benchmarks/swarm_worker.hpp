@@ -33,7 +33,7 @@ struct SwarmWorkerConfig {
   std::string endpoint;
   std::uint32_t num_slots = 1;
   std::uint32_t runs_held_max = wire::runs_per_lease_max;  ///< It wants no more at a time.
-  double compute_s = 0.0;  ///< What it says that a run takes. It takes no time.
+  double elapsed_s = 0.0;  ///< What it says that a run takes. It takes no time.
 };
 
 /// A worker whose runs cost nothing and that shares its process and thread with many: the product's

@@ -62,6 +62,7 @@ class Speaker {
       wire::ComputedRun computed;
       computed.result.run = {run};
       computed.compute_s = 0.5;
+      computed.elapsed_s = 8.0;
       batch.results.push_back(computed);
     }
     say(std::move(batch));

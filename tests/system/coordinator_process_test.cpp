@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <regex>
@@ -108,13 +109,18 @@ TEST_F(NoticedProcess, OfAWorkerTellsHowItIs) {
   (void)coordinator.wait();
 }
 
-TEST_F(CoordinatorProcess, ThreeThreadsOfAWorkerGiveTheBitsOfOne) {
+TEST_F(CoordinatorProcess, ThreeThreadsOfAWorkerGiveTheBitsOfOneAndThriceItsTimeAtMost) {
+  const auto begin = std::chrono::steady_clock::now();
   Process worker = start_worker("threads", "3");
   Process coordinator = start_coordinator();
   EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
   EXPECT_EQ(worker.wait(), 0) << errors_of("threads");
   EXPECT_TRUE(contains(errors_of("coordinator"), "name=threads ")) << errors_of("coordinator");
-  EXPECT_EQ(stored_runs(path("served/hardy2013.db")), reference());
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+  const auto file = path("served/hardy2013.db");
+  EXPECT_EQ(stored_runs(file), reference());
+  const std::string query = "SELECT CAST(1000 * compute_s AS INTEGER) FROM worker_throughput";
+  EXPECT_LE(std::stod(stored_text(file, query)), 3000.0 * elapsed.count());
 }
 
 TEST_F(CoordinatorProcess, RefusesMoreThreadsThanAWorkerMayHave) {

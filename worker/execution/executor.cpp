@@ -261,7 +261,8 @@ std::vector<RunResult> Executor::simulate(Batch& batch) {
 
 void Executor::finish(const Batch& batch, const std::vector<RunResult>& results) {
   const Duration elapsed = now() - batch.started_at;
-  const double compute_s = std::chrono::duration<double>(elapsed).count();
+  const double elapsed_s = std::chrono::duration<double>(elapsed).count();
+  const double compute_s = elapsed_s / static_cast<double>(results.size());
   const wire::CampaignId campaign = batch.assignment.campaign;
   {
     const std::lock_guard lock(mutex_);
@@ -270,7 +271,8 @@ void Executor::finish(const Batch& batch, const std::vector<RunResult>& results)
     campaigns_.at(campaign).batch_time = elapsed;
     for (const RunResult& result : results) {
       finished_.push_back(
-          {.campaign = campaign, .computed = {.result = result, .compute_s = compute_s}});
+          {.campaign = campaign,
+           .computed = {.result = result, .compute_s = compute_s, .elapsed_s = elapsed_s}});
     }
   }
   on_change_();

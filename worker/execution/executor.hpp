@@ -43,9 +43,9 @@ struct ExecutorConfig {
 /// Computes runs on threads of its own, in the order in which they are submitted.
 ///
 /// A free thread takes a batch of runs of one campaign from the queue, of as many leases as it
-/// takes, and starts at once with what is there. Each run takes the time of its batch, and that is
-/// its `compute_s`. A campaign is prepared by a thread when its first run is due, while the others
-/// go on.
+/// takes, and starts at once with what is there. What each run took, `elapsed_s`, is the time of
+/// its batch, of which it has an equal share in `compute_s`. A campaign is prepared by a thread
+/// when its first run is due, while the others go on.
 class Executor final : public Execution {
  public:
   /// @param prepare    Called on the threads, once for each definition.

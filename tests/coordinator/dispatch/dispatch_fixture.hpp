@@ -100,7 +100,7 @@ class DispatchFixture : public testing::Test {
     wire::ComputedRun result;
     result.result.run = {run};
     result.result.status = status;
-    result.compute_s = 1000.0;
+    result.elapsed_s = 1000.0;
     return result;
   }
 

@@ -18,7 +18,7 @@ class LendingTest : public DispatchFixture {
         << "how long a run takes is not known yet";
     heartbeat(first, {held(one, {{0}, 1})}, {}, num_runs_max);
     wire::ComputedRun result;
-    result.compute_s = run_time_s;
+    result.elapsed_s = run_time_s;
     on_results(state, first, {.campaign = one, .attempt = {1}, .results = {result}}, now, outbox);
     outbox.forget();
     return runs_held_text(state, first);

@@ -176,8 +176,9 @@ TEST(Codec, KeepsEveryBitOfResultsOfEachStatus) {
   ResultBatch sent{.campaign = {3}, .attempt = {1}, .results = {}};
   for (const RunStatus status : {RunStatus::completed, RunStatus::not_converged,
                                  RunStatus::not_finite, RunStatus::no_draw}) {
-    sent.results.push_back(
-        {.result = some_result({sent.results.size()}, status), .compute_s = 2.5});
+    sent.results.push_back({.result = some_result({sent.results.size()}, status),
+                            .compute_s = 2.5,
+                            .elapsed_s = 40.0});
   }
   const ResultBatch got = round_trip(sent);
   EXPECT_EQ(got.campaign, sent.campaign);
@@ -191,6 +192,7 @@ TEST(Codec, KeepsEveryBitOfResultsOfEachStatus) {
     EXPECT_EQ(a.num_draws, 3U);
     EXPECT_EQ(a.num_rounds, 7U);
     EXPECT_EQ(got.results[run].compute_s, 2.5);
+    EXPECT_EQ(got.results[run].elapsed_s, 40.0);
     for (std::size_t i = 0; i < num_parameters; ++i) {
       EXPECT_EQ(bits(a.truth[i]), bits(b.truth[i]));
       EXPECT_EQ(bits(a.estimate[i]), bits(b.estimate[i]));

@@ -99,7 +99,7 @@ TEST(MalformedEnvelope, OfAnotherVersionIsRefused) {
   envelope.mutable_bye();
   const DecodeError error = refusal_of(envelope.SerializeAsString());
   EXPECT_EQ(error.fault, DecodeFault::wrong_version);
-  EXPECT_EQ(error.text, "protocol_version = 1 (must be 2)");
+  EXPECT_EQ(error.text, "protocol_version = 1 (must be 3)");
 }
 
 TEST(MalformedEnvelope, WithoutAMessageIsRefused) {
@@ -320,6 +320,8 @@ TEST(MalformedComputedRun, HasFiniteNumbers) {
             "compute_s = -1 (must be >= 0)");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_compute_s(nan); }),
             "compute_s = nan (must be >= 0)");
+  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_elapsed_s(-1.0); }),
+            "elapsed_s = -1 (must be >= 0)");
 }
 
 // Welcome.

@@ -20,6 +20,7 @@ KeptResult result(std::uint64_t run, std::uint64_t campaign = 1, std::uint32_t a
   kept.computed.result.run = {run};
   kept.computed.result.truth[3] = 0.1 * static_cast<double>(run);
   kept.computed.compute_s = 1.5;
+  kept.computed.elapsed_s = 24.0;
   return kept;
 }
 
@@ -70,6 +71,7 @@ TEST_F(SpoolTest, HandsResultsToTheNextWorker) {
   EXPECT_EQ(std::bit_cast<std::uint64_t>(kept.computed.result.truth[3]),
             std::bit_cast<std::uint64_t>(0.1 * 8.0));
   EXPECT_EQ(kept.computed.compute_s, 1.5);
+  EXPECT_EQ(kept.computed.elapsed_s, 24.0);
   EXPECT_EQ(spool.num_bytes_dropped(), 0U);
 }
 
