@@ -2,13 +2,17 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <sys/statfs.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
+#include <sstream>
 #include <string>
 
 #include "coordinator/store/store_error.hpp"
@@ -36,6 +40,16 @@ constexpr std::array<FileSystemType, 12> network_file_systems{{
     {0xAAD7AAEA, "PanFS"},
 }};
 
+constexpr std::uint64_t fuse_type = 0x65735546;
+
+// Sorted. Others run in user space, too, and are of this machine: ntfs-3g, fuse-overlayfs,
+// gocryptfs.
+constexpr std::array<std::string_view, 16> network_fuse_types{
+    "fuse.blobfuse2", "fuse.ceph",    "fuse.ceph-fuse", "fuse.curlftpfs",
+    "fuse.cvmfs2",    "fuse.davfs2",  "fuse.gcsfuse",   "fuse.glusterfs",
+    "fuse.goofys",    "fuse.juicefs", "fuse.lizardfs",  "fuse.mfs",
+    "fuse.rclone",    "fuse.s3fs",    "fuse.seaweedfs", "fuse.sshfs"};
+
 std::filesystem::path directory_of(const std::filesystem::path& path) {
   return std::filesystem::absolute(path).parent_path();
 }
@@ -48,6 +62,32 @@ std::string_view network_file_system_name(std::uint64_t type) {
   return found == network_file_systems.end() ? std::string_view() : found->name;
 }
 
+std::string network_fuse_name(std::string_view mount_table, std::string_view device) {
+  std::istringstream lines{std::string(mount_table)};
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string number, parent, device_of_line, word;
+    words >> number >> parent >> device_of_line;
+    if (device_of_line != device) continue;
+    while (words >> word && word != "-") continue;
+    if (words >> word && std::ranges::binary_search(network_fuse_types, word)) return word;
+  }
+  return {};
+}
+
+namespace {
+
+std::string network_fuse_name_of(const std::string& directory) {
+  struct stat status {};
+  if (::stat(directory.c_str(), &status) != 0) return {};
+  std::ostringstream mount_table;
+  mount_table << std::ifstream("/proc/self/mountinfo").rdbuf();
+  return network_fuse_name(mount_table.str(),
+                           fmt::format("{}:{}", major(status.st_dev), minor(status.st_dev)));
+}
+
+}  // namespace
+
 void check_directory_of(const std::filesystem::path& path) {
   const std::string directory = directory_of(path).string();
   struct statfs status {};
@@ -56,7 +96,8 @@ void check_directory_of(const std::filesystem::path& path) {
   }
   // The kernel's types have 32 bits; f_type is signed and may have extended the uppermost.
   const auto type = static_cast<std::uint32_t>(status.f_type);
-  const std::string_view name = network_file_system_name(type);
+  const std::string name = type == fuse_type ? network_fuse_name_of(directory)
+                                             : std::string(network_file_system_name(type));
   if (!name.empty()) {
     throw StoreError(
         fmt::format("directory = {} (is on the network file system {}, where a campaign "

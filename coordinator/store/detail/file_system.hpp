@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 namespace proofmass::coordinator::detail {
@@ -9,6 +10,12 @@ namespace proofmass::coordinator::detail {
 /// Name of the network file system with this statfs(2) type, or empty if the type is none of those.
 /// A write-ahead log needs memory shared by all readers and writers, so one host.
 [[nodiscard]] std::string_view network_file_system_name(std::uint64_t type);
+
+/// The same for file systems in user space, of which the type tells nothing: `fuse.sshfs`.
+///
+/// @param mount_table  As in /proc/self/mountinfo.
+/// @param device       `major:minor` of the directory.
+[[nodiscard]] std::string network_fuse_name(std::string_view mount_table, std::string_view device);
 
 /// @throws StoreError if new files cannot stand beside `path`: no such directory, or a network file
 ///         system below it.

@@ -28,6 +28,24 @@ TEST(NetworkFileSystemName, IsEmptyForLocalOnes) {
   EXPECT_EQ(network_file_system_name(0x794c7630), "");  // overlayfs, as in containers
 }
 
+// Lines from proc(5), as the kernel writes them.
+TEST(NetworkFuseName, IsReadFromTheMountTable) {
+  const std::string_view table =
+      "22 27 0:20 / /sys rw,nosuid - sysfs sysfs rw\n"
+      "27 1 254:1 / / rw,relatime shared:1 - ext4 /dev/vda1 rw\n"
+      "95 27 0:45 / /mnt/a\\040b rw,nosuid shared:7 master:2 - fuse.sshfs me@host:/data "
+      "rw,user_id=0\n"
+      "96 27 0:46 / /mnt/c rw - fuse.fuse-overlayfs fuse-overlayfs rw\n"
+      "97 27 0:47 / /mnt/d rw - fuse.glusterfs host:/vol rw\n";
+  EXPECT_EQ(network_fuse_name(table, "0:45"), "fuse.sshfs");
+  EXPECT_EQ(network_fuse_name(table, "0:47"), "fuse.glusterfs");
+  EXPECT_EQ(network_fuse_name(table, "0:46"), "");
+  EXPECT_EQ(network_fuse_name(table, "0:4"), "");
+  EXPECT_EQ(network_fuse_name(table, "254:1"), "");
+  EXPECT_EQ(network_fuse_name("", "0:45"), "");
+  EXPECT_EQ(network_fuse_name("95 27 0:45 / /mnt rw", "0:45"), "");
+}
+
 TEST_F(FileSystemTest, CheckPassesALocalDirectory) {
   check_directory_of(file());
   synchronise_directory_of(file());
