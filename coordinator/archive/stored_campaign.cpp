@@ -1,5 +1,7 @@
 #include "coordinator/archive/stored_campaign.hpp"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cstddef>
 #include <utility>
@@ -16,7 +18,12 @@ Campaign stored_campaign(const Store& store) {
     std::vector<double> column = std::move(store.table_columns(elements).front());
     if (!column.empty()) columns.push_back(std::move(column));
   }
-  return parse_stored_campaign(store.definition(), store.environment_table(), std::move(columns));
+  Campaign campaign =
+      parse_stored_campaign(store.definition(), store.environment_table(), std::move(columns));
+  require_identity(campaign, {.name = store.name(),
+                              .seed = fmt::to_string(store.seed()),
+                              .num_runs = fmt::to_string(store.num_runs())});
+  return campaign;
 }
 
 }  // namespace proofmass::coordinator

@@ -122,6 +122,18 @@ Campaign parse_stored_campaign(std::string_view definition, EnvironmentTable env
   return campaign;
 }
 
+void require_identity(const Campaign& defined, const StoredIdentity& stored) {
+  const auto require_same = [](std::string_view field, const std::string& value,
+                               const std::string& expected) {
+    if (value == expected) return;
+    throw CampaignFileError(
+        fmt::format("campaign.{} = {} (must be {}, as in the definition)", field, value, expected));
+  };
+  require_same("name", stored.name, defined.name);
+  require_same("seed", stored.seed, fmt::to_string(defined.seed));
+  require_same("num_runs", stored.num_runs, fmt::to_string(defined.num_runs));
+}
+
 Campaign hardy2013_campaign() {
   Campaign campaign;
   campaign.name = "hardy2013";

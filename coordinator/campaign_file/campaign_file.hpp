@@ -55,6 +55,16 @@ inline constexpr std::uintmax_t data_file_size_max = std::uintmax_t{64} << 20;
                                              EnvironmentTable environment_table,
                                              std::vector<std::vector<double>> table_columns);
 
+/// What a database says of its campaign besides the definition, as text.
+struct StoredIdentity {
+  std::string name;
+  std::string seed;
+  std::string num_runs;
+};
+
+/// @throws CampaignFileError if these are not of the campaign that the definition is of.
+void require_identity(const Campaign& defined, const StoredIdentity& stored);
+
 /// Every value of a campaign as TOML, in a fixed order and with the shortest numbers that read back
 /// to the same bits. Rows of data files are not in it.
 [[nodiscard]] std::string canonical_definition(const Campaign& campaign);

@@ -96,10 +96,11 @@ std::vector<std::vector<double>> table_columns_of(sqlite3* connection) {
 }  // namespace
 
 Campaign read_campaign_of(sqlite3* connection) {
-  Selection row(connection, "SELECT definition FROM main.campaign");
+  Selection row(connection, "SELECT definition, name, seed, num_runs FROM main.campaign");
   row.require_row();
   Campaign campaign = parse_stored_campaign(row.text(0), environment_table_of(connection),
                                             table_columns_of(connection));
+  require_identity(campaign, {.name = row.text(1), .seed = row.text(2), .num_runs = row.text(3)});
   campaign.validate();
   return campaign;
 }

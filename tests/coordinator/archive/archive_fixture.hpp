@@ -8,7 +8,6 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/simulation/run.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
@@ -60,12 +59,6 @@ inline std::vector<RunResult> results_of_each_status(std::uint64_t count) {
     results.push_back(result_of(run, static_cast<RunStatus>(1 + run % 4)));
   }
   return results;
-}
-
-/// Changes a file as anybody with SQL can.
-inline void change(const std::filesystem::path& file, const std::string& sql) {
-  coordinator::detail::Database database(file, coordinator::detail::Access::read_write);
-  database.execute(sql);
 }
 
 inline std::uint64_t bits_of(double value) { return std::bit_cast<std::uint64_t>(value); }

@@ -3,7 +3,10 @@
 
 #include <bit>
 #include <cstdint>
+#include <filesystem>
 #include <limits>
+#include <map>
+#include <string>
 
 #include "core/campaign/draw.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
@@ -189,6 +192,18 @@ TEST_F(DrawTable, IsTheCampaignOfTheFileAndNothingIsStored) {
 TEST_F(DrawTable, SaysThatTheStoredDefinitionIsNoCampaign) {
   coordinator::Store::create(file(), campaign_of(2), "name = 1");
   EXPECT_THAT(error_of("SELECT * FROM draw"), HasSubstr("(draw: "));
+}
+
+TEST_F(DrawTable, SaysThatTheStoredDefinitionIsOfAnotherCampaign) {
+  for (const auto& [change, message] : std::map<std::string, std::string>{
+           {"name = 'other'", "campaign.name = other (must be varied, as in the definition)"},
+           {"seed = '9'", "campaign.seed = 9 (must be 20260314, as in the definition)"},
+           {"num_runs = 4", "campaign.num_runs = 4 (must be 3, as in the definition)"}}) {
+    std::filesystem::remove(file());
+    make_file(varied_campaign(3));
+    test::change(file(), "UPDATE campaign SET " + change);
+    EXPECT_THAT(error_of("SELECT * FROM draw"), HasSubstr(message));
+  }
 }
 
 }  // namespace

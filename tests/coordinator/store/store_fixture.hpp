@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "tests/message_of.hpp"
@@ -95,6 +96,12 @@ inline std::vector<coordinator::Delivery> deliveries_of(std::uint64_t first, std
   std::vector<coordinator::Delivery> deliveries;
   for (std::uint64_t run = first; run < end; ++run) deliveries.push_back(delivery_of(run));
   return deliveries;
+}
+
+/// Changes a file as anybody with SQL can.
+inline void change(const std::filesystem::path& file, const std::string& sql) {
+  coordinator::detail::Database database(file, coordinator::detail::Access::read_write);
+  database.execute(sql);
 }
 
 inline std::vector<RunResult> results_in(const coordinator::Store& store) {
