@@ -36,11 +36,17 @@ std::string json_text(std::string_view text) {
   return nlohmann::json(text).dump(-1, ' ', false, on_error);
 }
 
+// A number without point or exponent would be read as an integer, and -0 lose its sign.
+std::string json_number(double value) {
+  if (std::isinf(value)) return value > 0.0 ? "1e999" : "-1e999";
+  const std::string text = shortest_text(value);
+  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
+}
+
 std::string json_cell(const Cell& cell) {
   if (std::holds_alternative<std::monostate>(cell)) return "null";
   if (const auto* text = std::get_if<std::string_view>(&cell)) return json_text(*text);
-  const auto* real = std::get_if<double>(&cell);
-  if (real != nullptr && std::isinf(*real)) return *real > 0.0 ? "1e999" : "-1e999";
+  if (const auto* real = std::get_if<double>(&cell)) return json_number(*real);
   return is_number(cell) ? cell_text(cell) : json_text(cell_text(cell));
 }
 

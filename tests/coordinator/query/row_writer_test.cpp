@@ -101,6 +101,14 @@ TEST(JsonRows, CanBeReadWhateverTheyHold) {
   EXPECT_EQ(read.at(3).at(key), std::int64_t{1} << 62);
 }
 
+// nlohmann's reader, like Python's, takes a number without point or exponent for an integer.
+TEST(JsonRows, KeepTheTypeAndSignOfARealNumber) {
+  const auto read = nlohmann::json::parse(written(RowFormat::json, {"a"}, {{-0.0}, {3.0}, {1e22}}));
+  for (const auto& row : read) EXPECT_TRUE(row.at("a").is_number_float()) << row;
+  EXPECT_TRUE(std::signbit(read.at(0).at("a").get<double>()));
+  EXPECT_EQ(read.at(1).at("a"), 3.0);
+}
+
 TEST(JsonRows, HaveInfinityAsANumberBeyondAll) {
   EXPECT_EQ(written(RowFormat::json, {"a"}, {{infinity}, {-infinity}}),
             "[\n {\"a\": 1e999},\n {\"a\": -1e999}\n]\n");
