@@ -71,10 +71,10 @@ std::vector<double> magnitudes_of(std::span<const RunResult> results, Parameter 
   return magnitudes;
 }
 
-std::uint64_t num_without_estimate(const ComparedCampaign& side) {
-  const auto num_unknown = std::ranges::count_if(
-      side.results, [](const RunResult& result) { return !result.has_estimate(); });
-  return static_cast<std::uint64_t>(num_unknown) + side.num_given_up;
+MissingEstimates missing_in(const ComparedCampaign& side) {
+  MissingEstimates missing{.num_given_up = side.num_given_up};
+  for (const RunResult& result : side.results) missing.add(result);
+  return missing;
 }
 
 ComparedAccuracy accuracy_of(std::span<const double> magnitudes) {
@@ -145,8 +145,8 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                      const ComparedCampaign& second) {
   CampaignComparison comparison;
   comparison.differences = all_differences(first, second);
-  comparison.num_first_without_estimate = num_without_estimate(first);
-  comparison.num_second_without_estimate = num_without_estimate(second);
+  comparison.missing_in_first = missing_in(first);
+  comparison.missing_in_second = missing_in(second);
   const std::vector<Pair> pairs = common_runs(first.results, second.results);
   comparison.why_unpaired = why_unpaired(first, second, pairs);
   for (const ParameterInfo& info : parameter_infos()) {

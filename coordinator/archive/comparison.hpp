@@ -9,6 +9,7 @@
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/report/missing_estimates.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/parameter.hpp"
@@ -56,8 +57,8 @@ struct CampaignComparison {
   std::size_t num_second = 0;  ///< The same as num_first if paired.
   /// Finished and given-up runs of each whole campaign that have no estimate: they may be its
   /// worst.
-  std::uint64_t num_first_without_estimate = 0;
-  std::uint64_t num_second_without_estimate = 0;
+  MissingEstimates missing_in_first;
+  MissingEstimates missing_in_second;
   /// Why the parameters are not compared; empty if they are.
   std::string why_not_compared;
   /// Indexed by `index(parameter)`.

@@ -42,8 +42,8 @@ std::string comparison_json(const CampaignComparison& comparison, std::string_vi
             {"why_not_compared", text_or_null(comparison.why_not_compared)},
             {"num_first", comparison.num_first},
             {"num_second", comparison.num_second},
-            {"num_first_without_estimate", comparison.num_first_without_estimate},
-            {"num_second_without_estimate", comparison.num_second_without_estimate},
+            {"num_first_without_estimate", comparison.missing_in_first.total()},
+            {"num_second_without_estimate", comparison.missing_in_second.total()},
             {"confidence", default_confidence},
             {"parameters", Json::array()}};
   for (const auto& [field, of_first, of_second] : comparison.differences) {

@@ -50,10 +50,13 @@ std::string basis(const CampaignComparison& comparison) {
 }
 
 std::string left_out(const CampaignComparison& comparison) {
-  const std::uint64_t first = comparison.num_first_without_estimate;
-  const std::uint64_t second = comparison.num_second_without_estimate;
-  if (first == 0 && second == 0) return "";
-  return fmt::format("Left out, without an estimate: {} of A's runs, {} of B's.\n", first, second);
+  std::string text;
+  for (const auto& [name, missing] : {std::pair("A", comparison.missing_in_first),
+                                      std::pair("B", comparison.missing_in_second)}) {
+    if (missing.total() == 0) continue;
+    text += fmt::format("Left out of {}, without an estimate: {}.\n", name, reasons_text(missing));
+  }
+  return text;
 }
 
 std::string heading(std::initializer_list<std::pair<std::string_view, std::size_t>> titles) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "core/campaign/draw.hpp"
+#include "core/campaign/run_ranges.hpp"
 
 namespace proofmass::coordinator {
 
@@ -33,10 +34,11 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign,
   DrawnRuns drawn;
   drawn.names = column_names();
   drawn.columns.resize(drawn.names.size());
+  drawn.missing.num_given_up = num_runs_in(store.given_up_runs());
   store.for_each_result([&](const RunResult& result) {
     if (drawn.runs.size() == num_runs_max) return;
     if (!result.has_estimate()) {
-      ++drawn.num_without_estimate;
+      drawn.missing.add(result);
       return;
     }
     const DrawnValues values = draw_values(campaign.dispersions, campaign.seed, result.run,

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/report/missing_estimates.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/dispersion.hpp"
@@ -14,8 +15,8 @@ namespace proofmass::coordinator {
 /// What was drawn for runs that have an estimate, and how far their estimates are off. Draws are
 /// made again from the definition; no file holds them.
 struct DrawnRuns {
-  std::vector<RunIndex> runs;              ///< Ascending; n of them.
-  std::uint64_t num_without_estimate = 0;  ///< Finished runs among these that are left out.
+  std::vector<RunIndex> runs;  ///< Ascending; n of them.
+  MissingEstimates missing;    ///< Runs among these that are left out; all that are given up.
   /// Drawn quantities as in drawn_names(), then the true parameters that follow from them, as in
   /// `truth_k2d_s2_m`. Units are in the names.
   std::vector<std::string> names;

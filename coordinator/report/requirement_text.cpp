@@ -29,7 +29,8 @@ std::string percent(double fraction) { return fmt::format("{:.4g} %", 100.0 * fr
 // As it was asked for: 99.9999 % is not 100 %.
 std::string given_percent(double fraction) { return fmt::format("{:.12g} %", 100.0 * fraction); }
 
-std::string exceedance_line(const RequirementCheck& check) {
+std::string exceedance_line(const RequirementAnswer& answer) {
+  const RequirementCheck& check = answer.check;
   const std::string counts =
       fmt::format("Exceeding    {} of {} runs", check.num_exceedances, check.num_runs);
   constexpr std::size_t margin = 13;
@@ -41,8 +42,8 @@ std::string exceedance_line(const RequirementCheck& check) {
                    margin);
   }
   if (check.num_without_estimate == 0) return text;
-  return text + fmt::format("{:{}}{} of them for want of an estimate\n", "", margin,
-                            check.num_without_estimate);
+  return text + fmt::format("{0:{1}}{2} of them for want of an estimate:\n{0:{1}}{3}\n", "", margin,
+                            check.num_without_estimate, reasons_text(answer.missing));
 }
 
 std::string bound_line(const RequirementAnswer& answer) {
@@ -79,27 +80,29 @@ std::vector<RequirementAnswer> check_requirements(const Store& store,
                                                   std::span<const std::string> texts) {
   std::vector<RequirementAnswer> answers;
   for (const std::string& text : texts) {
-    answers.push_back({.text = text, .requirement = parse_requirement(text), .check = {}});
+    answers.push_back(
+        {.text = text, .requirement = parse_requirement(text), .check = {}, .missing = {}});
   }
   ParameterArray no_objectives{};
   StatisticsAccumulator accumulator(no_objectives);
-  std::uint64_t num_without_estimate = num_runs_in(store.given_up_runs());
+  MissingEstimates missing{.num_given_up = num_runs_in(store.given_up_runs())};
   store.for_each_result([&](const RunResult& result) {
     accumulator.add(result);
-    if (!result.has_estimate()) ++num_without_estimate;
+    missing.add(result);
   });
   for (RequirementAnswer& answer : answers) {
     std::vector<double> errors = accumulator.errors(answer.requirement.parameter);
     for (double& error : errors) error = std::abs(error);
-    answer.check = check_requirement(answer.requirement, errors, num_without_estimate);
+    answer.check = check_requirement(answer.requirement, errors, missing.total());
+    answer.missing = missing;
   }
   return answers;
 }
 
 std::string requirement_text(const RequirementAnswer& answer) {
   return fmt::format("Requirement  {}\nAnswer       {}\n{}{}{}", answer.text,
-                     name_of(answer.check.verdict), exceedance_line(answer.check),
-                     bound_line(answer), needed_line(answer.check));
+                     name_of(answer.check.verdict), exceedance_line(answer), bound_line(answer),
+                     needed_line(answer.check));
 }
 
 }  // namespace proofmass::coordinator

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "coordinator/report/missing_estimates.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/statistics/requirement.hpp"
 
@@ -14,6 +15,7 @@ struct RequirementAnswer {
   std::string text;
   Requirement requirement;
   RequirementCheck check;
+  MissingEstimates missing;  ///< The exceedances for want of an estimate.
 };
 
 /// Holds requirements against the results in a campaign file; runs without an estimate, and those

@@ -65,11 +65,9 @@ std::string noise_line(const std::vector<Sensitivity>& rows) {
       100.0 * rows.front().first_order.noise_level);
 }
 
-std::string header_of(const DrawnRuns& drawn, Parameter parameter) {
-  std::string text =
-      fmt::format("{}: {} runs", parameter_infos()[index(parameter)].label, drawn.runs.size());
-  if (drawn.num_without_estimate == 0) return text;
-  return text + fmt::format("; {} without an estimate left out", drawn.num_without_estimate);
+std::string left_out(const DrawnRuns& drawn) {
+  const std::string reasons = reasons_text(drawn.missing);
+  return reasons.empty() ? "" : fmt::format("Left out, without an estimate: {}\n", reasons);
 }
 
 std::span<const Sensitivity> first_of(const std::vector<Sensitivity>& rows, std::size_t num_rows) {
@@ -79,9 +77,9 @@ std::span<const Sensitivity> first_of(const std::vector<Sensitivity>& rows, std:
 std::size_t position_of(const DrawnRuns& drawn, RunIndex run) {
   const auto found = std::ranges::lower_bound(drawn.runs, run);
   if (found == drawn.runs.end() || *found != run) {
-    throw InvalidArgument(
-        fmt::format("run = {} (must be one of the first {} runs with an estimate)", run.value,
-                    drawn.runs.size()));
+    const std::string last = drawn.runs.empty() ? "none" : fmt::to_string(drawn.runs.back().value);
+    throw InvalidArgument(fmt::format("run = {} (must have an estimate, as {} runs up to {} have)",
+                                      run.value, drawn.runs.size(), last));
   }
   return static_cast<std::size_t>(found - drawn.runs.begin());
 }
@@ -121,10 +119,10 @@ std::string explanation_rows(const DrawnRuns& drawn, std::span<const Sensitivity
 
 std::string sensitivity_text(const DrawnRuns& drawn, Parameter parameter, std::size_t num_rows) {
   const auto both = sensitivities_of(drawn, parameter);
-  return fmt::format("{}\n\n{}\n{}{}", header_of(drawn, parameter),
-                     sensitivity_rows(drawn, first_of(both[1], num_rows), "|error|"),
-                     sensitivity_rows(drawn, first_of(both[0], num_rows), "error"),
-                     noise_line(both[1]));
+  return fmt::format(
+      "{}: {} runs\n{}\n{}\n{}{}", parameter_infos()[index(parameter)].label, drawn.runs.size(),
+      left_out(drawn), sensitivity_rows(drawn, first_of(both[1], num_rows), "|error|"),
+      sensitivity_rows(drawn, first_of(both[0], num_rows), "error"), noise_line(both[1]));
 }
 
 std::string explanation_text(const DrawnRuns& drawn, Parameter parameter, RunIndex run,
@@ -133,11 +131,12 @@ std::string explanation_text(const DrawnRuns& drawn, Parameter parameter, RunInd
   const ParameterInfo& info = parameter_infos()[index(parameter)];
   const std::vector<double>& errors = drawn.errors[index(parameter)];
   const auto both = sensitivities_of(drawn, parameter);
-  return fmt::format(
-      "Run {}: error of {} {:.3g} {}, rank {} of {}\n\n{}\n{}{}", run.value, info.label,
-      errors[position] / info.display_scale, info.display_unit, rank_of(errors, position),
-      errors.size(), explanation_rows(drawn, first_of(both[1], num_rows), position, "|error|"),
-      explanation_rows(drawn, first_of(both[0], num_rows), position, "error"), noise_line(both[1]));
+  return fmt::format("Run {}: error of {} {:.3g} {}, rank {} of {}\n{}\n{}\n{}{}", run.value,
+                     info.label, errors[position] / info.display_scale, info.display_unit,
+                     rank_of(errors, position), errors.size(), left_out(drawn),
+                     explanation_rows(drawn, first_of(both[1], num_rows), position, "|error|"),
+                     explanation_rows(drawn, first_of(both[0], num_rows), position, "error"),
+                     noise_line(both[1]));
 }
 
 Parameter worst_parameter_of(const DrawnRuns& drawn, RunIndex run) {

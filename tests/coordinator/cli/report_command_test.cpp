@@ -93,7 +93,7 @@ TEST_F(ReportCommand, RefusesARunWithoutAnEstimate) {
   EXPECT_EQ(message_of<InvalidArgument>([&] {
               (void)print_sensitivity({.database = database_, .parameter = {}, .run = 60});
             }),
-            "run = 60 (must be one of the first 60 runs with an estimate)");
+            "run = 60 (must have an estimate, as 60 runs up to 59 have)");
 }
 
 }  // namespace

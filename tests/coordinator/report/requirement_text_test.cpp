@@ -17,7 +17,8 @@ std::string answer_to(const std::string& text, std::size_t num_runs, std::size_t
   const Requirement requirement = parse_requirement(text);
   return requirement_text({.text = text,
                            .requirement = requirement,
-                           .check = check_requirement(requirement, errors, 0)});
+                           .check = check_requirement(requirement, errors, 0),
+                           .missing = {}});
 }
 
 // [Wilks1941]: 299 runs for 99 % with 95 %. Clopper and Pearson: 1 - 0.025^(1/299) = 1.226 %.
@@ -69,10 +70,13 @@ TEST(RequirementText, SaysThatItIsNotMet) {
 TEST(RequirementText, SaysHowManyDrawsExceedForWantOfAnEstimate) {
   const Requirement requirement = parse_requirement("a_c12 < 9e-4 for 99% with 95%");
   const std::vector<double> errors(395, 1e-4);
-  const std::string text = requirement_text(
-      {.text = "", .requirement = requirement, .check = check_requirement(requirement, errors, 5)});
+  const std::string text = requirement_text({.text = "",
+                                             .requirement = requirement,
+                                             .check = check_requirement(requirement, errors, 5),
+                                             .missing = {.num_not_finite = 1, .num_no_draw = 4}});
   EXPECT_THAT(text, testing::HasSubstr("Exceeding    5 of 400 runs; "));
-  EXPECT_THAT(text, testing::HasSubstr("\n             5 of them for want of an estimate\n"));
+  EXPECT_THAT(text, testing::HasSubstr("\n             5 of them for want of an estimate:\n"
+                                       "             1 not finite, 4 without draw\n"));
   EXPECT_THAT(text, testing::HasSubstr("Bound        none: 1049 draws at least, "));
 }
 
@@ -97,6 +101,7 @@ TEST_F(StoredRequirement, CountsRunsWithoutAnEstimateAsExceeding) {
   ASSERT_EQ(answers.size(), 1U);
   EXPECT_EQ(answers[0].check.num_runs, 11U);
   EXPECT_EQ(answers[0].check.num_exceedances, 2U);
+  EXPECT_EQ(answers[0].missing, (MissingEstimates{.num_no_draw = 1, .num_given_up = 1}));
 }
 
 TEST_F(StoredRequirement, IsOfErrorsOfEitherSign) {

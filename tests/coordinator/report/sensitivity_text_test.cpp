@@ -72,9 +72,12 @@ TEST(SensitivityText, SaysWhatChanceAloneShows) {
 
 TEST(SensitivityText, CountsTheRunsThatItLeavesOut) {
   DrawnRuns drawn = made_up_runs();
-  drawn.num_without_estimate = 3;
+  drawn.missing = {.num_not_finite = 2, .num_no_draw = 11, .num_given_up = 1};
+  const std::string left_out =
+      "\nLeft out, without an estimate: 2 not finite, 11 without draw, 1 given up\n\n";
   EXPECT_THAT(sensitivity_text(drawn, Parameter::k2c, 1),
-              StartsWith("K2c/K1c²: 1000 runs; 3 without an estimate left out\n"));
+              StartsWith("K2c/K1c²: 1000 runs" + left_out));
+  EXPECT_THAT(explanation_text(drawn, Parameter::k2c, {42}, 1), HasSubstr(" of 1000" + left_out));
 }
 
 // |error| goes as the magnitude, which no correlation sees. Of x² the part 5/bins² is missed, 2 %
@@ -149,7 +152,7 @@ TEST(ExplanationText, RefusesARunThatIsNotThere) {
     (void)explanation_text(made_up_runs(), Parameter::k2c, {1000}, 1);
     FAIL();
   } catch (const InvalidArgument& error) {
-    EXPECT_STREQ(error.what(), "run = 1000 (must be one of the first 1000 runs with an estimate)");
+    EXPECT_STREQ(error.what(), "run = 1000 (must have an estimate, as 1000 runs up to 999 have)");
   }
 }
 
@@ -170,7 +173,7 @@ TEST_F(DrawnRunsTest, AreThoseOfTheSimulation) {
   const DrawnRuns drawn = read_drawn_runs(store, campaign, 40);
 
   ASSERT_EQ(drawn.runs.size(), 40U);
-  EXPECT_EQ(drawn.num_without_estimate, 1U);
+  EXPECT_EQ(drawn.missing, (MissingEstimates{.num_not_finite = 1}));
   EXPECT_EQ(drawn.names[num_drawn + 1], "truth_a_c11_delta_z_m");
   EXPECT_EQ(drawn.runs[4], RunIndex{5});
   for (std::size_t i = 0; i < drawn.runs.size(); ++i) {

@@ -1,0 +1,32 @@
+#include "coordinator/report/missing_estimates.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <string_view>
+#include <utility>
+
+namespace proofmass::coordinator {
+
+void MissingEstimates::add(const RunResult& result) {
+  if (result.status == RunStatus::not_finite) ++num_not_finite;
+  if (result.status == RunStatus::no_draw) ++num_no_draw;
+}
+
+std::uint64_t MissingEstimates::total() const {
+  return num_not_finite + num_no_draw + num_given_up;
+}
+
+std::string reasons_text(const MissingEstimates& missing) {
+  const std::array<std::pair<std::uint64_t, std::string_view>, 3> reasons{
+      {{missing.num_not_finite, "not finite"},
+       {missing.num_no_draw, "without draw"},
+       {missing.num_given_up, "given up"}}};
+  std::string text;
+  for (const auto& [count, reason] : reasons) {
+    if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, reason);
+  }
+  return text;
+}
+
+}  // namespace proofmass::coordinator
