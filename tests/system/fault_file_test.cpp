@@ -1,13 +1,18 @@
 // Campaign files that somebody else uses or has spoilt.
 
 #include <gtest/gtest.h>
+#include <sys/mount.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <string>
 
+#include "tests/skip_for_want.hpp"
 #include "tests/system/fault_fixture.hpp"
+#include "tests/system/network_namespace.hpp"
 
 namespace proofmass::test {
 namespace {
@@ -119,6 +124,54 @@ TEST_F(CampaignFiles, ThatAreDamagedAreNotReplaced) {
                "proofmass-coordinator: error: campaign file = served/null.db (is damaged: "))
       << errors_of("second");
   EXPECT_EQ(fs::file_size(file_of("null")), 5000U);
+}
+
+/// `served` is a directory of another machine, as far as the kernel knows.
+class NetworkFileSystem : public FaultTest {
+ protected:
+  void SetUp() override {
+    FaultTest::SetUp();
+    write_null_campaign(64);
+    if (!fs::exists("/dev/fuse")) GTEST_SKIP() << "the kernel has no file systems in user space";
+    if (!take_private_mounts()) skip_for_want("no permission to mount a file system");
+    fs::create_directory(path(served));
+    fs::create_directory(path("remote"));
+    // Both ends of what would be a connection.
+    const std::string script =
+        "mkfifo there back; /usr/lib/openssh/sftp-server < there > back & "
+        "sshfs -f -o passive :remote served > there < back";
+    sshfs_.emplace(directory / "", "sshfs", "/bin/bash", Arguments{"-c", script});
+    wait_until("mount", [&] { return device_of(served) != device_of("remote"); });
+  }
+  void TearDown() override { umount2(path(served).c_str(), MNT_DETACH); }
+
+ private:
+  [[nodiscard]] dev_t device_of(const std::string& name) const {
+    struct stat status {};
+    EXPECT_EQ(stat(path(name).c_str(), &status), 0);
+    return status.st_dev;
+  }
+
+  std::optional<Process> sshfs_;
+};
+
+TEST_F(NetworkFileSystem, HasCampaignsForReadersOnly) {
+  const std::string before = undisturbed_digest("null");
+  const std::string refusal =
+      "(is on the network file system fuse.sshfs, where a campaign file may "
+      "be damaged; use a local disk)\n";
+  Process made = start_behind({}, "made", "proofmass", {"run", "null.toml", "--db", "served/a.db"});
+  EXPECT_EQ(made.wait(), 1);
+  EXPECT_TRUE(errors_of("made").ends_with(refusal)) << errors_of("made");
+  EXPECT_TRUE(fs::is_empty(path(served)));
+
+  fs::copy_file(path("undisturbed/null.db"), file_of("null"));
+  write_null_campaign(128);
+  Process extended =
+      start_behind({}, "extended", "proofmass", {"run", "null.toml", "--db", "served/null.db"});
+  EXPECT_EQ(extended.wait(), 1);
+  EXPECT_TRUE(errors_of("extended").ends_with(refusal)) << errors_of("extended");
+  EXPECT_EQ(digest("null"), before);
 }
 
 }  // namespace
