@@ -161,7 +161,7 @@ using DrawnRunsTest = test::StoreTest;
 // Run by run what the simulation draws, those that were rejected first included.
 TEST_F(DrawnRunsTest, AreThoseOfTheSimulation) {
   Campaign campaign = hardy2013_campaign();
-  campaign.num_runs = 50;
+  campaign.num_runs = 51;
   Store store = Store::create(file(), campaign, canonical_definition(campaign));
   std::vector<Delivery> deliveries = test::deliveries_of(0, 50);
   for (Delivery& delivery : deliveries) {
@@ -169,11 +169,13 @@ TEST_F(DrawnRunsTest, AreThoseOfTheSimulation) {
   }
   deliveries[4].result.status = RunStatus::not_finite;
   store.commit(deliveries);
+  const Entry given_up = GivenUpRun{.run = {50}};
+  store.write({&given_up, 1});
 
   const DrawnRuns drawn = read_drawn_runs(store, campaign, 40);
 
   ASSERT_EQ(drawn.runs.size(), 40U);
-  EXPECT_EQ(drawn.missing, (MissingEstimates{.num_not_finite = 1}));
+  EXPECT_EQ(drawn.missing, (MissingEstimates{.num_not_finite = 1, .num_given_up = 1}));
   EXPECT_EQ(drawn.names[num_drawn + 1], "truth_a_c11_delta_z_m");
   EXPECT_EQ(drawn.runs[4], RunIndex{5});
   for (std::size_t i = 0; i < drawn.runs.size(); ++i) {
