@@ -56,14 +56,17 @@ ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,
                                  plan.stop_rule));
   }
   Campaign campaign = wanted;
-  const auto with_horizon = [&](std::uint64_t num_runs_now) {
+  const auto set_horizon = [&](std::uint64_t num_runs_now) {
     campaign.num_runs = horizon_of(plan, wanted.num_runs, num_runs_now);
-    return campaign;
   };
   const bool is_new = !std::filesystem::exists(database);
-  Store store = is_new ? Store::create(database, with_horizon(0), canonical_definition(campaign))
+  if (is_new) set_horizon(0);
+  Store store = is_new ? Store::create(database, campaign, canonical_definition(campaign))
                        : Store::open(database);
-  if (!is_new) extend_to(store, with_horizon(store.num_runs()), database, remedy);
+  if (!is_new) {
+    set_horizon(store.num_runs());
+    extend_to(store, campaign, database, remedy);
+  }
   if (store.stop_plan() != plan) set_plan(store, plan);
   // Shared with the dispatch and with messages under way.
   return {.file = database,

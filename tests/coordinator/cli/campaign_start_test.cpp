@@ -87,6 +87,15 @@ TEST(CampaignStart, TakesUpAFinishedCampaignUnderANewStopRule) {
   EXPECT_EQ(served.store.control().phase, wire::CampaignPhase::active);
 }
 
+// Both say how many runs there are.
+TEST(CampaignStart, DefinesAsManyRunsAsTheFileHasUntilAStopRuleIsChecked) {
+  const test::TemporaryDirectory directory;
+  const StopPlan plan{.stop_rule = "mean(k2c) within 5%", .num_runs_max = 1000, .failures_max = {}};
+  const ServedCampaign served = open_or_create(campaign_of(1000), plan, directory / "a.db");
+  EXPECT_EQ(served.store.num_runs(), 128U);
+  EXPECT_EQ(served.store.definition(), canonical_definition(campaign_of(128)));
+}
+
 // Its tables have a row for each run, and nobody knows yet how many there will be.
 TEST(CampaignStart, RefusesAStopRuleWithTables) {
   const test::TemporaryDirectory directory;
