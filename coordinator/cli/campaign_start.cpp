@@ -25,16 +25,6 @@ void require_same(const Store& store, const Campaign& wanted, const std::filesys
   throw UsageError(fmt::format("{}\n{}", text, remedy));
 }
 
-// A rule that has not been checked leaves a campaign unfinished.
-void set_plan(Store& store, const StopPlan& plan) {
-  store.set_stop_plan(plan);
-  CampaignControl control = store.control();
-  if (control.phase != wire::CampaignPhase::finished) return;
-  control.phase = wire::CampaignPhase::active;
-  const Entry entry = control;
-  (void)store.write({&entry, 1});
-}
-
 }  // namespace
 
 void extend_to(Store& store, const Campaign& wanted, const std::filesystem::path& database,
@@ -67,7 +57,7 @@ ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,
     set_horizon(store.num_runs());
     extend_to(store, campaign, database, remedy);
   }
-  if (store.stop_plan() != plan) set_plan(store, plan);
+  if (store.stop_plan() != plan) store.set_stop_plan(plan);
   // Shared with the dispatch and with messages under way.
   return {.file = database,
           .store = std::move(store),

@@ -86,6 +86,7 @@ class Store {
   [[nodiscard]] CampaignControl control() const;
 
   [[nodiscard]] StopPlan stop_plan() const;
+  /// Under another plan with a rule, a finished campaign is active until the rule is checked.
   void set_stop_plan(const StopPlan& plan);
   /// Keeps what came of evaluating a stop rule; replaces what is there of these runs.
   /// @param statistic  Of the rule: `std(a_c13)`.

@@ -80,7 +80,11 @@ StopPlan read_stop_plan(const Database& database) {
 }
 
 void write_stop_plan(const Database& database, const StopPlan& plan) {
-  database.prepare("UPDATE campaign SET stop_rule = ?, num_runs_max = ?, failures_max = ?")
+  database
+      .prepare(
+          "UPDATE campaign SET stop_rule = ?1, num_runs_max = ?2, failures_max = ?3,"
+          " phase = iif(phase = 'finished' AND ?1 <> ''"
+          " AND (stop_rule, num_runs_max, failures_max) IS NOT (?1, ?2, ?3), 'active', phase)")
       .run(plan.stop_rule, plan.num_runs_max, plan.failures_max);
 }
 

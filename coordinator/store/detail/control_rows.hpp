@@ -16,6 +16,7 @@ void write_control(const Database& database, const CampaignControl& control);
 
 /// When the campaign ends early: columns of `campaign`.
 [[nodiscard]] StopPlan read_stop_plan(const Database& database);
+/// A new plan with a rule, not checked yet, leaves a campaign unfinished: `finished` is `active`.
 void write_stop_plan(const Database& database, const StopPlan& plan);
 
 /// The row of `stop_check` with the most runs.

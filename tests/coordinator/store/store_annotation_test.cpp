@@ -150,6 +150,21 @@ TEST_F(StoreStop, PlanIsKept) {
   EXPECT_EQ(Store::open_read_only(file()).stop_plan(), StopPlan{});
 }
 
+// Also if the process ends in between.
+TEST_F(StoreStop, PlanThatIsNewLeavesAFinishedCampaignActiveUntilItsRuleIsChecked) {
+  Store store = Store::open(file());
+  const Entry finished = CampaignControl{.phase = wire::CampaignPhase::finished};
+  (void)store.write({&finished, 1});
+  store.set_stop_plan({.stop_rule = "", .num_runs_max = {}, .failures_max = 3});
+  EXPECT_EQ(store.control().phase, wire::CampaignPhase::finished) << "no rule";
+  const StopPlan plan{.stop_rule = "std(a_c13) within 5%", .num_runs_max = 50, .failures_max = {}};
+  store.set_stop_plan(plan);
+  EXPECT_EQ(store.control().phase, wire::CampaignPhase::active);
+  (void)store.write({&finished, 1});
+  store.set_stop_plan(plan);
+  EXPECT_EQ(store.control().phase, wire::CampaignPhase::finished) << "the same plan";
+}
+
 TEST_F(StoreStop, ChecksAreKeptOnceForEachCount) {
   Store store = Store::open(file());
   store.record_stop_check(128, "std(a_c13)", {});
