@@ -359,9 +359,16 @@ void Store::record_event(std::string_view kind, std::string_view text) {
   write({&event, 1});
 }
 
+void Store::read_one_state(const std::function<void()>& read) const {
+  const detail::ReadTransaction transaction(parts_->database);
+  read();
+}
+
 std::uint64_t Store::log_size() const { return parts_->database.log_size(); }
 
-void Store::check_integrity() const { detail::check_integrity(parts_->database); }
+void Store::check_integrity() const {
+  read_one_state([&] { detail::check_integrity(parts_->database); });
+}
 
 void Store::back_up(const std::filesystem::path& destination) const {
   check_name(destination);

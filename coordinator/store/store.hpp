@@ -142,6 +142,9 @@ class Store {
   /// Appends to the campaign's log, of which the newest 10,000 entries are kept.
   void record_event(std::string_view kind, std::string_view text);
 
+  /// Lets `read` see one state of the file, whatever a coordinator writes meanwhile.
+  void read_one_state(const std::function<void()>& read) const;
+
   /// Bytes of the write-ahead log, which only grows while somebody reads one state of the file.
   [[nodiscard]] std::uint64_t log_size() const;
 

@@ -232,16 +232,28 @@ Transaction::Transaction(Database& database) : database_(database) {
   database_.execute("BEGIN IMMEDIATE");
 }
 
+namespace {
+
 // SQLite ends a transaction by itself on a full disk, so that there may be none to roll back.
-Transaction::~Transaction() {
-  if (!database_.in_transaction()) return;
+void roll_back(Database& database) {
+  if (!database.in_transaction()) return;
   try {
-    database_.execute("ROLLBACK");
+    database.execute("ROLLBACK");
   } catch (const StoreError&) {
     // The next BEGIN reports what is wrong with the connection.
   }
 }
 
+}  // namespace
+
+Transaction::~Transaction() { roll_back(database_); }
+
 void Transaction::commit() { database_.execute("COMMIT"); }
+
+ReadTransaction::ReadTransaction(Database& database) : database_(database) {
+  database_.execute("BEGIN");
+}
+
+ReadTransaction::~ReadTransaction() { roll_back(database_); }
 
 }  // namespace proofmass::coordinator::detail

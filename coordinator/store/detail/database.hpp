@@ -135,4 +135,16 @@ class Transaction {
   Database& database_;
 };
 
+/// While it lives, all that is read is of one state of the file, whatever others write meanwhile.
+class ReadTransaction {
+ public:
+  explicit ReadTransaction(Database& database);
+  ~ReadTransaction();
+  ReadTransaction(const ReadTransaction&) = delete;
+  ReadTransaction& operator=(const ReadTransaction&) = delete;
+
+ private:
+  Database& database_;
+};
+
 }  // namespace proofmass::coordinator::detail
