@@ -148,8 +148,9 @@ class Store {
   /// Bytes of the write-ahead log, which only grows while somebody reads one state of the file.
   [[nodiscard]] std::uint64_t log_size() const;
 
-  /// Checks every page, row, index and reference, and that the schema is that of a new file. Takes
-  /// some 2 s for a million runs.
+  /// Checks every page, row, index and reference, that the schema is that of a new file, and that
+  /// what is kept of results and deliveries follows from them (`overrun`, `worst_run`, counts of
+  /// `worker`, digests of `audit`). Takes some 2 s for a million runs.
   /// @throws StoreError naming the first finding.
   void check_integrity() const;
 

@@ -5,11 +5,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <map>
 #include <string>
 
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/standout_rows.hpp"
+#include "coordinator/store/detail/worker_rows.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -58,6 +61,79 @@ void check_standouts(const Database& database) {
   }
 }
 
+/// Deliveries of a worker.
+struct Deliveries {
+  std::uint64_t count = 0;
+  double compute_s = 0.0;
+};
+
+std::map<std::int64_t, Deliveries> read_deliveries(const Database& database) {
+  Statement select = database.prepare("SELECT run_index, worker, compute_s FROM delivery");
+  std::map<std::int64_t, Deliveries> by_worker;
+  while (select.step()) {
+    const double compute_s = select.real(2);
+    if (!(std::isfinite(compute_s) && compute_s >= 0.0)) {
+      database.refuse_as_damaged(
+          fmt::format("delivery.compute_s of run {} = {} (must be finite and at least 0)",
+                      select.integer(0), compute_s));
+    }
+    Deliveries& deliveries = by_worker[select.integer(1)];
+    ++deliveries.count;
+    deliveries.compute_s += compute_s;
+  }
+  return by_worker;
+}
+
+// Each order of adding rounds in its own way, and the worker's sum was made of those of commits.
+// Two sums of n terms that are not negative differ by n epsilon of their value at most.
+bool are_close(double stored_s, const Deliveries& deliveries) {
+  const double tolerance = static_cast<double>(deliveries.count) *
+                           std::numeric_limits<double>::epsilon() * deliveries.compute_s;
+  return std::abs(stored_s - deliveries.compute_s) <= tolerance;
+}
+
+// `num_results` and `compute_s` of a worker follow from its deliveries. A second delivery of a run
+// counts for nobody.
+void check_workers(const Database& database) {
+  const std::map<std::int64_t, Deliveries> by_worker = read_deliveries(database);
+  Statement select =
+      database.prepare("SELECT worker_key, num_results, compute_s FROM worker ORDER BY worker_key");
+  while (select.step()) {
+    const auto found = by_worker.find(select.integer(0));
+    const Deliveries deliveries = found == by_worker.end() ? Deliveries{} : found->second;
+    if (select.count(1) != deliveries.count) {
+      database.refuse_as_damaged(
+          fmt::format("worker.num_results of worker_key {} = {} (must be {}, its deliveries)",
+                      select.integer(0), select.integer(1), deliveries.count));
+    }
+    if (!are_close(select.real(2), deliveries)) {
+      database.refuse_as_damaged(
+          fmt::format("worker.compute_s of worker_key {} = {} (must be {}, of its deliveries)",
+                      select.integer(0), select.real(2), deliveries.compute_s));
+    }
+  }
+}
+
+// An audit has the digest of the stored result, and is equal if the second one has the same.
+void check_audits(const Database& database) {
+  Statement select = database.prepare(
+      "SELECT run_index, worker, stored_digest, second_digest, is_equal FROM audit");
+  ResultRows results(database);
+  while (select.step()) {
+    const std::string row =
+        fmt::format("run {} by worker_key {}", select.count(0), select.integer(1));
+    const std::string must = hexadecimal(digest(results.read(RunIndex{select.count(0)})));
+    if (select.text(2) != must) {
+      database.refuse_as_damaged(
+          fmt::format("audit.stored_digest of {} = {} (must be {})", row, select.text(2), must));
+    }
+    const bool is_equal = select.text(2) == select.text(3);
+    if ((select.integer(4) != 0) == is_equal) continue;
+    database.refuse_as_damaged(fmt::format("audit.is_equal of {} = {} (must be {}, as the digests)",
+                                           row, select.integer(4), std::int64_t{is_equal}));
+  }
+}
+
 }  // namespace
 
 void check_integrity(const Database& database) {
@@ -66,6 +142,8 @@ void check_integrity(const Database& database) {
   check_schema(database);
   check_references(database);
   check_standouts(database);
+  check_workers(database);
+  check_audits(database);
 }
 
 }  // namespace proofmass::coordinator::detail

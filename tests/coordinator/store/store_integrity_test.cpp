@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
@@ -88,6 +90,72 @@ TEST_F(StoreIntegrity, IsMissedByAnOverrunThatIsNone) {
 TEST_F(StoreIntegrity, IsMissedByOtherWorstRuns) {
   change("UPDATE worst_run SET magnitude = 1e9 WHERE parameter = 'a_d12' AND run_index = 999");
   EXPECT_EQ(finding(), "is damaged: worst_run does not follow from the results of a_d12");
+}
+
+// The first delivery of each run counts for its worker; sums are of commits of any size.
+TEST_F(StoreIntegrity, IsThatOfWorkersWhoseSumsWereRoundedAnotherWay) {
+  const std::filesystem::path path = directory() / "rounded.db";
+  {
+    Store store = Store::create(path, campaign_of(300), "");
+    for (std::uint64_t first = 0; first < 300; first += 7) {
+      auto deliveries = deliveries_of(first, std::min<std::uint64_t>(first + 7, 300));
+      for (Delivery& delivery : deliveries) {
+        delivery.compute_s = 0.1 * static_cast<double>(delivery.result.run.value % 11);
+      }
+      store.commit(deliveries);
+      store.commit(deliveries);
+    }
+  }
+  const Database database(path, Access::read_only);
+  EXPECT_EQ(database.integer("SELECT compute_s = (SELECT sum(compute_s) FROM delivery)"
+                             " FROM worker"),
+            0)
+      << "else this tests nothing";
+  Store::open_read_only(path).check_integrity();
+}
+
+TEST_F(StoreIntegrity, IsMissedByACountOfAWorkerThatIsNotOfItsDeliveries) {
+  change("UPDATE worker SET num_results = 999");
+  EXPECT_EQ(finding(),
+            "is damaged: worker.num_results of worker_key 1 = 999 (must be 1000, its deliveries); "
+            "restore it from a copy");
+}
+
+TEST_F(StoreIntegrity, IsMissedByATimeOfAWorkerThatIsNotOfItsDeliveries) {
+  change("UPDATE worker SET compute_s = 500.000001");
+  EXPECT_EQ(finding(),
+            "is damaged: worker.compute_s of worker_key 1 = 500.000001 (must be 500, of its "
+            "deliveries); restore it from a copy");
+}
+
+TEST_F(StoreIntegrity, IsMissedByAWorkerWithResultsAndNoDeliveries) {
+  change("INSERT INTO worker (name, host, num_results) VALUES ('w', 'h', 1)");
+  EXPECT_THAT(finding(), HasSubstr("worker.num_results of worker_key 2 = 1 (must be 0"));
+}
+
+TEST_F(StoreIntegrity, IsMissedByATimeThatNoRunTakes) {
+  change("UPDATE delivery SET compute_s = -5 WHERE run_index = 3");
+  EXPECT_EQ(finding(),
+            "is damaged: delivery.compute_s of run 3 = -5 (must be finite and at least 0); restore "
+            "it from a copy");
+  change("UPDATE delivery SET compute_s = 9e999 WHERE run_index = 3");
+  EXPECT_THAT(finding(), HasSubstr("delivery.compute_s of run 3 = inf (must be finite"));
+}
+
+TEST_F(StoreIntegrity, IsMissedByAnAuditOfAnotherResult) {
+  Store::open(file()).commit(deliveries_of(7, 8));
+  EXPECT_EQ(finding(), "");
+  const std::string digest =
+      Database(file(), Access::read_only).text("SELECT stored_digest FROM audit");
+  change("UPDATE audit SET is_equal = 0");
+  EXPECT_EQ(finding(),
+            "is damaged: audit.is_equal of run 7 by worker_key 1 = 0 (must be 1, as the digests); "
+            "restore it from a copy");
+  change("UPDATE audit SET stored_digest = '0000000000000000'");
+  EXPECT_EQ(
+      finding(),
+      "is damaged: audit.stored_digest of run 7 by worker_key 1 = 0000000000000000 (must be " +
+          digest + "); restore it from a copy");
 }
 
 class StoreBackup : public StoreIntegrity {
