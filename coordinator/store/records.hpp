@@ -8,6 +8,7 @@
 
 #include "core/campaign/identifiers.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/statistics/stop_rule.hpp"
 #include "proto/wire/client_messages.hpp"
 #include "proto/wire/messages.hpp"
 
@@ -139,6 +140,21 @@ struct StoredStopCheck {
   std::uint64_t num_runs = 0;
   bool is_reached = false;
   std::optional<double> relative_half_width;  ///< Empty if runs were too few for an interval.
+};
+
+/// A row of `stop_check`.
+struct StopCheckRow {
+  std::string statistic;  ///< `std(a_c13)`.
+  std::uint64_t num_runs = 0;
+  StopCheck check;
+};
+
+/// A second result that is not the stored one.
+struct Contradiction {
+  RunIndex run;
+  std::string worker;         ///< Name of the one that delivered it.
+  std::string stored_digest;  ///< FNV-1a of the stored result, hexadecimal.
+  std::string second_digest;
 };
 
 /// What the stored statistics were computed from.

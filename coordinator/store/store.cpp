@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <charconv>
 #include <functional>
 #include <optional>
@@ -20,12 +21,14 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_lock.hpp"
+#include "coordinator/store/detail/table_differences.hpp"
 #include "core/campaign/dispersion.hpp"
 #include "proto/link/kill_point.hpp"
 
 namespace proofmass::coordinator {
 
 using detail::Access;
+using detail::ComparedTable;
 using detail::Database;
 using detail::Statement;
 using detail::Transaction;
@@ -106,6 +109,15 @@ void appear_complete(const std::filesystem::path& path,
   }
   std::filesystem::rename(draft, path);
   detail::synchronise_directory_of(path);
+}
+
+void replace_all(Database& database, const CampaignStatistics& statistics, const Budget& before,
+                 const Budget& after_worst, const Budget& after_mean) {
+  const bool has_estimates = statistics.num_estimated > 0;
+  detail::replace_statistics(database, statistics);
+  detail::replace_budgets(database, {.before = before,
+                                     .after_worst = has_estimates ? &after_worst : nullptr,
+                                     .after_mean = has_estimates ? &after_mean : nullptr});
 }
 
 }  // namespace
@@ -270,6 +282,10 @@ std::optional<StoredStopCheck> Store::last_stop_check(std::string_view statistic
   return detail::read_last_stop_check(parts_->database, statistic);
 }
 
+std::vector<StopCheckRow> Store::stop_checks() const {
+  return detail::read_stop_checks(parts_->database);
+}
+
 std::uint64_t Store::num_without_estimate() const {
   // The index has all that are not completed.
   return parts_->database.count("SELECT count(*) FROM run_result WHERE status <> 1 AND status > 2");
@@ -293,6 +309,20 @@ std::vector<RunRange> Store::given_up_runs() const {
 
 std::vector<BlamedRun> Store::blamed_runs() const {
   return detail::read_blamed_runs(parts_->database);
+}
+
+std::uint64_t Store::num_before_blame() const {
+  return parts_->database.count(
+      "SELECT coalesce((SELECT min(first_run) FROM attempt WHERE is_blamed), num_runs)"
+      " FROM campaign");
+}
+
+std::uint64_t Store::num_compared() const {
+  return parts_->database.count("SELECT count(*) FROM audit");
+}
+
+std::vector<Contradiction> Store::contradictions() const {
+  return detail::read_contradictions(parts_->database);
 }
 
 std::vector<wire::SessionId> Store::attached_sessions() const {
@@ -342,17 +372,71 @@ void Store::for_each_result(const std::function<void(const RunResult&)>& visit) 
 void Store::write_statistics(const CampaignStatistics& statistics, const Budget& before,
                              const Budget& after_worst, const Budget& after_mean,
                              std::string_view digest) {
-  const bool has_estimates = statistics.num_estimated > 0;
   Transaction transaction(parts_->database);
-  detail::replace_statistics(parts_->database, statistics);
-  detail::replace_budgets(parts_->database, {.before = before,
-                                             .after_worst = has_estimates ? &after_worst : nullptr,
-                                             .after_mean = has_estimates ? &after_mean : nullptr});
+  replace_all(parts_->database, statistics, before, after_worst, after_mean);
   detail::replace_summary(parts_->database, statistics, digest);
   transaction.commit();
 }
 
 std::optional<Summary> Store::summary() const { return detail::read_summary(parts_->database); }
+
+std::vector<std::string> Store::parameter_differences(const ParameterArray& objectives) const {
+  constexpr std::array tables{ComparedTable{.name = "parameter", .row_name = "name"}};
+  return detail::table_differences(
+      parts_->database,
+      [&](Database& expected) { detail::insert_parameters(expected, objectives); }, tables);
+}
+
+std::vector<std::string> Store::statistic_differences(const CampaignStatistics& statistics,
+                                                      const Budget& before,
+                                                      const Budget& after_worst,
+                                                      const Budget& after_mean) const {
+  constexpr std::array tables{ComparedTable{.name = "statistic", .row_name = "parameter"},
+                              ComparedTable{.name = "budget_entry", .row_name = "name"}};
+  return detail::table_differences(
+      parts_->database,
+      [&](Database& expected) {
+        replace_all(expected, statistics, before, after_worst, after_mean);
+      },
+      tables);
+}
+
+std::vector<std::string> Store::budget_differences(const Budget& before) const {
+  constexpr std::array tables{ComparedTable{
+      .name = "budget_entry",
+      .row_name = "name",
+      .columns = "position, label, before, paper_before, paper_after_worst, paper_after_mean"}};
+  return detail::table_differences(
+      parts_->database,
+      [&](Database& expected) {
+        detail::replace_budgets(expected,
+                                {.before = before, .after_worst = nullptr, .after_mean = nullptr});
+      },
+      tables);
+}
+
+std::vector<std::string> Store::stop_check_differences(
+    std::span<const StopCheckRow> expected) const {
+  constexpr std::array tables{
+      ComparedTable{.name = "stop_check",
+                    .row_name = "statistic || ' after ' || num_runs || ' runs'",
+                    .columns = "estimate, lower, upper, relative_half_width, is_reached"}};
+  return detail::table_differences(
+      parts_->database,
+      [&](Database& database) {
+        for (const StopCheckRow& row : expected) {
+          detail::replace_stop_check(database, row.num_runs, row.statistic, row.check);
+        }
+      },
+      tables, detail::FurtherRows::ignore);
+}
+
+bool Store::has_older_statistics() const {
+  return parts_->database.integer(
+             "SELECT EXISTS (SELECT 1 FROM statistic)"
+             " AND NOT EXISTS (SELECT 1 FROM statistic WHERE percentile_50 IS NOT NULL)"
+             " AND NOT EXISTS (SELECT 1 FROM summary)") != 0;
+}
 
 void Store::record_event(std::string_view kind, std::string_view text) {
   const Entry event = EventEntry{.kind = std::string(kind), .text = std::string(text)};

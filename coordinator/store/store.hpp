@@ -94,6 +94,7 @@ class Store {
                          const StopCheck& check);
   /// The one with the most runs.
   [[nodiscard]] std::optional<StoredStopCheck> last_stop_check(std::string_view statistic) const;
+  [[nodiscard]] std::vector<StopCheckRow> stop_checks() const;
   /// Finished runs without an estimate.
   [[nodiscard]] std::uint64_t num_without_estimate() const;
 
@@ -107,6 +108,13 @@ class Store {
   [[nodiscard]] std::vector<RunRange> compared_runs() const;
   /// Runs that are neither finished nor given up, ascending.
   [[nodiscard]] std::vector<BlamedRun> blamed_runs() const;
+
+  /// Runs [0, n) with the largest n of which no loss was blamed on any: none was ever given up.
+  [[nodiscard]] std::uint64_t num_before_blame() const;
+  /// Second results that were compared with the stored ones.
+  [[nodiscard]] std::uint64_t num_compared() const;
+  /// Those of them that differ, in run order.
+  [[nodiscard]] std::vector<Contradiction> contradictions() const;
 
   /// Workers that joined and have not ended, as far as the file knows: those that may come back
   /// after the coordinator before this one was killed.
@@ -138,6 +146,23 @@ class Store {
                         std::string_view digest);
   /// That of the last write_statistics(); empty before the first.
   [[nodiscard]] std::optional<Summary> summary() const;
+
+  /// What `parameter` has other than a new file of a campaign with these objectives, a line each:
+  /// `parameter.unit of k2d = m (must be s²/m)`. Numbers are equal if their bits are.
+  [[nodiscard]] std::vector<std::string> parameter_differences(
+      const ParameterArray& objectives) const;
+  /// What `statistic` and `budget_entry` have other than write_statistics() would store, likewise.
+  [[nodiscard]] std::vector<std::string> statistic_differences(const CampaignStatistics& statistics,
+                                                               const Budget& before,
+                                                               const Budget& after_worst,
+                                                               const Budget& after_mean) const;
+  /// The same of `budget_entry` alone, but for the budgets after calibration.
+  [[nodiscard]] std::vector<std::string> budget_differences(const Budget& before) const;
+  /// What rows of `stop_check` have other than these; there may be more of them.
+  [[nodiscard]] std::vector<std::string> stop_check_differences(
+      std::span<const StopCheckRow> expected) const;
+  /// True if the statistics are those of a program before version 5: seven numbers, no summary.
+  [[nodiscard]] bool has_older_statistics() const;
 
   /// Appends to the campaign's log, of which the newest 10,000 entries are kept.
   void record_event(std::string_view kind, std::string_view text);

@@ -74,6 +74,9 @@ class StatisticsAccumulator {
   /// Takes some 1 s for a million runs.
   [[nodiscard]] CampaignStatistics statistics() const;
 
+  /// The runs that have an estimate, ascending.
+  [[nodiscard]] const std::vector<RunIndex>& estimated_runs() const { return estimated_runs_; }
+
   /// estimate − truth of the runs that have an estimate, in run order, SI.
   [[nodiscard]] const std::vector<double>& errors(Parameter parameter) const {
     return errors_[index(parameter)];

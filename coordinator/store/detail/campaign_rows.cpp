@@ -19,15 +19,6 @@ std::uint64_t stored_num_runs(const Database& database) {
   return database.count("SELECT num_runs FROM campaign");
 }
 
-void insert_parameters(Database& database, const ParameterArray& objectives) {
-  Statement insert = database.prepare("INSERT INTO parameter VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
-  for (const ParameterInfo& info : parameter_infos()) {
-    const std::size_t i = index(info.parameter);
-    insert.run(i + 1, info.name, info.label, info.unit, objectives[i], info.paper.worst,
-               info.paper.mean, info.paper.standard_deviation);
-  }
-}
-
 void insert_environment(Database& database, const EnvironmentTable& table) {
   Statement insert =
       database.prepare("INSERT INTO environment_row VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
@@ -74,6 +65,15 @@ void check_same_values(std::string_view drawn_name, const std::vector<double>& g
 }
 
 }  // namespace
+
+void insert_parameters(Database& database, const ParameterArray& objectives) {
+  Statement insert = database.prepare("INSERT INTO parameter VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
+  for (const ParameterInfo& info : parameter_infos()) {
+    const std::size_t i = index(info.parameter);
+    insert.run(i + 1, info.name, info.label, info.unit, objectives[i], info.paper.worst,
+               info.paper.mean, info.paper.standard_deviation);
+  }
+}
 
 void insert_campaign(Database& database, const Campaign& campaign, std::string_view definition) {
   database

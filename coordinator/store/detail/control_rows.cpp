@@ -100,6 +100,24 @@ std::optional<StoredStopCheck> read_last_stop_check(const Database& database,
                          .relative_half_width = select.optional_real(2)};
 }
 
+std::vector<StopCheckRow> read_stop_checks(const Database& database) {
+  Statement select = database.prepare(
+      "SELECT statistic, num_runs, is_reached, estimate, lower, upper, relative_half_width "
+      "FROM stop_check ORDER BY statistic, num_runs");
+  std::vector<StopCheckRow> rows;
+  while (select.step()) {
+    StopCheckRow& row = rows.emplace_back(
+        StopCheckRow{.statistic = select.text(0), .num_runs = select.count(1), .check = {}});
+    row.check.is_reached = select.integer(2) != 0;
+    row.check.estimate = select.real(3);
+    const std::optional<double> lower = select.optional_real(4);
+    const std::optional<double> upper = select.optional_real(5);
+    if (lower && upper) row.check.interval = Interval{.lower = *lower, .upper = *upper};
+    row.check.relative_half_width = select.optional_real(6);
+  }
+  return rows;
+}
+
 void replace_stop_check(const Database& database, std::uint64_t num_runs,
                         std::string_view statistic, const StopCheck& check) {
   const bool is_bounded = check.interval.has_value();
@@ -146,6 +164,21 @@ std::vector<BlamedRun> read_blamed_runs(const Database& database) {
   std::vector<BlamedRun> runs;
   for (const auto& [run, entry] : blamed) runs.push_back(entry);
   return runs;
+}
+
+std::vector<Contradiction> read_contradictions(const Database& database) {
+  Statement select = database.prepare(
+      "SELECT a.run_index, w.name, a.stored_digest, a.second_digest "
+      "FROM audit AS a JOIN worker AS w ON w.worker_key = a.worker "
+      "WHERE NOT a.is_equal ORDER BY a.run_index, a.worker");
+  std::vector<Contradiction> contradictions;
+  while (select.step()) {
+    contradictions.push_back({.run = RunIndex{select.count(0)},
+                              .worker = select.text(1),
+                              .stored_digest = select.text(2),
+                              .second_digest = select.text(3)});
+  }
+  return contradictions;
 }
 
 void insert_start(const Database& database, const CoordinatorStart& start) {

@@ -22,6 +22,8 @@ void write_stop_plan(const Database& database, const StopPlan& plan);
 /// The row of `stop_check` with the most runs.
 [[nodiscard]] std::optional<StoredStopCheck> read_last_stop_check(const Database& database,
                                                                   std::string_view statistic);
+/// All rows of `stop_check`.
+[[nodiscard]] std::vector<StopCheckRow> read_stop_checks(const Database& database);
 /// A row of `stop_check`.
 void replace_stop_check(const Database& database, std::uint64_t num_runs,
                         std::string_view statistic, const StopCheck& check);
@@ -31,6 +33,9 @@ void replace_stop_check(const Database& database, std::uint64_t num_runs,
 
 /// Runs that were blamed for losses and are neither finished nor given up, ascending.
 [[nodiscard]] std::vector<BlamedRun> read_blamed_runs(const Database& database);
+
+/// Rows of `audit` that are not equal, in run order.
+[[nodiscard]] std::vector<Contradiction> read_contradictions(const Database& database);
 
 void insert_start(const Database& database, const CoordinatorStart& start);
 void end_start(const Database& database, wire::Epoch epoch);

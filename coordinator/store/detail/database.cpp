@@ -145,6 +145,23 @@ std::string Statement::text(int column) const {
   return text == nullptr ? std::string() : std::string(text, static_cast<std::size_t>(size));
 }
 
+std::string Statement::shown(int column) const {
+  switch (sqlite3_column_type(statement_.get(), column)) {
+    case SQLITE_NULL:
+      return "NULL";
+    case SQLITE_FLOAT:
+      return fmt::format("{}", real(column));
+    default:
+      return text(column);
+  }
+}
+
+int Statement::num_columns() const { return sqlite3_column_count(statement_.get()); }
+
+std::string Statement::column_name(int column) const {
+  return sqlite3_column_name(statement_.get(), column);
+}
+
 void Statement::refuse_as_damaged(std::string_view what) const {
   database_->refuse_as_damaged(what);
 }

@@ -57,6 +57,11 @@ class Statement {
   [[nodiscard]] std::optional<std::uint64_t> optional_count(int column) const;  ///< Empty: NULL.
   [[nodiscard]] std::string text(int column) const;
 
+  /// A cell in words: numbers in the shortest text that reads back to the same bits, `NULL`.
+  [[nodiscard]] std::string shown(int column) const;
+  [[nodiscard]] int num_columns() const;
+  [[nodiscard]] std::string column_name(int column) const;
+
   [[noreturn]] void refuse_as_damaged(std::string_view what) const;  ///< As that of the Database.
 
  private:
