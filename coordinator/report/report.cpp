@@ -82,12 +82,34 @@ void update_statistics(Store& store, const Scenario& scenario) {
   write_statistics(store, scenario, read_results(store, scenario));
 }
 
+namespace {
+
+/// The budgets that are stored with statistics.
+struct StoredBudgets {
+  Budget before;
+  Budget after_worst;
+  Budget after_mean;
+};
+
+StoredBudgets budgets_of(const Scenario& scenario, const CampaignStatistics& statistics) {
+  return {.before = budget_before_calibration(scenario),
+          .after_worst = budget_after_calibration(scenario, statistics.worst_errors()),
+          .after_mean = budget_after_calibration(scenario, statistics.mean_errors())};
+}
+
+}  // namespace
+
 void write_statistics(Store& store, const Scenario& scenario, const ReadResults& results) {
-  const CampaignStatistics& statistics = results.statistics;
-  store.write_statistics(statistics, budget_before_calibration(scenario),
-                         budget_after_calibration(scenario, statistics.worst_errors()),
-                         budget_after_calibration(scenario, statistics.mean_errors()),
-                         results.digest);
+  const StoredBudgets budgets = budgets_of(scenario, results.statistics);
+  store.write_statistics(results.statistics, budgets.before, budgets.after_worst,
+                         budgets.after_mean, results.digest);
+}
+
+std::vector<std::string> statistic_differences(const Store& store, const Scenario& scenario,
+                                               const CampaignStatistics& statistics) {
+  const StoredBudgets budgets = budgets_of(scenario, statistics);
+  return store.statistic_differences(statistics, budgets.before, budgets.after_worst,
+                                     budgets.after_mean);
 }
 
 }  // namespace proofmass::coordinator

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "coordinator/store/store.hpp"
 #include "core/campaign/scenario.hpp"
@@ -51,6 +52,12 @@ struct ReadResults {
 
 /// Stores statistics, their digest, and the budgets that follow from them in the file.
 void write_statistics(Store& store, const Scenario& scenario, const ReadResults& results);
+
+/// What `statistic` and `budget_entry` have other than write_statistics() would store, a line each:
+/// `statistic.mean of k2d = 1 (must be 25.5)`.
+[[nodiscard]] std::vector<std::string> statistic_differences(const Store& store,
+                                                             const Scenario& scenario,
+                                                             const CampaignStatistics& statistics);
 
 /// Brings the statistics and budgets that are stored in the file up to its results; does nothing
 /// if they are.

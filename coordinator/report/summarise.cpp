@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <vector>
 
 #include "coordinator/report/report.hpp"
@@ -47,6 +48,87 @@ std::optional<std::uint64_t> summarise_file(
   const std::uint64_t num_runs_max = plan.num_runs_max.value_or(num_runs);
   if (check.is_reached || num_runs >= num_runs_max) return std::nullopt;
   return std::min(next_stop_check(num_runs), num_runs_max);
+}
+
+namespace {
+
+/// Errors of the runs [0, num_runs) that have an estimate.
+std::vector<double> errors_of_first(const StatisticsAccumulator& results, Parameter parameter,
+                                    std::uint64_t num_runs) {
+  const std::vector<RunIndex>& runs = results.estimated_runs();
+  const auto end = std::ranges::lower_bound(runs, RunIndex{num_runs});
+  const std::vector<double>& errors = results.errors(parameter);
+  return {errors.begin(), errors.begin() + (end - runs.begin())};
+}
+
+/// A rule of the statistic that a row is of; empty if there is no such statistic.
+std::optional<StopRule> rule_of(const StopCheckRow& row) {
+  try {
+    return parse_stop_rule(row.statistic + " within 5%");
+  } catch (const ConfigError&) {
+    return std::nullopt;
+  }
+}
+
+// A plan may be changed: the rule of an older row may have asked for any width below 100 %.
+bool was_reached(const StopCheck& check, bool stored) {
+  if (!check.relative_half_width || *check.relative_half_width >= 1.0) return false;
+  return *check.relative_half_width == 0.0 || stored;
+}
+
+// The relative width of an interval about 0 is none that a file can hold.
+bool is_storable(const StopCheck& check) {
+  return !check.relative_half_width || std::isfinite(*check.relative_half_width);
+}
+
+StopCheckRow recomputed(const StopCheckRow& row, const StopRule& rule,
+                        const StatisticsAccumulator& results) {
+  StopCheckRow must = row;
+  must.check = check_with(rule, errors_of_first(results, rule.parameter, row.num_runs));
+  must.check.is_reached = was_reached(must.check, row.check.is_reached);
+  return must;
+}
+
+/// The check that ended a campaign; empty if it has not ended, or has no rule.
+std::optional<StopCheckRow> deciding_check(const Store& store,
+                                           const StatisticsAccumulator& results) {
+  const std::string text = store.stop_plan().stop_rule;
+  if (text.empty() || store.control().phase != wire::CampaignPhase::finished) return std::nullopt;
+  const StopRule rule = parse_stop_rule(text);
+  const std::uint64_t num_runs = store.num_runs();
+  return StopCheckRow{
+      .statistic = std::string(statistic_of(text)),
+      .num_runs = num_runs,
+      .check = check_with(rule, errors_of_first(results, rule.parameter, num_runs))};
+}
+
+}  // namespace
+
+std::vector<std::string> stop_check_differences(const Store& store,
+                                                const StatisticsAccumulator& results,
+                                                std::uint64_t num_held) {
+  std::vector<std::string> differences;
+  std::vector<StopCheckRow> expected;
+  const std::uint64_t num_runs = store.num_runs();
+  for (const StopCheckRow& row : store.stop_checks()) {
+    const std::optional<StopRule> rule = rule_of(row);
+    if (!rule) {
+      differences.push_back(
+          fmt::format("stop_check.statistic = {} (must be that of a stop rule)", row.statistic));
+    } else if (row.num_runs > num_runs) {
+      differences.push_back(fmt::format("stop_check.num_runs of {} = {} (must be at most {})",
+                                        row.statistic, row.num_runs, num_runs));
+    } else if (row.num_runs <= num_held) {
+      expected.push_back(recomputed(row, *rule, results));
+    }
+  }
+  // Comes last: of two expected rows of one check, this one holds.
+  if (num_runs <= num_held) {
+    if (const auto deciding = deciding_check(store, results)) expected.push_back(*deciding);
+  }
+  std::erase_if(expected, [](const StopCheckRow& row) { return !is_storable(row.check); });
+  std::ranges::copy(store.stop_check_differences(expected), std::back_inserter(differences));
+  return differences;
 }
 
 bool is_rule_missed(const Store& store) {

@@ -5,9 +5,11 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "coordinator/store/store.hpp"
 #include "core/campaign/scenario.hpp"
+#include "core/campaign/statistics.hpp"
 
 namespace proofmass::coordinator {
 
@@ -20,6 +22,19 @@ namespace proofmass::coordinator {
 std::optional<std::uint64_t> summarise_file(
     const std::filesystem::path& file, const Scenario& scenario,
     const std::function<void(const std::function<void(Store&)>&)>& write);
+
+/// What `stop_check` has other than the results yield, a line each:
+/// `stop_check.estimate of std(a_c13) after 128 runs = 1 (must be 2.5)`.
+///
+/// Beside the rows that are there, that of the campaign's rule and of all runs must be there once
+/// the campaign has ended.
+///
+/// @param results   All that are stored, and no others.
+/// @param num_held  Rows of up to so many runs are held against the results: all of these runs are
+///                  finished, and were when the rule was checked.
+[[nodiscard]] std::vector<std::string> stop_check_differences(const Store& store,
+                                                              const StatisticsAccumulator& results,
+                                                              std::uint64_t num_held);
 
 /// What came of a campaign's stop rule, in two lines of at most 80 characters; empty if there is
 /// none or it was not checked.
