@@ -2,6 +2,7 @@
 
 #include <array>
 #include <sstream>
+#include <utility>
 
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/text_cells.hpp"
@@ -39,6 +40,29 @@ std::string wrapped(const std::string& text, std::size_t indent) {
 }
 
 }  // namespace
+
+Check Check::holds(std::string finding) {
+  return {.name = {}, .verdict = Verdict::holds, .finding = std::move(finding), .details = {}};
+}
+
+Check Check::fails(std::string finding) { return fails(std::move(finding), {}); }
+
+Check Check::fails(std::string finding, std::vector<std::string> details) {
+  if (details.size() > details_named_max) {
+    const std::size_t num_more = details.size() - details_named_max;
+    details.resize(details_named_max);
+    details.push_back(fmt::format("and {} more", num_more));
+  }
+  return {.name = {},
+          .verdict = Verdict::fails,
+          .finding = std::move(finding),
+          .details = std::move(details)};
+}
+
+Check Check::not_checked(std::string finding) {
+  return {
+      .name = {}, .verdict = Verdict::not_checked, .finding = std::move(finding), .details = {}};
+}
 
 std::string check_text(const Check& check) {
   std::string text = left_aligned(check.name, name_width) +

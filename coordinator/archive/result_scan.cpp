@@ -77,24 +77,30 @@ std::vector<RunIndex> missing_in(std::span<const RunIndex> those, std::span<cons
 
 }  // namespace
 
-// A coordinator may write meanwhile: deliveries are read before and after.
-ResultScan scan_results(const Store& store, std::int64_t num_rounds_max,
-                        const IsStopped& is_stopped) {
-  ResultScan scan;
-  Rules rules(store.num_runs(), num_rounds_max, scan);
+ResultScan scan_results(const Store& store, const Scenario& scenario, const IsStopped& is_stopped) {
+  ResultScan scan{.runs = {},
+                  .digest = {},
+                  .accumulator = StatisticsAccumulator(scenario.objectives),
+                  .num_violations = 0,
+                  .violations = {}};
+  Rules rules(store.num_runs(), scenario.estimation.num_rounds_max, scan);
   Digest digest;
-  const std::vector<RunIndex> before = delivered_runs(store);
   walk_results(store, is_stopped, [&](const RunResult& result) {
     rules.check(result);
     digest.add(result);
+    if (scan.runs.empty() || scan.runs.back() < result.run) {
+      scan.accumulator.add(result);
+    } else {
+      rules.violate(result.run, "is out of order");  // In a damaged tree.
+    }
     scan.runs.push_back(result.run);
   });
-  const std::vector<RunIndex> after = delivered_runs(store);
+  const std::vector<RunIndex> delivered = delivered_runs(store);
   scan.digest = digest.finish();
-  for (const RunIndex run : missing_in(scan.runs, before)) {
+  for (const RunIndex run : missing_in(scan.runs, delivered)) {
     rules.violate(run, "has a delivery and no result");
   }
-  for (const RunIndex run : missing_in(after, scan.runs)) {
+  for (const RunIndex run : missing_in(delivered, scan.runs)) {
     rules.violate(run, "has a result and no delivery");
   }
   return scan;

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <utility>
 
 #include "coordinator/archive/campaign_mark.hpp"
+#include "coordinator/archive/derived_checks.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/resimulation.hpp"
 #include "coordinator/archive/result_scan.hpp"
@@ -15,8 +17,6 @@
 
 namespace proofmass::coordinator {
 namespace {
-
-constexpr std::size_t differences_named_max = 10;
 
 /// The checks of one file, each made once, in order.
 class Verification {
@@ -30,72 +30,80 @@ class Verification {
     make("integrity", [this] { return check_integrity(); });
     make("definition", [this] { return check_definition(); });
     make("model", [this] { return check_model(); });
-    make("results", [this] { return check_results(); });
-    make("digest", [this] { return check_digest(); });
+    if (store_) {
+      // A coordinator may end the campaign meanwhile, with statistics of results not read here.
+      store_->read_one_state([this] { run_result_checks(); });
+    } else {
+      run_result_checks();
+    }
     make("simulation", [this] { return check_simulation(); });
     return holds_;
   }
 
  private:
+  void run_result_checks() {
+    make("results", [this] { return check_results(); });
+    make("digest", [this] { return check_digest(); });
+    make("statistics", [this] { return check_statistics(); });
+    make("stop_checks", [this] { return check_stop_checks(); });
+    make("audit", [this] { return check_contradictions(*store_); });
+  }
+
   template <typename Make>
   void make(std::string_view name, const Make& make_check) {
     if (is_stopped_()) throw Interrupted();
     Check check;
     try {
-      check = store_ || name == "file" ? make_check() : not_checked("the file cannot be opened");
+      check =
+          store_ || name == "file" ? make_check() : Check::not_checked("the file cannot be opened");
     } catch (const Interrupted&) {
       throw;
     } catch (const Error& error) {
-      check = fails(error.what());
+      check = Check::fails(error.what());
     }
     check.name = name;
     holds_ = holds_ && check.verdict != Verdict::fails;
     report_(check);
   }
 
-  static Check holds(std::string finding) {
-    return {.name = {}, .verdict = Verdict::holds, .finding = std::move(finding), .details = {}};
-  }
-  static Check fails(std::string finding) {
-    return {.name = {}, .verdict = Verdict::fails, .finding = std::move(finding), .details = {}};
-  }
-  static Check not_checked(std::string finding) {
-    return {
-        .name = {}, .verdict = Verdict::not_checked, .finding = std::move(finding), .details = {}};
-  }
-
   Check check_file() {
     store_ = Store::open_read_only(file_);
-    return holds(fmt::format("{}, made {}", store_->name(), store_->created_utc()));
+    return Check::holds(fmt::format("{}, made {}", store_->name(), store_->created_utc()));
   }
 
   Check check_integrity() {
     store_->check_integrity();
-    return holds("every page, row, index and reference; the schema");
+    return Check::holds("every page, row, index and reference; the schema");
   }
 
   Check check_definition() {
     campaign_ = stored_campaign(*store_);
-    return holds(fmt::format("valid: seed {}, {} runs", campaign_->seed, campaign_->num_runs));
+    std::vector<std::string> details =
+        store_->parameter_differences(campaign_->scenario.objectives);
+    if (details.empty()) {
+      return Check::holds(
+          fmt::format("valid: seed {}, {} runs", campaign_->seed, campaign_->num_runs));
+    }
+    return Check::fails("the file is not of the campaign that it defines", std::move(details));
   }
 
   Check check_model() {
     const std::string model = store_->model_version();
     is_same_model_ = model == options_.model_version;
-    if (is_same_model_) return holds(fmt::format("{}; {}", model, store_->build()));
-    return fails(
+    if (is_same_model_) return Check::holds(fmt::format("{}; {}", model, store_->build()));
+    return Check::fails(
         fmt::format("{} made this file and this program has {}: its runs cannot be "
                     "simulated again",
                     model, options_.model_version));
   }
 
   Check check_results() {
-    if (!campaign_) return not_checked("the definition cannot be read");
-    scan_ = scan_results(*store_, campaign_->scenario.estimation.num_rounds_max, is_stopped_);
+    if (!campaign_) return Check::not_checked("the definition cannot be read");
+    scan_ = scan_results(*store_, campaign_->scenario, is_stopped_);
     const std::string counts = fmt::format("{} of {} runs", scan_->runs.size(), store_->num_runs());
-    if (scan_->num_violations == 0) return holds(counts + ": each number obeys its rule");
-    Check check = fails(fmt::format("{}: {} {} broken", counts, scan_->num_violations,
-                                    scan_->num_violations == 1 ? "rule is" : "rules are"));
+    if (scan_->num_violations == 0) return Check::holds(counts + ": each number obeys its rule");
+    Check check = Check::fails(fmt::format("{}: {} {} broken", counts, scan_->num_violations,
+                                           scan_->num_violations == 1 ? "rule is" : "rules are"));
     check.details = scan_->violations;
     if (scan_->num_violations > scan_->violations.size()) {
       check.details.push_back(
@@ -106,42 +114,52 @@ class Verification {
 
   // A coordinator stores the digest when it ends; until then there are newer results.
   Check check_digest() {
-    if (!scan_) return not_checked("the results cannot be read");
+    if (!scan_) return Check::not_checked("the results cannot be read");
     const std::optional<Summary> summary = store_->summary();
     if (!summary) {
-      return not_checked("none is stored: a coordinator has the file, or was killed");
+      return Check::not_checked("none is stored: a coordinator has the file, or was killed");
     }
     const std::uint64_t num_now = scan_->runs.size();
     if (num_now > summary->num_finished) {
-      return not_checked(
+      return Check::not_checked(
           fmt::format("it is of {} runs and {} are finished: a coordinator has the "
                       "file, or was killed",
                       summary->num_finished, num_now));
     }
     if (num_now < summary->num_finished) {
-      return fails(fmt::format("it is of {} runs, of which {} are in the file",
-                               summary->num_finished, num_now));
+      return Check::fails(fmt::format("it is of {} runs, of which {} are in the file",
+                                      summary->num_finished, num_now));
     }
     if (summary->digest == scan_->digest) {
-      Check check = holds(fmt::format("of {} runs", num_now));
+      Check check = Check::holds(fmt::format("of {} runs", num_now));
       check.details = {scan_->digest};
       return check;
     }
     Check check =
-        fails(fmt::format("the results of {} runs are not those it was made of", num_now));
+        Check::fails(fmt::format("the results of {} runs are not those it was made of", num_now));
     check.details = {"stored", "  " + summary->digest, "computed", "  " + scan_->digest};
     return check;
   }
 
+  Check check_statistics() {
+    if (!scan_) return Check::not_checked("the results cannot be read");
+    return check_stored_statistics(*store_, campaign_->scenario, *scan_);
+  }
+
+  Check check_stop_checks() {
+    if (!scan_) return Check::not_checked("the results cannot be read");
+    return check_stored_stop_checks(*store_, *scan_);
+  }
+
   Check check_simulation() {
-    if (!is_same_model_) return not_checked("another model made the file");
-    if (!scan_) return not_checked("the results cannot be read");
+    if (!is_same_model_) return Check::not_checked("another model made the file");
+    if (!scan_) return Check::not_checked("the results cannot be read");
     const std::vector<RunResult> results = chosen_results();
-    if (results.empty()) return not_checked("no run is finished");
+    if (results.empty()) return Check::not_checked("no run is finished");
     const std::vector<ResultDifference> differences =
         simulate_again(*campaign_, results, options_.num_threads, is_stopped_);
     const std::string runs = fmt::format("{} of {} runs", results.size(), scan_->runs.size());
-    if (differences.empty()) return holds(runs + " simulated again: every bit is the same");
+    if (differences.empty()) return Check::holds(runs + " simulated again: every bit is the same");
     return simulation_failure(runs, differences);
   }
 
@@ -151,12 +169,11 @@ class Verification {
     for (std::size_t i = 0; i < differences.size(); ++i) {
       if (i == 0 || differences[i].run != differences[i - 1].run) ++num_runs;
     }
-    Check check = fails(fmt::format("{} simulated again, of which {} {}", runs, num_runs,
-                                    num_runs == 1 ? "differs" : "differ"));
+    Check check = Check::fails(fmt::format("{} simulated again, of which {} {}", runs, num_runs,
+                                           num_runs == 1 ? "differs" : "differ"));
     for (const ResultDifference& difference : differences) {
-      if (&difference - differences.data() == differences_named_max) {
-        check.details.push_back(
-            fmt::format("and {} more", differences.size() - differences_named_max));
+      if (&difference - differences.data() == details_named_max) {
+        check.details.push_back(fmt::format("and {} more", differences.size() - details_named_max));
         break;
       }
       check.details.push_back(fmt::format("run {}: {}", difference.run.value, difference.column));

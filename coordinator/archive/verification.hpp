@@ -19,12 +19,22 @@ enum class Verdict : std::uint8_t {
   not_checked,  ///< Another check failed that it needs, or the file does not tell.
 };
 
+/// Details that a Check names of many.
+inline constexpr std::size_t details_named_max = 10;
+
 /// One thing that a campaign file was checked for.
 struct Check {
   std::string_view name;  ///< `integrity`, `digest` ...
   Verdict verdict = Verdict::holds;
   std::string finding;               ///< What was found, in a line.
   std::vector<std::string> details;  ///< Further lines.
+
+  // Checks without a name yet.
+  [[nodiscard]] static Check holds(std::string finding);
+  [[nodiscard]] static Check fails(std::string finding);
+  /// Names the first ten of the details and counts the others.
+  [[nodiscard]] static Check fails(std::string finding, std::vector<std::string> details);
+  [[nodiscard]] static Check not_checked(std::string finding);
 };
 
 /// How much is checked, and against what.
@@ -35,8 +45,9 @@ struct VerifyOptions {
 };
 
 /// Checks whether a campaign file is whole and holds what its definition yields, in this order:
-/// file, integrity, definition, model, results, digest, simulation. A check that fails ends none of
-/// the others that can still be made. Nothing is written, and a coordinator may write meanwhile.
+/// file, integrity, definition, model, results, digest, statistics, stop_checks, audit, simulation.
+/// A check that fails ends none of the others that can still be made. Nothing is written, and a
+/// coordinator may write meanwhile.
 ///
 /// @param report  Called with each check as soon as it is made.
 /// @return True if no check fails.

@@ -5,12 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <map>
 #include <sstream>
 
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "tests/coordinator/archive/archive_fixture.hpp"
+#include "tests/coordinator/archive/verification_fixture.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -21,43 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-constexpr std::uint64_t num_runs = 18;  // Two batches.
-
-class Verification : public test::StoreTest {
- protected:
-  Verification() : campaign_(test::quick_campaign(num_runs)) {
-    static const std::vector<RunResult> results = test::simulated(campaign_);
-    results_ = results;
-  }
-
-  /// A finished campaign, and nobody who has it open.
-  void make_file() {
-    Store store = test::store_of(file(), campaign_, results_);
-    update_statistics(store, campaign_.scenario);
-  }
-
-  bool verify_all() {
-    checks_.clear();
-    return verify(
-        file(), {.fraction = 1.0, .num_threads = 2},
-        [&](const Check& check) { checks_.emplace(check.name, check); }, test::never_stopped);
-  }
-
-  [[nodiscard]] const Check& check(const std::string& name) const { return checks_.at(name); }
-
-  /// Names of the checks with a verdict, in alphabetical order.
-  [[nodiscard]] std::vector<std::string> names(Verdict verdict) const {
-    std::vector<std::string> found;
-    for (const auto& [name, check] : checks_) {
-      if (check.verdict == verdict) found.push_back(name);
-    }
-    return found;
-  }
-
-  Campaign campaign_;
-  std::vector<RunResult> results_;
-  std::map<std::string, Check, std::less<>> checks_;
-};
+using Verification = test::VerificationTest;
 
 std::string flipped_estimate_sql(double estimate) {
   std::ostringstream sql;
@@ -71,7 +34,7 @@ TEST_F(Verification, FindsAFileWithoutFault) {
   EXPECT_TRUE(verify_all());
   EXPECT_THAT(names(Verdict::fails), IsEmpty());
   EXPECT_THAT(names(Verdict::not_checked), IsEmpty());
-  EXPECT_EQ(checks_.size(), 7U);
+  EXPECT_EQ(checks_.size(), 10U);
   EXPECT_THAT(check("file").finding, StartsWith("hardy2013, made 2"));
   EXPECT_EQ(check("definition").finding, "valid: seed 1, 18 runs");
   EXPECT_EQ(check("results").finding, "18 of 18 runs: each number obeys its rule");
@@ -129,7 +92,8 @@ TEST_F(Verification, FindsAPageThatIsOverwritten) {
   EXPECT_EQ(check("file").verdict, Verdict::fails);
   EXPECT_THAT(check("file").finding, HasSubstr("damaged"));
   EXPECT_THAT(names(Verdict::not_checked),
-              ElementsAre("definition", "digest", "integrity", "model", "results", "simulation"));
+              ElementsAre("audit", "definition", "digest", "integrity", "model", "results",
+                          "simulation", "statistics", "stop_checks"));
   EXPECT_EQ(check("digest").finding, "the file cannot be opened");
 }
 
@@ -158,7 +122,8 @@ TEST_F(Verification, FindsADefinitionThatIsNone) {
   test::change(file(), "UPDATE campaign SET definition = 'nonsense'");
   EXPECT_FALSE(verify_all());
   EXPECT_THAT(names(Verdict::fails), ElementsAre("definition"));
-  EXPECT_THAT(names(Verdict::not_checked), ElementsAre("digest", "results", "simulation"));
+  EXPECT_THAT(names(Verdict::not_checked),
+              ElementsAre("digest", "results", "simulation", "statistics", "stop_checks"));
   EXPECT_EQ(check("results").finding, "the definition cannot be read");
   EXPECT_EQ(check("digest").finding, "the results cannot be read");
 }
@@ -280,9 +245,9 @@ TEST_F(Verification, CanBeInterruptedWhileItSimulates) {
   int num_questions = 0;
   const auto report = [&](const Check& check) { last = check.name; };
   // The first question is asked before the simulation, the second while its results are read.
-  const auto is_stopped = [&] { return last == "digest" && ++num_questions > 2; };
+  const auto is_stopped = [&] { return last == "audit" && ++num_questions > 2; };
   EXPECT_THROW((void)verify(file(), {.fraction = 1.0}, report, is_stopped), Interrupted);
-  EXPECT_EQ(last, "digest");
+  EXPECT_EQ(last, "audit");
 }
 
 TEST_F(Verification, NeedsACampaignFileAndAFraction) {

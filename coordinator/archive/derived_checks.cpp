@@ -1,0 +1,150 @@
+#include "coordinator/archive/derived_checks.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "coordinator/report/report.hpp"
+#include "coordinator/report/summarise.hpp"
+#include "core/campaign/budget.hpp"
+#include "core/campaign/parameter.hpp"
+#include "core/campaign/run_ranges.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::string_view unfit = "not what follows from definition and results";
+constexpr std::string_view too_far = "an estimate is too far off to have any";
+
+using Lines = std::vector<std::string>;
+
+void append(Lines& lines, const Lines& further) {
+  std::ranges::copy(further, std::back_inserter(lines));
+}
+
+// Cubes of larger errors may add up to infinity; no simulation comes near.
+constexpr double error_max = 1e90;
+
+bool have_statistics(const StatisticsAccumulator& results) {
+  return std::ranges::all_of(parameter_infos(), [&](const ParameterInfo& info) {
+    return std::ranges::all_of(results.errors(info.parameter),
+                               [](double error) { return std::abs(error) <= error_max; });
+  });
+}
+
+Lines count_differences(const Summary& stored, const CampaignStatistics& now) {
+  Lines lines;
+  const auto require_same = [&](std::string_view column, std::uint64_t count, std::uint64_t must) {
+    if (count == must) return;
+    lines.push_back(fmt::format("summary.{} = {} (must be {})", column, count, must));
+  };
+  require_same("num_estimated", stored.num_estimated, now.num_estimated);
+  require_same("num_not_converged", stored.num_not_converged, now.num_not_converged);
+  require_same("num_not_finite", stored.num_not_finite, now.num_not_finite);
+  require_same("num_no_draw", stored.num_no_draw, now.num_no_draw);
+  return lines;
+}
+
+// A run is given up after the summary without another result, and remains so until it has one: of
+// as many results it cannot have been more.
+Lines given_up_differences(const Store& store, const Summary& summary) {
+  const std::uint64_t num_given_up = num_runs_in(store.given_up_runs());
+  if (summary.num_given_up <= num_given_up) return {};
+  return {fmt::format("summary.num_given_up = {} (must be at most {})", summary.num_given_up,
+                      num_given_up)};
+}
+
+Check check_current(const Store& store, const Scenario& scenario, const Summary& summary,
+                    const CampaignStatistics& statistics) {
+  Lines lines = count_differences(summary, statistics);
+  append(lines, given_up_differences(store, summary));
+  append(lines, statistic_differences(store, scenario, statistics));
+  if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
+  return Check::holds(
+      fmt::format("of {} runs: every number and every budget", statistics.num_runs));
+}
+
+// Without a summary nothing was ever stored but the budget before calibration.
+Check check_first(const Store& store, const Scenario& scenario) {
+  const bool is_old = store.has_older_statistics() || store.build().empty();
+  Lines lines = is_old ? Lines() : statistic_differences(store, scenario, {});
+  if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
+  return Check::not_checked(is_old ? "no summary tells of which results those of an older file are"
+                                   : "none are stored: a coordinator has the file, or was killed");
+}
+
+}  // namespace
+
+Check check_stored_statistics(const Store& store, const Scenario& scenario,
+                              const ResultScan& scan) {
+  const std::optional<Summary> summary = store.summary();
+  if (!summary) return check_first(store, scenario);
+  if (summary->num_finished == scan.runs.size() && summary->digest == scan.digest &&
+      scan.num_violations == 0) {
+    if (!have_statistics(scan.accumulator)) return Check::fails(std::string(too_far));
+    return check_current(store, scenario, *summary, scan.accumulator.statistics());
+  }
+  Lines lines = store.budget_differences(budget_before_calibration(scenario));
+  const std::uint64_t num_counted =
+      summary->num_estimated + summary->num_not_finite + summary->num_no_draw;
+  if (num_counted != summary->num_finished) {
+    lines.push_back(fmt::format("summary.num_finished = {} (must be {}, the sum of its kinds)",
+                                summary->num_finished, num_counted));
+  }
+  if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
+  return Check::not_checked("they are not of the results that are in the file");
+}
+
+namespace {
+
+/// Runs [0, n) that are finished, and were before any stop check of as many runs: none of them was
+/// ever given up, to be finished later.
+std::uint64_t num_held(const Store& store, const ResultScan& scan) {
+  std::uint64_t num_runs = 0;
+  while (num_runs < scan.runs.size() && scan.runs[num_runs].value == num_runs) ++num_runs;
+  return std::min(num_runs, store.num_before_blame());
+}
+
+}  // namespace
+
+Check check_stored_stop_checks(const Store& store, const ResultScan& scan) {
+  if (scan.num_violations > 0) return Check::not_checked("a result breaks its rule");
+  if (!have_statistics(scan.accumulator)) return Check::fails(std::string(too_far));
+  const std::uint64_t num_runs = num_held(store, scan);
+  Lines lines = stop_check_differences(store, scan.accumulator, num_runs);
+  if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
+  const auto num_checks = static_cast<std::uint64_t>(store.stop_checks().size());
+  return Check::holds(num_checks == 0 ? "none" : fmt::format("{} of a stop rule", num_checks));
+}
+
+Check check_contradictions(const Store& store) {
+  const std::uint64_t num_compared = store.num_compared();
+  const std::vector<Contradiction> contradictions = store.contradictions();
+  if (contradictions.empty()) {
+    return Check::holds(num_compared == 0
+                            ? "no run was computed twice"
+                            : fmt::format("{} second {}: each is the stored one", num_compared,
+                                          num_compared == 1 ? "result" : "results"));
+  }
+  Lines lines;
+  for (const Contradiction& found : contradictions) {
+    lines.push_back(fmt::format("run {}: {} delivered {} (must be {}, as stored)", found.run.value,
+                                found.worker, found.second_digest, found.stored_digest));
+  }
+  return Check::fails(
+      fmt::format("{} of {} second results {} not the stored one: a worker computes "
+                  "wrongly",
+                  contradictions.size(), num_compared, contradictions.size() == 1 ? "is" : "are"),
+      std::move(lines));
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,355 @@
+// What a campaign file keeps beside its results, and what verification says if it is not so.
+
+#include "coordinator/archive/derived_checks.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include "coordinator/report/digest.hpp"
+#include "coordinator/report/summarise.hpp"
+#include "tests/coordinator/archive/verification_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using ::testing::StartsWith;
+
+class DerivedChecks : public test::VerificationTest {
+ protected:
+  /// Changes a finished campaign as anybody with SQL can; returns which checks fail.
+  std::vector<std::string> failing_after(const std::string& sql) {
+    if (!std::filesystem::exists(file())) make_file();
+    test::change(file(), sql);
+    const bool holds = verify_all(0.0);
+    const std::vector<std::string> failing = names(Verdict::fails);
+    EXPECT_EQ(holds, failing.empty());
+    return failing;
+  }
+
+  /// First column of the first row of a query.
+  [[nodiscard]] std::string stored(const std::string& sql) const {
+    return detail::Database(file(), detail::Access::read_only).text(sql);
+  }
+};
+
+TEST_F(DerivedChecks, HoldParametersAgainstTheDefinition) {
+  EXPECT_THAT(failing_after("UPDATE parameter SET objective = 260, paper_worst = 1, unit = 'm',"
+                            " label = 'zz' WHERE name = 'k2d'"),
+              Contains("definition"));
+  EXPECT_THAT(check("definition").details,
+              ElementsAre("parameter.label of k2d = zz (must be K2d/K1c²)",
+                          "parameter.unit of k2d = m (must be s²/m)",
+                          HasSubstr("parameter.objective of k2d = 260 (must be "),
+                          HasSubstr("parameter.paper_worst of k2d = 1 (must be ")));
+}
+
+TEST_F(DerivedChecks, FindAStatisticThatDoesNotFollowFromTheResults) {
+  make_file();
+  const std::string mean =
+      stored("SELECT format('%!.17g', mean) FROM statistic WHERE parameter = 'k2d'");
+  EXPECT_THAT(failing_after("UPDATE statistic SET mean = 1"), ElementsAre("statistics"));
+  EXPECT_EQ(check("statistics").finding, "not what follows from definition and results");
+  ASSERT_THAT(check("statistics").details, SizeIs(10));
+  const std::string of_k2d = check("statistics").details[8];
+  ASSERT_THAT(of_k2d, StartsWith("statistic.mean of k2d = 1 (must be "));
+  EXPECT_DOUBLE_EQ(std::stod(of_k2d.substr(of_k2d.find("must be ") + 8)), std::stod(mean));
+}
+
+TEST_F(DerivedChecks, FindABoundThatIsOffByItsLastBitOrMissing) {
+  EXPECT_THAT(failing_after("UPDATE statistic SET skewness = skewness * (1 + 3e-16)"
+                            " WHERE parameter = 'a_d12'"),
+              ElementsAre("statistics"));
+  EXPECT_THAT(check("statistics").details, ElementsAre(StartsWith("statistic.skewness of a_d12")));
+  EXPECT_THAT(failing_after("UPDATE statistic SET bias_lower = NULL WHERE parameter = 'a_c13'"),
+              ElementsAre("statistics"));
+  EXPECT_THAT(check("statistics").details,
+              Contains(StartsWith("statistic.bias_lower of a_c13 = NULL (must be ")));
+}
+
+TEST_F(DerivedChecks, FindStatisticsThatAreMissing) {
+  EXPECT_THAT(failing_after("DELETE FROM statistic"), ElementsAre("statistics"));
+  EXPECT_THAT(check("statistics").details, Contains("statistic lacks k2c"));
+}
+
+TEST_F(DerivedChecks, NameTheFirstOfManyDifferences) {
+  EXPECT_THAT(failing_after("DELETE FROM statistic; DELETE FROM budget_entry"),
+              ElementsAre("statistics"));
+  ASSERT_THAT(check("statistics").details, SizeIs(11));
+  EXPECT_EQ(check("statistics").details.back(), "and 11 more");
+}
+
+TEST_F(DerivedChecks, FindABudgetThatDoesNotFollow) {
+  EXPECT_THAT(failing_after("UPDATE budget_entry SET after_mean = 1, before = 2"
+                            " WHERE name = 'total'"),
+              ElementsAre("statistics"));
+  EXPECT_THAT(check("statistics").details,
+              ElementsAre(StartsWith("budget_entry.before of total = 2 (must be "),
+                          StartsWith("budget_entry.after_mean of total = 1 (must be ")));
+}
+
+TEST_F(DerivedChecks, FindBudgetsThatAreMissingOrTooMany) {
+  EXPECT_THAT(failing_after("UPDATE budget_entry SET name = 'own' WHERE name = 'residual_y'"),
+              ElementsAre("statistics"));
+  EXPECT_THAT(check("statistics").details,
+              ElementsAre("budget_entry lacks residual_y", "budget_entry has a row too many: own"));
+}
+
+TEST_F(DerivedChecks, FindASummaryThatDoesNotCountTheResults) {
+  EXPECT_THAT(failing_after("UPDATE summary SET num_no_draw = 5, num_estimated = 13,"
+                            " num_not_converged = 2, num_not_finite = 3, num_given_up = 4"),
+              ElementsAre("statistics"));
+  EXPECT_THAT(
+      check("statistics").details,
+      ElementsAre("summary.num_estimated = 13 (must be 18)",
+                  "summary.num_not_converged = 2 (must be 0)",
+                  "summary.num_not_finite = 3 (must be 0)", "summary.num_no_draw = 5 (must be 0)",
+                  "summary.num_given_up = 4 (must be at most 0)"));
+}
+
+// Nobody can tell which results these are of, but a sum and a bound are what they are.
+TEST_F(DerivedChecks, HoldOlderStatisticsAgainstWhatIsKnownOfThem) {
+  EXPECT_THAT(failing_after("UPDATE summary SET num_finished = 17"), ElementsAre("statistics"));
+  EXPECT_THAT(check("statistics").details,
+              ElementsAre("summary.num_finished = 17 (must be 18, the sum of its kinds)"));
+  EXPECT_THAT(failing_after("UPDATE summary SET num_estimated = 17"), IsEmpty());
+  EXPECT_EQ(check("statistics").verdict, Verdict::not_checked);
+  EXPECT_EQ(check("statistics").finding, "they are not of the results that are in the file");
+  EXPECT_THAT(failing_after("UPDATE budget_entry SET before = 2 WHERE name = 'total'"),
+              ElementsAre("statistics"));
+  EXPECT_THAT(check("statistics").details,
+              ElementsAre(StartsWith("budget_entry.before of total = 2 (must be ")));
+}
+
+TEST_F(DerivedChecks, FindStatisticsWithoutASummary) {
+  EXPECT_THAT(failing_after("DELETE FROM summary"), ElementsAre("statistics"));
+  EXPECT_THAT(check("statistics").details, Contains("statistic has a row too many: k2d"));
+}
+
+// What a coordinator has made of a file of version 4: its statistics are seven numbers.
+TEST_F(DerivedChecks, LetStatisticsOfOlderProgramsBe) {
+  EXPECT_THAT(failing_after("DELETE FROM summary;"
+                            "CREATE TABLE old AS SELECT parameter, num_runs, worst,"
+                            " worst_run_index, num_beyond_objective, mean, standard_deviation"
+                            " FROM statistic;"
+                            "DELETE FROM statistic;"
+                            "INSERT INTO statistic (parameter, num_runs, worst, worst_run_index,"
+                            " num_beyond_objective, mean, standard_deviation) SELECT * FROM old;"
+                            "DROP TABLE old"),
+              IsEmpty());
+  EXPECT_EQ(check("statistics").finding,
+            "no summary tells of which results those of an older file are");
+  EXPECT_THAT(failing_after("DELETE FROM statistic; DELETE FROM budget_entry;"
+                            "UPDATE campaign SET build = ''"),
+              IsEmpty());
+}
+
+TEST_F(DerivedChecks, HoldForRunsThatFailed) {
+  results_[0].status = RunStatus::not_finite;
+  results_[1].status = RunStatus::no_draw;
+  results_[1].num_draws = 1000;
+  results_[1].num_rounds = 0;
+  make_file();
+  EXPECT_TRUE(verify_all(0.0)) << "simulates run 9";
+  EXPECT_THAT(names(Verdict::not_checked), IsEmpty());
+  EXPECT_THAT(failing_after("UPDATE summary SET num_not_finite = 0"), ElementsAre("statistics"));
+}
+
+TEST_F(DerivedChecks, HoldIfEveryRunFailed) {
+  campaign_.scenario.acceptance.a_d11_max = 1e-300;
+  results_ = test::simulated(campaign_);
+  make_file();
+  EXPECT_TRUE(verify_all());
+  EXPECT_THAT(names(Verdict::not_checked), IsEmpty());
+  EXPECT_EQ(stored("SELECT num_no_draw || ' ' || num_estimated FROM summary"), "18 0");
+  EXPECT_THAT(failing_after("UPDATE budget_entry SET after_worst = 1 WHERE name = 'total'"),
+              ElementsAre("statistics"));
+  EXPECT_THAT(check("statistics").details,
+              ElementsAre("budget_entry.after_worst of total = 1 (must be NULL)"));
+}
+
+// A run may be given up after the statistics, without another result.
+TEST_F(DerivedChecks, HoldIfARunIsGivenUpLater) {
+  results_.pop_back();
+  {
+    Store store = test::store_of(file(), campaign_, results_);
+    update_statistics(store, campaign_.scenario);
+    const Entry given_up = GivenUpRun{.run = RunIndex{17}};
+    (void)store.write({&given_up, 1});
+  }
+  EXPECT_TRUE(verify_all());
+  EXPECT_EQ(check("statistics").verdict, Verdict::holds);
+}
+
+// A campaign that ends between two checks.
+TEST_F(DerivedChecks, AreOfOneStateOfTheFile) {
+  Store store = test::store_of(file(), campaign_, {results_.begin(), results_.begin() + 17});
+  const auto end_campaign = [&](const Check& check) {
+    checks_.emplace(check.name, check);
+    if (check.name != "results") return;
+    const Delivery last{.result = results_[17], .worker = test::session_1, .attempt = {1}};
+    (void)store.commit({&last, 1});
+    update_statistics(store, campaign_.scenario);
+  };
+  EXPECT_TRUE(verify(file(), {.fraction = 0.0}, end_campaign, test::never_stopped));
+  EXPECT_EQ(check("statistics").finding,
+            "none are stored: a coordinator has the file, or was killed");
+}
+
+TEST_F(DerivedChecks, RefuseEstimatesThatHaveNoStatistics) {
+  results_[3].estimate[8] = 1e200;
+  (void)test::store_of(file(), campaign_, results_);
+  const std::string digest = digest_of(Store::open_read_only(file()));
+  EXPECT_THAT(
+      failing_after("INSERT INTO summary VALUES (1, 18, 18, 0, 0, 0, 0, '" + digest + "', '')"),
+      ElementsAre("statistics", "stop_checks"));
+  EXPECT_EQ(check("statistics").finding, "an estimate is too far off to have any");
+}
+
+TEST_F(DerivedChecks, HoldWorkersAgainstTheirDeliveries) {
+  EXPECT_THAT(failing_after("UPDATE worker SET num_results = 1"), ElementsAre("integrity"));
+  EXPECT_THAT(check("integrity").finding,
+              HasSubstr("worker.num_results of worker_key 1 = 1 (must be 18, its deliveries)"));
+}
+
+TEST_F(DerivedChecks, HoldIfASecondResultIsTheSame) {
+  {
+    Store store = test::store_of(file(), campaign_, results_);
+    update_statistics(store, campaign_.scenario);
+    const Delivery again{.result = results_[5], .worker = {7}, .attempt = {2}, .compute_s = 9.0};
+    (void)store.commit({&again, 1});
+  }
+  EXPECT_TRUE(verify_all());
+  EXPECT_EQ(check("audit").finding, "1 second result: each is the stored one");
+}
+
+TEST_F(DerivedChecks, FindResultsThatContradictEachOther) {
+  {
+    Store store = test::store_of(file(), campaign_, results_);
+    update_statistics(store, campaign_.scenario);
+    Delivery second{.result = results_[5], .worker = {7}, .attempt = {2}};
+    second.result.estimate[0] *= 2.0;
+    const std::vector<Entry> entries{WorkerJoined{.session = {7}, .name = "liar", .host = "h"},
+                                     SecondDelivery{second}};
+    (void)store.write(entries);
+  }
+  EXPECT_FALSE(verify_all());
+  EXPECT_THAT(names(Verdict::fails), ElementsAre("audit"));
+  EXPECT_EQ(check("audit").finding,
+            "1 of 1 second results is not the stored one: a worker computes wrongly");
+  EXPECT_THAT(check("audit").details,
+              ElementsAre(fmt::format("run 5: liar delivered {} (must be {}, as stored)",
+                                      stored("SELECT second_digest FROM audit"),
+                                      stored("SELECT stored_digest FROM audit"))));
+}
+
+TEST_F(DerivedChecks, FindAnAuditThatIsInvented) {
+  EXPECT_THAT(failing_after("INSERT INTO audit VALUES (5, 1, 0, '0000000000000000',"
+                            " '1111111111111111', 0)"),
+              ElementsAre("audit", "integrity"));
+}
+
+/// A campaign of 18 runs that was asked to stop by a rule, and has ended.
+class DerivedStopChecks : public DerivedChecks {
+ protected:
+  DerivedStopChecks() { make_file_with_rule("std(a_c13) within 50%"); }
+
+  void make_file_with_rule(const std::string& rule) {
+    Store store = test::store_of(file(), campaign_, results_);
+    decide(store, rule);
+  }
+  void decide(Store& store, const std::string& rule) {
+    store.set_stop_plan({.stop_rule = rule, .num_runs_max = 18, .failures_max = {}});
+    (void)summarise_file(file(), campaign_.scenario,
+                         [&](const std::function<void(Store&)>& action) { action(store); });
+    const Entry finished = CampaignControl{.phase = wire::CampaignPhase::finished};
+    (void)store.write({&finished, 1});
+  }
+};
+
+TEST_F(DerivedStopChecks, Hold) {
+  EXPECT_THAT(failing_after(""), IsEmpty());
+  EXPECT_EQ(check("stop_checks").finding, "1 of a stop rule");
+}
+
+TEST_F(DerivedStopChecks, FindAnEstimateThatDoesNotFollow) {
+  EXPECT_THAT(failing_after("UPDATE stop_check SET estimate = 1, upper = NULL"),
+              ElementsAre("stop_checks"));
+  EXPECT_THAT(
+      check("stop_checks").details,
+      ElementsAre(StartsWith("stop_check.estimate of std(a_c13) after 18 runs = 1 (must be "),
+                  StartsWith("stop_check.upper of std(a_c13) after 18 runs = NULL (must be ")));
+}
+
+TEST_F(DerivedStopChecks, FindADecisionThatTheRuleDoesNotMake) {
+  EXPECT_THAT(failing_after("UPDATE stop_check SET is_reached = NOT is_reached"),
+              ElementsAre("stop_checks"));
+  EXPECT_THAT(check("stop_checks").details,
+              ElementsAre(StartsWith("stop_check.is_reached of std(a_c13) after 18 runs = ")));
+}
+
+TEST_F(DerivedStopChecks, FindThatTheLastOneIsMissing) {
+  EXPECT_THAT(failing_after("DELETE FROM stop_check"), ElementsAre("stop_checks"));
+  EXPECT_THAT(check("stop_checks").details,
+              ElementsAre("stop_check lacks std(a_c13) after 18 runs"));
+}
+
+TEST_F(DerivedStopChecks, FindOnesOfNoRuleAndOfRunsThatThereAreNot) {
+  EXPECT_THAT(failing_after("INSERT INTO stop_check VALUES ('max(k2c)', 18, 1, 1, 1, 0, 1, '');"
+                            "INSERT INTO stop_check VALUES ('p9(k2c)', 128, 1, 1, 1, 0, 1, '');"
+                            "INSERT INTO stop_check VALUES ('mean(k2c)', 10, 1, 1, 1, 0.1, 1, '')"),
+              ElementsAre("stop_checks"));
+  EXPECT_THAT(check("stop_checks").details,
+              ElementsAre("stop_check.statistic = max(k2c) (must be that of a stop rule)",
+                          "stop_check.num_runs of p9(k2c) = 128 (must be at most 18)",
+                          StartsWith("stop_check.estimate of mean(k2c) after 10 runs = 1 (must"),
+                          StartsWith("stop_check.lower of mean(k2c) after 10 runs"),
+                          StartsWith("stop_check.upper of mean(k2c) after 10 runs"),
+                          StartsWith("stop_check.relative_half_width of mean(k2c)")));
+}
+
+// Nothing of a plan that was changed is deleted, and it asked for another width.
+TEST_F(DerivedStopChecks, HoldAfterTheRuleWasChanged) {
+  {
+    Store store = Store::open(file());
+    decide(store, "mean(k2c) within 1%");
+    decide(store, "mean(k2c) within 99%");
+    store.set_stop_plan(
+        {.stop_rule = "mean(k2c) within 2%", .num_runs_max = 18, .failures_max = {}});
+    EXPECT_EQ(store.control().phase, wire::CampaignPhase::active) << "until it is checked";
+  }
+  EXPECT_THAT(failing_after(""), IsEmpty());
+  EXPECT_EQ(check("stop_checks").finding, "2 of a stop rule");
+}
+
+// Its result came after the check, which was of the others.
+TEST_F(DerivedStopChecks, HoldIfARunHadBeenGivenUp) {
+  std::filesystem::remove(file());
+  const RunResult last = results_.back();
+  results_.pop_back();
+  make_file_with_rule("std(a_c13) within 50%");
+  {
+    Store store = Store::open(file());
+    const std::vector<Entry> entries{LostRuns{.runs = {RunIndex{17}, 1},
+                                              .attempt = {1},
+                                              .worker = test::session_1,
+                                              .reason = wire::LossReason::crashed,
+                                              .is_blamed = true},
+                                     GivenUpRun{.run = RunIndex{17}}};
+    (void)store.write(entries);
+  }
+  EXPECT_THAT(failing_after(""), IsEmpty()) << "given up";
+  {
+    Store store = Store::open(file());
+    const Delivery late{.result = last, .worker = test::session_1, .attempt = {2}};
+    (void)store.commit({&late, 1});
+  }
+  EXPECT_THAT(failing_after(""), IsEmpty()) << "finished";
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "coordinator/archive/verification.hpp"
+#include "tests/coordinator/archive/archive_fixture.hpp"
+
+namespace proofmass::test {
+
+/// A campaign of two batches with its results, and what verification says of its file.
+class VerificationTest : public StoreTest {
+ protected:
+  using Check = coordinator::Check;
+  using Verdict = coordinator::Verdict;
+
+  VerificationTest() : campaign_(quick_campaign(18)) {
+    static const std::vector<RunResult> results = simulated(campaign_);
+    results_ = results;
+  }
+
+  /// A finished campaign, and nobody who has it open.
+  void make_file() {
+    coordinator::Store store = store_of(file(), campaign_, results_);
+    coordinator::update_statistics(store, campaign_.scenario);
+  }
+
+  bool verify_all(double fraction = 1.0) {
+    checks_.clear();
+    return coordinator::verify(
+        file(), {.fraction = fraction, .num_threads = 2},
+        [&](const Check& check) { checks_.emplace(check.name, check); }, never_stopped);
+  }
+
+  [[nodiscard]] const Check& check(const std::string& name) const { return checks_.at(name); }
+
+  /// Names of the checks with a verdict, in alphabetical order.
+  [[nodiscard]] std::vector<std::string> names(Verdict verdict) const {
+    std::vector<std::string> found;
+    for (const auto& [name, check] : checks_) {
+      if (check.verdict == verdict) found.push_back(name);
+    }
+    return found;
+  }
+
+  Campaign campaign_;
+  std::vector<RunResult> results_;
+  std::map<std::string, Check, std::less<>> checks_;
+};
+
+}  // namespace proofmass::test
