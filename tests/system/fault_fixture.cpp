@@ -24,9 +24,11 @@ void FaultTest::write_null_campaign(std::size_t count) {
   write_campaign("null", count);
 }
 
-void FaultTest::extend_null_campaign(std::size_t count) {
+void FaultTest::extend_null_campaign(std::size_t count, const Arguments& further) {
   write_null_campaign(count);
-  (void)told({"submit", "null.toml"});
+  Arguments command{"submit", "null.toml"};
+  command.insert(command.end(), further.begin(), further.end());
+  (void)told(command);
 }
 
 void FaultTest::write_campaign(const std::string& name, std::size_t count) const {

@@ -22,7 +22,8 @@ class FaultTest : public CampaignProcess {
   /// Gives the campaign `null` another number of runs than 4000.
   void write_null_campaign(std::size_t count);
   /// The same for a coordinator that serves it already with fewer runs.
-  void extend_null_campaign(std::size_t count);
+  /// @param further  Arguments of the submission.
+  void extend_null_campaign(std::size_t count, const Arguments& further = {});
   /// A campaign file NAME.toml with so many runs.
   void write_campaign(const std::string& name, std::size_t count) const;
 

@@ -63,7 +63,7 @@ TEST_F(FaultyNetwork, LosesAFifthOfThePacketsAndNoRun) {
   wait_for_done("null", num_null_runs);
   while (!both_have_delivered() || network->num_lost("one") <= 10 ||
          network->num_lost("two") <= 10) {
-    extend_null_campaign(num_null_runs + 1000);
+    extend_null_campaign(num_null_runs + 1000, {"--keys", "keys"});
     wait_for_done("null", num_null_runs);
   }
   end_when_done(coordinator, "coordinator", 2);
