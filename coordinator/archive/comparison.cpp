@@ -136,8 +136,10 @@ ComparedCampaign read_compared(const Store& store, const IsStopped& is_stopped) 
                             .build = store.build(),
                             .results = {},
                             .num_given_up = num_runs_in(store.given_up_runs())};
-  walk_results(store, is_stopped,
-               [&](const RunResult& result) { compared.results.push_back(result); });
+  walk_results(store, is_stopped, [&](const RunResult& result) {
+    require_in_range(result);
+    compared.results.push_back(result);
+  });
   return compared;
 }
 

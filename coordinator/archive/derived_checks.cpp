@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
@@ -23,22 +22,11 @@ namespace proofmass::coordinator {
 namespace {
 
 constexpr std::string_view unfit = "not what follows from definition and results";
-constexpr std::string_view too_far = "an estimate is too far off to have any";
 
 using Lines = std::vector<std::string>;
 
 void append(Lines& lines, const Lines& further) {
   std::ranges::copy(further, std::back_inserter(lines));
-}
-
-// Cubes of larger errors may add up to infinity; no simulation comes near.
-constexpr double error_max = 1e90;
-
-bool have_statistics(const StatisticsAccumulator& results) {
-  return std::ranges::all_of(parameter_infos(), [&](const ParameterInfo& info) {
-    return std::ranges::all_of(results.errors(info.parameter),
-                               [](double error) { return std::abs(error) <= error_max; });
-  });
 }
 
 Lines count_differences(const Summary& stored, const CampaignStatistics& now) {
@@ -90,7 +78,6 @@ Check check_stored_statistics(const Store& store, const Scenario& scenario,
   if (!summary) return check_first(store, scenario);
   if (summary->num_finished == scan.runs.size() && summary->digest == scan.digest &&
       scan.num_violations == 0) {
-    if (!have_statistics(scan.accumulator)) return Check::fails(std::string(too_far));
     return check_current(store, scenario, *summary, scan.accumulator.statistics());
   }
   Lines lines = store.budget_differences(budget_before_calibration(scenario));
@@ -118,7 +105,6 @@ std::uint64_t num_held(const Store& store, const ResultScan& scan) {
 
 Check check_stored_stop_checks(const Store& store, const ResultScan& scan) {
   if (scan.num_violations > 0) return Check::not_checked("a result breaks its rule");
-  if (!have_statistics(scan.accumulator)) return Check::fails(std::string(too_far));
   const std::uint64_t num_runs = num_held(store, scan);
   Lines lines = stop_check_differences(store, scan.accumulator, num_runs);
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));

@@ -41,6 +41,7 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign,
       drawn.missing.add(result);
       return;
     }
+    require_in_range(result);
     const DrawnValues values = draw_values(campaign.dispersions, campaign.seed, result.run,
                                            result.num_draws - 1, campaign.table_values(result.run));
     append(result, values, drawn);

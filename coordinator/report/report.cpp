@@ -69,6 +69,7 @@ ReadResults read_results(const Store& store, const Scenario& scenario) {
       .accumulator = StatisticsAccumulator(scenario.objectives), .statistics = {}, .digest = {}};
   Digest digest;
   store.for_each_result([&](const RunResult& result) {
+    require_in_range(result);
     results.accumulator.add(result);
     digest.add(result);
   });

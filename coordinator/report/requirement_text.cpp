@@ -87,6 +87,7 @@ std::vector<RequirementAnswer> check_requirements(const Store& store,
   StatisticsAccumulator accumulator(no_objectives);
   MissingEstimates missing{.num_given_up = num_runs_in(store.given_up_runs())};
   store.for_each_result([&](const RunResult& result) {
+    require_in_range(result);
     accumulator.add(result);
     missing.add(result);
   });

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "core/campaign/identifiers.hpp"
@@ -7,11 +8,19 @@
 
 namespace proofmass {
 
+/// What is larger than any truth or estimate, SI: cubes of errors can be added up over any number
+/// of runs.
+inline constexpr double magnitude_max = 1e90;
+
+/// False for infinities and NaN, too.
+[[nodiscard]] inline bool is_in_range(double value) { return std::abs(value) <= magnitude_max; }
+
 /// How a run ended. The values are stored and sent: never renumber.
 enum class RunStatus : std::uint8_t {
   completed = 1,      ///< All ten estimates converged.
   not_converged = 2,  ///< Estimates are those of the last allowed round.
-  not_finite = 3,     ///< The simulation or an estimate overflowed; truth holds, estimates do not.
+  not_finite =
+      3,        ///< An estimate is out of range, see is_in_range(); truth holds, estimates do not.
   no_draw = 4,  ///< No draw inside the acceptance bounds was found; neither truth nor estimate.
 };
 
@@ -35,5 +44,9 @@ struct RunResult {
     return estimate[index(parameter)] - truth[index(parameter)];
   }
 };
+
+/// Statistics would be nonsense, or never end.
+/// @throws Error if a truth or estimate that means something is out of range.
+void require_in_range(const RunResult& result);
 
 }  // namespace proofmass

@@ -84,12 +84,7 @@ struct Lane {
   std::size_t index = 0;  ///< Of its record.
 };
 
-bool all_finite(const ParameterArray& values) {
-  for (const double value : values) {
-    if (!std::isfinite(value)) return false;
-  }
-  return true;
-}
+bool are_in_range(const ParameterArray& values) { return std::ranges::all_of(values, is_in_range); }
 
 }  // namespace
 
@@ -244,7 +239,7 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
   const CalibrationResult calibration =
       calibrate_hardy2013(record.phasors, scenario.estimation, scenario.objectives);
   result.num_rounds = calibration.num_rounds;
-  if (!all_finite(calibration.estimate)) {
+  if (!are_in_range(calibration.estimate)) {
     result.status = RunStatus::not_finite;
     return result;
   }

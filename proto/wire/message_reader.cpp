@@ -145,7 +145,7 @@ Message read(const proto::GiveBack& message) {
   return give_back;
 }
 
-/// Ten finite values if they mean something, none if not.
+/// Ten values in range if they mean something, none if not.
 template <typename Values>
 ParameterArray read_parameters(const Values& values, bool meaningful, std::string_view field) {
   const int count = meaningful ? static_cast<int>(num_parameters) : 0;
@@ -156,8 +156,9 @@ ParameterArray read_parameters(const Values& values, bool meaningful, std::strin
   ParameterArray parameters{};
   std::copy(values.begin(), values.end(), parameters.begin());
   for (const double value : parameters) {
-    if (!std::isfinite(value)) {
-      throw ConfigError(field, fmt::format("{}", value), "must be finite");
+    if (!is_in_range(value)) {
+      throw ConfigError(field, fmt::format("{}", value),
+                        fmt::format("must be in [{}, {}]", -magnitude_max, magnitude_max));
     }
   }
   return parameters;

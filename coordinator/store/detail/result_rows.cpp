@@ -61,13 +61,6 @@ std::uint64_t digest_with(std::uint64_t digest, const ParameterArray& values) {
   return digest;
 }
 
-void check_finite(const RunResult& result, std::string_view kind, const ParameterInfo& info,
-                  double value) {
-  if (std::isfinite(value)) return;
-  throw StoreError(fmt::format("run_result.{}_{}{} = {} (must be finite; run {})", kind, info.name,
-                               info.unit_suffix, value, result.run.value));
-}
-
 RunStatus read_status(const Statement& row) {
   const std::int64_t status = row.integer(1);
   const bool is_known = status >= static_cast<std::int64_t>(RunStatus::completed) &&
@@ -150,10 +143,10 @@ void check_delivery(const Delivery& delivery, std::uint64_t num_runs) {
     throw StoreError(fmt::format("run_result.run_index = {} (must be below num_runs = {})",
                                  result.run.value, num_runs));
   }
-  for (const ParameterInfo& info : parameter_infos()) {
-    const std::size_t i = index(info.parameter);
-    if (result.has_truth()) check_finite(result, "truth", info, result.truth[i]);
-    if (result.has_estimate()) check_finite(result, "estimate", info, result.estimate[i]);
+  try {
+    require_in_range(result);
+  } catch (const Error& error) {
+    throw StoreError(fmt::format("run_result.{}", error.what()));
   }
   if (!std::isfinite(delivery.compute_s)) {
     throw StoreError(fmt::format("delivery.compute_s = {} (must be finite; run {})",

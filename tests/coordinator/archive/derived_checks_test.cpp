@@ -200,14 +200,12 @@ TEST_F(DerivedChecks, AreOfOneStateOfTheFile) {
             "none are stored: a coordinator has the file, or was killed");
 }
 
-TEST_F(DerivedChecks, RefuseEstimatesThatHaveNoStatistics) {
-  results_[3].estimate[8] = 1e200;
-  (void)test::store_of(file(), campaign_, results_);
-  const std::string digest = digest_of(Store::open_read_only(file()));
-  EXPECT_THAT(
-      failing_after("INSERT INTO summary VALUES (1, 18, 18, 0, 0, 0, 0, '" + digest + "', '')"),
-      ElementsAre("statistics", "stop_checks"));
-  EXPECT_EQ(check("statistics").finding, "an estimate is too far off to have any");
+TEST_F(DerivedChecks, ComputeNoStatisticsOfAnEstimateThatNoSimulationYields) {
+  EXPECT_THAT(failing_after("UPDATE run_result SET estimate_k2d_s2_m = 1e200 WHERE run_index = 3"),
+              Contains("results"));
+  EXPECT_THAT(check("results").details,
+              ElementsAre("run 3: estimate_k2d_s2_m = 1e+200 (must be in [-1e+90, 1e+90])"));
+  EXPECT_EQ(check("stop_checks").verdict, Verdict::not_checked);
 }
 
 TEST_F(DerivedChecks, HoldWorkersAgainstTheirDeliveries) {

@@ -231,6 +231,15 @@ TEST(Report, AlignsEveryRow) {
 
 using StoredReport = test::StoreTest;
 
+// Its square has no deviation, and a bootstrap of such deviations no end.
+TEST_F(StoredReport, RefusesAnEstimateThatNoSimulationYields) {
+  Store store = Store::create(file(), test::campaign_of(12), "");
+  store.commit(test::deliveries_of(0, 12));
+  test::change(file(), "UPDATE run_result SET estimate_k2d_s2_m = 1e200 WHERE run_index = 3");
+  EXPECT_EQ(test::message_of<Error>([&] { (void)read_results(store, {}); }),
+            "estimate_k2d_s2_m of run 3 = 1e+200 (must be in [-1e+90, 1e+90])");
+}
+
 TEST_F(StoredReport, IsThatOfTheResultsInTheFile) {
   Store store = Store::create(file(), test::campaign_of(12), "");
   std::vector<Delivery> deliveries = test::deliveries_of(0, 10);

@@ -5,6 +5,8 @@
 #include <bit>
 #include <cstdint>
 
+#include "core/estimation/signals.hpp"
+
 namespace proofmass {
 namespace {
 
@@ -92,6 +94,18 @@ TEST(RunPlan, SaysWhenTheSimulationDiverges) {
   EXPECT_EQ(result.status, RunStatus::not_finite);
   EXPECT_FALSE(result.has_estimate());
   EXPECT_TRUE(result.has_truth());
+}
+
+// Estimates are linear in the measured difference.
+TEST(RunPlan, SaysWhenAnEstimateIsOutOfRange) {
+  const Campaign campaign = short_campaign(1);
+  const RunPlan plan(campaign);
+  RunRecord record = plan.record(RunIndex{0}, {});
+  EXPECT_TRUE(plan.estimate(record).has_estimate());
+  for (SessionPhasors& session : record.phasors) {
+    for (auto& amplitude : session.amplitude[index(Signal::differential_x)]) amplitude *= 1e110;
+  }
+  EXPECT_EQ(plan.estimate(record).status, RunStatus::not_finite);
 }
 
 TEST(RunPlan, SaysWhenEstimatesStillMoveInTheLastRound) {

@@ -313,9 +313,11 @@ TEST(MalformedComputedRun, HasTheNumbersThatItsStatusGives) {
 
 TEST(MalformedComputedRun, HasFiniteNumbers) {
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_truth(3, nan); }),
-            "truth = nan (must be finite)");
+            "truth = nan (must be in [-1e+90, 1e+90])");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_estimate(3, 1.0 / 0.0); }),
-            "estimate = inf (must be finite)");
+            "estimate = inf (must be in [-1e+90, 1e+90])");
+  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_estimate(9, -1.1e90); }),
+            "estimate = -1.1e+90 (must be in [-1e+90, 1e+90])");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_compute_s(-1.0); }),
             "compute_s = -1 (must be >= 0)");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_compute_s(nan); }),
