@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <vector>
 
@@ -76,11 +75,6 @@ bool was_reached(const StopCheck& check, bool stored) {
   return *check.relative_half_width == 0.0 || stored;
 }
 
-// The relative width of an interval about 0 is none that a file can hold.
-bool is_storable(const StopCheck& check) {
-  return !check.relative_half_width || std::isfinite(*check.relative_half_width);
-}
-
 StopCheckRow recomputed(const StopCheckRow& row, const StopRule& rule,
                         const StatisticsAccumulator& results) {
   StopCheckRow must = row;
@@ -126,7 +120,6 @@ std::vector<std::string> stop_check_differences(const Store& store,
   if (num_runs <= num_held) {
     if (const auto deciding = deciding_check(store, results)) expected.push_back(*deciding);
   }
-  std::erase_if(expected, [](const StopCheckRow& row) { return !is_storable(row.check); });
   std::ranges::copy(store.stop_check_differences(expected), std::back_inserter(differences));
   return differences;
 }

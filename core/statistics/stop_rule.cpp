@@ -92,7 +92,9 @@ StopCheck check_stop_rule(const StopRule& rule, std::span<const double> errors) 
   StopCheck check = estimated(rule, errors);
   if (!check.interval) return check;
   const double half_width = 0.5 * (check.interval->upper - check.interval->lower);
-  check.relative_half_width = half_width == 0.0 ? 0.0 : half_width / std::abs(check.estimate);
+  const double relative = half_width == 0.0 ? 0.0 : half_width / std::abs(check.estimate);
+  if (!std::isfinite(relative)) return check;
+  check.relative_half_width = relative;
   check.is_reached = *check.relative_half_width <= rule.relative_half_width;
   return check;
 }

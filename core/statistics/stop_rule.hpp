@@ -35,7 +35,8 @@ struct StopCheck {
   bool is_reached = false;
   double estimate = 0.0;             ///< Of the statistic, SI; 0 without errors.
   std::optional<Interval> interval;  ///< Its 95 % interval; empty if errors are too few.
-  /// Half the width of the interval over the estimate; empty without an interval.
+  /// Half the width of the interval over the estimate; empty without an interval, or if it is one
+  /// about 0.
   std::optional<double> relative_half_width;
 };
 

@@ -98,6 +98,18 @@ TEST(CheckStopRule, IsNotReachedWithoutAnInterval) {
   EXPECT_FALSE(check_stop_rule(rule, {}).is_reached);
 }
 
+// Half of 128 runs have no error at all; whether the median of all is 0 is open.
+TEST(CheckStopRule, IsNotReachedByAnIntervalAboutZero) {
+  std::vector<double> errors(66, 0.0);
+  errors.resize(128, 1.0);
+  const StopCheck check = check_stop_rule(parse_stop_rule("p50(k2c) within 50%"), errors);
+  EXPECT_EQ(check.estimate, 0.0);
+  ASSERT_TRUE(check.interval.has_value());
+  EXPECT_GT(check.interval->upper, 0.0);
+  EXPECT_FALSE(check.relative_half_width.has_value());
+  EXPECT_FALSE(check.is_reached);
+}
+
 TEST(CheckStopRule, TakesAnExactZeroForKnown) {
   const StopRule rule = parse_stop_rule("std(k2c) within 5%");
   EXPECT_TRUE(check_stop_rule(rule, std::vector<double>(128, 0.0)).is_reached);
