@@ -1,7 +1,5 @@
 #include "coordinator/report/digest.hpp"
 
-#include <sodium.h>
-
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -37,13 +35,6 @@ class Layout {
 
 }  // namespace
 
-struct Digest::Hash {
-  crypto_hash_sha256_state state;
-};
-
-Digest::Digest() : hash_(std::make_unique<Hash>()) { crypto_hash_sha256_init(&hash_->state); }
-Digest::~Digest() = default;
-
 void Digest::add(const RunResult& result) {
   Layout layout;
   layout.put(result.run.value);
@@ -53,16 +44,10 @@ void Digest::add(const RunResult& result) {
   layout.put(std::uint32_t{0});
   layout.put(result.has_truth() ? result.truth : ParameterArray{});
   layout.put(result.has_estimate() ? result.estimate : ParameterArray{});
-  crypto_hash_sha256_update(&hash_->state, layout.bytes().data(), layout.bytes().size());
+  hash_.add(layout.bytes());
 }
 
-std::string Digest::finish() {
-  std::array<unsigned char, crypto_hash_sha256_BYTES> hash{};
-  crypto_hash_sha256_final(&hash_->state, hash.data());
-  std::array<char, 2 * crypto_hash_sha256_BYTES + 1> text{};
-  sodium_bin2hex(text.data(), text.size(), hash.data(), hash.size());
-  return text.data();
-}
+std::string Digest::finish() { return hash_.finish(); }
 
 std::string digest_of(const Store& store) {
   Digest digest;

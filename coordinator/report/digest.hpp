@@ -1,8 +1,8 @@
 #pragma once
 
-#include <memory>
 #include <string>
 
+#include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/run_result.hpp"
 
@@ -16,19 +16,13 @@ namespace proofmass::coordinator {
 /// negative zeros).
 class Digest {
  public:
-  Digest();
-  ~Digest();
-  Digest(const Digest&) = delete;
-  Digest& operator=(const Digest&) = delete;
-
   void add(const RunResult& result);
 
   /// 64 hexadecimal digits. @pre Called once, at the end.
   [[nodiscard]] std::string finish();
 
  private:
-  struct Hash;
-  std::unique_ptr<Hash> hash_;
+  Sha256 hash_;
 };
 
 /// Digest of the results in a campaign file.

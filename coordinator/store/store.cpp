@@ -22,6 +22,7 @@
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_lock.hpp"
 #include "coordinator/store/detail/table_differences.hpp"
+#include "coordinator/store/detail/table_digest.hpp"
 #include "core/campaign/dispersion.hpp"
 #include "proto/link/kill_point.hpp"
 
@@ -240,6 +241,22 @@ std::string Store::build() const { return parts_->database.text("SELECT build FR
 
 std::string Store::created_utc() const {
   return parts_->database.text("SELECT created_utc FROM campaign");
+}
+
+std::string Store::owner() const { return parts_->database.text("SELECT owner FROM campaign"); }
+
+void Store::set_owner(std::string_view owner) {
+  Transaction transaction(parts_->database);
+  parts_->database.prepare("UPDATE campaign SET owner = ?").run(owner);
+  transaction.commit();
+}
+
+std::string Store::table_digest() const {
+  return parts_->database.text("SELECT table_digest FROM campaign");
+}
+
+std::string Store::computed_table_digest() const {
+  return detail::compute_table_digest(parts_->database);
 }
 
 EnvironmentTable Store::environment_table() const {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "coordinator/store/detail/table_digest.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/campaign/parameter.hpp"
 #include "core/simulation/run.hpp"
@@ -85,6 +86,7 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
   insert_parameters(database, campaign.scenario.objectives);
   insert_environment(database, campaign.environment_table);
   insert_dispersion_values(database, campaign, 0);
+  write_table_digest(database);
 }
 
 EnvironmentTable read_environment_table(const Database& database) {
@@ -138,6 +140,7 @@ void extend_campaign(Database& database, const Campaign& campaign, std::string_v
   insert_dispersion_values(database, campaign, stored_num_runs(database));
   database.prepare("UPDATE campaign SET num_runs = ?, definition = ?")
       .run(campaign.num_runs, definition);
+  write_table_digest(database);
 }
 
 }  // namespace proofmass::coordinator::detail

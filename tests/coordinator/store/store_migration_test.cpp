@@ -116,6 +116,21 @@ TEST_F(StoreMigration, FromVersion4KeepsStatisticsAndFindsTheRunsThatStandOut) {
             "0.5 3 0.25 0.125 2 7 NULL");
 }
 
+TEST_F(StoreMigration, FromVersion5HasNoOwnerAndNoDigestOfTables) {
+  {
+    Database old(file(), Access::create);
+    for (std::size_t i = 0; i < 5; ++i) old.execute(std::string(detail::migrations()[i]));
+    old.execute(
+        "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition,"
+        " model_version) VALUES (1, 'old', '42', 30, 'text', 'hardy2013-1')");
+  }
+  Store store = Store::open(file());
+  EXPECT_EQ(store.name(), "old");
+  EXPECT_EQ(store.owner(), "");
+  EXPECT_EQ(store.table_digest(), "");
+  EXPECT_EQ(Database(file(), Access::read_only).integer("SELECT is_log_needed FROM campaign"), 0);
+}
+
 // A table in the way: nothing of the step may remain.
 TEST_F(StoreMigration, ThatFailsLeavesTheFileAsItWas) {
   make_file_of_version_3();

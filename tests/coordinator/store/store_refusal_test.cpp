@@ -73,7 +73,7 @@ TEST_F(StoreRefusal, OfANewerFile) {
   create();
   Database(file(), Access::read_write).execute("PRAGMA user_version = 99");
   const std::string expected =
-      message("is newer than this program: its user_version is 99, the newest known one 5");
+      message("is newer than this program: its user_version is 99, the newest known one 6");
   EXPECT_EQ(error_of_open(), expected);
   EXPECT_EQ(error_of_open_read_only(), expected);
 }
@@ -83,7 +83,7 @@ TEST_F(StoreRefusal, ToReadAnOlderFile) {
   Database(file(), Access::read_write).execute("PRAGMA user_version = 2");
   EXPECT_EQ(
       error_of_open_read_only(),
-      message("is older than this program: its user_version is 2, not 5; resuming the campaign "
+      message("is older than this program: its user_version is 2, not 6; resuming the campaign "
               "brings it up to date"));
 }
 

@@ -253,6 +253,45 @@ TEST_F(StoreTest, RefusesToExtendToAnotherCampaign) {
   EXPECT_EQ(error_after([](Campaign&) {}), "");
 }
 
+TEST_F(StoreTest, KeepsTheDigestOfItsTables) {
+  Store store = Store::create(file(), campaign_with_data(3), "");
+  const std::string digest_of_three = store.table_digest();
+  EXPECT_EQ(store.computed_table_digest(), digest_of_three);
+  store.extend(campaign_with_data(4), "");
+  const std::string digest_of_four = store.table_digest();
+  EXPECT_NE(digest_of_four, digest_of_three);
+  EXPECT_EQ(Store::create(directory() / "whole.db", campaign_with_data(4), "").table_digest(),
+            digest_of_four);
+  for (const std::string change :
+       {"UPDATE environment_row SET linear_y_m_s2 = linear_y_m_s2 + 1e-12 WHERE position = 2",
+        "DELETE FROM environment_row WHERE position = 1",
+        "UPDATE dispersion_value SET value = value + 1e-12 WHERE run_index = 3",
+        "UPDATE dispersion_value SET run_index = 9 WHERE run_index = 2"}) {
+    const std::filesystem::path copy = directory() / "copy.db";
+    store.back_up(copy);
+    test::change(copy, change);
+    const Store changed = Store::open_read_only(copy);
+    EXPECT_EQ(changed.table_digest(), digest_of_four);
+    EXPECT_NE(changed.computed_table_digest(), digest_of_four) << change;
+    std::filesystem::remove(copy);
+  }
+}
+
+// The SHA-256 of two numbers of rows, both 0, by another program (python3 -m hashlib).
+TEST_F(StoreTest, HasTheKnownDigestOfEmptyTables) {
+  EXPECT_EQ(Store::create(file(), campaign_of(3), "").table_digest(),
+            "374708fff7719dd5979ec875d56cd2286f6d3cf7ec317a3b25632aab28ec37bb");
+}
+
+TEST_F(StoreTest, KeepsItsOwner) {
+  {
+    Store store = Store::create(file(), campaign_of(3), "");
+    EXPECT_EQ(store.owner(), "");
+    store.set_owner("anna");
+  }
+  EXPECT_EQ(Store::open_read_only(file()).owner(), "anna");
+}
+
 TEST_F(StoreTest, IsReadableWhileItsCoordinatorWrites) {
   Store writer = Store::create(file(), campaign_of(10), "");
   const Store reader = Store::open_read_only(file());

@@ -1,0 +1,45 @@
+#include "coordinator/store/detail/table_digest.hpp"
+
+#include "coordinator/store/sha256.hpp"
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+constexpr int num_environment_columns = 7;
+
+void add_environment(const Database& database, Sha256& hash) {
+  hash.add(database.count("SELECT count(*) FROM environment_row"));
+  Statement row = database.prepare(
+      "SELECT time_s, linear_x_m_s2, linear_y_m_s2, linear_z_m_s2,"
+      " angular_x_rad_s2, angular_y_rad_s2, angular_z_rad_s2 FROM environment_row"
+      " ORDER BY position");
+  while (row.step()) {
+    for (int column = 0; column < num_environment_columns; ++column) hash.add(row.real(column));
+  }
+}
+
+void add_dispersions(const Database& database, Sha256& hash) {
+  hash.add(database.count("SELECT count(*) FROM dispersion_value"));
+  Statement row = database.prepare(
+      "SELECT name, run_index, value FROM dispersion_value ORDER BY name, run_index");
+  while (row.step()) {
+    hash.add(row.text(0));
+    hash.add(row.count(1));
+    hash.add(row.real(2));
+  }
+}
+
+}  // namespace
+
+std::string compute_table_digest(const Database& database) {
+  Sha256 hash;
+  add_environment(database, hash);
+  add_dispersions(database, hash);
+  return hash.finish();
+}
+
+void write_table_digest(const Database& database) {
+  database.prepare("UPDATE campaign SET table_digest = ?").run(compute_table_digest(database));
+}
+
+}  // namespace proofmass::coordinator::detail
