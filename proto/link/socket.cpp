@@ -15,20 +15,40 @@ namespace {
 
 // Times in ms.
 constexpr int handshake_duration_max = 5000;
-constexpr int transport_heartbeat_interval = 5000;
-constexpr int transport_silence_max = 20000;
+// A host that is gone is noticed within 20 s, whether or not something is under way to it: by
+// probes after 10 s without traffic, or because what was sent is not confirmed.
+constexpr int tcp_idle_s = 10;
+constexpr int tcp_probe_interval_s = 3;
+constexpr int tcp_probe_count = 3;
+constexpr int tcp_unconfirmed_max = 20000;
 constexpr int reconnect_interval_min = 100;
 constexpr int reconnect_interval_max = 5000;
 constexpr int linger_of_router = 1000;
 constexpr int linger_of_dealer = 2000;
 
+// Messages that wait for their reader in one connection; 0 is any number. A queue that fills makes
+// ZeroMQ 4.3.4 stop reading from the connection, and abort the process if the peer hangs up then
+// and a ZMTP heartbeat, ours or the peer's, is handled afterwards (stream_engine_base.cpp,
+// out_event(): `!_io_error`). No queue can be full that has no limit in messages. What bounds them
+// is the coordinator's limit on its memory (coordinator/net/memory_guard.hpp), in bytes and for all
+// connections together.
+constexpr int unread_count_max = 0;
+// Messages that wait to be sent to one peer. A worker may be told of many ranges and results at a
+// time; whoever does not take them loses them, and the protocol repeats what matters.
+constexpr int unsent_count_max = 1000;
+
 void limit(zmq::socket_t& socket, std::size_t message_size, int linger) {
   socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(message_size));
+  socket.set(zmq::sockopt::rcvhwm, unread_count_max);
+  socket.set(zmq::sockopt::sndhwm, unsent_count_max);
   socket.set(zmq::sockopt::linger, linger);
   socket.set(zmq::sockopt::handshake_ivl, handshake_duration_max);
-  socket.set(zmq::sockopt::heartbeat_ivl, transport_heartbeat_interval);
-  socket.set(zmq::sockopt::heartbeat_timeout, transport_silence_max);
+  // ZMTP's heartbeats stay off, for the same reason: the protocol has its own.
   socket.set(zmq::sockopt::tcp_keepalive, 1);
+  socket.set(zmq::sockopt::tcp_keepalive_idle, tcp_idle_s);
+  socket.set(zmq::sockopt::tcp_keepalive_intvl, tcp_probe_interval_s);
+  socket.set(zmq::sockopt::tcp_keepalive_cnt, tcp_probe_count);
+  socket.set(zmq::sockopt::tcp_maxrt, tcp_unconfirmed_max);
 }
 
 /// Campaigns come in by the clients' door, and go out to workers.

@@ -14,8 +14,10 @@ class socket_t;
 namespace proofmass::wire {
 
 // Sockets with every option set that the protocol relies on: limits on the size of messages and on
-// the time for a handshake, dead connections noticed, nothing queued for peers that are not there.
-// The sender of a message never waits: send with zmq::send_flags::dontwait.
+// the time for a handshake, dead hosts noticed within 20 s, nothing queued for peers that are not
+// there. The sender of a message never waits: send with zmq::send_flags::dontwait. The number of
+// messages that wait to be received has no limit: a process that others can reach must watch its
+// memory.
 
 /// A ROUTER, bound. With keys, an Authenticator must be bound in the same context before: whoever
 /// comes earlier is refused.
