@@ -1,3 +1,4 @@
+#include <cstdint>
 #include <map>
 #include <string>
 
@@ -11,6 +12,8 @@ using namespace proofmass::coordinator;
 namespace wire = proofmass::wire;
 
 constexpr double drain_time_s_max = 366.0 * 86400.0;
+constexpr std::uint64_t memory_mib_min = 64;
+constexpr std::uint64_t memory_mib_max = std::uint64_t{1} << 24;
 
 void add_addresses(CLI::App& app, ServeOptions& options) {
   app.add_option("--bind", options.endpoint,
@@ -35,6 +38,12 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
   app.add_option("--drain-time", options.drain_time_s,
                  "Seconds that workers have after SIGTERM to\ndeliver what they hold")
       ->check(wire::in_range(0.0, drain_time_s_max))
+      ->capture_default_str();
+  app.add_option(
+         "--memory-max", options.memory_mib_max,
+         "MiB of memory; before it has more it closes\nall connections, and peers connect anew")
+      ->check(wire::in_range(memory_mib_min, memory_mib_max))
+      ->envname("PROOFMASS_MEMORY_MAX")
       ->capture_default_str();
   static const std::map<std::string, wire::LogFormat> formats{{"json", wire::LogFormat::json},
                                                               {"text", wire::LogFormat::text}};

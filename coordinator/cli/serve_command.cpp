@@ -118,6 +118,7 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
   config.end = options.end;
   config.drain_max =
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(options.drain_time_s));
+  config.memory_size_max = options.memory_mib_max << 20;
   config.files = &folder;
   config.version = PROOFMASS_VERSION;
   config.dispatch.reference_digest = reference_digest(best_instruction_set());

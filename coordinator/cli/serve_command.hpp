@@ -20,6 +20,7 @@ struct ServeOptions {
   bool is_plain_waived = false;
   ServiceEnd end = ServiceEnd::never;
   double drain_time_s = 120.0;  ///< ≥ 0.
+  std::uint64_t memory_mib_max = 2048;  ///< ≥ 64; of the process.
   wire::LogFormat log_format = wire::LogFormat::text;
   std::string faults;       ///< As FaultPlan::parse() reads them.
   double time_scale = 1.0;  ///< > 0; of all that is waited for. Below 1 in tests of this program.

@@ -12,7 +12,6 @@
 #include <zmq.hpp>
 
 #include "coordinator/net/allow_list.hpp"
-#include "coordinator/net/handshake_watch.hpp"
 #include "coordinator/net/refusal_log.hpp"
 #include "core/error.hpp"
 
@@ -86,8 +85,7 @@ class Authenticator::Parts {
  public:
   Parts(zmq::context_t& context, const std::filesystem::path& directory,
         std::function<void(Event)> log)
-      : context_(context),
-        log_(std::move(log)),
+      : log_(std::move(log)),
         refusals_(log_),
         workers_(directory / wire::authorized_workers_name),
         clients_(directory / wire::authorized_clients_name),
@@ -101,12 +99,12 @@ class Authenticator::Parts {
 
   [[nodiscard]] void* handle() { return socket_.handle(); }
 
-  void watch(Domain domain, void* router) {
-    watches_.push_back(std::make_unique<HandshakeWatch>(context_, router, domain, refusals_));
+  void watch(Domain domain, HandshakeWatch::EventSource next_event) {
+    watches_.emplace_back(std::move(next_event), domain, refusals_);
   }
 
   void serve(TimePoint now) {
-    for (const auto& watch : watches_) watch->update(now);
+    for (HandshakeWatch& watch : watches_) watch.update(now);
     for (int i = 0; i < requests_per_turn_max; ++i) {
       const std::vector<std::string> frames = receive_frames(socket_);
       if (frames.empty()) return;
@@ -179,13 +177,12 @@ class Authenticator::Parts {
           .text = fmt::format("{}; the list before it stands", *what_is_wrong)});
   }
 
-  zmq::context_t& context_;
   std::function<void(Event)> log_;
   RefusalLog refusals_;
   AllowList workers_;
   AllowList clients_;
   zmq::socket_t socket_;
-  std::vector<std::unique_ptr<HandshakeWatch>> watches_;
+  std::vector<HandshakeWatch> watches_;
 };
 
 Authenticator::Authenticator(zmq::context_t& context, const std::filesystem::path& directory,
@@ -195,7 +192,9 @@ Authenticator::Authenticator(zmq::context_t& context, const std::filesystem::pat
 Authenticator::~Authenticator() = default;
 
 void* Authenticator::handle() const { return parts_->handle(); }
-void Authenticator::watch(Domain domain, void* router) { parts_->watch(domain, router); }
+void Authenticator::watch(Domain domain, HandshakeWatch::EventSource next_event) {
+  parts_->watch(domain, std::move(next_event));
+}
 void Authenticator::serve(TimePoint now) { parts_->serve(now); }
 
 bool Authenticator::is_allowed(Domain domain, std::string_view public_key, TimePoint now) {

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "coordinator/dispatch/outbox.hpp"
+#include "coordinator/net/handshake_watch.hpp"
 #include "proto/link/security.hpp"
 
 namespace zmq {
@@ -41,10 +42,10 @@ class Authenticator {
   /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t; then call serve().
   [[nodiscard]] void* handle() const;
 
-  /// Logs peers that do not get as far as showing a key to this socket.
+  /// Logs peers that do not get as far as showing a key to a socket.
   ///
-  /// @param router  Handle of a ROUTER of the same context, which outlives this object.
-  void watch(wire::Domain domain, void* router);
+  /// @param next_event  Gives the next failed handshake of a ROUTER of the same context, if any.
+  void watch(wire::Domain domain, HandshakeWatch::EventSource next_event);
 
   /// Answers all handshakes that wait; never waits itself.
   void serve(TimePoint now);

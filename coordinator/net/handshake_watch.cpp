@@ -6,13 +6,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "proto/link/socket_events.hpp"
-
 namespace proofmass::coordinator {
 namespace {
-
-constexpr int watched_events =
-    ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL;
 
 std::string_view protocol_reason(std::uint32_t error) {
   switch (error) {
@@ -36,34 +31,16 @@ std::string_view reason_of(const wire::SocketEvent& event) {
 
 }  // namespace
 
-class HandshakeWatch::Parts {
- public:
-  Parts(zmq::context_t& context, void* router, wire::Domain domain, RefusalLog& log)
-      : events_(context, router, watched_events), domain_(domain), log_(log) {}
+const int failed_handshakes =
+    ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL;
 
-  void update(TimePoint now) {
-    while (const auto event = events_.take()) {
-      if ((event->kind & watched_events) == 0) continue;  // The monitor's own end.
-      log_.refused({.domain = to_text(domain_),
-                    .address = {},
-                    .public_key = {},
-                    .reason = reason_of(*event)},
-                   now);
-    }
+void HandshakeWatch::update(TimePoint now) {
+  while (const auto event = next_event_()) {
+    if ((event->kind & failed_handshakes) == 0) continue;
+    log_.refused(
+        {.domain = to_text(domain_), .address = {}, .public_key = {}, .reason = reason_of(*event)},
+        now);
   }
-
- private:
-  wire::SocketEvents events_;
-  wire::Domain domain_;
-  RefusalLog& log_;
-};
-
-HandshakeWatch::HandshakeWatch(zmq::context_t& context, void* router, wire::Domain domain,
-                               RefusalLog& log)
-    : parts_(std::make_unique<Parts>(context, router, domain, log)) {}
-
-HandshakeWatch::~HandshakeWatch() = default;
-
-void HandshakeWatch::update(TimePoint now) { parts_->update(now); }
+}
 
 }  // namespace proofmass::coordinator

@@ -2,16 +2,26 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cerrno>
+#include <chrono>
+#include <cstddef>
 #include <map>
+#include <utility>
 #include <vector>
 #include <zmq.hpp>
 
+#include "coordinator/net/handshake_watch.hpp"
 #include "core/error.hpp"
 #include "proto/link/socket.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+// Enough to say that they are too many.
+constexpr std::size_t frames_max = 16;
+// The library's thread closes an address as soon as it gets to it.
+constexpr std::chrono::seconds unbind_time_max(2);
 
 /// A property of a message's connection; empty if there is none.
 std::string property_of(zmq::message_t& message, const char* name) {
@@ -37,15 +47,25 @@ Incoming view_of(const Received& received) {
 
 class RouterSocket::Parts {
  public:
-  Parts(zmq::socket_t socket, const std::optional<wire::FaultPlan>& faults)
-      : socket_(std::move(socket)) {
+  Parts(zmq::context_t& context, std::string_view option, const std::string& endpoint,
+        const wire::ServerSecurity& security, const std::optional<wire::FaultPlan>& faults)
+      : context_(context), option_(option), security_(security) {
+    bind(endpoint);
+    endpoint_ = socket_.get(zmq::sockopt::last_endpoint);
     if (!faults) return;
     faults_.emplace(Faults{{*faults, wire::FaultyLink::Direction::sending},
                            {*faults, wire::FaultyLink::Direction::receiving},
                            {}});
   }
 
-  [[nodiscard]] zmq::socket_t& socket() { return socket_; }
+  [[nodiscard]] std::unique_lock<std::mutex> hold() { return std::unique_lock(mutex_); }
+  [[nodiscard]] void* handle() { return socket_.handle(); }
+  [[nodiscard]] const std::string& endpoint() const { return endpoint_; }
+
+  [[nodiscard]] std::optional<wire::SocketEvent> take_event() {
+    const std::lock_guard lock(mutex_);
+    return events_ == nullptr ? std::nullopt : events_->take();
+  }
 
   void receive(int count_max, TimePoint now, const std::function<void(const Incoming&)>& handle) {
     for (int i = 0; i < count_max; ++i) {
@@ -67,6 +87,35 @@ class RouterSocket::Parts {
     return true;
   }
 
+  void close() {
+    const std::lock_guard lock(mutex_);
+    if (!socket_) return;
+    try {
+      // Otherwise the address would be in use until the library has ended all connections.
+      socket_.unbind(endpoint_);
+      wait_for_unbound();
+      socket_.set(zmq::sockopt::linger, 0);
+    } catch (const zmq::error_t&) {
+      // It is closed anyway; open() says whether the address can be had.
+    }
+    events_.reset();
+    socket_.close();
+  }
+
+  [[nodiscard]] bool open() {
+    const std::lock_guard lock(mutex_);
+    if (socket_) return true;
+    try {
+      bind(endpoint_);
+      return true;
+    } catch (const Error&) {
+    } catch (const zmq::error_t&) {  // No descriptor left, for one.
+    }
+    events_.reset();
+    socket_.close();
+    return false;
+  }
+
  private:
   struct Faults {
     wire::FaultyLink sending;
@@ -74,14 +123,33 @@ class RouterSocket::Parts {
     std::map<std::string, Address> addresses;  ///< Of those whose messages are delayed.
   };
 
+  void bind(const std::string& endpoint) {
+    socket_ = wire::make_router(context_, option_, endpoint, security_);
+    const int kinds = ZMQ_EVENT_CLOSED | (security_.keys ? failed_handshakes : 0);
+    events_ = std::make_unique<wire::SocketEvents>(context_, socket_.handle(), kinds);
+  }
+
+  void wait_for_unbound() {
+    const auto deadline = std::chrono::steady_clock::now() + unbind_time_max;
+    while (std::chrono::steady_clock::now() < deadline) {
+      while (const auto event = events_->take()) {
+        if (event->kind == ZMQ_EVENT_CLOSED) return;
+      }
+      std::array<zmq::pollitem_t, 1> item{{{events_->handle(), 0, ZMQ_POLLIN, 0}}};
+      zmq::poll(item, unbind_time_max / 10);
+    }
+  }
+
   std::optional<Received> next() {
+    const std::lock_guard lock(mutex_);
     zmq::message_t routing_id;
-    if (!socket_.recv(routing_id, zmq::recv_flags::dontwait)) return std::nullopt;
+    if (!socket_ || !socket_.recv(routing_id, zmq::recv_flags::dontwait)) return std::nullopt;
     Received received;
     received.from.routing_id = routing_id.to_string();
     while (socket_.get(zmq::sockopt::rcvmore)) {
       // The parts of a message arrive together.
-      (void)socket_.recv(received.frames.emplace_back());
+      if (received.frames.size() < frames_max) received.frames.emplace_back();
+      (void)socket_.recv(received.frames.back());
     }
     if (received.frames.empty()) return received;
     received.from.key = property_of(received.frames.front(), "User-Id");
@@ -99,6 +167,8 @@ class RouterSocket::Parts {
   }
 
   bool send_now(const std::string& routing_id, const std::string& bytes) {
+    const std::lock_guard lock(mutex_);
+    if (!socket_) return false;
     try {
       const auto flags = zmq::send_flags::dontwait | zmq::send_flags::sndmore;
       if (!socket_.send(zmq::buffer(routing_id), flags)) return false;
@@ -109,23 +179,30 @@ class RouterSocket::Parts {
     }
   }
 
+  zmq::context_t& context_;
+  std::string option_;
+  wire::ServerSecurity security_;
+  std::string endpoint_;
+  std::mutex mutex_;  ///< For the socket and its events.
   zmq::socket_t socket_;
+  std::unique_ptr<wire::SocketEvents> events_;  ///< Of the socket: gone before it.
   std::optional<Faults> faults_;
 };
 
 RouterSocket::RouterSocket(zmq::context_t& context, std::string_view option,
                            const std::string& endpoint, const wire::ServerSecurity& security,
                            const std::optional<wire::FaultPlan>& faults)
-    : parts_(std::make_unique<Parts>(wire::make_router(context, option, endpoint, security),
-                                     faults)) {}
+    : parts_(std::make_unique<Parts>(context, option, endpoint, security, faults)) {}
 
 RouterSocket::~RouterSocket() = default;
 
-void* RouterSocket::handle() const { return parts_->socket().handle(); }
+std::unique_lock<std::mutex> RouterSocket::hold() const { return parts_->hold(); }
 
-std::string RouterSocket::endpoint() const {
-  return parts_->socket().get(zmq::sockopt::last_endpoint);
-}
+void* RouterSocket::handle() const { return parts_->handle(); }
+
+const std::string& RouterSocket::endpoint() const { return parts_->endpoint(); }
+
+std::optional<wire::SocketEvent> RouterSocket::take_event() { return parts_->take_event(); }
 
 void RouterSocket::receive(int count_max, TimePoint now,
                            const std::function<void(const Incoming&)>& handle) {
@@ -135,5 +212,9 @@ void RouterSocket::receive(int count_max, TimePoint now,
 bool RouterSocket::send(const std::string& routing_id, const std::string& bytes, TimePoint now) {
   return parts_->send(routing_id, bytes, now);
 }
+
+void RouterSocket::close() { parts_->close(); }
+
+bool RouterSocket::open() { return parts_->open(); }
 
 }  // namespace proofmass::coordinator

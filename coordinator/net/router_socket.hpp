@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 #include "coordinator/net/worker_desk.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/security.hpp"
+#include "proto/link/socket_events.hpp"
 
 namespace zmq {
 class context_t;
@@ -18,6 +20,9 @@ class context_t;
 namespace proofmass::coordinator {
 
 /// The socket at one of a coordinator's doors. It never waits.
+///
+/// One thread uses it; another may close and open it meanwhile, to free what it holds. Peers then
+/// connect anew to the same address, and what was under way is lost.
 class RouterSocket {
  public:
   /// Binds the socket.
@@ -31,17 +36,28 @@ class RouterSocket {
   RouterSocket(const RouterSocket&) = delete;
   RouterSocket& operator=(const RouterSocket&) = delete;
 
-  /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t.
+  /// Keeps the socket from being closed while it is polled.
+  [[nodiscard]] std::unique_lock<std::mutex> hold() const;
+  /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t, while it is held; null if it is closed.
   [[nodiscard]] void* handle() const;
 
   /// The address to connect to, with the port that was chosen.
-  [[nodiscard]] std::string endpoint() const;
+  [[nodiscard]] const std::string& endpoint() const;
+
+  /// The next handshake that failed, if there are keys.
+  [[nodiscard]] std::optional<wire::SocketEvent> take_event();
 
   /// Hands the next messages to `handle`, as many as there are and at most `count_max`.
   void receive(int count_max, TimePoint now, const std::function<void(const Incoming&)>& handle);
 
-  /// False if the peer is gone or its queue is full.
+  /// False if the peer is gone or its queue is full, or the socket is closed.
   bool send(const std::string& routing_id, const std::string& bytes, TimePoint now);
+
+  /// Ends all connections and drops what they hold, soon; from any thread.
+  void close();
+  /// Binds a closed socket to the address that it had; from any thread. False if that is not
+  /// possible now.
+  [[nodiscard]] bool open();
 
  private:
   class Parts;

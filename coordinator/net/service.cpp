@@ -12,21 +12,17 @@
 #include <set>
 #include <utility>
 #include <variant>
-#include <zmq.hpp>
 
 #include "coordinator/dispatch/dispatch.hpp"
-#include "coordinator/net/authenticator.hpp"
 #include "coordinator/net/campaign_desk.hpp"
 #include "coordinator/net/client_desk.hpp"
 #include "coordinator/net/descriptor_limit.hpp"
-#include "coordinator/net/router_socket.hpp"
+#include "coordinator/net/service_sockets.hpp"
 #include "coordinator/net/waking_time.hpp"
 #include "coordinator/net/worker_desk.hpp"
 #include "coordinator/net/worker_history.hpp"
 #include "core/error.hpp"
-#include "proto/link/key_files.hpp"
-#include "proto/link/wake.hpp"
-#include "proto/wire/endpoint.hpp"
+#include "proto/link/kill_point.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
@@ -60,30 +56,6 @@ CoordinatorStart coordinator_start(wire::Epoch epoch, const std::string& version
           .version = version};
 }
 
-wire::ServerSecurity security_of(const ServiceConfig& config, wire::Domain domain) {
-  if (config.keys) return wire::read_server_security(*config.keys, domain);
-  return {.domain = domain, .keys = std::nullopt};
-}
-
-/// Socket of the clients, if there are any.
-std::unique_ptr<RouterSocket> client_socket(zmq::context_t& context, const ServiceConfig& config) {
-  if (!config.clients_endpoint) return nullptr;
-  return std::make_unique<RouterSocket>(context, "bind-clients", *config.clients_endpoint,
-                                        security_of(config, wire::Domain::clients), std::nullopt);
-}
-
-ServiceConfig checked(const ServiceConfig& config) {
-  const auto protection = config.keys              ? wire::Protection::keys
-                          : config.is_plain_waived ? wire::Protection::waived
-                                                   : wire::Protection::none;
-  wire::check_endpoint("bind", config.workers_endpoint, wire::EndpointUse::bind, protection);
-  if (config.clients_endpoint) {
-    wire::check_endpoint("bind-clients", *config.clients_endpoint, wire::EndpointUse::bind,
-                         protection);
-  }
-  return config;
-}
-
 std::set<SessionId> attached_sessions(const std::vector<ServedCampaign>& campaigns) {
   std::set<SessionId> attached;
   for (const ServedCampaign& campaign : campaigns) {
@@ -99,32 +71,20 @@ class Service::Parts final : public Outbox {
  public:
   Parts(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log)
       : Parts(attached_sessions(campaigns), config, std::move(log)) {
-    if (authenticator_ != nullptr) {
-      authenticator_->watch(wire::Domain::workers, worker_socket_.handle());
-      if (client_socket_ != nullptr) {
-        authenticator_->watch(wire::Domain::clients, client_socket_->handle());
-      }
-    }
     for (ServedCampaign& campaign : campaigns) {
       desk_.serve(std::move(campaign), config_.given_up, now(), *this);
     }
   }
 
-  // The authenticator watches the sockets, and must be there before they are bound.
-  ~Parts() override { authenticator_.reset(); }
-
   /// For all that is measured here and in the dispatch.
   [[nodiscard]] TimePoint now() { return time_.at(std::chrono::steady_clock::now()); }
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const CampaignDesk& desk() const { return desk_; }
-  [[nodiscard]] std::string workers_endpoint() const { return worker_socket_.endpoint(); }
-  [[nodiscard]] std::string clients_endpoint() const {
-    return client_socket_ == nullptr ? "" : client_socket_->endpoint();
-  }
+  [[nodiscard]] const ServiceSockets& sockets() const { return sockets_; }
 
   void run(const std::atomic<StopRequest>& stop, const std::function<void()>& on_turn) {
     while (!is_over(stop)) {
-      wait();
+      sockets_.wait(config_.faults ? tick_interval / 10 : tick_interval);
       turn();
       on_turn();
     }
@@ -177,32 +137,22 @@ class Service::Parts final : public Outbox {
 
  private:
   Parts(std::set<SessionId> attached, const ServiceConfig& config, Log log)
-      : config_(checked(config)),
+      : config_(config),
         log_(std::move(log)),
         epoch_(random_epoch()),
-        authenticator_(make_authenticator()),
-        worker_socket_(context_, "bind", config.workers_endpoint,
-                       security_of(config, wire::Domain::workers), config.faults),
-        client_socket_(client_socket(context_, config)),
+        sockets_(config, log_),
         state_(initial_state(config.dispatch, attached, now())),
-        writer_([this] { wake_.notify(); }, config.writer),
+        writer_([this] { sockets_.wake(); }, config.writer),
         history_(state_, writer_, std::move(attached)),
         worker_desk_(state_, epoch_, surroundings()),
         desk_(state_, writer_, config.files, coordinator_start(epoch_, config.version), now()) {
     raise_descriptor_limit();
   }
 
-  /// Before any socket is bound, as it must be.
-  std::unique_ptr<Authenticator> make_authenticator() {
-    if (!config_.keys) return nullptr;
-    return std::make_unique<Authenticator>(context_, *config_.keys,
-                                           [this](const Event& event) { log_(event); });
-  }
-
   WorkerDesk::Surroundings surroundings() {
     return {.transmit =
                 [this](const std::string& routing_id, const std::string& bytes) {
-                  return worker_socket_.send(routing_id, bytes, now());
+                  return sockets_.send_to_worker(routing_id, bytes, now());
                 },
             .is_allowed =
                 [this](const std::string& key, TimePoint time) {
@@ -213,7 +163,8 @@ class Service::Parts final : public Outbox {
   }
 
   [[nodiscard]] bool is_allowed(wire::Domain domain, const std::string& key, TimePoint time) {
-    return authenticator_ == nullptr || authenticator_->is_allowed(domain, key, time);
+    Authenticator* const authenticator = sockets_.authenticator();
+    return authenticator == nullptr || authenticator->is_allowed(domain, key, time);
   }
 
   Delivery delivery_of(Arrival arrival) {
@@ -243,23 +194,8 @@ class Service::Parts final : public Outbox {
     return told_progress_at_ && now() - *told_progress_at_ < follow_up_max;
   }
 
-  void wait() {
-    std::array<zmq::pollitem_t, 4> items{};
-    std::size_t count = 0;
-    items[count++] = {nullptr, wake_.descriptor(), ZMQ_POLLIN, 0};
-    items[count++] = {worker_socket_.handle(), 0, ZMQ_POLLIN, 0};
-    if (client_socket_ != nullptr) items[count++] = {client_socket_->handle(), 0, ZMQ_POLLIN, 0};
-    if (authenticator_ != nullptr) items[count++] = {authenticator_->handle(), 0, ZMQ_POLLIN, 0};
-    try {
-      zmq::poll(items.data(), count, config_.faults ? tick_interval / 10 : tick_interval);
-    } catch (const zmq::error_t& error) {
-      if (error.num() != EINTR) throw Error(fmt::format("socket: {}", error.what()));
-    }
-  }
-
   void turn() {
-    (void)wake_.take();
-    if (authenticator_ != nullptr) authenticator_->serve(now());
+    sockets_.serve(now());
     receive_from_workers();
     for (const Completion& completion : writer_.take_completions()) {
       std::visit([this](const auto& content) { complete(content); }, completion);
@@ -286,19 +222,19 @@ class Service::Parts final : public Outbox {
   }
 
   void receive_from_workers() {
-    worker_socket_.receive(worker_messages_per_turn_max, now(), [this](const Incoming& message) {
-      worker_desk_.receive(message, now(), *this);
-    });
+    sockets_.receive_from_workers(
+        worker_messages_per_turn_max, now(),
+        [this](const Incoming& message) { worker_desk_.receive(message, now(), *this); });
   }
 
   void receive_from_clients() {
-    if (client_socket_ == nullptr) return;
-    client_socket_->receive(client_messages_per_turn_max, now(), [this](const Incoming& message) {
+    const auto handle = [this](const Incoming& message) {
       const std::string reply = answer_client(
           message.frames,
           [&](const wire::ClientRequest& request) { return answer(request, message.from); });
-      client_socket_->send(message.from.routing_id, reply, now());
-    });
+      (void)sockets_.send_to_client(message.from.routing_id, reply, now());
+    };
+    sockets_.receive_from_clients(client_messages_per_turn_max, now(), handle);
   }
 
   wire::ClientReply answer(const wire::ClientRequest& request, const Address& from) {
@@ -356,11 +292,7 @@ class Service::Parts final : public Outbox {
   ServiceConfig config_;
   Log log_;
   wire::Epoch epoch_;
-  zmq::context_t context_;
-  wire::Wake wake_;
-  std::unique_ptr<Authenticator> authenticator_;
-  RouterSocket worker_socket_;
-  std::unique_ptr<RouterSocket> client_socket_;
+  ServiceSockets sockets_;
   State state_;
   StoreWriter writer_;
   WorkerHistory history_;
@@ -378,9 +310,9 @@ Service::Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& con
 
 Service::~Service() = default;
 
-std::string Service::workers_endpoint() const { return parts_->workers_endpoint(); }
+std::string Service::workers_endpoint() const { return parts_->sockets().workers_endpoint(); }
 
-std::string Service::clients_endpoint() const { return parts_->clients_endpoint(); }
+std::string Service::clients_endpoint() const { return parts_->sockets().clients_endpoint(); }
 
 void Service::run(const std::atomic<StopRequest>& stop, const std::function<void()>& on_turn) {
   parts_->run(stop, on_turn);

@@ -44,6 +44,9 @@ struct ServiceConfig {
   ServiceEnd end = ServiceEnd::never;
   GivenUpRuns given_up = GivenUpRuns::keep;
   Duration drain_max = std::chrono::seconds(120);  ///< Then a drain becomes a stop.
+  /// Of the process, bytes. Sockets are closed and bound again before it is reached; nothing if all
+  /// that can connect is trusted.
+  std::optional<std::size_t> memory_size_max;
   CampaignFiles* files = nullptr;  ///< Outlives the service; null if nothing can be submitted.
   std::string version;             ///< Of the program, for people.
   DispatchConfig dispatch;

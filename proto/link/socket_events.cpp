@@ -18,6 +18,9 @@ class SocketEvents::Parts {
     if (zmq_socket_monitor(socket_, address.c_str(), kinds) != 0) {
       throw Error(fmt::format("zmq_socket_monitor: {}", zmq_strerror(zmq_errno())));
     }
+    // Otherwise the library's own thread would wait for a reader that is busy, and all connections
+    // with it.
+    events_.set(zmq::sockopt::rcvhwm, 0);
     events_.connect(address);
   }
   ~Parts() { zmq_socket_monitor(socket_, nullptr, 0); }

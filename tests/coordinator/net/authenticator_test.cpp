@@ -47,7 +47,10 @@ class AuthenticatorTest : public ::testing::Test {
     for (const Domain domain : {Domain::workers, Domain::clients}) {
       routers_.emplace(domain, wire::make_router(context_, "bind", "tcp://127.0.0.1:*",
                                                  {.domain = domain, .keys = coordinator_}));
-      authenticator_->watch(domain, routers_.at(domain).handle());
+      events_of_routers_.push_back(std::make_unique<wire::SocketEvents>(
+          context_, routers_.at(domain).handle(), failed_handshakes));
+      authenticator_->watch(domain,
+                            [source = events_of_routers_.back().get()] { return source->take(); });
     }
   }
 
@@ -119,6 +122,7 @@ class AuthenticatorTest : public ::testing::Test {
   zmq::context_t context_;
   std::unique_ptr<Authenticator> authenticator_;
   std::map<Domain, zmq::socket_t> routers_;
+  std::vector<std::unique_ptr<wire::SocketEvents>> events_of_routers_;
 };
 
 std::string key_refusal(const KeyPair& keys, const std::string& endpoint, const std::string& role) {

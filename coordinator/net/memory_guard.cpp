@@ -1,0 +1,166 @@
+#include "coordinator/net/memory_guard.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <malloc.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <condition_variable>
+#include <cstring>
+#include <mutex>
+#include <string_view>
+#include <thread>
+#include <utility>
+
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// One connection on the same machine can bring in about a gigabyte a second.
+constexpr std::chrono::milliseconds look_interval(25);
+// ZeroMQ frees what a closed socket held in threads of its own: it is done when nothing more comes.
+constexpr std::chrono::milliseconds settled_after(100);
+constexpr std::chrono::seconds settle_time_max(3);
+
+std::size_t mebibytes(std::size_t size) { return size >> 20; }
+
+}  // namespace
+
+bool MemoryBound::is_exceeded(std::size_t size) {
+  if (size <= alarm_size_) {
+    limit_ = alarm_size_;
+    is_high_ = false;
+  }
+  return size > limit_;
+}
+
+bool MemoryBound::note_reset(std::size_t size) {
+  if (size <= alarm_size_) return false;
+  limit_ = size + size / 4;
+  return !std::exchange(is_high_, true);
+}
+
+ResidentMemory::ResidentMemory() : file_(open("/proc/self/statm", O_RDONLY | O_CLOEXEC)) {
+  if (file_ < 0) throw Error(fmt::format("/proc/self/statm: {}", std::strerror(errno)));
+}
+
+ResidentMemory::~ResidentMemory() { close(file_); }
+
+std::size_t ResidentMemory::size() const {
+  // In pages: the size of the address space, what of it is resident.
+  std::array<char, 128> text{};
+  const ssize_t length = pread(file_, text.data(), text.size(), 0);
+  PROOFMASS_EXPECT(length > 0);
+  std::array<std::size_t, 2> pages{};
+  const char* position = text.data();
+  for (std::size_t& number : pages) {
+    const auto end = std::from_chars(position, text.data() + length, number);
+    PROOFMASS_EXPECT(end.ec == std::errc());
+    position = end.ptr + 1;
+  }
+  return pages[1] * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
+
+class MemoryGuard::Parts {
+ public:
+  Parts(std::size_t size_max, Actions actions)
+      : bound_(size_max),
+        size_max_(size_max),
+        actions_(std::move(actions)),
+        thread_([this] { watch(); }) {}
+
+  ~Parts() {
+    {
+      const std::lock_guard lock(mutex_);
+      is_stopping_ = true;
+    }
+    stopping_.notify_all();
+    thread_.join();
+  }
+
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
+
+ private:
+  void watch() {
+    while (!is_stopping_after(look_interval)) {
+      if (!is_open_) open();
+      const std::size_t size = memory_.size();
+      if (bound_.is_exceeded(size)) reset(size);
+    }
+  }
+
+  void reset(std::size_t size_before) {
+    actions_.close();
+    const std::size_t size = settled_size();
+    is_open_ = actions_.open();
+    const bool is_news = bound_.note_reset(size);
+    note("sockets_reset",
+         fmt::format("resident_mib={} left_mib={} memory_max_mib={} (peers connect anew)",
+                     mebibytes(size_before), mebibytes(size), mebibytes(size_max_)));
+    if (is_news) {
+      note("memory_high",
+           fmt::format("resident_mib={} memory_max_mib={} (not held by sockets; next reset at {} "
+                       "MiB)",
+                       mebibytes(size), mebibytes(size_max_), mebibytes(bound_.limit())));
+    }
+    if (!is_open_) note("sockets_unbound", "an address is taken; tried again until it is free");
+  }
+
+  void open() {
+    is_open_ = actions_.open();
+    if (is_open_) note("sockets_bound", "");
+  }
+
+  /// Size of the process once what the sockets held is free. Nothing comes in meanwhile.
+  std::size_t settled_size() {
+    const auto begin = Clock::now();
+    auto shrunk_at = begin;
+    std::size_t smallest = memory_.size();
+    for (;;) {
+      malloc_trim(0);
+      const std::size_t size = memory_.size();
+      const auto now = Clock::now();
+      if (size < smallest) shrunk_at = now;
+      smallest = std::min(smallest, size);
+      const bool is_settled = now - shrunk_at > settled_after || now - begin > settle_time_max;
+      if (is_settled || is_stopping_after(look_interval)) return size;
+    }
+  }
+
+  void note(std::string_view kind, std::string text) {
+    actions_.note({.severity = kind == "sockets_unbound" ? Severity::error : Severity::warning,
+                   .kind = kind,
+                   .text = std::move(text)});
+  }
+
+  bool is_stopping_after(Clock::duration duration) {
+    std::unique_lock lock(mutex_);
+    return stopping_.wait_for(lock, duration, [this] { return is_stopping_; });
+  }
+
+  ResidentMemory memory_;
+  MemoryBound bound_;
+  std::size_t size_max_;
+  Actions actions_;
+  bool is_open_ = true;
+  std::mutex mutex_;
+  std::condition_variable stopping_;
+  bool is_stopping_ = false;
+  std::thread thread_;
+};
+
+MemoryGuard::MemoryGuard(std::size_t size_max, Actions actions)
+    : parts_(std::make_unique<Parts>(size_max, std::move(actions))) {}
+
+MemoryGuard::~MemoryGuard() = default;
+
+}  // namespace proofmass::coordinator

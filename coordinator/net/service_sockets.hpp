@@ -1,0 +1,61 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "coordinator/net/authenticator.hpp"
+#include "coordinator/net/service.hpp"
+#include "coordinator/net/worker_desk.hpp"
+
+namespace proofmass::coordinator {
+
+/// The sockets of a service: one for workers, perhaps one for clients, and one at which the library
+/// asks who may connect. For one thread.
+///
+/// A MemoryGuard watches the memory of the process from a thread of its own. It closes the sockets
+/// and binds them again to free what they hold.
+class ServiceSockets {
+ public:
+  using Handle = std::function<void(const Incoming&)>;
+
+  /// Binds the sockets.
+  ///
+  /// @param log  Refused peers, lists that cannot be read, sockets that were closed; called by
+  ///             serve() and is_allowed() of the authenticator only.
+  /// @throws InvalidArgument if an endpoint is not acceptable; Error if it cannot be bound or keys
+  ///         cannot be read.
+  ServiceSockets(const ServiceConfig& config, Log log);
+  ~ServiceSockets();
+  ServiceSockets(const ServiceSockets&) = delete;
+  ServiceSockets& operator=(const ServiceSockets&) = delete;
+
+  /// The addresses to connect to, with the ports that were chosen.
+  [[nodiscard]] std::string workers_endpoint() const;
+  [[nodiscard]] std::string clients_endpoint() const;  ///< Empty if there are no clients.
+
+  /// Who may connect; null if there are no keys.
+  [[nodiscard]] Authenticator* authenticator();
+
+  /// Until a message, a handshake or a wake() is there, or the time is over.
+  void wait(std::chrono::milliseconds duration_max);
+  /// Ends a wait(); from any thread.
+  void wake() const;
+  /// Answers handshakes and logs what happened to the sockets. Never waits.
+  void serve(TimePoint now);
+
+  /// Hands the next messages to `handle`, as many as there are and at most `count_max`.
+  void receive_from_workers(int count_max, TimePoint now, const Handle& handle);
+  void receive_from_clients(int count_max, TimePoint now, const Handle& handle);
+
+  /// False if the peer is gone, its queue is full, or the sockets are closed at the moment.
+  bool send_to_worker(const std::string& routing_id, const std::string& bytes, TimePoint now);
+  bool send_to_client(const std::string& routing_id, const std::string& bytes, TimePoint now);
+
+ private:
+  class Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace proofmass::coordinator
