@@ -38,21 +38,6 @@ std::string_view name_of(ValueKind kind) {
   return {};
 }
 
-std::string_view name_of(RunStatus status) {
-  switch (status) {
-    case RunStatus::completed:
-      return "completed";
-    case RunStatus::not_converged:
-      return "not_converged";
-    case RunStatus::not_finite:
-      return "not_finite";
-    case RunStatus::no_draw:
-      return "no_draw";
-  }
-  PROOFMASS_EXPECT(false);
-  return {};
-}
-
 std::optional<double> ValueColumn::value_in(const RunResult& result) const {
   const bool is_known = kind == ValueKind::truth ? result.has_truth() : result.has_estimate();
   if (!is_known) return std::nullopt;

@@ -18,9 +18,6 @@ enum class ValueKind : std::uint8_t { truth, estimate, error };
 /// `truth`, `estimate`, `error`.
 [[nodiscard]] std::string_view name_of(ValueKind kind);
 
-/// `completed`, `not_converged`, `not_finite`, `no_draw`.
-[[nodiscard]] std::string_view name_of(RunStatus status);
-
 /// True if both are the same to the last bit; zeros have no sign, as in a campaign file.
 [[nodiscard]] inline bool have_same_bits(double a, double b) {
   return std::bit_cast<std::uint64_t>(a + 0.0) == std::bit_cast<std::uint64_t>(b + 0.0);

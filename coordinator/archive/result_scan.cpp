@@ -10,7 +10,6 @@
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/report/digest.hpp"
-#include "core/campaign/draw.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -25,7 +24,9 @@ class Rules {
     if (result.run.value >= num_runs_) {
       violate(result.run, fmt::format("must be below num_runs = {}", num_runs_));
     }
-    check_counts(result);
+    for (const std::string& broken : broken_count_rules(result, num_rounds_max_)) {
+      violate(result.run, broken);
+    }
     for (const ValueColumn& column : value_columns()) {
       if (column.name.starts_with("error_")) continue;  // Follow from the others.
       const std::optional<double> value = column.value_in(result);
@@ -41,22 +42,6 @@ class Rules {
   }
 
  private:
-  void check_counts(const RunResult& result) {
-    const bool has_draw = result.status != RunStatus::no_draw;
-    require_between(result, "num_draws", result.num_draws, has_draw ? 1 : num_draws_max,
-                    num_draws_max);
-    const bool used_all_rounds = result.status == RunStatus::not_converged;
-    require_between(result, "num_rounds", result.num_rounds, used_all_rounds ? num_rounds_max_ : 0,
-                    has_draw ? num_rounds_max_ : 0);
-  }
-
-  void require_between(const RunResult& result, std::string_view name, std::int64_t value,
-                       std::int64_t least, std::int64_t most) {
-    if (value >= least && value <= most) return;
-    violate(result.run, fmt::format("{} = {} (must be {} to {} if {})", name, value, least, most,
-                                    name_of(result.status)));
-  }
-
   std::uint64_t num_runs_;
   std::int64_t num_rounds_max_;
   ResultScan& scan_;

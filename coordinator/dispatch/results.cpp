@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <map>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "coordinator/dispatch/dispatch.hpp"
 #include "coordinator/dispatch/leases.hpp"
@@ -98,6 +100,18 @@ bool is_foreign(const CampaignState& campaign, const wire::ResultBatch& batch) {
   });
 }
 
+/// The rule that a result of the batch breaks, as `run 7: num_draws = 0 (...)`; empty if none does.
+std::string broken_rule(const CampaignState& campaign, const wire::ResultBatch& batch) {
+  const std::int64_t num_rounds_max = campaign.definition->scenario.estimation.num_rounds_max;
+  for (const wire::ComputedRun& computed : batch.results) {
+    const std::vector<std::string> broken = broken_count_rules(computed.result, num_rounds_max);
+    if (!broken.empty()) {
+      return fmt::format("run {}: {}", computed.result.run.value, broken.front());
+    }
+  }
+  return {};
+}
+
 /// The worker and its host can compute: what they show with every result.
 void count_results(State& state, Worker& worker, CampaignId id, const wire::ResultBatch& batch) {
   Host& host = state.hosts.at(worker.host);
@@ -131,6 +145,10 @@ void on_results(State& state, WorkerId id, const wire::ResultBatch& batch, TimeP
   if (is_foreign(campaign, batch)) {
     outbox.send(id, wire::Reject{.reason = wire::RejectReason::malformed,
                                  .text = "run = beyond the campaign (must be below num_runs)"});
+    return on_gone(state, id, LossReason::protocol, now, outbox);
+  }
+  if (const std::string broken = broken_rule(campaign, batch); !broken.empty()) {
+    outbox.send(id, wire::Reject{.reason = wire::RejectReason::malformed, .text = broken});
     return on_gone(state, id, LossReason::protocol, now, outbox);
   }
   count_results(state, *worker, batch.campaign, batch);

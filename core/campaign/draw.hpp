@@ -5,16 +5,14 @@
 #include <span>
 
 #include "core/campaign/campaign.hpp"
+#include "core/campaign/run_result.hpp"
 #include "core/instrument/instrument.hpp"
 
 namespace proofmass {
 
-/// Most draws of one run; with the nominal laws three of four are accepted.
-inline constexpr std::uint32_t num_draws_max = 1000;
-
 struct AcceptedDraw {
   std::optional<Instrument> instrument;  ///< Empty if all num_draws_max were rejected.
-  std::uint32_t num_draws = 0;
+  std::uint32_t num_draws = 0;           ///< At most num_draws_max.
 };
 
 /// True if a_d11, a_d12, a_d13, a_c12 and a_c13 lie inside their bounds.

@@ -2,9 +2,42 @@
 
 #include <fmt/format.h>
 
+#include <string_view>
+
 #include "core/error.hpp"
 
 namespace proofmass {
+
+std::string_view name_of(RunStatus status) {
+  switch (status) {
+    case RunStatus::completed:
+      return "completed";
+    case RunStatus::not_converged:
+      return "not_converged";
+    case RunStatus::not_finite:
+      return "not_finite";
+    case RunStatus::no_draw:
+      return "no_draw";
+  }
+  PROOFMASS_EXPECT(false);
+  return {};
+}
+
+std::vector<std::string> broken_count_rules(const RunResult& result, std::int64_t num_rounds_max) {
+  std::vector<std::string> broken;
+  const auto require_between = [&](std::string_view name, std::int64_t value, std::int64_t least,
+                                   std::int64_t most) {
+    if (value >= least && value <= most) return;
+    broken.push_back(fmt::format("{} = {} (must be {} to {} if {})", name, value, least, most,
+                                 name_of(result.status)));
+  };
+  const bool has_draw = result.has_truth();
+  const bool used_all_rounds = result.status == RunStatus::not_converged;
+  require_between("num_draws", result.num_draws, has_draw ? 1 : num_draws_max, num_draws_max);
+  require_between("num_rounds", result.num_rounds, used_all_rounds ? num_rounds_max : 0,
+                  has_draw ? num_rounds_max : 0);
+  return broken;
+}
 
 void require_in_range(const RunResult& result) {
   const auto require = [&](std::string_view kind, const ParameterInfo& info, double value) {

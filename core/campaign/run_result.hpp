@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "core/campaign/identifiers.hpp"
 #include "core/campaign/parameter.hpp"
@@ -24,6 +27,9 @@ enum class RunStatus : std::uint8_t {
   no_draw = 4,  ///< No draw inside the acceptance bounds was found; neither truth nor estimate.
 };
 
+/// `not_converged`, for people and files.
+[[nodiscard]] std::string_view name_of(RunStatus status);
+
 /// Everything a run yields. The same bits whatever worker, thread or attempt computed it.
 struct RunResult {
   RunIndex run;
@@ -44,6 +50,16 @@ struct RunResult {
     return estimate[index(parameter)] - truth[index(parameter)];
   }
 };
+
+/// Most draws of one run; with the nominal laws three of four are accepted. Then: no_draw.
+inline constexpr std::uint32_t num_draws_max = 1000;
+
+/// The rules about its counts that a result breaks; no simulation yields a result that breaks one.
+///
+/// @param num_rounds_max  Of the scenario: EstimationConfig::num_rounds_max.
+/// @return Each as `num_draws = 0 (must be 1 to 1000 if completed)`.
+[[nodiscard]] std::vector<std::string> broken_count_rules(const RunResult& result,
+                                                          std::int64_t num_rounds_max);
 
 /// Statistics would be nonsense, or never end.
 /// @throws Error if a truth or estimate that means something is out of range.

@@ -17,6 +17,8 @@ namespace {
 constexpr std::size_t reject_text_size_max = 4096;
 constexpr double heartbeat_interval_s_max = 3600.0;
 constexpr std::uint64_t signal_max = 64;
+/// Some 30 years: the times of any number of runs can be added up.
+constexpr double time_s_max = 1e9;
 
 CampaignId checked_campaign(std::uint64_t id) { return {checked_id(id, "campaign")}; }
 
@@ -164,6 +166,11 @@ ParameterArray read_parameters(const Values& values, bool meaningful, std::strin
   return parameters;
 }
 
+double checked_time(double time_s, std::string_view field) {
+  if (checked_magnitude(time_s, field) <= time_s_max) return time_s;
+  throw ConfigError(field, fmt::format("{}", time_s), fmt::format("must be <= {}", time_s_max));
+}
+
 ComputedRun read_run(const proto::ComputedRun& message) {
   const int status = static_cast<int>(message.status());
   require_in(static_cast<std::uint64_t>(status), 1, 4, "status");
@@ -175,8 +182,8 @@ ComputedRun read_run(const proto::ComputedRun& message) {
   result.truth = read_parameters(message.truth(), result.has_truth(), "truth");
   result.estimate = read_parameters(message.estimate(), result.has_estimate(), "estimate");
   return {.result = result,
-          .compute_s = checked_magnitude(message.compute_s(), "compute_s"),
-          .elapsed_s = checked_magnitude(message.elapsed_s(), "elapsed_s")};
+          .compute_s = checked_time(message.compute_s(), "compute_s"),
+          .elapsed_s = checked_time(message.elapsed_s(), "elapsed_s")};
 }
 
 Message read(const proto::ResultBatch& message) {

@@ -174,8 +174,8 @@ struct GiveBack {
 /// A result and what it took.
 struct ComputedRun {
   RunResult result;
-  double compute_s = 0.0;  ///< Time of a thread: its share of the batch it was in; ≥ 0.
-  double elapsed_s = 0.0;  ///< From its beginning to its end: the time of that batch; ≥ 0.
+  double compute_s = 0.0;  ///< Time of a thread: its share of the batch it was in; 0 to 1e9.
+  double elapsed_s = 0.0;  ///< From its beginning to its end: the time of that batch; 0 to 1e9.
 };
 
 /// Worker → coordinator: results, repeated until acknowledged.

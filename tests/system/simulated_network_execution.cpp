@@ -120,7 +120,7 @@ PlayedExecution::Outcome PlayedExecution::advance() {
       continue;
     }
     for (const auto& [campaign, run] : batch->runs) {
-      wire::ComputedRun computed{.result = {.run = run}, .elapsed_s = 0.7};
+      wire::ComputedRun computed{.result = {.run = run, .num_draws = 1}, .elapsed_s = 0.7};
       finished_.push_back({.campaign = campaign, .computed = computed});
     }
     outcome = Outcome::finished;

@@ -105,6 +105,7 @@ class Rounds final : public Outbox {
     for (const HeldRun& held : batch) {
       wire::ComputedRun computed;
       computed.result.run = held.run;
+      computed.result.num_draws = 1;
       computed.elapsed_s = batch_time_s;
       messages[held.attempt].campaign = id_;
       messages[held.attempt].attempt = held.attempt;

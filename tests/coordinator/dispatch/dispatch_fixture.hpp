@@ -100,6 +100,10 @@ class DispatchFixture : public testing::Test {
     wire::ComputedRun result;
     result.result.run = {run};
     result.result.status = status;
+    result.result.num_draws = status == RunStatus::no_draw ? num_draws_max : 1;
+    if (status == RunStatus::not_converged) {
+      result.result.num_rounds = static_cast<std::uint32_t>(EstimationConfig{}.num_rounds_max);
+    }
     result.elapsed_s = 1000.0;
     return result;
   }

@@ -17,7 +17,7 @@ class LendingTest : public DispatchFixture {
     EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 1}))
         << "how long a run takes is not known yet";
     heartbeat(first, {held(one, {{0}, 1})}, {}, num_runs_max);
-    wire::ComputedRun result;
+    wire::ComputedRun result = computed(0);
     result.elapsed_s = run_time_s;
     on_results(state, first, {.campaign = one, .attempt = {1}, .results = {result}}, now, outbox);
     outbox.forget();

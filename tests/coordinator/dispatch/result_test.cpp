@@ -32,6 +32,19 @@ TEST_F(ResultTest, IsAcknowledgedAfterTheCommitAndNotBefore) {
   EXPECT_EQ(ack.runs, Runs{{0}});
 }
 
+// Once it was stored, the file would be called damaged for ever.
+TEST_F(ResultTest, ThatNoSimulationYieldsIsRefused) {
+  wire::ComputedRun impossible = computed(0);
+  impossible.result.num_draws = 4294967295;
+  on_results(state, first, {.campaign = one, .attempt = {1}, .results = {computed(1), impossible}},
+             now, outbox);
+  const auto reject = outbox.take_sent<wire::Reject>(first);
+  EXPECT_EQ(reject.reason, wire::RejectReason::malformed);
+  EXPECT_EQ(reject.text, "run 0: num_draws = 4294967295 (must be 1 to 1000 if completed)");
+  EXPECT_TRUE(outbox.stored().empty());
+  EXPECT_FALSE(state.workers.contains(first));
+}
+
 TEST_F(ResultTest, RepeatedBeforeTheCommitIsOneThatWaits) {
   deliver(first, one, {0});
   (void)outbox.take_sent<wire::RunLease>(first);

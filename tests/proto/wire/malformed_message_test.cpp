@@ -322,6 +322,11 @@ TEST(MalformedComputedRun, HasFiniteNumbers) {
             "compute_s = -1 (must be >= 0)");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_compute_s(nan); }),
             "compute_s = nan (must be >= 0)");
+  // The times of all results of a worker are added up and stored.
+  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_compute_s(1.7e308); }),
+            "compute_s = 1.7e+308 (must be <= 1000000000)");
+  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_elapsed_s(1.1e9); }),
+            "elapsed_s = 1100000000 (must be <= 1000000000)");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_elapsed_s(-1.0); }),
             "elapsed_s = -1 (must be >= 0)");
 }
