@@ -104,6 +104,8 @@ class Service::Parts final : public Outbox {
 
   void send(WorkerId worker, wire::Message message) override {
     if (std::holds_alternative<wire::Welcome>(message)) history_.note_registered(worker);
+    const auto* lease = std::get_if<wire::RunLease>(&message);
+    if (lease != nullptr) history_.note_lent(lease->campaign, worker);
     worker_desk_.send(worker, std::move(message));
   }
 
@@ -119,7 +121,7 @@ class Service::Parts final : public Outbox {
 
   void record(const Loss& loss) override {
     const auto session = worker_desk_.peers().session_of(loss.worker);
-    history_.note_registered(loss.worker);
+    history_.note_lent(loss.campaign, loss.worker);
     history_.note_reason(loss.worker, loss.reason);
     writer_.record_loss(loss.campaign, {.runs = loss.runs,
                                         .attempt = loss.attempt,
@@ -168,7 +170,7 @@ class Service::Parts final : public Outbox {
   }
 
   Delivery delivery_of(Arrival arrival) {
-    history_.note_registered(arrival.worker);
+    history_.note_lent(arrival.campaign, arrival.worker);
     const auto session = worker_desk_.peers().session_of(arrival.worker);
     PROOFMASS_EXPECT(session.has_value());
     return {.result = arrival.computed.result,
@@ -269,6 +271,18 @@ class Service::Parts final : public Outbox {
          .kind = "write_ahead_log_grown",
          .text = fmt::format("size_bytes={} (somebody reads an old state of the file)", grown.size),
          .campaign = grown.campaign});
+  }
+  void complete(const LogKept& kept) {
+    log({.severity = Severity::warning,
+         .kind = "write_ahead_log_kept",
+         .text = fmt::format("reason=\"{}\"", kept.reason),
+         .campaign = kept.campaign});
+  }
+  void complete(const LogFolded& folded) {
+    log({.severity = Severity::info,
+         .kind = "write_ahead_log_folded",
+         .text = "",
+         .campaign = folded.campaign});
   }
   void complete(const LogShrunk& shrunk) {
     log({.severity = Severity::info,

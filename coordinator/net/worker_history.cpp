@@ -10,14 +10,22 @@ WorkerHistory::WorkerHistory(const State& state, StoreWriter& writer, std::set<S
 void WorkerHistory::note_registered(WorkerId id) {
   const auto found = state_.workers.find(id);
   if (found == state_.workers.end() || registered_.contains(id)) return;
+  registered_[id] = {.session = found->second.session, .campaigns = {}};
+  attached_.erase(found->second.session);
+}
+
+void WorkerHistory::note_lent(CampaignId campaign, WorkerId id) {
+  note_registered(id);
+  const auto known = registered_.find(id);
+  const auto found = state_.workers.find(id);
+  if (known == registered_.end() || found == state_.workers.end()) return;
+  if (!known->second.campaigns.insert(campaign).second) return;
   const Worker& worker = found->second;
-  writer_.record_worker_joined({.session = worker.session,
-                                .name = worker.name,
-                                .host = worker.host,
-                                .process_id = worker.process_id,
-                                .num_slots = worker.num_slots});
-  registered_[id] = worker.session;
-  attached_.erase(worker.session);
+  writer_.record_worker_joined(campaign, {.session = worker.session,
+                                          .name = worker.name,
+                                          .host = worker.host,
+                                          .process_id = worker.process_id,
+                                          .num_slots = worker.num_slots});
 }
 
 void WorkerHistory::note_reason(WorkerId worker, LossReason reason) {
@@ -27,8 +35,8 @@ void WorkerHistory::note_reason(WorkerId worker, LossReason reason) {
 void WorkerHistory::review() {
   for (const auto& [id, worker] : state_.workers) note_registered(id);
   const auto registered = registered_;
-  for (const auto& [id, session] : registered) {
-    if (!state_.workers.contains(id)) end(id, session);
+  for (const auto& [id, worker] : registered) {
+    if (!state_.workers.contains(id)) end(id, worker.session);
   }
   if (!state_.awaited.empty()) return;
   for (const SessionId session : std::exchange(attached_, {})) {
@@ -39,9 +47,9 @@ void WorkerHistory::review() {
 void WorkerHistory::end_all(LossReason reason) {
   review();
   const auto registered = registered_;
-  for (const auto& [id, session] : registered) {
+  for (const auto& [id, worker] : registered) {
     reasons_.try_emplace(id, reason);
-    end(id, session);
+    end(id, worker.session);
   }
 }
 

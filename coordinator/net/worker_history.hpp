@@ -8,16 +8,20 @@
 
 namespace proofmass::coordinator {
 
-/// Keeps in the campaign files which workers are registered, so that the next coordinator knows
-/// whom to wait for, and how each worker ended.
+/// Keeps in the campaign files which workers were lent their runs, so that the next coordinator
+/// knows whom to wait for, and how each of them ended. A worker that comes, or goes, without runs
+/// of a campaign changes nothing in its file.
 class WorkerHistory {
  public:
   /// @param state, writer  Outlive this object.
   /// @param attached       Workers that may come back from the coordinator before this one.
   WorkerHistory(const State& state, StoreWriter& writer, std::set<SessionId> attached);
 
-  /// To be called before anything of a worker that may be new is written.
+  /// To be called when a worker is welcome.
   void note_registered(WorkerId worker);
+  /// To be called whenever runs are lent, and before anything of a worker that may be new to the
+  /// campaign's file is written.
+  void note_lent(CampaignId campaign, WorkerId worker);
   /// Why the worker is about to be removed, or was; `silent` if nobody says so.
   void note_reason(WorkerId worker, LossReason reason);
 
@@ -32,7 +36,13 @@ class WorkerHistory {
   const State& state_;
   StoreWriter& writer_;
   std::set<SessionId> attached_;
-  std::map<WorkerId, SessionId> registered_;
+  /// A worker that is registered.
+  struct Registered {
+    SessionId session;
+    std::set<CampaignId> campaigns;  ///< Whose files know it.
+  };
+
+  std::map<WorkerId, Registered> registered_;
   std::map<WorkerId, LossReason> reasons_;
 };
 

@@ -17,6 +17,7 @@
 #include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/detail/integrity.hpp"
+#include "coordinator/store/detail/parts.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
@@ -35,15 +36,6 @@ using detail::Statement;
 using detail::Transaction;
 
 namespace {
-
-constexpr std::uint64_t usual_log_size = std::uint64_t{4} << 20;
-
-// A file from elsewhere is data: nothing in its schema may call functions with side effects, and
-// what a page says of its content is checked when it is read.
-void configure(Database& database) {
-  database.execute(
-      "PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA foreign_keys = ON");
-}
 
 void check_presence(const std::filesystem::path& path) {
   std::error_code ignored;
@@ -77,6 +69,15 @@ void check_name(const std::filesystem::path& path) {
   throw StoreError(fmt::format("campaign file = {} (names no file)", path.string()));
 }
 
+// Nothing if a coordinator serves the file, which can be written to all the same.
+std::unique_ptr<detail::StoreLock> lock_if_free(const std::filesystem::path& path) {
+  try {
+    return std::make_unique<detail::StoreLock>(path);
+  } catch (const StoreError&) {
+    return nullptr;
+  }
+}
+
 // Removes an unfinished file, its rollback journal with it.
 void remove_draft(const std::filesystem::path& draft) {
   std::error_code ignored;
@@ -87,7 +88,7 @@ void remove_draft(const std::filesystem::path& draft) {
 void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
                  std::string_view definition) {
   Database database(draft, Access::create);
-  configure(database);
+  detail::configure(database);
   Transaction transaction(database);
   detail::migrate(database);
   detail::insert_campaign(database, campaign, definition);
@@ -123,49 +124,6 @@ void replace_all(Database& database, const CampaignStatistics& statistics, const
 
 }  // namespace
 
-struct Store::Parts {
-  std::unique_ptr<detail::StoreLock> lock;  // Of a coordinator; a reader has none.
-  Database database;
-  std::optional<detail::EntryRows> rows;  // Prepared when they are first needed.
-
-  explicit Parts(const std::filesystem::path& path);
-  Parts(const std::filesystem::path& path, std::unique_ptr<detail::StoreLock> lock);
-  ~Parts();
-};
-
-Store::Parts::Parts(const std::filesystem::path& path) : database(path, Access::read_only) {
-  configure(database);
-  detail::check_campaign_file(database, path);
-  detail::check_up_to_date(database, path);
-}
-
-Store::Parts::Parts(const std::filesystem::path& path, std::unique_ptr<detail::StoreLock> held_lock)
-    : lock(std::move(held_lock)), database(path, Access::read_write) {
-  configure(database);
-  detail::check_campaign_file(database, path);
-  detail::check_after_unclean_end(database);
-  database.execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
-  // A log that had to grow gives the disk its space back when it begins anew.
-  database.execute(fmt::format("PRAGMA journal_size_limit = {}", usual_log_size));
-  Transaction transaction(database);
-  detail::migrate(database);
-  transaction.commit();
-  detail::check_results(database);
-}
-
-// Readers cannot open a file in WAL mode on read-only media, so that a closed one is in the other.
-// With somebody reading, both steps fail at once and the log stays: nothing is lost by that.
-Store::Parts::~Parts() {
-  if (!lock) return;
-  try {
-    database.execute("PRAGMA busy_timeout = 0");
-    database.execute("PRAGMA wal_checkpoint(TRUNCATE)");
-    database.execute("PRAGMA journal_mode = DELETE");
-  } catch (const StoreError&) {
-    // The next coordinator finds the log and goes on from there.
-  }
-}
-
 Store::Store(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 Store::~Store() = default;
 Store::Store(Store&&) noexcept = default;
@@ -186,7 +144,11 @@ Store Store::open(const std::filesystem::path& path) {
   check_presence(path);
   check_that_name_is_the_only_one(path);
   detail::check_directory_of(path);
-  return Store(std::make_unique<Parts>(path, std::make_unique<detail::StoreLock>(path)));
+  Store store(std::make_unique<Parts>(path, std::make_unique<detail::StoreLock>(path)));
+  if (store.has_lost_its_log()) {
+    store.record_event("log_lost", "results that were not in the file itself are missing");
+  }
+  return store;
 }
 
 Store Store::open_read_only(const std::filesystem::path& path) {
@@ -199,13 +161,21 @@ void Store::annotate(const std::filesystem::path& path,
   check_presence(path);
   check_that_name_is_the_only_one(path);
   detail::check_directory_of(path);
+  const std::unique_ptr<detail::StoreLock> lock = lock_if_free(path);
   Database database(path, Access::read_write);
-  configure(database);
+  detail::configure(database);
   detail::check_campaign_file(database, path);
   detail::check_up_to_date(database, path);
-  Transaction transaction(database);
-  for (const Annotation& annotation : annotations) detail::write_annotation(database, annotation);
-  transaction.commit();
+  detail::check_that_log_is_there(database, path);
+  {
+    Transaction transaction(database);
+    for (const Annotation& annotation : annotations) {
+      detail::write_annotation(database, annotation);
+    }
+    transaction.commit();
+  }
+  // What the last coordinator had to leave in the log, as somebody was reading.
+  if (lock != nullptr) (void)detail::bring_to_rest(database);
 }
 
 wire::CampaignId Store::id() const {
@@ -246,9 +216,8 @@ std::string Store::created_utc() const {
 std::string Store::owner() const { return parts_->database.text("SELECT owner FROM campaign"); }
 
 void Store::set_owner(std::string_view owner) {
-  Transaction transaction(parts_->database);
-  parts_->database.prepare("UPDATE campaign SET owner = ?").run(owner);
-  transaction.commit();
+  parts_->change(
+      [&](Database& database) { database.prepare("UPDATE campaign SET owner = ?").run(owner); });
 }
 
 std::string Store::table_digest() const {
@@ -273,9 +242,8 @@ std::vector<std::vector<double>> Store::table_columns(std::span<const std::size_
 
 void Store::extend(const Campaign& campaign, std::string_view definition) {
   detail::check_extension(parts_->database, campaign);
-  Transaction transaction(parts_->database);
-  detail::extend_campaign(parts_->database, campaign, definition);
-  transaction.commit();
+  parts_->change(
+      [&](Database& database) { detail::extend_campaign(database, campaign, definition); });
 }
 
 CampaignControl Store::control() const { return detail::read_control(parts_->database); }
@@ -283,16 +251,14 @@ CampaignControl Store::control() const { return detail::read_control(parts_->dat
 StopPlan Store::stop_plan() const { return detail::read_stop_plan(parts_->database); }
 
 void Store::set_stop_plan(const StopPlan& plan) {
-  Transaction transaction(parts_->database);
-  detail::write_stop_plan(parts_->database, plan);
-  transaction.commit();
+  parts_->change([&](Database& database) { detail::write_stop_plan(database, plan); });
 }
 
 void Store::record_stop_check(std::uint64_t num_runs, std::string_view statistic,
                               const StopCheck& check) {
-  Transaction transaction(parts_->database);
-  detail::replace_stop_check(parts_->database, num_runs, statistic, check);
-  transaction.commit();
+  parts_->change([&](Database& database) {
+    detail::replace_stop_check(database, num_runs, statistic, check);
+  });
 }
 
 std::optional<StoredStopCheck> Store::last_stop_check(std::string_view statistic) const {
@@ -347,15 +313,11 @@ std::vector<wire::SessionId> Store::attached_sessions() const {
 }
 
 void Store::begin_coordinator(const CoordinatorStart& start) {
-  Transaction transaction(parts_->database);
-  detail::insert_start(parts_->database, start);
-  transaction.commit();
+  parts_->change([&](Database& database) { detail::insert_start(database, start); });
 }
 
 void Store::end_coordinator(wire::Epoch epoch) {
-  Transaction transaction(parts_->database);
-  detail::end_start(parts_->database, epoch);
-  transaction.commit();
+  parts_->change([&](Database& database) { detail::end_start(database, epoch); });
 }
 
 CommitSummary Store::write(std::span<const Entry> entries) {
@@ -364,18 +326,23 @@ CommitSummary Store::write(std::span<const Entry> entries) {
     const auto* delivery = std::get_if<Delivery>(&entry);
     if (delivery != nullptr) detail::check_delivery(*delivery, num_runs_wanted);
   }
-  if (!parts_->rows) parts_->rows.emplace(parts_->database);
+  CommitSummary summary;
   try {
-    Transaction transaction(parts_->database);
-    CommitSummary summary = parts_->rows->write(entries);
-    wire::kill_point(wire::KillPoint::before_commit);
-    transaction.commit();
-    return summary;
+    parts_->change([&](Database& database) {
+      if (!parts_->rows) parts_->rows.emplace(database);
+      summary = parts_->rows->write(entries);
+      wire::kill_point(wire::KillPoint::before_commit);
+    });
   } catch (...) {
     parts_->rows.reset();  // It knows of rows that are rolled back.
     throw;
   }
+  return summary;
 }
+
+bool Store::has_lost_its_log() const { return parts_->is_log_lost; }
+
+std::optional<std::string> Store::rest() { return parts_->rest(); }
 
 CommitSummary Store::commit(std::span<const Delivery> deliveries) {
   return write(std::vector<Entry>(deliveries.begin(), deliveries.end()));
@@ -389,10 +356,10 @@ void Store::for_each_result(const std::function<void(const RunResult&)>& visit) 
 void Store::write_statistics(const CampaignStatistics& statistics, const Budget& before,
                              const Budget& after_worst, const Budget& after_mean,
                              std::string_view digest) {
-  Transaction transaction(parts_->database);
-  replace_all(parts_->database, statistics, before, after_worst, after_mean);
-  detail::replace_summary(parts_->database, statistics, digest);
-  transaction.commit();
+  parts_->change([&](Database& database) {
+    replace_all(database, statistics, before, after_worst, after_mean);
+    detail::replace_summary(database, statistics, digest);
+  });
 }
 
 std::optional<Summary> Store::summary() const { return detail::read_summary(parts_->database); }
@@ -478,7 +445,8 @@ void Store::back_up(const std::filesystem::path& destination) const {
   appear_complete(destination, [&](const std::filesystem::path& draft) {
     Database copy(draft, Access::create);
     parts_->database.copy_to(copy);
-    copy.execute("PRAGMA journal_mode = DELETE");  // The copied header may ask for a log.
+    // What is copied may say that there is a log.
+    copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
   });
 }
 

@@ -42,11 +42,12 @@ class Store {
   /// Opens a campaign file for its coordinator: takes the lock, brings an older file up to date.
   /// @throws StoreError if the file is missing, foreign, newer than this program or damaged, or if
   ///         another coordinator has it; on a network file system; if it has another hard link.
+  ///         A file without the log that it needs is opened as it is; see has_lost_its_log().
   static Store open(const std::filesystem::path& path);
 
   /// Opens a campaign file for reading, also while a coordinator writes to it.
   /// @throws StoreError as open() does, but for lock, file system and hard links; if the file is
-  ///         older than this program.
+  ///         older than this program; if the file lacks the log that it needs.
   static Store open_read_only(const std::filesystem::path& path);
 
   /// Adds tags and notes or removes tags, all or none of them, also while a coordinator serves the
@@ -138,6 +139,15 @@ class Store {
   /// is
   ///         not finite.
   CommitSummary write(std::span<const Entry> entries);
+
+  /// To be called when nothing more is expected: folds the write-ahead log into the file, which is
+  /// whole without it until the next change. Waits for nobody.
+  /// @return Why the log is still needed: somebody reads an old state of the file. Or nothing.
+  std::optional<std::string> rest();
+
+  /// Whether open() found that the file needs a log and that there was none: runs whose results
+  /// were in it are missing, and are computed again. The event `log_lost` says so.
+  [[nodiscard]] bool has_lost_its_log() const;
 
   /// Stores results like write().
   CommitSummary commit(std::span<const Delivery> deliveries);

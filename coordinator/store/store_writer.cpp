@@ -11,11 +11,14 @@
 #include <thread>
 #include <utility>
 
-#include "coordinator/store/detail/waiting_entries.hpp"
+#include "coordinator/store/detail/open_file.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
 
+using detail::Attempted;
+using detail::CommitTimes;
+using detail::OpenFile;
 using detail::TimePoint;
 
 namespace {
@@ -23,15 +26,6 @@ namespace {
 // Entries of one transaction: enough that its cost is shared, few enough that the first of them
 // does not wait long for the last.
 constexpr std::size_t entries_per_commit_max = 8192;
-
-/// One open file. The thread alone uses `store` and `writing`, without the lock.
-struct OpenFile {
-  Store store;
-  detail::WaitingEntries waiting;
-  std::vector<Entry> writing;         // Taken from `waiting`; not empty if the last attempt failed.
-  std::optional<TimePoint> retry_at;  // If the last attempt failed.
-  bool has_large_log = false;         // As was said last.
-};
 
 /// Something that the caller waits for, after all that was handed over for its file.
 struct Request {
@@ -42,49 +36,36 @@ struct Request {
 
 using Files = std::map<wire::CampaignId, OpenFile>;
 
-/// When the file wants to be written to; nothing if nothing waits.
-std::optional<TimePoint> due_time(const OpenFile& file, const WriterConfig& config) {
-  if (file.retry_at) return file.retry_at;
-  const std::optional<TimePoint> since = file.waiting.waiting_since();
-  if (!since) return std::nullopt;
-  if (file.waiting.num_results() >= config.commit_runs_max) return since;
-  return *since + config.commit_after;
+bool is_written_out(const OpenFile& file) {
+  return file.writing.empty() && file.waiting.size() == 0;
 }
 
-std::vector<RunIndex> delivered_runs(const std::vector<Entry>& entries) {
-  std::vector<RunIndex> runs;
-  for (const Entry& entry : entries) {
-    if (const auto* delivery = std::get_if<Delivery>(&entry)) runs.push_back(delivery->result.run);
-  }
-  return runs;
+/// Keeps in mind which workers the file has without an end.
+void note_worker(OpenFile& file, const Entry& entry) {
+  if (const auto* joined = std::get_if<WorkerJoined>(&entry)) file.known.insert(joined->session);
+  if (const auto* ended = std::get_if<WorkerEnded>(&entry)) file.known.erase(ended->session);
 }
 
-/// What came of one attempt to write.
-struct Attempted {
-  CommitSummary summary;
-  std::optional<std::string> failure;
-  std::uint64_t log_size = 0;  // Afterwards.
-};
-
-Attempted try_to_write(Store& store, const std::vector<Entry>& entries) {
-  try {
-    CommitSummary summary = store.write(entries);
-    return {.summary = std::move(summary), .failure = {}, .log_size = store.log_size()};
-  } catch (const std::exception& error) {
-    return {.summary = {}, .failure = error.what(), .log_size = store.log_size()};
-  }
+CommitTimes times_of(const WriterConfig& config) {
+  return {.commit_runs_max = config.commit_runs_max,
+          .commit_after = config.commit_after,
+          .record_after = config.record_after};
 }
 
 }  // namespace
 
 struct StoreWriter::Parts {
   Parts(std::function<void()> wake_caller, const WriterConfig& writer_config)
-      : config(writer_config), wake(std::move(wake_caller)), thread([this] { run(); }) {}
+      : config(writer_config),
+        times(times_of(config)),
+        wake(std::move(wake_caller)),
+        thread([this] { run(); }) {}
 
   // Called by the service.
   OpenFile& file(wire::CampaignId campaign);
   void add(wire::CampaignId campaign, Entry entry);
-  void add_to_all(const Entry& entry);
+  void add_where(const Entry& entry, const std::function<bool(const OpenFile&)>& is_for);
+  [[nodiscard]] bool add(OpenFile& open_file, Entry entry);
   void wait_for(wire::CampaignId campaign, std::function<void()> action);
 
   // The thread.
@@ -93,6 +74,7 @@ struct StoreWriter::Parts {
   void serve_request(Lock& lock);
   void write_due(Lock& lock);
   void write_all(wire::CampaignId campaign, Lock& lock);
+  void fold(wire::CampaignId campaign, Lock& lock);
   bool write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock);
   void finish_write(wire::CampaignId campaign, OpenFile& file, Attempted attempted);
   void watch_log(wire::CampaignId campaign, OpenFile& file, std::uint64_t log_size);
@@ -100,12 +82,12 @@ struct StoreWriter::Parts {
   [[nodiscard]] std::vector<wire::CampaignId> ids() const;
 
   const WriterConfig config;
+  const CommitTimes times;
   const std::function<void()> wake;
 
   std::mutex mutex;  // Guards all that follows; see OpenFile for what it does not.
   std::condition_variable changed;
   Files files;
-  std::map<wire::SessionId, WorkerJoined> registered;
   std::deque<Request> requests;
   std::vector<Completion> completions;
   bool is_ending = false;
@@ -120,22 +102,35 @@ OpenFile& StoreWriter::Parts::file(wire::CampaignId campaign) {
 }
 
 void StoreWriter::Parts::add(wire::CampaignId campaign, Entry entry) {
-  const TimePoint now = std::chrono::steady_clock::now();
   bool is_sooner = false;
   {
     const std::lock_guard lock(mutex);
-    OpenFile& open_file = file(campaign);
-    const std::optional<TimePoint> due_before = due_time(open_file, config);
-    open_file.waiting.add(std::move(entry), now);
-    is_sooner = due_time(open_file, config) != due_before;
+    is_sooner = add(file(campaign), std::move(entry));
   }
   if (is_sooner) changed.notify_one();  // Otherwise the thread would wake for every result.
 }
 
-/// @pre The lock is held.
-void StoreWriter::Parts::add_to_all(const Entry& entry) {
+void StoreWriter::Parts::add_where(const Entry& entry,
+                                   const std::function<bool(const OpenFile&)>& is_for) {
+  bool is_sooner = false;
+  {
+    const std::lock_guard lock(mutex);
+    for (auto& [campaign, open_file] : files) {
+      if (is_for(open_file)) is_sooner = add(open_file, entry) || is_sooner;
+    }
+  }
+  if (is_sooner) changed.notify_one();
+}
+
+/// True if the file is to be written to sooner than before. @pre The lock is held.
+bool StoreWriter::Parts::add(OpenFile& open_file, Entry entry) {
   const TimePoint now = std::chrono::steady_clock::now();
-  for (auto& [campaign, file] : files) file.waiting.add(entry, now);
+  const std::optional<TimePoint> due_before = due_time(open_file, times);
+  note_worker(open_file, entry);
+  if (detail::is_result(entry)) open_file.is_rest_wanted = false;
+  open_file.waiting.add(std::move(entry), now);
+  open_file.rest_at = open_file.is_rest_wanted ? std::optional(now) : std::nullopt;
+  return due_time(open_file, times) != due_before;
 }
 
 void StoreWriter::Parts::wait_for(wire::CampaignId campaign, std::function<void()> action) {
@@ -188,8 +183,13 @@ void StoreWriter::Parts::serve_request(Lock& lock) {
 void StoreWriter::Parts::write_due(Lock& lock) {
   const TimePoint now = std::chrono::steady_clock::now();
   for (const wire::CampaignId campaign : ids()) {
-    const std::optional<TimePoint> due = due_time(file(campaign), config);
-    if (due && *due <= now) write_some(campaign, entries_per_commit_max, lock);
+    const std::optional<TimePoint> due = due_time(file(campaign), times);
+    if (!due || *due > now) continue;
+    if (is_written_out(file(campaign))) {
+      fold(campaign, lock);
+    } else {
+      write_some(campaign, entries_per_commit_max, lock);
+    }
   }
 }
 
@@ -202,6 +202,29 @@ void StoreWriter::Parts::write_all(wire::CampaignId campaign, Lock& lock) {
     is_written = write_some(campaign, num_entries, lock);
     num_left -= num_entries;
   }
+  if (file(campaign).rest_at && is_written_out(file(campaign))) fold(campaign, lock);
+}
+
+/// Brings a file of which nothing waits to rest.
+void StoreWriter::Parts::fold(wire::CampaignId campaign, Lock& lock) {
+  OpenFile& open_file = file(campaign);
+  open_file.rest_at.reset();  // What is added meanwhile sets it again.
+  lock.unlock();
+  const std::optional<std::string> reason = detail::try_to_rest(open_file.store);
+  lock.lock();
+  if (reason && open_file.is_rest_wanted) {
+    open_file.rest_at = std::chrono::steady_clock::now() + config.retry_after;
+  }
+  if (reason.has_value() == open_file.is_log_kept) return;
+  open_file.is_log_kept = reason.has_value();
+  if (reason) {
+    completions.emplace_back(LogKept{.campaign = campaign, .reason = *reason});
+  } else {
+    completions.emplace_back(LogFolded{.campaign = campaign});
+  }
+  lock.unlock();
+  wake();
+  lock.lock();
 }
 
 /// Tries to write what failed before or, if nothing did, up to `num_max` more entries. The file
@@ -212,7 +235,7 @@ bool StoreWriter::Parts::write_some(wire::CampaignId campaign, std::size_t num_m
     open_file.waiting.take(num_max, open_file.writing, std::chrono::steady_clock::now());
   }
   lock.unlock();
-  Attempted attempted = try_to_write(open_file.store, open_file.writing);
+  Attempted attempted = detail::try_to_write(open_file);
   const bool is_written = !attempted.failure;
   lock.lock();
   const std::size_t num_before = completions.size();
@@ -235,7 +258,7 @@ void StoreWriter::Parts::finish_write(wire::CampaignId campaign, OpenFile& open_
     return;
   }
   open_file.retry_at.reset();
-  std::vector<RunIndex> runs = delivered_runs(open_file.writing);
+  std::vector<RunIndex> runs = detail::delivered_runs(open_file.writing);
   open_file.writing.clear();
   if (!runs.empty()) {
     completions.emplace_back(Committed{.campaign = campaign, .runs = std::move(runs)});
@@ -261,7 +284,7 @@ void StoreWriter::Parts::watch_log(wire::CampaignId campaign, OpenFile& open_fil
 std::optional<TimePoint> StoreWriter::Parts::next_due_time() const {
   std::optional<TimePoint> next;
   for (const auto& [campaign, file] : files) {
-    const std::optional<TimePoint> due = due_time(file, config);
+    const std::optional<TimePoint> due = due_time(file, times);
     if (due && (!next || *due < *next)) next = due;
   }
   return next;
@@ -286,14 +309,16 @@ StoreWriter::~StoreWriter() {
 }
 
 void StoreWriter::open(wire::CampaignId campaign, Store store) {
-  const TimePoint now = std::chrono::steady_clock::now();
+  const std::vector<wire::SessionId> attached = store.attached_sessions();
   {
     const std::lock_guard lock(parts_->mutex);
     OpenFile file{.store = std::move(store),
                   .waiting = detail::WaitingEntries(parts_->config.num_records_max),
                   .writing = {},
-                  .retry_at = std::nullopt};
-    for (const auto& [session, worker] : parts_->registered) file.waiting.add(worker, now);
+                  .retry_at = {},
+                  .known = {},
+                  .rest_at = {}};
+    for (const wire::SessionId session : attached) file.known.insert(session);
     const bool is_new = parts_->files.emplace(campaign, std::move(file)).second;
     PROOFMASS_EXPECT(is_new);
   }
@@ -340,27 +365,24 @@ void StoreWriter::record_event(wire::CampaignId campaign, EventEntry event) {
     parts_->add(campaign, std::move(event));
     return;
   }
-  {
-    const std::lock_guard lock(parts_->mutex);
-    parts_->add_to_all(event);
-  }
-  parts_->changed.notify_one();
+  parts_->add_where(event, [](const OpenFile& file) { return !file.is_rest_wanted; });
 }
 
-void StoreWriter::record_worker_joined(const WorkerJoined& worker) {
-  {
-    const std::lock_guard lock(parts_->mutex);
-    parts_->registered.insert_or_assign(worker.session, worker);
-    parts_->add_to_all(worker);
-  }
-  parts_->changed.notify_one();
+void StoreWriter::record_worker_joined(wire::CampaignId campaign, const WorkerJoined& worker) {
+  parts_->add(campaign, worker);
 }
 
 void StoreWriter::record_worker_ended(const WorkerEnded& ended) {
+  parts_->add_where(ended,
+                    [&](const OpenFile& file) { return file.known.contains(ended.session); });
+}
+
+void StoreWriter::rest(wire::CampaignId campaign) {
   {
     const std::lock_guard lock(parts_->mutex);
-    parts_->registered.erase(ended.session);
-    parts_->add_to_all(ended);
+    OpenFile& open_file = parts_->file(campaign);
+    open_file.is_rest_wanted = true;
+    open_file.rest_at = std::chrono::steady_clock::now();
   }
   parts_->changed.notify_one();
 }

@@ -19,6 +19,8 @@ namespace proofmass::coordinator {
 struct WriterConfig {
   std::size_t commit_runs_max = 256;  ///< Results for which a commit waits ...
   std::chrono::steady_clock::duration commit_after = std::chrono::milliseconds(50);  ///< ... or so.
+  /// What nobody waits for, such as events and losses, causes a commit of its own after this time.
+  std::chrono::steady_clock::duration record_after = std::chrono::seconds(1);
   std::chrono::steady_clock::duration retry_after = std::chrono::seconds(5);  ///< After a failure.
   /// Entries other than results that wait for one file, at most; further ones are counted and
   /// dropped.
@@ -64,8 +66,21 @@ struct LogShrunk {
   wire::CampaignId campaign;
 };
 
-using Completion =
-    std::variant<Committed, Compared, StoreFailed, StoreRecovered, LogGrown, LogShrunk>;
+/// After rest(): the write-ahead log cannot be folded into the file while somebody reads an old
+/// state of it. The file must be copied together with its log for now. Said once until LogFolded;
+/// tried again each `retry_after`.
+struct LogKept {
+  wire::CampaignId campaign;
+  std::string reason;
+};
+
+/// The log that was kept is folded in: the file is whole without it.
+struct LogFolded {
+  wire::CampaignId campaign;
+};
+
+using Completion = std::variant<Committed, Compared, StoreFailed, StoreRecovered, LogGrown,
+                                LogShrunk, LogKept, LogFolded>;
 
 /// Writes to campaign files, in a thread of its own: a service never waits for a disk.
 ///
@@ -82,7 +97,7 @@ class StoreWriter {
   StoreWriter(const StoreWriter&) = delete;
   StoreWriter& operator=(const StoreWriter&) = delete;
 
-  /// Takes over a file, and writes to it which workers are registered.
+  /// Takes over a file.
   /// @pre No campaign has this id.
   void open(wire::CampaignId campaign, Store store);
   /// Gives a file back; waits for one attempt to write what was handed over. What that could not
@@ -100,12 +115,18 @@ class StoreWriter {
 
   void record_loss(wire::CampaignId campaign, const LostRuns& lost);
   void give_up(wire::CampaignId campaign, RunIndex run);
-  /// @param campaign  0 for all that are open.
+  /// @param campaign  0 for all that are open and not at rest.
   void record_event(wire::CampaignId campaign, EventEntry event);
-  /// To all files, also those opened later.
-  void record_worker_joined(const WorkerJoined& worker);
+  /// To be called for the files of campaigns of which the worker was lent runs.
+  void record_worker_joined(wire::CampaignId campaign, const WorkerJoined& worker);
+  /// To all files that have the worker without an end.
   void record_worker_ended(const WorkerEnded& ended);
   void set_control(wire::CampaignId campaign, const CampaignControl& control);
+
+  /// Nothing more is expected for a file: once all that was handed over is written, the write-ahead
+  /// log is folded in, so that a copy of the file alone is whole. Later entries are written as
+  /// usual, and the log is folded in again after each, until a result is delivered.
+  void rest(wire::CampaignId campaign);
 
   /// What happened since the last call, in order.
   [[nodiscard]] std::vector<Completion> take_completions();

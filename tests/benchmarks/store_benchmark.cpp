@@ -109,7 +109,7 @@ void fill(const std::filesystem::path& file, std::uint64_t num_runs) {
   Counter counter;
   StoreWriter writer([&] { counter.wake(); });
   writer.open(id, Store::create(file, campaign, ""));
-  writer.record_worker_joined({.session = worker, .name = "null", .host = "here"});
+  writer.record_worker_joined(id, {.session = worker, .name = "null", .host = "here"});
   for (std::uint64_t run = 0; run < num_runs; ++run) {
     writer.deliver(id, {.result = null_result(campaign.seed, RunIndex{run}),
                         .worker = worker,

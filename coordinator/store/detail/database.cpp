@@ -13,8 +13,6 @@
 namespace proofmass::coordinator::detail {
 namespace {
 
-constexpr int busy_timeout_ms = 5000;
-
 int open_flags(Access access) {
   switch (access) {
     case Access::create:
@@ -235,6 +233,14 @@ std::uint64_t Database::log_size() const {
   const std::uintmax_t size =
       std::filesystem::file_size(std::filesystem::path(path_).concat("-wal"), error);
   return error ? 0 : size;
+}
+
+// The row of the pragma: whether somebody was in the way, frames of the log, frames in the file.
+bool Database::fold_log(Fold fold) {
+  Statement row = prepare(fold == Fold::all_and_empty_it ? "PRAGMA wal_checkpoint(TRUNCATE)"
+                                                         : "PRAGMA wal_checkpoint(PASSIVE)");
+  if (!row.step()) return false;
+  return row.integer(0) == 0 && row.integer(1) == row.integer(2);
 }
 
 void Database::refuse(std::string_view what) const {

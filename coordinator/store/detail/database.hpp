@@ -15,6 +15,12 @@ namespace proofmass::coordinator::detail {
 /// How a database file is opened; `memory` opens none, and the path is for messages.
 enum class Access { create, read_write, read_only, memory };
 
+/// How long a connection waits for the locks of others.
+inline constexpr int busy_timeout_ms = 5000;
+
+/// What of a write-ahead log goes into its file.
+enum class Fold { what_no_reader_needs, all_and_empty_it };
+
 class Database;
 
 /// A prepared statement of a Database, which outlives it. Parameters count from 1, columns from 0.
@@ -106,6 +112,10 @@ class Database {
 
   /// Bytes of the write-ahead log; 0 if there is none.
   [[nodiscard]] std::uint64_t log_size() const;
+
+  /// Copies the write-ahead log into the file. True if all of it is there now and, if so asked, the
+  /// log is empty; false if somebody reads an older state, or writes.
+  [[nodiscard]] bool fold_log(Fold fold);
 
   /// @throws StoreError `campaign file = path (what)`.
   [[noreturn]] void refuse(std::string_view what) const;

@@ -10,8 +10,9 @@
 namespace proofmass::coordinator::detail {
 namespace {
 
-bool is_result(const Entry& entry) {
-  return std::holds_alternative<Delivery>(entry) || std::holds_alternative<SecondDelivery>(entry);
+// What somebody waits for. The rest is history, which shares the next commit.
+bool is_urgent(const Entry& entry) {
+  return is_result(entry) || std::holds_alternative<CampaignControl>(entry);
 }
 
 // What the history of a campaign can do without.
@@ -21,6 +22,10 @@ bool is_record(const Entry& entry) {
 
 }  // namespace
 
+bool is_result(const Entry& entry) {
+  return std::holds_alternative<Delivery>(entry) || std::holds_alternative<SecondDelivery>(entry);
+}
+
 void WaitingEntries::add(Entry entry, TimePoint now) {
   if (is_record(entry) && num_records_ >= num_records_max_) {
     ++num_dropped_;
@@ -28,6 +33,7 @@ void WaitingEntries::add(Entry entry, TimePoint now) {
   }
   if (is_result(entry)) ++num_results_;
   if (is_record(entry)) ++num_records_;
+  if (is_urgent(entry) && num_urgent_++ == 0) urgent_since_ = now;
   if (entries_.empty()) waiting_since_ = now;
   entries_.push_back(std::move(entry));
 }
@@ -35,10 +41,12 @@ void WaitingEntries::add(Entry entry, TimePoint now) {
 void WaitingEntries::take(std::size_t num_max, std::vector<Entry>& entries, TimePoint now) {
   const auto end = entries_.begin() + static_cast<std::ptrdiff_t>(std::min(num_max, size()));
   num_results_ -= static_cast<std::size_t>(std::count_if(entries_.begin(), end, is_result));
+  num_urgent_ -= static_cast<std::size_t>(std::count_if(entries_.begin(), end, is_urgent));
   num_records_ -= static_cast<std::size_t>(std::count_if(entries_.begin(), end, is_record));
   std::move(entries_.begin(), end, std::back_inserter(entries));
   entries_.erase(entries_.begin(), end);
   waiting_since_ = entries_.empty() ? std::nullopt : std::optional(now);
+  urgent_since_ = num_urgent_ == 0 ? std::nullopt : std::optional(now);
   if (num_dropped_ == 0) return;
   entries.push_back(
       EventEntry{.kind = "records_dropped",

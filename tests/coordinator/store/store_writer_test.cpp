@@ -80,7 +80,7 @@ TEST_F(StoreWriterTest, ComparesWithWhatWasDeliveredJustBefore) {
 TEST_F(StoreWriterTest, WritesEveryKindOfRecord) {
   StoreWriter& writer = start();
   writer.open(id, create());
-  writer.record_worker_joined(worker_1());
+  writer.record_worker_joined(id, worker_1());
   writer.record_loss(id, {.runs = {RunIndex{3}, 1},
                           .attempt = {1},
                           .worker = test::session_1,
@@ -104,13 +104,54 @@ TEST_F(StoreWriterTest, WritesEveryKindOfRecord) {
   EXPECT_THAT(take_completions(), IsEmpty());
 }
 
-TEST_F(StoreWriterTest, TellsFilesOpenedLaterWhoIsRegistered) {
+// A join of one campaign's worker writes nothing to the files of the others, nor does its end.
+TEST_F(StoreWriterTest, TellsOnlyTheFilesThatKnowAWorkerOfIt) {
+  constexpr wire::CampaignId other{2};
+  const std::filesystem::path other_file = directory() / "other.db";
   StoreWriter& writer = start();
-  writer.record_worker_joined(worker_1());
-  writer.record_worker_joined({.session = {2}, .name = "gone", .host = "node-2"});
-  writer.record_worker_ended({.session = {2}, .reason = wire::LossReason::drained});
   writer.open(id, create());
+  writer.open(other, Store::create(other_file, campaign_of(100), ""));
+  writer.record_worker_joined(id, worker_1());
+  writer.record_worker_joined(id, {.session = {2}, .name = "gone", .host = "node-2"});
+  writer.flush();
+  writer.record_worker_ended({.session = {2}, .reason = wire::LossReason::drained});
   EXPECT_THAT(writer.close(id).attached_sessions(), ElementsAre(test::session_1));
+  const Store untouched = writer.close(other);
+  EXPECT_EQ(untouched.log_size(), 0u);
+  EXPECT_EQ(Database(other_file, Access::read_only).integer("SELECT count(*) FROM worker"), 0);
+}
+
+TEST_F(StoreWriterTest, TellsAFileOfTheEndOfAWorkerThatItKnewBefore) {
+  start().open(id, create());
+  StoreWriter& first = start();
+  first.open(id, Store::open(file()));
+  first.record_worker_joined(id, worker_1());
+  end();
+  StoreWriter& writer = start();
+  writer.open(id, Store::open(file()));
+  writer.record_worker_ended({.session = test::session_1, .reason = wire::LossReason::silent});
+  EXPECT_THAT(writer.close(id).attached_sessions(), IsEmpty());
+}
+
+// History waits for the next result, or for a second, so that workers that come and go cost no
+// commits of their own.
+TEST_F(StoreWriterTest, LetsRecordsWaitLongerThanResults) {
+  WriterConfig config = patient_config();
+  config.commit_after = std::chrono::milliseconds(1);
+  StoreWriter& writer = start(config);
+  writer.open(id, create());
+  writer.record_event(id, {.kind = "early", .text = ""});
+  writer.deliver(id, delivery_of(7));
+  wait_for("committed 7");
+  EXPECT_EQ(Database(file(), Access::read_only).text("SELECT group_concat(kind) FROM event"),
+            "early");
+  config.record_after = std::chrono::milliseconds(1);
+  config.commit_after = std::chrono::hours(1);
+  StoreWriter& hasty = start(config);
+  hasty.open(id, Store::open(file()));
+  hasty.deliver(id, delivery_of(8));
+  hasty.record_event(id, {.kind = "late", .text = ""});
+  wait_for("committed 8");
 }
 
 TEST_F(StoreWriterTest, KeepsSeveralCampaignsApart) {

@@ -20,6 +20,7 @@ namespace proofmass::test {
 inline coordinator::WriterConfig patient_config() {
   return {.commit_runs_max = 1'000'000,
           .commit_after = std::chrono::hours(1),
+          .record_after = std::chrono::hours(1),
           .retry_after = std::chrono::hours(1)};
 }
 
@@ -98,6 +99,8 @@ class WriterTest : public StoreTest {
   static std::string text_of(const coordinator::StoreRecovered&) { return "recovered"; }
   static std::string text_of(const coordinator::LogGrown&) { return "log grown"; }
   static std::string text_of(const coordinator::LogShrunk&) { return "log shrunk"; }
+  static std::string text_of(const coordinator::LogKept&) { return "log kept"; }
+  static std::string text_of(const coordinator::LogFolded&) { return "log folded"; }
 
   std::mutex mutex_;
   std::condition_variable woken_;

@@ -55,6 +55,22 @@ TEST(WaitingEntries, KnowHowManyResultsWaitAndSinceWhen) {
   EXPECT_EQ(waiting.waiting_since(), std::nullopt);
 }
 
+TEST(WaitingEntries, KnowSinceWhenSomethingUrgentWaits) {
+  WaitingEntries waiting(10);
+  waiting.add(event("a"), start + seconds(1));
+  EXPECT_EQ(waiting.urgent_since(), std::nullopt);
+  waiting.add(CampaignControl{}, start + seconds(2));
+  waiting.add(delivery_of(0), start + seconds(3));
+  EXPECT_EQ(waiting.urgent_since(), start + seconds(2));
+  std::vector<Entry> taken;
+  waiting.take(2, taken, start + seconds(5));
+  EXPECT_EQ(waiting.urgent_since(), start + seconds(5));
+  waiting.add(event("b"), start + seconds(6));
+  waiting.take(1, taken, start + seconds(7));
+  EXPECT_EQ(waiting.urgent_since(), std::nullopt);
+  EXPECT_EQ(waiting.waiting_since(), start + seconds(7));
+}
+
 TEST(WaitingEntries, DropLossesAndEventsBeyondTheLimitAndSaySo) {
   WaitingEntries waiting(2);
   waiting.add(event("a"), start);

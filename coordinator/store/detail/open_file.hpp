@@ -1,0 +1,55 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "coordinator/store/detail/waiting_entries.hpp"
+#include "coordinator/store/store.hpp"
+
+namespace proofmass::coordinator::detail {
+
+/// One campaign file of a StoreWriter. The writer's thread alone uses `store` and `writing`,
+/// without the writer's lock.
+struct OpenFile {
+  Store store;
+  WaitingEntries waiting;
+  std::vector<Entry> writing;         ///< Taken from `waiting`; kept if the last attempt failed.
+  std::optional<TimePoint> retry_at;  ///< If the last attempt failed.
+  bool has_large_log = false;         ///< As was said last.
+  std::set<wire::SessionId> known;    ///< Workers of which the file has no end yet.
+  bool is_rest_wanted = false;        ///< Nothing more is expected.
+  std::optional<TimePoint> rest_at;   ///< When to fold the log in, once nothing waits.
+  bool is_log_kept = false;           ///< As was said last: a reader keeps it from that.
+};
+
+/// Times as in WriterConfig.
+struct CommitTimes {
+  std::size_t commit_runs_max;
+  std::chrono::steady_clock::duration commit_after;
+  std::chrono::steady_clock::duration record_after;
+};
+
+/// When the file wants to be written to or brought to rest; nothing if nothing waits.
+[[nodiscard]] std::optional<TimePoint> due_time(const OpenFile& file, const CommitTimes& times);
+
+/// What came of one attempt to write.
+struct Attempted {
+  CommitSummary summary;
+  std::optional<std::string> failure;
+  std::uint64_t log_size = 0;  ///< Afterwards.
+};
+
+/// Tries to write what `writing` holds.
+[[nodiscard]] Attempted try_to_write(OpenFile& file);
+
+/// Tries to fold the log in; returns why it is still needed.
+[[nodiscard]] std::optional<std::string> try_to_rest(Store& store);
+
+/// The runs of all deliveries, in order.
+[[nodiscard]] std::vector<RunIndex> delivered_runs(const std::vector<Entry>& entries);
+
+}  // namespace proofmass::coordinator::detail

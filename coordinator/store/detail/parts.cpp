@@ -1,0 +1,130 @@
+#include "coordinator/store/detail/parts.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <utility>
+
+#include "coordinator/store/detail/file_log.hpp"
+#include "coordinator/store/detail/schema.hpp"
+
+namespace proofmass::coordinator {
+
+using detail::Access;
+using detail::Database;
+using detail::Transaction;
+
+namespace {
+
+constexpr std::uint64_t usual_log_size = std::uint64_t{4} << 20;
+
+bool says_that_log_is_needed(const Database& database) {
+  return database.text("PRAGMA journal_mode") == "wal" &&
+         database.integer("SELECT is_log_needed FROM campaign") != 0;
+}
+
+constexpr std::string_view reader_in_the_way =
+    "somebody reads an old state of the file, and its log is still needed";
+
+}  // namespace
+
+namespace detail {
+
+void configure(Database& database) {
+  database.execute(
+      "PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA foreign_keys = ON");
+}
+
+// The log comes and goes while a coordinator works, and it is there whenever a file says that it
+// needs one. So a file that says so, before and after no log was seen, lacks it.
+void check_that_log_is_there(const Database& database, const std::filesystem::path& file) {
+  for (int i = 0; i < 3; ++i) {
+    if (!says_that_log_is_needed(database) || detail::has_log(file)) return;
+  }
+  database.refuse(fmt::format(
+      "lacks its log {}: results may be missing; copy both files, or make copies with `proofmass "
+      "backup`; resuming the campaign computes what is missing",
+      detail::log_path(file).filename().string()));
+}
+
+// First everything else, then the mark alone: whenever the file says that it needs no log, all is
+// in it, and whenever it says that it needs one, the log is there.
+std::optional<std::string> bring_to_rest(Database& database) {
+  if (!database.fold_log(Fold::what_no_reader_needs)) return std::string(reader_in_the_way);
+  database.execute("UPDATE campaign SET is_log_needed = 0 WHERE is_log_needed");
+  if (!database.fold_log(Fold::all_and_empty_it)) return std::string(reader_in_the_way);
+  return std::nullopt;
+}
+
+}  // namespace detail
+
+Store::Parts::Parts(const std::filesystem::path& file)
+    : path(file), database(file, Access::read_only) {
+  detail::configure(database);
+  detail::check_campaign_file(database, file);
+  detail::check_up_to_date(database, file);
+  detail::check_that_log_is_there(database, file);
+}
+
+Store::Parts::Parts(const std::filesystem::path& file, std::unique_ptr<detail::StoreLock> held_lock)
+    : path(file), lock(std::move(held_lock)), database(file, Access::read_write) {
+  detail::configure(database);
+  detail::check_campaign_file(database, file);
+  detail::check_after_unclean_end(database);
+  const bool has_log = detail::has_log(file);
+  database.execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+  // A log that had to grow gives the disk its space back when it begins anew.
+  database.execute(fmt::format("PRAGMA journal_size_limit = {}", usual_log_size));
+  Transaction transaction(database);
+  detail::migrate(database);
+  transaction.commit();
+  detail::check_results(database);
+  is_perhaps_marked_ = says_that_log_is_needed(database);
+  is_log_lost = is_perhaps_marked_ && !has_log;
+}
+
+// Readers cannot open a file in WAL mode on read-only media, so that a closed one is in the other.
+// With somebody reading, a step fails at once and the log stays: nothing is lost by that.
+Store::Parts::~Parts() {
+  if (!lock) return;
+  try {
+    rows.reset();
+    if (rest()) return;
+    database.execute("PRAGMA busy_timeout = 0; PRAGMA journal_mode = DELETE");
+  } catch (const StoreError&) {
+    // The next coordinator finds the log and goes on from there.
+  }
+}
+
+void Store::Parts::change(const std::function<void(Database&)>& action) {
+  mark_log_as_needed();
+  Transaction transaction(database);
+  action(database);
+  transaction.commit();
+}
+
+// The mark reaches the file itself before anything that a copy of the file alone would lack. A
+// reader of an old state may hold it up: the next change tries again.
+void Store::Parts::mark_log_as_needed() {
+  if (!lock || is_marked_) return;
+  is_perhaps_marked_ = true;
+  database.execute("UPDATE campaign SET is_log_needed = 1 WHERE NOT is_log_needed");
+  is_marked_ = database.fold_log(detail::Fold::what_no_reader_needs);
+}
+
+std::optional<std::string> Store::Parts::rest() {
+  if (!is_perhaps_marked_ && database.log_size() == 0) return std::nullopt;
+  is_marked_ = false;
+  database.execute("PRAGMA busy_timeout = 0");
+  std::optional<std::string> reason;
+  try {
+    reason = detail::bring_to_rest(database);
+  } catch (const StoreError& error) {
+    reason = error.what();
+  }
+  database.execute(fmt::format("PRAGMA busy_timeout = {}", detail::busy_timeout_ms));
+  is_perhaps_marked_ = reason.has_value();
+  return reason;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/entry_rows.hpp"
+#include "coordinator/store/detail/store_lock.hpp"
+#include "coordinator/store/store.hpp"
+
+namespace proofmass::coordinator {
+
+namespace detail {
+
+/// Settings of every connection to a campaign file. A file from elsewhere is data: nothing in its
+/// schema may call functions with side effects, and what a page says of its content is checked when
+/// it is read.
+void configure(Database& database);
+
+/// @throws StoreError if the file says that it needs a log, and there is none.
+void check_that_log_is_there(const Database& database, const std::filesystem::path& file);
+
+/// Folds the log into the file; returns why it is still needed. @pre No coordinator serves the file
+/// but the caller.
+[[nodiscard]] std::optional<std::string> bring_to_rest(Database& database);
+
+}  // namespace detail
+
+/// What a Store consists of.
+struct Store::Parts {
+  /// Opens a file for reading.
+  explicit Parts(const std::filesystem::path& file);
+  /// Opens a file for its coordinator.
+  Parts(const std::filesystem::path& file, std::unique_ptr<detail::StoreLock> held_lock);
+  ~Parts();
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
+
+  /// Stores what `action` changes, durable when it returns, or nothing.
+  void change(const std::function<void(detail::Database&)>& action);
+
+  /// Folds the log into the file, which is whole without it afterwards. Does not wait for readers:
+  /// returns why it could not.
+  [[nodiscard]] std::optional<std::string> rest();
+
+  std::filesystem::path path;
+  std::unique_ptr<detail::StoreLock> lock;  ///< Of a coordinator; a reader has none.
+  detail::Database database;
+  std::optional<detail::EntryRows> rows;  ///< Prepared when they are first needed.
+  bool is_log_lost = false;  ///< The file needed a log when it was opened; none was there.
+
+ private:
+  void mark_log_as_needed();
+
+  bool is_marked_ = false;          ///< The file itself, not only its log, says that it needs one.
+  bool is_perhaps_marked_ = false;  ///< What the file says is not known to be that it needs none.
+};
+
+}  // namespace proofmass::coordinator

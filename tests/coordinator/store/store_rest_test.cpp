@@ -1,0 +1,220 @@
+// When a campaign file is whole without its write-ahead log, and what is made of one that is not.
+
+#include <gmock/gmock.h>
+
+#include "coordinator/store/detail/database.hpp"
+#include "tests/coordinator/store/writer_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using detail::Access;
+using detail::Database;
+using test::campaign_of;
+using test::deliveries_of;
+using test::delivery_of;
+using test::patient_config;
+using test::results_in;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+class StoreRest : public test::WriterTest {
+ protected:
+  /// A copy of the file alone, as `cp` makes it.
+  [[nodiscard]] std::filesystem::path copy() const {
+    const std::filesystem::path path = directory() / "copy.db";
+    std::filesystem::remove(path);
+    std::filesystem::remove(directory() / "copy.db-wal");
+    std::filesystem::copy_file(file(), path);
+    return path;
+  }
+
+  /// Somebody in the middle of a table, who needs the state of the file as it is now.
+  class Reader {
+   public:
+    explicit Reader(const std::filesystem::path& path)
+        : database_(path, Access::read_only),
+          select_(database_.prepare("SELECT 1 FROM parameter")) {
+      EXPECT_TRUE(select_.step());
+    }
+
+   private:
+    Database database_;
+    detail::Statement select_;
+  };
+
+  [[nodiscard]] std::string lacks_its_log(const std::filesystem::path& path) const {
+    return "campaign file = " + path.string() + " (lacks its log " + path.filename().string() +
+           "-wal: results may be missing; copy both files, or make copies with `proofmass backup`; "
+           "resuming the campaign computes what is missing)";
+  }
+};
+
+TEST_F(StoreRest, ACopyWithoutTheLogOfACampaignThatGoesOnIsRefused) {
+  Store store = Store::create(file(), campaign_of(64), "");
+  store.commit(deliveries_of(0, 64));
+  const std::filesystem::path alone = copy();
+  EXPECT_EQ(test::store_error_of([&] { Store::open_read_only(alone); }), lacks_its_log(alone));
+  EXPECT_EQ(test::store_error_of([&] { Store::open_read_only(alone); }), lacks_its_log(alone))
+      << "the empty log that a reader makes is no log";
+}
+
+TEST_F(StoreRest, ACopyWithItsLogIsRead) {
+  Store store = Store::create(file(), campaign_of(64), "");
+  store.commit(deliveries_of(0, 64));
+  const std::filesystem::path both = copy();
+  std::filesystem::copy_file(file().string() + "-wal", both.string() + "-wal");
+  EXPECT_EQ(results_in(Store::open_read_only(both)).size(), 64u);
+}
+
+TEST_F(StoreRest, ACopyOfACampaignAtRestIsWhole) {
+  Store store = Store::create(file(), campaign_of(64), "");
+  store.commit(deliveries_of(0, 64));
+  EXPECT_EQ(store.rest(), std::nullopt);
+  EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 64u);
+  EXPECT_EQ(store.log_size(), 0u);
+  Store::open_read_only(copy()).check_integrity();
+}
+
+TEST_F(StoreRest, ACopyOfACampaignThatWentOnAfterItsRestIsRefused) {
+  Store store = Store::create(file(), campaign_of(64), "");
+  store.commit(deliveries_of(0, 32));
+  EXPECT_EQ(store.rest(), std::nullopt);
+  store.extend(campaign_of(100), "");
+  const std::filesystem::path alone = copy();
+  EXPECT_EQ(test::store_error_of([&] { Store::open_read_only(alone); }), lacks_its_log(alone));
+}
+
+TEST_F(StoreRest, ABackupOfACampaignThatGoesOnIsWhole) {
+  Store store = Store::create(file(), campaign_of(64), "");
+  store.commit(deliveries_of(0, 64));
+  store.back_up(directory() / "backup.db");
+  EXPECT_EQ(results_in(Store::open_read_only(directory() / "backup.db")).size(), 64u);
+}
+
+TEST_F(StoreRest, AClosedFileNeedsNoLog) {
+  { Store::create(file(), campaign_of(64), "").commit(deliveries_of(0, 64)); }
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+  EXPECT_EQ(Database(file(), Access::read_only).integer("SELECT is_log_needed FROM campaign"), 0);
+}
+
+TEST_F(StoreRest, OfAFileThatSomebodyReadsIsRefusedWithTheReason) {
+  Store store = Store::create(file(), campaign_of(64), "");
+  {
+    const Reader reader(file());
+    store.commit(deliveries_of(0, 64));
+    EXPECT_THAT(store.rest().value_or(""), HasSubstr("somebody reads an old state"));
+  }
+  EXPECT_EQ(store.rest(), std::nullopt);
+  EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 64u);
+}
+
+TEST_F(StoreRest, AFileClosedWhileSomebodyReadsIsFoldedInByWhoeverOpensItNext) {
+  {
+    Store store = Store::create(file(), campaign_of(64), "");
+    store.commit(deliveries_of(0, 32));
+    ASSERT_EQ(store.rest(), std::nullopt);
+    const Reader reader(file());
+    store.commit(deliveries_of(32, 64));
+    const Store closed = std::move(store);
+  }
+  // The mark could not reach the file, nor could the log: both are beside it.
+  ASSERT_GT(std::filesystem::file_size(file().string() + "-wal"), 0u);
+  EXPECT_EQ(results_in(Store::open_read_only(file())).size(), 64u);
+  Store::annotate(file(), {AddTag{"kept"}});
+  EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 64u);
+}
+
+TEST_F(StoreRest, ACoordinatorGoesOnWithoutTheLogAndSaysSo) {
+  Store store = Store::create(file(), campaign_of(64), "");
+  store.commit(deliveries_of(0, 10));
+  ASSERT_EQ(store.rest(), std::nullopt);
+  store.commit(deliveries_of(10, 64));
+  const std::filesystem::path alone = copy();
+  {
+    Store resumed = Store::open(alone);
+    EXPECT_TRUE(resumed.has_lost_its_log());
+    EXPECT_THAT(resumed.finished_runs(), ElementsAre(RunRange{RunIndex{0}, 10}));
+    resumed.commit(deliveries_of(0, 64));
+  }
+  EXPECT_EQ(results_in(Store::open_read_only(alone)).size(), 64u);
+  EXPECT_EQ(Database(alone, Access::read_only).text("SELECT group_concat(kind) FROM event"),
+            "log_lost");
+  EXPECT_FALSE(Store::open(alone).has_lost_its_log());
+}
+
+// Whatever step of the protocol the process dies after: the file with its log has everything, and
+// the file alone has everything or says that it lacks its log.
+TEST_F(StoreRest, NoStepLeavesACopyThatPassesAsWholeAndIsNot) {
+  Store store = Store::create(file(), campaign_of(1000), "");
+  std::uint64_t num_stored = 0;
+  for (int round = 0; round < 20; ++round) {
+    const bool is_rest = round % 3 == 2;
+    if (is_rest) {
+      EXPECT_EQ(store.rest(), std::nullopt);
+    } else {
+      store.commit(deliveries_of(num_stored, num_stored + 7));
+      num_stored += 7;
+    }
+    const std::filesystem::path alone = copy();
+    std::size_t num_read = 0;
+    const std::string error =
+        test::store_error_of([&] { num_read = results_in(Store::open_read_only(alone)).size(); });
+    EXPECT_EQ(error.empty(), is_rest) << round;
+    EXPECT_EQ(num_read, is_rest ? num_stored : 0);
+  }
+}
+
+TEST_F(StoreRest, TheWriterBringsAFileToRestOnceAllIsWritten) {
+  StoreWriter& writer = start();
+  writer.open(id, create());
+  for (std::uint64_t run = 0; run < 100; ++run) writer.deliver(id, delivery_of(run));
+  writer.rest(id);
+  writer.flush();
+  EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 100u);
+  // An event is written, and the file comes to rest again.
+  writer.record_event(id, {.kind = "later", .text = ""});
+  writer.record_event({}, {.kind = "for those not at rest", .text = ""});
+  writer.flush();
+  Database alone(copy(), Access::read_only);
+  EXPECT_EQ(alone.text("SELECT group_concat(kind) FROM event"), "later");
+  EXPECT_EQ(alone.integer("SELECT is_log_needed FROM campaign"), 0);
+  EXPECT_THAT(take_completions(), Not(Contains("log kept")));
+}
+
+TEST_F(StoreRest, TheWriterSaysThatAReaderKeepsTheLogAndWhenItIsFolded) {
+  WriterConfig config = patient_config();
+  config.commit_after = std::chrono::milliseconds(1);
+  config.retry_after = std::chrono::milliseconds(1);
+  StoreWriter& writer = start(config);
+  writer.open(id, create());
+  {
+    const Reader reader(file());
+    writer.deliver(id, delivery_of(1));
+    writer.rest(id);
+    wait_for("log kept");
+  }
+  const std::vector<std::string> texts = wait_for("log folded");
+  EXPECT_THAT(texts, Not(Contains("log kept")));
+  EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 1u);
+}
+
+TEST_F(StoreRest, EndsForTheWriterWithTheNextResult) {
+  StoreWriter& writer = start();
+  writer.open(id, create());
+  writer.rest(id);
+  writer.flush();
+  writer.deliver(id, delivery_of(1));
+  writer.record_event({}, {.kind = "for those not at rest", .text = ""});
+  writer.flush();
+  const std::filesystem::path alone = copy();
+  EXPECT_EQ(test::store_error_of([&] { Store::open_read_only(alone); }), lacks_its_log(alone));
+  EXPECT_EQ(Database(file(), Access::read_only).text("SELECT group_concat(kind) FROM event"),
+            "for those not at rest");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
