@@ -1,0 +1,443 @@
+"""What can go wrong in a schedule. Each fault begins, lasts for a while and is then mended."""
+
+import contextlib
+import errno
+import fcntl
+import os
+import shutil
+import signal
+import sqlite3
+import time
+
+
+class Fault:
+    """begin() returns False where the fault cannot happen now; nothing must be mended then."""
+
+    def __init__(self, world):
+        self.world = world
+        self.campaign = None
+
+    def __str__(self):
+        campaign = f" of {self.campaign.name}" if self.campaign else ""
+        return f"{type(self).__name__}{campaign}"
+
+    def take_campaign(self):
+        """A campaign whose file is there and to whose file nothing else is being done."""
+        free = [campaign for campaign in self.world.campaigns
+                if not campaign.is_busy and self.world.file_of(campaign).is_file()]
+        if not free:
+            return False
+        self.campaign = self.world.random.choice(free)
+        self.campaign.is_busy = True
+        self.world.look(self.campaign)
+        return True
+
+    def release_campaign(self):
+        self.campaign.is_busy = False
+
+    def take_coordinator(self):
+        coordinator = self.world.coordinator
+        if coordinator.has_ended() or coordinator.is_end_expected or coordinator.is_stopped:
+            return None
+        return coordinator
+
+
+class CoordinatorKilled(Fault):
+    number = signal.SIGKILL
+
+    def begin(self):
+        self.coordinator = self.take_coordinator()
+        if self.coordinator is None:
+            return False
+        self.coordinator.is_end_expected = True
+        self.coordinator.signal(self.number)
+        code = self.coordinator.wait()
+        if code < 0 and code not in (-self.number, -signal.SIGKILL):
+            raise RuntimeError(f"{self.coordinator.name} ended with {code}")
+        self.world.restart_at = None
+        return True
+
+    def end(self):
+        self.world.start_coordinator()
+
+
+class CoordinatorTerminated(CoordinatorKilled):
+    number = signal.SIGTERM
+
+
+class CoordinatorInterrupted(CoordinatorKilled):
+    number = signal.SIGINT
+
+
+class CoordinatorStopped(Fault):
+    def begin(self):
+        self.coordinator = self.take_coordinator()
+        if self.coordinator is None:
+            return False
+        self.coordinator.is_stopped = True
+        self.coordinator.signal(signal.SIGSTOP)
+        return True
+
+    def end(self):
+        self.coordinator.signal(signal.SIGCONT)
+        self.coordinator.is_stopped = False
+
+
+class WorkerFault(Fault):
+    def take_worker(self):
+        free = [worker for worker in self.world.workers
+                if not (worker.has_ended() or worker.is_end_expected or worker.is_stopped)]
+        if not free:
+            return False
+        self.worker = self.world.random.choice(free)
+        return True
+
+
+class WorkerKilled(WorkerFault):
+    def begin(self):
+        if not self.take_worker():
+            return False
+        self.worker.kill()
+        return True
+
+    def end(self):
+        self.world.replace_worker(self.worker)
+
+
+class WorkerTerminated(WorkerFault):
+    """It delivers what it can, and ends without an error in any case."""
+
+    def begin(self):
+        if not self.take_worker():
+            return False
+        self.worker.signal(signal.SIGTERM)
+        self.worker.is_end_expected = True
+        return True
+
+    def end(self):
+        self.worker.wait()
+        self.world.check_worker_end(self.worker)
+        self.world.replace_worker(self.worker)
+
+
+class WorkerChildKilled(WorkerFault):
+    """The process that computes; the one that watches it starts another."""
+
+    def begin(self):
+        if not self.take_worker():
+            return False
+        parent = self.worker.process.pid
+        with contextlib.suppress(OSError):
+            with open(f"/proc/{parent}/task/{parent}/children") as children:
+                for child in children.read().split():
+                    os.kill(int(child), signal.SIGKILL)
+        return True
+
+    def end(self):
+        pass
+
+
+class WorkerStopped(WorkerFault):
+    def begin(self):
+        if not self.take_worker():
+            return False
+        self.worker.is_stopped = True
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.worker.process.pid, signal.SIGSTOP)
+        return True
+
+    def end(self):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.worker.process.pid, signal.SIGCONT)
+        self.worker.is_stopped = False
+
+
+class DiskFull(Fault):
+    def begin(self):
+        if (self.world.served / "ballast").exists():
+            return False
+        self.world.fill_disk()
+        return True
+
+    def end(self):
+        self.world.free_disk()
+
+
+class CallsFail(Fault):
+    """Some system calls of the coordinator on its files."""
+
+    def begin(self):
+        if self.world.orders.memory[0:4] != bytes(4):
+            return False
+        draw = self.world.random
+        calls = draw.choice([["write"], ["sync"], ["open"], ["map"], ["truncate"], ["unlink"],
+                             ["write", "sync", "open", "truncate", "map"]])
+        error = draw.choice([errno.EIO, errno.EIO, errno.ENOSPC, errno.EMFILE])
+        first = draw.choice([1, 1, draw.randint(1, 20)])
+        last = draw.choice([first, 0xFFFFFFFF, 0xFFFFFFFF])
+        self.world.orders.set(calls, error, first, last)
+        self.world.tell(f"{calls} fail with {errno.errorcode[error]} from {first} to {last}")
+        return True
+
+    def end(self):
+        self.world.orders.clear()
+
+
+class FileMoved(Fault):
+    """Renamed, and renamed back."""
+
+    def begin(self):
+        if not self.take_campaign():
+            return False
+        file = self.world.file_of(self.campaign)
+        self.away = self.world.served / f"{self.campaign.name}.away"
+        file.rename(self.away)
+        return True
+
+    def end(self):
+        self.away.rename(self.world.file_of(self.campaign))
+        self.release_campaign()
+
+
+class FileRemoved(Fault):
+    with_log = False
+
+    def begin(self):
+        if not self.take_campaign():
+            return False
+        file = self.world.file_of(self.campaign)
+        file.unlink()
+        if self.with_log:
+            for suffix in ("-wal", "-shm"):
+                with contextlib.suppress(FileNotFoundError):
+                    file.with_name(file.name + suffix).unlink()
+        return True
+
+    def end(self):
+        self.release_campaign()
+
+
+class FileAndLogRemoved(FileRemoved):
+    with_log = True
+
+
+class BackupRestored(Fault):
+    """An older state takes the file's place by `mv`, as rsync and most tools restore files."""
+
+    def begin(self):
+        if not self.take_campaign():
+            return False
+        self.backup = self.world.backups / f"{self.campaign.name}.db"
+        if not self.make():
+            self.release_campaign()
+            return False
+        self.num_runs = self.campaign.num_runs
+        return True
+
+    def make(self):
+        self.backup.unlink(missing_ok=True)
+        done = self.world.run("backup", self.world.file_of(self.campaign), self.backup)
+        return done.returncode == 0
+
+    def end(self):
+        """The state is as old as this fault is long, and often from before an extension."""
+        self.world.look(self.campaign)
+        there = self.world.served / f"{self.campaign.name}.incoming"
+        try:
+            shutil.copy(self.backup, there)
+            there.rename(self.world.file_of(self.campaign))
+        except OSError as error:  # No room: the restoration does not take place.
+            self.world.tell(f"not restored: {error}")
+            there.unlink(missing_ok=True)
+        self.release_campaign()
+
+
+class BackupRestoredAfterExtension(BackupRestored):
+    def begin(self):
+        if not super().begin():
+            return False
+        self.is_extended = extend(self.world, self.campaign)
+        return True
+
+
+class CopyRestored(BackupRestored):
+    """Not `proofmass backup`, but the file alone, copied while nobody writes to it."""
+
+    def make(self):
+        coordinator = self.take_coordinator()
+        if coordinator is None:
+            return False
+        coordinator.signal(signal.SIGSTOP)
+        time.sleep(0.01)
+        try:
+            shutil.copy(self.world.file_of(self.campaign), self.backup)
+        finally:
+            coordinator.signal(signal.SIGCONT)
+        return is_campaign(self.backup)
+
+
+class RestoredWhileDown(BackupRestored):
+    """As the documentation says: the coordinator is ended first, and the log goes too."""
+
+    def end(self):
+        coordinator = self.take_coordinator()
+        if coordinator is not None:
+            coordinator.is_end_expected = True
+            coordinator.signal(self.world.random.choice([signal.SIGTERM, signal.SIGKILL]))
+            coordinator.wait()
+        file = self.world.file_of(self.campaign)
+        if self.world.coordinator.has_ended():
+            for suffix in ("-wal", "-shm"):
+                file.with_name(file.name + suffix).unlink(missing_ok=True)
+        super().end()
+        if coordinator is not None:
+            self.world.start_coordinator()
+
+
+class RestoredBesideALog(RestoredWhileDown):
+    """As it should not be done: the write-ahead log of the newer state stays."""
+
+    def end(self):
+        coordinator = self.take_coordinator()
+        if coordinator is not None:
+            coordinator.is_end_expected = True
+            coordinator.signal(signal.SIGKILL)
+            coordinator.wait()
+        BackupRestored.end(self)
+        if coordinator is not None:
+            self.world.start_coordinator()
+
+
+class StartFault(Fault):
+    """Something is in the way when a coordinator starts."""
+
+    def begin(self):
+        self.coordinator = self.take_coordinator()
+        if self.coordinator is None or not self.take_campaign():
+            return False
+        self.coordinator.is_end_expected = True
+        self.coordinator.signal(self.world.random.choice([signal.SIGKILL, signal.SIGTERM]))
+        self.coordinator.wait()
+        self.file = self.world.file_of(self.campaign)
+        self.block()
+        self.world.start_coordinator()
+        return True
+
+    def end(self):
+        self.unblock()
+        self.release_campaign()
+
+
+class DirectoryInPlaceOfFile(StartFault):
+    def block(self):
+        self.away = self.file.with_suffix(".hidden")
+        self.file.rename(self.away)
+        self.file.mkdir()
+
+    def unblock(self):
+        self.file.rmdir()
+        self.away.rename(self.file)
+
+
+class LockHeld(StartFault):
+    """By another program that is about to end."""
+
+    def block(self):
+        self.lock = os.open(f"{self.file}.lock", os.O_RDWR | os.O_CREAT, 0o600)
+        with contextlib.suppress(OSError):
+            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    def unblock(self):
+        os.close(self.lock)
+
+
+class CallsFailAtStart(StartFault):
+    def block(self):
+        draw = self.world.random
+        calls = draw.choice([["open"], ["map"], ["write"], ["sync"]])
+        self.world.orders.set(calls, draw.choice([errno.EIO, errno.EMFILE, errno.ENOSPC]),
+                              draw.choice([1, draw.randint(1, 12)]))
+        self.world.tell(f"{calls} fail at start")
+
+    def unblock(self):
+        self.world.orders.clear()
+
+
+class ReaderHeld(Fault):
+    """Somebody reads one state of the file for long."""
+
+    def begin(self):
+        if not self.take_campaign():
+            return False
+        try:
+            self.connection = sqlite3.connect(
+                f"file:{self.world.file_of(self.campaign)}?mode=ro", uri=True, timeout=0.2)
+            self.connection.execute("BEGIN")
+            self.connection.execute("SELECT count(*) FROM run_result").fetchall()
+        except sqlite3.Error:
+            self.connection.close()
+            self.release_campaign()
+            return False
+        return True
+
+    def end(self):
+        self.connection.close()
+        self.release_campaign()
+
+
+class Extended(Fault):
+    def begin(self):
+        free = [campaign for campaign in self.world.campaigns
+                if not campaign.is_busy and campaign.next_size()]
+        if not free:
+            return False
+        self.campaign = self.world.random.choice(free)
+        return extend(self.world, self.campaign)
+
+    def end(self):
+        pass
+
+
+class Paused(Fault):
+    def begin(self):
+        free = [campaign for campaign in self.world.campaigns
+                if not campaign.is_paused and not campaign.is_busy]
+        if not free or self.take_coordinator() is None:
+            return False
+        self.campaign = self.world.random.choice(free)
+        done = self.world.ask("pause", self.campaign.name)
+        self.campaign.is_paused = True  # Perhaps, even without an answer.
+        return done.returncode == 0
+
+    def end(self):
+        if self.world.ask("resume", self.campaign.name).returncode == 0:
+            self.campaign.is_paused = False
+
+
+def extend(world, campaign):
+    size = campaign.next_size()
+    if size is None or world.coordinator.has_ended():
+        return False
+    campaign.num_runs = size  # Also if it is refused: then it is submitted again in the end.
+    return world.submit(campaign)
+
+
+def is_campaign(file):
+    """Whether a copy has got far enough to hold a campaign."""
+    try:
+        connection = sqlite3.connect(f"file:{file}?mode=ro&immutable=1", uri=True)
+        try:
+            return connection.execute("SELECT count(*) FROM campaign").fetchone()[0] == 1
+        finally:
+            connection.close()
+    except sqlite3.Error:
+        return False
+
+
+KINDS = [CoordinatorKilled, CoordinatorKilled, CoordinatorTerminated, CoordinatorInterrupted,
+         CoordinatorStopped, WorkerKilled, WorkerKilled, WorkerTerminated, WorkerChildKilled,
+         WorkerStopped, DiskFull, DiskFull, CallsFail, CallsFail, CallsFail, FileMoved, FileMoved,
+         FileRemoved, FileAndLogRemoved, BackupRestored, BackupRestored,
+         BackupRestoredAfterExtension, CopyRestored, RestoredWhileDown, RestoredBesideALog,
+         DirectoryInPlaceOfFile, LockHeld, CallsFailAtStart, ReaderHeld, Extended, Extended,
+         Paused]
