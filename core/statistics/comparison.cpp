@@ -140,9 +140,11 @@ void compare_means(const Moments& first, const Moments& second, double confidenc
     comparison.mean_p_value = comparison.mean_difference == 0.0 ? 1.0 : 0.0;
     return;
   }
-  const double degrees = (a + b) * (a + b) /
-                         (a * a / (static_cast<double>(first.count) - 1.0) +
-                          b * b / (static_cast<double>(second.count) - 1.0));
+  // From the shares of the squared error: the square of a large one leaves the range of a double.
+  const double share_a = a / (a + b);
+  const double share_b = b / (a + b);
+  const double degrees = 1.0 / (share_a * share_a / (static_cast<double>(first.count) - 1.0) +
+                                share_b * share_b / (static_cast<double>(second.count) - 1.0));
   const double error = std::sqrt(a + b);
   const double half_width = student_quantile(0.5 + 0.5 * confidence, degrees) * error;
   comparison.mean_p_value = student_two_sided(comparison.mean_difference / error, degrees);

@@ -71,6 +71,16 @@ TEST(CompareUnpaired, IsWelchs) {
   EXPECT_NEAR(comparison.mean_p_value, 1.0 - s * (1.0 + 2.0 / (4.0 + t * t)), 1e-14);
 }
 
+// A campaign file may hold numbers up to 1e90, whose variance has a square beyond all doubles.
+TEST(CompareUnpaired, DoesNotDependOnTheUnit) {
+  const double expected = compare_unpaired(Values{1, 2, 3}, Values{4, 5, 6}, 0.95).mean_p_value;
+  for (const double unit : {0x1p300, 0x1p-300}) {
+    const Values first{unit, 2 * unit, 3 * unit};
+    const Values second{4 * unit, 5 * unit, 6 * unit};
+    EXPECT_NEAR(compare_unpaired(first, second, 0.95).mean_p_value, expected, 1e-14) << unit;
+  }
+}
+
 // Of the 20 ways to mix three and three, two keep them apart.
 TEST(CompareUnpaired, CountsThePathsOfSmirnov) {
   const UnpairedComparison apart = compare_unpaired(Values{1, 2, 3}, Values{4, 5, 6}, 0.95);
