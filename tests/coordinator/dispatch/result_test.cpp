@@ -43,6 +43,8 @@ TEST_F(ResultTest, ThatNoSimulationYieldsIsRefused) {
   EXPECT_EQ(reject.text, "run 0: num_draws = 4294967295 (must be 1 to 1000 if completed)");
   EXPECT_TRUE(outbox.stored().empty());
   EXPECT_FALSE(state.workers.contains(first));
+  EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::protocol);
+  (void)outbox.take_events();
 }
 
 TEST_F(ResultTest, RepeatedBeforeTheCommitIsOneThatWaits) {
