@@ -13,6 +13,8 @@
 namespace proofmass::coordinator::detail {
 namespace {
 
+constexpr int sql_size_max = 1'000'000;  // Of a statement, a definition in the schema among them.
+
 int open_flags(Access access) {
   switch (access) {
     case Access::create:
@@ -40,6 +42,8 @@ std::string explanation(int code, sqlite3* connection) {
       return "the disk is full; what was committed before is safe, free space and try again";
     case SQLITE_BUSY:
       return fmt::format("is locked by another program for more than {} s", busy_timeout_ms / 1000);
+    case SQLITE_INTERRUPT:
+      return "has more in its schema than a campaign has";
     case SQLITE_IOERR:
       return fmt::format("{}; what was committed before is safe", sqlite3_errmsg(connection));
     case SQLITE_CANTOPEN:
@@ -176,9 +180,16 @@ Database::Database(const std::filesystem::path& path, Access access) : path_(pat
   if (code != SQLITE_OK) fail(code);
   sqlite3_extended_result_codes(connection, 1);
   sqlite3_busy_timeout(connection, busy_timeout_ms);
+  sqlite3_limit(connection, SQLITE_LIMIT_SQL_LENGTH, sql_size_max);
   if (access != Access::read_only && sqlite3_db_readonly(connection, "main") != 0) {
     throw StoreError(fmt::format("campaign file = {} (is not writable)", path_.string()));
   }
+}
+
+void Database::distrust_content() {
+  const int code = sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  if (code != SQLITE_OK) fail(code);
+  execute("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
 }
 
 void Database::execute(const std::string& sql) {
@@ -278,5 +289,14 @@ ReadTransaction::ReadTransaction(Database& database) : database_(database) {
 }
 
 ReadTransaction::~ReadTransaction() { roll_back(database_); }
+
+StepLimit::StepLimit(const Database& database, int num_steps) : database_(database) {
+  sqlite3_progress_handler(
+      database_.connection_.get(), num_steps, [](void*) { return 1; }, nullptr);
+}
+
+StepLimit::~StepLimit() {
+  sqlite3_progress_handler(database_.connection_.get(), 0, nullptr, nullptr);
+}
 
 }  // namespace proofmass::coordinator::detail

@@ -92,6 +92,11 @@ class Database {
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
 
+  /// What the file holds comes from elsewhere: nothing in its schema may call functions with side
+  /// effects, nothing changes the schema but the statements that are there for it, and what a page
+  /// says of its content is checked when it is read.
+  void distrust_content();
+
   /// Runs statements that yield nothing of interest.
   void execute(const std::string& sql);
   [[nodiscard]] Statement prepare(std::string_view sql) const;
@@ -127,6 +132,7 @@ class Database {
   [[noreturn]] void fail(int code) const;
 
  private:
+  friend class StepLimit;
   struct Close {
     void operator()(sqlite3* connection) const;
   };
@@ -160,6 +166,18 @@ class ReadTransaction {
 
  private:
   Database& database_;
+};
+
+/// While it lives, a statement fails that takes more than so many steps of SQLite's machine.
+class StepLimit {
+ public:
+  StepLimit(const Database& database, int num_steps);
+  ~StepLimit();
+  StepLimit(const StepLimit&) = delete;
+  StepLimit& operator=(const StepLimit&) = delete;
+
+ private:
+  const Database& database_;
 };
 
 }  // namespace proofmass::coordinator::detail

@@ -139,7 +139,7 @@ void check_audits(const Database& database) {
 void check_integrity(const Database& database) {
   const std::string finding = database.text("PRAGMA integrity_check(1)");
   if (finding != "ok") database.refuse_as_damaged(finding);
-  check_schema(database);
+  check_schema(database, schema_version());
   check_references(database);
   check_standouts(database);
   check_workers(database);

@@ -31,8 +31,8 @@ constexpr std::string_view reader_in_the_way =
 namespace detail {
 
 void configure(Database& database) {
-  database.execute(
-      "PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA foreign_keys = ON");
+  database.distrust_content();
+  database.execute("PRAGMA foreign_keys = ON");
 }
 
 // The log comes and goes while a coordinator works, and it is there whenever a file says that it

@@ -15,9 +15,7 @@ namespace proofmass::coordinator {
 
 namespace detail {
 
-/// Settings of every connection to a campaign file. A file from elsewhere is data: nothing in its
-/// schema may call functions with side effects, and what a page says of its content is checked when
-/// it is read.
+/// Settings of every connection to a campaign file. A file from elsewhere is data.
 void configure(Database& database);
 
 /// @throws StoreError if the file says that it needs a log, and there is none.

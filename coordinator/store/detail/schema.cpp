@@ -4,6 +4,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "coordinator/store/store_error.hpp"
 #include "proto/link/kill_point.hpp"
@@ -11,13 +12,50 @@
 namespace proofmass::coordinator::detail {
 namespace {
 
+/// Steps of SQLite's machine that reading a schema may take; that of a campaign takes some 1,000.
+constexpr int steps_of_schema_max = 100'000;
+
 /// Definitions by kind and name: `view budget`.
-std::map<std::string, std::string> schema_objects(const Database& database) {
-  Statement select =
-      database.prepare("SELECT type || ' ' || name, coalesce(sql, '') FROM sqlite_schema");
-  std::map<std::string, std::string> objects;
-  while (select.step()) objects.emplace(select.text(0), select.text(1));
+using SchemaObjects = std::map<std::string, std::string>;
+
+// The columns `type` and `name` say what SQLite believes only if the definition agrees, and all
+// three are compared. That a name occurs once is checked, as the second row of a name would not be
+// compared.
+SchemaObjects schema_objects(const Database& database) {
+  Statement select = database.prepare(
+      "SELECT type || ' ' || name, tbl_name || ': ' || coalesce(sql, '') FROM sqlite_schema");
+  SchemaObjects objects;
+  while (select.step()) {
+    const bool is_new = objects.emplace(select.text(0), select.text(1)).second;
+    if (!is_new) database.refuse("has two definitions of " + select.text(0));
+  }
   return objects;
+}
+
+/// What a file has that was brought to version n, for each n from 0.
+const std::vector<SchemaObjects>& known_schemas() {
+  static const std::vector<SchemaObjects> schemas = [] {
+    Database fresh("new campaign", Access::memory);
+    std::vector<SchemaObjects> all(1);
+    for (const std::string_view migration : migrations()) {
+      fresh.execute(std::string(migration));
+      all.push_back(schema_objects(fresh));
+    }
+    return all;
+  }();
+  return schemas;
+}
+
+std::int64_t version_of(const Database& database, const std::filesystem::path& path) {
+  const std::int64_t version = database.integer("PRAGMA user_version");
+  if (version > schema_version()) {
+    throw StoreError(
+        fmt::format("campaign file = {} (is newer than this program: its user_version "
+                    "is {}, the newest known one {})",
+                    path.string(), version, schema_version()));
+  }
+  if (version < 1) database.refuse_as_damaged(fmt::format("user_version = {}", version));
+  return version;
 }
 
 // Counting the rows of a table reads every page of its tree, and SQLite checks each that it reads.
@@ -32,22 +70,18 @@ void check_pages(const Database& database) {
 
 std::int64_t schema_version() { return static_cast<std::int64_t>(migrations().size()); }
 
-void check_campaign_file(const Database& database, const std::filesystem::path& path) {
+void check_campaign_file(Database& database, const std::filesystem::path& path) {
   const std::int64_t id = database.integer("PRAGMA application_id");
   if (id != application_id) {
     throw StoreError(fmt::format(
         "campaign file = {} (is not a Proofmass campaign: its application_id is {}, not {})",
         path.string(), id, application_id));
   }
-  const std::int64_t version = database.integer("PRAGMA user_version");
-  if (version > schema_version()) {
-    throw StoreError(
-        fmt::format("campaign file = {} (is newer than this program: its user_version "
-                    "is {}, the newest known one {})",
-                    path.string(), version, schema_version()));
-  }
-  if (database.integer("SELECT count(*) FROM sqlite_schema WHERE type = 'trigger'") > 0) {
-    database.refuse("has triggers, which a campaign has none of");
+  {
+    // A coordinator that brings the file up to date changes version and schema together.
+    const ReadTransaction one_state(database);
+    const StepLimit limit(database, steps_of_schema_max);
+    check_schema(database, version_of(database, path));
   }
   check_pages(database);
   const std::int64_t num_campaigns = database.integer("SELECT count(*) FROM campaign");
@@ -83,14 +117,8 @@ void check_up_to_date(const Database& database, const std::filesystem::path& pat
                   path.string(), version, schema_version()));
 }
 
-void check_schema(const Database& database) {
-  Database fresh("new campaign", Access::memory);
-  {
-    Transaction transaction(fresh);
-    migrate(fresh);
-    transaction.commit();
-  }
-  std::map<std::string, std::string> expected = schema_objects(fresh);
+void check_schema(const Database& database, std::int64_t version) {
+  SchemaObjects expected = known_schemas().at(static_cast<std::size_t>(version));
   for (const auto& [name, sql] : schema_objects(database)) {
     const auto found = expected.find(name);
     if (found == expected.end()) database.refuse("has what is no part of a campaign: " + name);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/error.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
@@ -128,7 +129,14 @@ TEST_F(StoreAnnotation, RefusesFilesThatAreNotUpToDate) {
   const std::filesystem::path missing = directory() / "missing.db";
   EXPECT_EQ(store_error_of([&] { Store::annotate(missing, {AddTag{"a"}}); }),
             "campaign file = " + missing.string() + " (does not exist)");
-  Database(file(), Access::read_write).execute("PRAGMA user_version = 4");
+  std::filesystem::remove(file());
+  {
+    Database old(file(), Access::create);
+    for (std::size_t i = 0; i < 4; ++i) old.execute(std::string(detail::migrations()[i]));
+    old.execute(
+        "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version)"
+        " VALUES (1, 'old', '42', 5, 'text', 'hardy2013-1')");
+  }
   EXPECT_EQ(error_of(AddTag{"a"}),
             "campaign file = " + file().string() +
                 " (is older than this program: its user_version is 4, not 6; resuming the "

@@ -57,9 +57,13 @@ TEST_F(StoreIntegrity, IsMissedByARowWithoutTheOneItRefersTo) {
 }
 
 TEST_F(StoreIntegrity, IsMissedByAnIndexThatLacksARow) {
-  change(
-      "UPDATE sqlite_schema SET sql = replace(sql, 'status <> 1', 'status <> 2')"
-      " WHERE name = 'run_result_not_completed'");
+  const auto redefine = [&](const std::string& old, const std::string& by) {
+    change("UPDATE sqlite_schema SET sql = replace(sql, '" + old + "', '" + by +
+           "') WHERE name = 'run_result_not_completed'");
+  };
+  redefine("<> 1", "= 7");
+  change("UPDATE run_result SET status = 2 WHERE run_index = 0");
+  redefine("= 7", "<> 1");
   EXPECT_THAT(finding(), HasSubstr("is damaged: row 1 missing from index"));
 }
 

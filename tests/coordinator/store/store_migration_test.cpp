@@ -131,12 +131,14 @@ TEST_F(StoreMigration, FromVersion5HasNoOwnerAndNoDigestOfTables) {
   EXPECT_EQ(Database(file(), Access::read_only).integer("SELECT is_log_needed FROM campaign"), 0);
 }
 
-// A table in the way: nothing of the step may remain.
+// A time that is none: nothing of the step may remain.
 TEST_F(StoreMigration, ThatFailsLeavesTheFileAsItWas) {
   make_file_of_version_3();
-  Database(file(), Access::read_write).execute("CREATE TABLE worker (x INTEGER)");
+  Database(file(), Access::read_write)
+      .execute("UPDATE delivery SET received_utc = 'never' WHERE run_index = 4");
   EXPECT_EQ(test::store_error_of([&] { Store::open(file()); }),
-            "campaign file = " + file().string() + " (table worker already exists)");
+            "campaign file = " + file().string() +
+                " (NOT NULL constraint failed: delivery_by_worker.received_unix_s)");
   const Database database(file(), Access::read_only);
   EXPECT_EQ(database.integer("PRAGMA user_version"), 3);
   EXPECT_EQ(database.text("SELECT group_concat(worker) FROM delivery"), "näh,näh,worker-2");

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/store.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 
@@ -79,8 +80,11 @@ TEST_F(StoreRefusal, OfANewerFile) {
 }
 
 TEST_F(StoreRefusal, ToReadAnOlderFile) {
-  create();
-  Database(file(), Access::read_write).execute("PRAGMA user_version = 2");
+  {
+    Database old(file(), Access::create);
+    for (std::size_t i = 0; i < 2; ++i) old.execute(std::string(detail::migrations()[i]));
+    old.execute("INSERT INTO campaign VALUES (1, 'old', '42', 5, 'text', 'proofmass 0', '')");
+  }
   EXPECT_EQ(
       error_of_open_read_only(),
       message("is older than this program: its user_version is 2, not 6; resuming the campaign "
@@ -92,8 +96,60 @@ TEST_F(StoreRefusal, OfAFileThatActsByItself) {
   create();
   Database(file(), Access::read_write)
       .execute("CREATE TRIGGER t AFTER INSERT ON run_result BEGIN DELETE FROM run_result; END");
-  EXPECT_EQ(error_of_open(), message("has triggers, which a campaign has none of"));
-  EXPECT_EQ(error_of_open_read_only(), message("has triggers, which a campaign has none of"));
+  EXPECT_EQ(error_of_open(), message("has what is no part of a campaign: trigger t"));
+  EXPECT_EQ(error_of_open_read_only(), message("has what is no part of a campaign: trigger t"));
+}
+
+// Each would take for ever, or do harm, as soon as somebody reads a row or adds one.
+TEST_F(StoreRefusal, OfAFileWhoseSchemaIsNotThatOfACampaign) {
+  const std::string endless =
+      "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT max(i) FROM n";
+  const auto replace = [](const std::string& name, const std::string& old, const std::string& by) {
+    return "PRAGMA writable_schema = ON; UPDATE sqlite_schema SET sql = replace(sql, '" + old +
+           "', '" + by + "') WHERE name = '" + name + "'";
+  };
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"ALTER TABLE campaign RENAME TO c; CREATE VIEW campaign AS " + endless,
+       "has what is no part of a campaign: table c"},
+      {"DROP TABLE tag; CREATE VIEW tag AS " + endless,
+       "has what is no part of a campaign: view tag"},
+      {"DROP VIEW budget; CREATE VIEW budget AS " + endless,
+       "has another definition of view budget"},
+      {"CREATE INDEX own ON run_result (hex(zeroblob(status * 9999999)))",
+       "has what is no part of a campaign: index own"},
+      {"ALTER TABLE note ADD COLUMN g TEXT AS (hex(zeroblob(99999999)))",
+       "has another definition of table note"},
+      {replace("note", "note_id ", "nota_id "), "has another definition of table note"},
+      {"PRAGMA writable_schema = ON; UPDATE sqlite_schema SET tbl_name = 'tag' WHERE name = "
+       "'audit_contradiction'",
+       "is damaged: malformed database schema (audit_contradiction); restore it from a copy"},
+      {"PRAGMA writable_schema = ON; INSERT INTO sqlite_schema SELECT type, name, tbl_name, 0, "
+       "'CREATE VIEW other AS SELECT 1' FROM sqlite_schema WHERE name = 'budget'",
+       "is damaged: malformed database schema (budget); restore it from a copy"},
+      {"PRAGMA user_version = 0", "is damaged: user_version = 0; restore it from a copy"},
+      {"PRAGMA user_version = -1", "is damaged: user_version = -1; restore it from a copy"},
+      {"PRAGMA user_version = 1", "has what is no part of a campaign: index attempt_blamed"}};
+  for (const auto& [sql, reason] : cases) {
+    std::filesystem::remove(file());
+    create();
+    Database(file(), Access::read_write).execute(sql);
+    EXPECT_EQ(error_of_open(), message(reason)) << sql;
+    EXPECT_EQ(error_of_open_read_only(), message(reason)) << sql;
+    EXPECT_EQ(store_error_of([&] { Store::annotate(file(), {}); }), message(reason)) << sql;
+  }
+}
+
+// What is no part of a campaign is not even read to its end.
+TEST_F(StoreRefusal, OfAFileWithAnEndlessSchema) {
+  create();
+  Database(file(), Access::read_write)
+      .execute(
+          "PRAGMA writable_schema = ON;"
+          " WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 20000)"
+          " INSERT INTO sqlite_schema SELECT 'view', 'v' || i, 'v' || i, 0,"
+          " 'CREATE VIEW v' || i || ' AS SELECT 1' FROM n");
+  EXPECT_EQ(error_of_open(), message("has more in its schema than a campaign has"));
+  EXPECT_EQ(error_of_open_read_only(), message("has more in its schema than a campaign has"));
 }
 
 // Of a file that was closed in order only pages are checked, of any other its rows as well.
