@@ -1,9 +1,8 @@
 #include "coordinator/cli/control_command.hpp"
 
-#include <fmt/format.h>
-
 #include "coordinator/cli/client_json.hpp"
 #include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -14,8 +13,8 @@ int control_campaign(const ControlOptions& options) {
   return with_connection(options.client, [&](const Ask& ask) {
     const auto done = reply_of<wire::DoneReply>(ask, request);
     const bool is_json = options.client.format == OutputFormat::json;
-    fmt::print("{}", is_json ? done_json(wire::name_of(request.action), request.campaign, done)
-                             : done.text + "\n");
+    print_lines(is_json ? done_json(wire::name_of(request.action), request.campaign, done)
+                        : done.text + "\n");
     return exit_done;
   });
 }

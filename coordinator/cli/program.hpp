@@ -29,7 +29,7 @@ inline constexpr const char* exit_codes_text =
 /// Parses the arguments, does the work and turns what goes wrong into a message and an exit code.
 inline int run_program(CLI::App& app, int argc, char** argv, const std::function<int()>& work) {
   const auto fail = [&app](std::string_view what, int exit_code) {
-    wire::say(fmt::format("{}: error: {}\n", app.get_name(), visible_lines(what)));
+    wire::say(fmt::format("{}: error: {}\n", app.get_name(), what));
     return exit_code;
   };
   try {

@@ -8,6 +8,7 @@
 #include <cstddef>
 
 #include "proto/command_line/standard_error.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -96,7 +97,7 @@ void ProgressDisplay::show_bar(const wire::CampaignStatus& status) {
 
 void ProgressDisplay::note(std::string_view text) {
   if (has_bar_) wire::say_on(stream_, "\r\033[K");
-  wire::say_on(stream_, fmt::format("{}\n", text));
+  wire::say_on(stream_, wire::visible_lines(text) + "\n");
   has_bar_ = false;
 }
 

@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
-#include <memory>
 #include <optional>
 #include <string_view>
 
@@ -16,7 +15,7 @@
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/cli/watch_display.hpp"
-#include "coordinator/query/query.hpp"
+#include "coordinator/query/query_process.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -51,8 +50,11 @@ int query_database(const QueryOptions& options) {
   const QueryLimits limits{.time_limit = std::chrono::duration<double>(options.timeout_s),
                            .is_interrupted = [&] { return stop != StopRequest::none; }};
   const TableLimits table{.num_rows_max = options.num_rows_max, .num_columns = terminal_columns()};
-  const auto writer = make_row_writer(options.format, table, write_standard_output);
-  const QueryEnd end = run_query(options.database, sql, limits, *writer);
+  const QueryOutput output{.format = options.format,
+                           .table = table,
+                           .sink = write_standard_output,
+                           .flush = flush_standard_output};
+  const QueryEnd end = run_query_in_process(options.database, sql, limits, output);
   flush_standard_output();
   return end == QueryEnd::complete ? exit_done : exit_interrupted;
 }

@@ -1,14 +1,10 @@
 #pragma once
 
-#include <string>
 #include <string_view>
 
 namespace proofmass::coordinator {
 
-/// Lines that are safe on a terminal: as visible_text(), but for the ends of lines.
-[[nodiscard]] std::string visible_lines(std::string_view text);
-
-/// Prints lines, which may hold text of a file from elsewhere, made visible.
+/// Prints lines, which may hold text of a file from elsewhere, as wire::visible_lines().
 /// @throws Error `standard output: No space left on device`.
 void print_lines(std::string_view text);
 

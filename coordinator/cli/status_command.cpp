@@ -1,19 +1,17 @@
 #include "coordinator/cli/status_command.hpp"
 
-#include <fmt/format.h>
-
 #include "coordinator/cli/client_json.hpp"
 #include "coordinator/cli/client_tables.hpp"
 #include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
 
 namespace proofmass::coordinator {
 
 int show_status(const ClientOptions& options) {
   return with_connection(options, [&](const Ask& ask) {
     const auto status = reply_of<wire::StatusReply>(ask, wire::StatusRequest{});
-    fmt::print("{}", options.format == OutputFormat::json
-                         ? status_json(status, JsonLayout::indented)
-                         : status_table(status));
+    print_lines(options.format == OutputFormat::json ? status_json(status, JsonLayout::indented)
+                                                     : status_table(status));
     return exit_done;
   });
 }

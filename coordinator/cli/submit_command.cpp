@@ -1,11 +1,10 @@
 #include "coordinator/cli/submit_command.hpp"
 
-#include <fmt/format.h>
-
 #include <utility>
 
 #include "coordinator/cli/client_json.hpp"
 #include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
@@ -32,7 +31,7 @@ int submit_campaign(const SubmitOptions& options) {
   return with_connection(options.client, [&](const Ask& ask) {
     const auto done = reply_of<wire::DoneReply>(ask, request);
     const bool is_json = options.client.format == OutputFormat::json;
-    fmt::print("{}", is_json ? done_json("submit", request.campaign.name, done) : done.text + "\n");
+    print_lines(is_json ? done_json("submit", request.campaign.name, done) : done.text + "\n");
     return exit_done;
   });
 }

@@ -9,6 +9,7 @@
 #include "coordinator/cli/client_json.hpp"
 #include "coordinator/cli/client_tables.hpp"
 #include "coordinator/report/text_cells.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -64,8 +65,8 @@ void WatchDisplay::update(const wire::StatusReply& status) {
 }
 
 void WatchDisplay::show_screen(const wire::StatusReply& status) {
-  const Drawing drawing =
-      drawn_over(num_lines_drawn_, status_table(status), screen_size_of(stream_));
+  const std::string table = wire::visible_lines(status_table(status));
+  const Drawing drawing = drawn_over(num_lines_drawn_, table, screen_size_of(stream_));
   fmt::print(stream_, "{}", drawing.text);
   num_lines_drawn_ = drawing.num_lines;
 }
@@ -76,7 +77,7 @@ void WatchDisplay::show_lines(const wire::StatusReply& status) {
     std::string& shown = shown_[campaign.name];
     if (gist == shown) continue;
     shown = std::move(gist);
-    fmt::print(stream_, "{}\n", campaign_line(campaign));
+    fmt::print(stream_, "{}\n", wire::visible_text(campaign_line(campaign)));
   }
 }
 

@@ -16,6 +16,7 @@
 #include <thread>
 #include <utility>
 
+#include "coordinator/query/child_process.hpp"
 #include "core/error.hpp"
 
 extern char** environ;
@@ -28,12 +29,6 @@ constexpr int grace_ms = 3000;  // A worker looks at signals between two orbits,
 std::uint64_t num_oom_kills() {
   std::ifstream stream("/proc/vmstat");
   return oom_kills_in(std::string(std::istreambuf_iterator<char>(stream), {}));
-}
-
-std::string text_of(int status) {
-  if (!WIFSIGNALED(status)) return fmt::format("exit code {}", WEXITSTATUS(status));
-  const int signal = WTERMSIG(status);
-  return fmt::format("killed by signal {} ({})", signal, strsignal(signal));
 }
 
 }  // namespace
@@ -96,7 +91,7 @@ std::vector<WorkerProcesses::Exit> WorkerProcesses::take_exits() {
     if (waitpid(process.process_id, &status, WNOHANG) != process.process_id) return false;
     exits.push_back({.name = process.name,
                      .process_id = process.process_id,
-                     .text = text_of(status),
+                     .text = end_text(status),
                      .reason = reason_of(status)});
     return true;
   });

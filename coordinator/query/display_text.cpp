@@ -1,21 +1,17 @@
 #include "coordinator/query/display_text.hpp"
 
-#include <fmt/format.h>
-#include <utf8.h>
-
 #include <algorithm>
 #include <array>
 #include <span>
 
-namespace proofmass::coordinator {
-namespace {
+#include "proto/text/characters.hpp"
 
-/// A character of UTF-8 and how many bytes it has; no character if these are not UTF-8.
-struct Character {
-  char32_t code = 0;
-  std::size_t size = 1;
-  bool is_valid = false;
-};
+namespace proofmass::coordinator {
+
+using wire::Character;
+using wire::first_character;
+
+namespace {
 
 /// Characters of one kind, both ends among them.
 struct CodeRange {
@@ -48,53 +44,12 @@ constexpr std::array<CodeRange, 10> wide{{{0x1100, 0x115f},
                                           {0xffe0, 0xffe6},
                                           {0x1f300, 0x1faff}}};
 constexpr CodeRange wide_planes{0x20000, 0x3fffd};
-// Control characters and those that turn the direction of writing.
-constexpr std::array<CodeRange, 6> dangerous{{{0x0, 0x1f},
-                                              {0x7f, 0x9f},
-                                              {0x61c, 0x61c},
-                                              {0x200e, 0x200f},
-                                              {0x2028, 0x202e},
-                                              {0x2066, 0x2069}}};
-
-// @pre The text is not empty.
-Character first_character(std::string_view text) {
-  try {
-    const char* at = text.data();
-    const char32_t code = utf8::next(at, text.data() + text.size());
-    return {.code = code, .size = static_cast<std::size_t>(at - text.data()), .is_valid = true};
-  } catch (const utf8::exception&) {
-    return {};
-  }
-}
-
 std::size_t width_of(char32_t code) {
   if (is_in(combining, code)) return 0;
   return is_in(wide, code) || is_in({&wide_planes, 1}, code) ? 2 : 1;
 }
 
-std::string escaped(const Character& character, std::string_view bytes) {
-  if (!character.is_valid) {
-    return fmt::format("\\x{:02x}", static_cast<unsigned char>(bytes.front()));
-  }
-  if (character.code == U'\n') return "\\n";
-  if (character.code == U'\r') return "\\r";
-  if (character.code == U'\t') return "\\t";
-  return fmt::format("\\u{:04x}", static_cast<std::uint32_t>(character.code));
-}
-
 }  // namespace
-
-std::string visible_text(std::string_view text) {
-  std::string visible;
-  while (!text.empty()) {
-    const Character character = first_character(text);
-    const std::string_view bytes = text.substr(0, character.size);
-    const bool is_shown = character.is_valid && !is_in(dangerous, character.code);
-    visible += is_shown ? std::string(bytes) : escaped(character, bytes);
-    text.remove_prefix(character.size);
-  }
-  return visible;
-}
 
 std::size_t display_width(std::string_view text) {
   std::size_t width = 0;

@@ -6,10 +6,6 @@
 
 namespace proofmass::coordinator {
 
-/// Text that is safe on a terminal and takes one line: control characters, those that turn the
-/// direction of writing and bytes that are not UTF-8 are written `\n`, `\u202e`, `\xff`.
-[[nodiscard]] std::string visible_text(std::string_view text);
-
 /// Columns of a terminal that visible text takes: none for a combining mark, two for an East Asian
 /// character or a pictograph.
 [[nodiscard]] std::size_t display_width(std::string_view text);

@@ -14,6 +14,7 @@
 #include "coordinator/query/functions.hpp"
 #include "coordinator/query/read_rule.hpp"
 #include "coordinator/store/store.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -39,7 +40,7 @@ std::string shown_sql(std::string_view sql, std::size_t position) {
   const std::string_view before = sql.substr(0, position);
   const std::size_t begin = before.rfind('\n') + 1;  // 0 without one.
   const std::size_t end = std::min(sql.find('\n', position), sql.size());
-  return shortened_text(visible_text(sql.substr(begin, end - begin)), shown_sql_width);
+  return shortened_text(wire::visible_text(sql.substr(begin, end - begin)), shown_sql_width);
 }
 
 std::string place_text(std::string_view sql, std::size_t position) {
@@ -58,7 +59,7 @@ std::string place_text(std::string_view sql, std::size_t position) {
 /// A read-only connection on which nothing but reading is possible, for some time.
 class Reader {
  public:
-  Reader(std::filesystem::path file, const QueryLimits& limits);
+  Reader(std::filesystem::path file, const QueryLimits& limits, Clock::time_point end);
 
   /// @throws QueryError unless the text is one statement that reads.
   [[nodiscard]] Statement prepare(const std::string& sql);
@@ -84,10 +85,8 @@ class Reader {
   std::unique_ptr<sqlite3, Close> connection_;
 };
 
-Reader::Reader(std::filesystem::path file, const QueryLimits& limits)
-    : file_(std::move(file)),
-      limits_(limits),
-      end_(Clock::now() + std::chrono::duration_cast<Clock::duration>(limits.time_limit)) {
+Reader::Reader(std::filesystem::path file, const QueryLimits& limits, Clock::time_point end)
+    : file_(std::move(file)), limits_(limits), end_(end) {
   // An absolute path is never mistaken for `:memory:` or a URI.
   const std::string name = std::filesystem::absolute(file_).string();
   sqlite3* connection = nullptr;
@@ -149,8 +148,9 @@ void Reader::fail(int code, const std::string& sql) const {
   const char* text = sqlite3_errmsg(connection_.get());
   switch (code & 0xff) {
     case SQLITE_INTERRUPT:
-      throw TimeLimitError(fmt::format("timeout = {} (the query did not end in so many seconds)",
-                                       limits_.time_limit.count()));
+      throw TimeLimitError(time_limit_text(limits_));
+    case SQLITE_NOMEM:
+      throw Error(memory_limit_text(limits_));
     case SQLITE_ERROR:
     case SQLITE_AUTH:
     case SQLITE_TOOBIG:
@@ -248,11 +248,22 @@ std::vector<std::string> column_names(sqlite3_stmt* statement) {
 
 }  // namespace
 
+std::string time_limit_text(const QueryLimits& limits) {
+  return fmt::format("timeout = {} (the query did not end in so many seconds)",
+                     limits.time_limit.count());
+}
+
+std::string memory_limit_text(const QueryLimits& limits) {
+  return fmt::format("memory = {} MiB (the query needs more)", limits.memory_size_max >> 20);
+}
+
 QueryEnd run_query(const std::filesystem::path& file, const std::string& sql,
                    const QueryLimits& limits, RowWriter& writer) {
+  const Clock::time_point end =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(limits.time_limit);
   // It knows a campaign file, an undamaged one, and says what is wrong with others.
   (void)Store::open_read_only(file);
-  Reader reader(file, limits);
+  Reader reader(file, limits, end);
   const Statement statement = reader.prepare(sql);
   const std::vector<std::string> names = column_names(statement.get());
   writer.begin(names);

@@ -25,10 +25,17 @@ class TimeLimitError : public Error {
 };
 
 struct QueryLimits {
-  std::chrono::duration<double> time_limit{60.0};
+  std::chrono::duration<double> time_limit{60.0};  ///< With the opening of the file.
+  /// Bytes; held by run_query_in_process().
+  std::uint64_t memory_size_max = std::uint64_t{8} << 30;
   /// Asked every few microseconds; the query ends when it says so.
   std::function<bool()> is_interrupted = [] { return false; };
 };
+
+/// What a TimeLimitError says.
+[[nodiscard]] std::string time_limit_text(const QueryLimits& limits);
+/// What is said of a query that needs more memory: `memory = 8192 MiB (the query needs more)`.
+[[nodiscard]] std::string memory_limit_text(const QueryLimits& limits);
 
 enum class QueryEnd : std::uint8_t { complete, interrupted };
 
@@ -39,8 +46,10 @@ inline constexpr std::size_t sql_size_max = 1'000'000;
 /// read, and nothing else; it sees the file as it was when it began.
 ///
 /// @param writer  Has got part of the rows if an exception comes after begin().
-/// @throws QueryError, TimeLimitError; StoreError if the file cannot be read; and what the writer
-///         throws.
+/// The limits are looked at between steps of the query; see run_query_in_process() for calls that
+/// do not end.
+/// @throws QueryError, TimeLimitError; StoreError if the file cannot be read; Error if memory is
+///         lacking; and what the writer throws.
 [[nodiscard]] QueryEnd run_query(const std::filesystem::path& file, const std::string& sql,
                                  const QueryLimits& limits, RowWriter& writer);
 

@@ -9,6 +9,7 @@
 #include "coordinator/query/cell_text.hpp"
 #include "coordinator/query/display_text.hpp"
 #include "coordinator/report/text_cells.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -56,7 +57,7 @@ TableWriter::TableWriter(const TableLimits& limits, TextSink sink)
 
 void TableWriter::begin(std::span<const std::string> columns) {
   for (const std::string& name : columns) {
-    const std::string shown = shortened_text(visible_text(name), text_width_max);
+    const std::string shown = shortened_text(wire::visible_text(name), text_width_max);
     columns_.push_back(
         {.name = shown, .width = display_width(shown), .texts = {}, .is_number = {}});
   }
@@ -69,7 +70,8 @@ bool TableWriter::row(std::span<const Cell> cells) {
     Column& column = columns_[i];
     const bool is_text = !is_number(cells[i]) && !std::holds_alternative<std::monostate>(cells[i]);
     // No more than this is ever shown, and a text may have megabytes.
-    const std::string text = visible_text(std::string_view(cell_text(cells[i])).substr(0, 1000));
+    const std::string text =
+        wire::visible_text(std::string_view(cell_text(cells[i])).substr(0, 1000));
     column.texts.push_back(shortened_text(text, text_width_max));
     column.is_number.push_back(is_number(cells[i]));
     column.has_text = column.has_text || is_text;
@@ -130,7 +132,7 @@ void MarkdownWriter::begin(std::span<const std::string> columns) {
   num_columns_ = columns.size();
   std::string line = "|";
   for (const std::string& name : columns)
-    line += fmt::format(" {} |", markdown_text(visible_text(name)));
+    line += fmt::format(" {} |", markdown_text(wire::visible_text(name)));
   sink_(line + "\n");
 }
 
@@ -147,7 +149,7 @@ bool MarkdownWriter::row(std::span<const Cell> cells) {
   if (!has_rule_) write_rule(cells);
   std::string line = "|";
   for (const Cell& cell : cells) {
-    line += fmt::format(" {} |", markdown_text(visible_text(cell_text(cell))));
+    line += fmt::format(" {} |", markdown_text(wire::visible_text(cell_text(cell))));
   }
   sink_(line + "\n");
   return true;

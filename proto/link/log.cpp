@@ -2,6 +2,7 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -10,15 +11,39 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "proto/text/visible_text.hpp"
+
 namespace proofmass::wire {
 namespace {
+
+// Messages quote files and peers: what they say must neither steer a terminal nor look like a line
+// of its own. All messages pass through one of the two formatters.
+std::string visible_payload(const spdlog::details::log_msg& message) {
+  return visible_text({message.payload.data(), message.payload.size()});
+}
+
+class TextFormatter final : public spdlog::formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) override {
+    const std::string payload = visible_payload(message);
+    spdlog::details::log_msg visible = message;
+    visible.payload = payload;
+    pattern_.format(visible, line);
+  }
+  [[nodiscard]] std::unique_ptr<formatter> clone() const override {
+    return std::make_unique<TextFormatter>();
+  }
+
+ private:
+  spdlog::pattern_formatter pattern_;
+};
 
 class JsonFormatter final : public spdlog::formatter {
  public:
   void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) override {
     const spdlog::string_view_t level = spdlog::level::to_string_view(message.level);
-    const std::string text = json_line({message.payload.data(), message.payload.size()},
-                                       {level.data(), level.size()}, message.time);
+    const std::string text =
+        json_line(visible_payload(message), {level.data(), level.size()}, message.time);
     line.append(text.data(), text.data() + text.size());
     line.push_back('\n');
   }
@@ -49,7 +74,11 @@ std::string_view unquoted(std::string_view value) {
 void set_up_log(const std::string& program, LogFormat format, LogLevel level) {
   spdlog::set_default_logger(spdlog::stderr_logger_mt(program));
   spdlog::set_level(level == LogLevel::info ? spdlog::level::info : spdlog::level::warn);
-  if (format == LogFormat::json) spdlog::set_formatter(std::make_unique<JsonFormatter>());
+  if (format == LogFormat::json) {
+    spdlog::set_formatter(std::make_unique<JsonFormatter>());
+  } else {
+    spdlog::set_formatter(std::make_unique<TextFormatter>());
+  }
 }
 
 std::string json_line(std::string_view message, std::string_view level,
@@ -64,7 +93,8 @@ std::string json_line(std::string_view message, std::string_view level,
   while (!message.empty()) {
     const std::string_view word = take_word(message);
     const std::size_t equals = word.find('=');
-    if (equals != std::string_view::npos && equals > 0) {
+    // The first of a name counts: what comes later may be text of a file or a peer.
+    if (equals != std::string_view::npos && equals > 0 && !line.contains(word.substr(0, equals))) {
       line[std::string(word.substr(0, equals))] = unquoted(word.substr(equals + 1));
     } else {
       rest += fmt::format("{}{}", rest.empty() ? "" : " ", word);

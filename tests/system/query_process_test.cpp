@@ -1,5 +1,7 @@
 #include <gmock/gmock.h>
+#include <signal.h>
 
+#include <chrono>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -104,6 +106,64 @@ TEST_F(QueryProcess, EndsWith130WhenItIsInterrupted) {
   query.signal(SIGINT);
   EXPECT_EQ(query.wait(), 130);
   EXPECT_EQ(errors(), "");
+}
+
+// Each is one call of a function, during which SQLite looks at nothing else; by themselves they end
+// after minutes or hours.
+const std::vector<std::string> endless_calls{
+    "instr(hex(zeroblob(16000000)), hex(zeroblob(8000000)) || '1')",
+    "replace(hex(zeroblob(16000000)), hex(zeroblob(8000000)) || '1', '')",
+    "hex(zeroblob(30000000)) LIKE '%' || hex(zeroblob(490)) || '1'",
+    "hex(zeroblob(30000000)) GLOB '*' || hex(zeroblob(490)) || '1'"};
+// Far more than the half second of grace, and far less than any of the calls.
+constexpr std::chrono::seconds soon(30);
+
+TEST_F(QueryProcess, EndsWithinTheTimeLimitWhateverAFunctionDoes) {
+  for (const std::string& call : endless_calls) {
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_EQ(query({"SELECT " + call, "--timeout", "0.5"}), 1);
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, soon) << call;
+    EXPECT_EQ(errors(),
+              "proofmass: error: timeout = 0.5 (the query did not end in so many seconds)\n");
+  }
+}
+
+TEST_F(QueryProcess, EndsWith130InTheMidstOfAFunction) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    std::filesystem::remove(directory() / "query.out");
+    Process query(directory(), "query", program(),
+                  {"query", file().string(), "--format", "csv",
+                   "SELECT i, CASE WHEN i = 3 THEN " + endless_calls[0] +
+                       " END AS x FROM (SELECT 1 AS i UNION ALL SELECT 2 UNION ALL SELECT 3)"});
+    wait_until("rows", [&] { return output().ends_with("2,\r\n"); });
+    const auto begin = std::chrono::steady_clock::now();
+    query.signal(signal);
+    EXPECT_EQ(query.wait(), 130);
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, soon);
+    EXPECT_EQ(errors(), "");
+    EXPECT_EQ(output(), "i,x\r\n1,\r\n2,\r\n");
+  }
+}
+
+TEST_F(QueryProcess, TakesItsChildWithIt) {
+  Process query(directory(), "query", program(),
+                {"query", file().string(), "SELECT " + endless_calls[0]});
+  wait_until("child", [&] { return !query.children().empty(); });
+  const pid_t child = query.children().front();
+  query.signal(SIGKILL);
+  EXPECT_EQ(query.wait(), -SIGKILL);
+  wait_until("end of the child", [&] { return !is_alive(child); });
+}
+
+TEST_F(QueryProcess, SaysWhatEndedItsChild) {
+  Process query(directory(), "query", program(),
+                {"query", file().string(), "SELECT " + endless_calls[0]});
+  wait_until("child", [&] { return !query.children().empty(); });
+  kill(query.children().front(), SIGSEGV);
+  EXPECT_EQ(query.wait(), 1);
+  EXPECT_EQ(errors(),
+            "proofmass: error: query: its process ended: killed by signal 11 (Segmentation "
+            "fault)\n");
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <memory>
 #include <string>
 
@@ -37,6 +38,12 @@ TEST(JsonLine, IsJsonWhateverAPeerSays) {
   EXPECT_EQ(json_line("malformed_message \xff\n\\ =x", "error", noon),
             R"({"time":"2026-03-04T12:00:01.234Z","level":"error","event":"malformed_message",)"
             "\"text\":\"\xef\xbf\xbd\\n\\\\ =x\"}");
+}
+
+TEST(JsonLine, KeepsWhatItSaysItselfWhateverAPeerSays) {
+  EXPECT_EQ(json_line("refused name=\"a\" level=info time=never event=done name=b", "error", noon),
+            R"({"time":"2026-03-04T12:00:01.234Z","level":"error","event":"refused",)"
+            R"("name":"a","text":"level=info time=never event=done name=b"})");
 }
 
 /// Gives the program its former log back.
@@ -74,6 +81,21 @@ TEST_F(SetUpLog, WritesAnObjectALineForPrograms) {
                   "\n"
                   R"([{]"time":"[^"]*","level":"warning","event":"worker_crashed","signal":"11"[}])"
                   "\n"));
+}
+
+// A name from a file or a peer could steer the terminal, or look like an event of its own.
+TEST_F(SetUpLog, MakesWhatFilesAndPeersSayVisible) {
+  for (const LogFormat format : {LogFormat::text, LogFormat::json}) {
+    set_up_log(format == LogFormat::text ? "visible text" : "visible json", format, LogLevel::info);
+    testing::internal::CaptureStderr();
+    spdlog::warn("refused name=\x1b[2J\n[2026] forged\xe2\x80\xae");
+    const std::string text = testing::internal::GetCapturedStderr();
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+    EXPECT_THAT(text, testing::HasSubstr("u001b[2J"));
+    EXPECT_THAT(text, testing::HasSubstr("u202e"));
+    EXPECT_EQ(text.find('\x1b'), std::string::npos);
+    EXPECT_EQ(text.find("\xe2\x80\xae"), std::string::npos);
+  }
 }
 
 TEST_F(SetUpLog, LeavesOutWhatIsBelowItsLevel) {

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace proofmass::wire {
+
+/// Text that is safe on a terminal and takes one line: control characters, those that turn the
+/// direction of writing and bytes that are not UTF-8 are written `\n`, `\u202e`, `\xff`. All text
+/// of a file or a peer passes through it, or visible_lines(), on its way to a person.
+[[nodiscard]] std::string visible_text(std::string_view text);
+
+/// The same for text of several lines, whose ends stay.
+[[nodiscard]] std::string visible_lines(std::string_view text);
+
+}  // namespace proofmass::wire
