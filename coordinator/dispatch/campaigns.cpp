@@ -12,9 +12,9 @@
 namespace proofmass::coordinator {
 namespace {
 
-void send_forget(const State& state, CampaignId id, Outbox& outbox) {
+void send_to_all(const State& state, CampaignId id, Outbox& outbox) {
   for (const auto& [worker, content] : state.workers) {
-    outbox.send(worker, wire::Forget{.campaign = id});
+    detail::send_not_served(state, worker, id, outbox);
   }
 }
 
@@ -73,6 +73,7 @@ void recall_all(State& state, CampaignId id, Outbox& outbox) {
 void on_campaign(State& state, CampaignId id, const StoredCampaign& stored, TimePoint now,
                  Outbox& outbox) {
   PROOFMASS_EXPECT(!state.campaigns.contains(id));
+  state.ended.erase(id);
   CampaignState& campaign = state.campaigns[id];
   state.order.push_back(id);
   campaign.definition = stored.definition;
@@ -143,13 +144,15 @@ void on_cancel(State& state, CampaignId id, Outbox& outbox) {
   campaign.phase = Phase::cancelled;
   detail::sort_served(state);
   recall_all(state, id, outbox);
-  send_forget(state, id, outbox);
+  send_to_all(state, id, outbox);
 }
 
 void on_removed(State& state, CampaignId id, Outbox& outbox) {
   const CampaignState& campaign = state.campaigns.at(id);
   PROOFMASS_EXPECT(campaign.delivered.empty());
   recall_all(state, id, outbox);
+  const bool has_ended = campaign.phase == Phase::finished || campaign.phase == Phase::cancelled;
+  if (has_ended) state.ended[id] = campaign.definition->num_runs;
   state.campaigns.erase(id);
   std::erase(state.order, id);
   std::erase(state.served, id);
@@ -159,7 +162,12 @@ void on_removed(State& state, CampaignId id, Outbox& outbox) {
     std::erase_if(worker.computing,
                   [&](const Progress& progress) { return progress.batch.campaign == id; });
   }
-  send_forget(state, id, outbox);
+  send_to_all(state, id, outbox);
+}
+
+void on_ended(State& state, CampaignId id, std::uint64_t num_runs) {
+  PROOFMASS_EXPECT(!state.campaigns.contains(id));
+  state.ended[id] = num_runs;
 }
 
 }  // namespace proofmass::coordinator

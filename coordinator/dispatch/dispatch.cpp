@@ -143,8 +143,9 @@ void reject_unregistered(WorkerId id, Outbox& outbox) {
                                .text = "this worker is not registered"});
 }
 
-void on_hello(State& state, WorkerId id, SessionId session, const wire::Hello& hello, TimePoint now,
-              Outbox& outbox) {
+void on_hello(State& state, WorkerId id, SessionId session, const std::string& key,
+              const wire::Hello& hello, TimePoint now, Outbox& outbox) {
+  (void)key;
   if (!take_hello_allowance(state, now)) return;
   if (state.is_stopped) return outbox.send(id, wire::Stop{});
   if (hello.former) note_former(state, *hello.former, outbox);
@@ -164,15 +165,22 @@ void on_hello(State& state, WorkerId id, SessionId session, const wire::Hello& h
   detail::settle(state, now, outbox);
 }
 
+bool on_release_host(State& state, const std::string& host, TimePoint now, Outbox& outbox) {
+  if (state.quarantined.erase(host) == 0) return false;
+  state.hosts[host].num_crashes = 0;
+  outbox.log({.kind = "host_released", .text = fmt::format("host={}", host)});
+  detail::lend_to_hungry(state, now, outbox);
+  return true;
+}
+
 void on_campaign_request(State& state, WorkerId id, const wire::CampaignRequest& request,
                          TimePoint now, Outbox& outbox) {
   if (detail::heard(state, id, now, outbox) == nullptr) return;
   const auto found = state.campaigns.find(request.campaign);
   if (found == state.campaigns.end() || found->second.phase == Phase::cancelled) {
-    return outbox.send(id, wire::Forget{.campaign = request.campaign});
+    return detail::send_not_served(state, id, request.campaign, outbox);
   }
-  outbox.send(id, wire::CampaignDefinition{.campaign = request.campaign,
-                                           .definition = found->second.definition});
+  outbox.send_definition(id, request, found->second.definition);
 }
 
 void on_heartbeat(State& state, WorkerId id, const wire::Heartbeat& heartbeat,

@@ -38,16 +38,28 @@ void on_pause(State& state, CampaignId id, Outbox& outbox);
 void on_resume(State& state, CampaignId id, TimePoint now, Outbox& outbox);
 /// Drops its open runs; workers forget them. What is stored stands, and on_resume() goes on.
 void on_cancel(State& state, CampaignId id, Outbox& outbox);
-/// Forgets a campaign of which nothing is on its way to the store. Workers forget it, too.
+/// Serves a campaign no more, of which nothing is on its way to the store. Workers forget it if it
+/// is finished or cancelled; otherwise they keep its results.
 void on_removed(State& state, CampaignId id, Outbox& outbox);
+/// A campaign that is not served is finished or cancelled: workers that ask for it are told to
+/// forget it. on_campaign() ends that.
+/// @param num_runs  Its runs; workers keep results from there on, as of an extension that is not
+///                  known here.
+void on_ended(State& state, CampaignId id, std::uint64_t num_runs = num_runs_max);
 
 // Workers.
 
 /// Answers a message of a worker that is not registered, or of another epoch.
 void reject_unregistered(WorkerId id, Outbox& outbox);
 /// Registers a worker, or answers again if it is registered already.
-void on_hello(State& state, WorkerId id, SessionId session, const wire::Hello& hello, TimePoint now,
-              Outbox& outbox);
+/// @param key  Public key of the connection; empty without keys. What is said about a host counts
+///             for workers with this key only.
+void on_hello(State& state, WorkerId id, SessionId session, const std::string& key,
+              const wire::Hello& hello, TimePoint now, Outbox& outbox);
+/// Workers of a quarantined host are taken again, whatever their keys.
+/// @return False if it is not quarantined.
+bool on_release_host(State& state, const std::string& host, TimePoint now, Outbox& outbox);
+/// Answers with a part of the definition.
 void on_campaign_request(State& state, WorkerId id, const wire::CampaignRequest& request,
                          TimePoint now, Outbox& outbox);
 /// Makes both sides agree about what the worker holds, and lends runs up to its share.

@@ -244,6 +244,17 @@ void sort_served(State& state) {
   });
 }
 
+void send_not_served(const State& state, WorkerId worker, CampaignId id, Outbox& outbox) {
+  if (const auto found = state.campaigns.find(id); found != state.campaigns.end()) {
+    const std::uint64_t num_runs = found->second.definition->num_runs;
+    return outbox.send(worker, wire::Forget{.campaign = id, .num_runs = num_runs});
+  }
+  if (const auto found = state.ended.find(id); found != state.ended.end()) {
+    return outbox.send(worker, wire::Forget{.campaign = id, .num_runs = found->second});
+  }
+  outbox.send(worker, wire::NotServed{.campaign = id, .ranges = {}});
+}
+
 void finish_if_done(State& state, CampaignId id, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
   if (campaign.phase == Phase::finished || campaign.phase == Phase::cancelled) return;
@@ -257,9 +268,7 @@ void finish_if_done(State& state, CampaignId id, Outbox& outbox) {
                            campaign.definition->num_runs, campaign.given_up.size(),
                            campaign.num_duplicates, campaign.num_audited, campaign.num_mismatches),
        .campaign = id});
-  for (const auto& [worker, content] : state.workers) {
-    outbox.send(worker, wire::Forget{.campaign = id});
-  }
+  for (const auto& [worker, content] : state.workers) send_not_served(state, worker, id, outbox);
 }
 
 void settle(State& state, TimePoint now, Outbox& outbox) {

@@ -30,6 +30,10 @@ void send_lease(const State& state, LeaseId lease, Outbox& outbox);
 /// To be called after all that changes the phase or the priority of a campaign.
 void sort_served(State& state);
 
+/// Tells a worker that names a campaign whose runs are not lent (any more) what to do with them:
+/// to forget them if the campaign is finished or cancelled, or else to keep their results.
+void send_not_served(const State& state, WorkerId worker, CampaignId campaign, Outbox& outbox);
+
 /// Ends the campaign if it is finished.
 void finish_if_done(State& state, CampaignId id, Outbox& outbox);
 

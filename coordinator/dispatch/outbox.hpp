@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/identifiers.hpp"
 #include "proto/wire/messages.hpp"
 
@@ -45,6 +47,10 @@ class Outbox {
 
   /// May be lost, like anything that is sent; the dispatch copes.
   virtual void send(wire::WorkerId worker, wire::Message message) = 0;
+  /// Sends the part of the campaign's definition that the worker asked for. May be lost likewise.
+  /// @param definition  Shared with the dispatch, because it may have millions of numbers.
+  virtual void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+                               const std::shared_ptr<const Campaign>& definition) = 0;
   /// Must lead to on_committed() with this run once the result is durable, or to the end of the
   /// service. Called at most once for a run.
   virtual void store(Arrival arrival) = 0;

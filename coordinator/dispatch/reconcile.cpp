@@ -169,7 +169,7 @@ void reconcile(State& state, WorkerId id, const wire::Heartbeat& heartbeat, Time
     if (is_wanted(state, campaign)) {
       settle_surplus(state, id, campaign, runs, now, outbox);
     } else {
-      outbox.send(id, wire::Forget{.campaign = campaign});
+      send_not_served(state, id, campaign, outbox);
       state.workers.at(id).unleased[campaign] = all_of(runs);
     }
   }

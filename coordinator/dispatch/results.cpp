@@ -139,7 +139,7 @@ void on_results(State& state, WorkerId id, const wire::ResultBatch& batch, TimeP
   if (worker == nullptr) return;
   const auto found = state.campaigns.find(batch.campaign);
   if (found == state.campaigns.end() || found->second.phase == Phase::cancelled) {
-    return outbox.send(id, wire::Forget{.campaign = batch.campaign});
+    return detail::send_not_served(state, id, batch.campaign, outbox);
   }
   CampaignState& campaign = found->second;
   if (is_foreign(campaign, batch)) {

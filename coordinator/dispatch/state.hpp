@@ -200,6 +200,9 @@ struct Host {
 struct State {
   DispatchConfig config;
   std::map<CampaignId, CampaignState> campaigns;
+  /// Campaigns that are known to be finished or cancelled although they are not served, with their
+  /// number of runs: workers may forget them. All others that are not served may be served later.
+  std::map<CampaignId, std::uint64_t> ended;
   std::vector<CampaignId> order;   ///< In which they were added.
   std::vector<CampaignId> served;  ///< Active ones, in the order in which their runs are lent.
   std::map<WorkerId, Worker> workers;

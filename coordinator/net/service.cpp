@@ -109,6 +109,11 @@ class Service::Parts final : public Outbox {
     worker_desk_.send(worker, std::move(message));
   }
 
+  void send_definition(WorkerId worker, const wire::CampaignRequest& request,
+                       const std::shared_ptr<const Campaign>& definition) override {
+    worker_desk_.send_definition(worker, request, definition);
+  }
+
   void store(Arrival arrival) override {
     const CampaignId campaign = arrival.campaign;
     writer_.deliver(campaign, delivery_of(std::move(arrival)));

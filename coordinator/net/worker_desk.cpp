@@ -20,12 +20,13 @@ using wire::RejectReason;
 struct Handler {
   State& state;
   WorkerId worker;
+  const std::string& key;
   const wire::Header& header;
   TimePoint now;
   Outbox& outbox;
 
   void operator()(const wire::Hello& hello) const {
-    on_hello(state, worker, header.session, hello, now, outbox);
+    on_hello(state, worker, header.session, key, hello, now, outbox);
   }
   void operator()(const wire::Heartbeat& heartbeat) const {
     on_heartbeat(state, worker, heartbeat, header.sequence, now, outbox);
@@ -88,7 +89,7 @@ void WorkerDesk::receive(const Incoming& message, TimePoint now, Outbox& outbox)
   if (const auto* const bye = std::get_if<wire::Bye>(&packet->message)) {
     surroundings_.on_leaving(*worker, bye->reason);
   }
-  std::visit(Handler{state_, *worker, header, now, outbox}, packet->message);
+  std::visit(Handler{state_, *worker, message.from.key, header, now, outbox}, packet->message);
 }
 
 std::optional<wire::Packet> WorkerDesk::decode(const Incoming& message, TimePoint now,
@@ -143,6 +144,11 @@ void WorkerDesk::send(WorkerId worker, wire::Message message) {
               {.header = peers_.next_header(worker, epoch_), .message = std::move(message)});
   if (is_lease) wire::kill_point(KillPoint::after_lend);
   if (is_acknowledgement) wire::kill_point(KillPoint::after_acknowledge);
+}
+
+void WorkerDesk::send_definition(WorkerId worker, const wire::CampaignRequest& request,
+                                 const std::shared_ptr<const Campaign>& definition) {
+  send(worker, definitions_.part(request, definition));
 }
 
 void WorkerDesk::send_packet(const Address& to, const wire::Packet& packet) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -9,6 +10,7 @@
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
+#include "coordinator/net/definition_cache.hpp"
 #include "coordinator/net/peers.hpp"
 
 namespace proofmass::coordinator {
@@ -45,6 +47,10 @@ class WorkerDesk {
   /// dispatch is made for that.
   void send(WorkerId worker, wire::Message message);
 
+  /// Carries out Outbox::send_definition().
+  void send_definition(WorkerId worker, const wire::CampaignRequest& request,
+                       const std::shared_ptr<const Campaign>& definition);
+
   /// Ends the sessions of workers whose keys were revoked, and forgets strangers once there are too
   /// many. To be called about once a second.
   void review(TimePoint now, Outbox& outbox);
@@ -64,6 +70,7 @@ class WorkerDesk {
   wire::Epoch epoch_;
   Surroundings surroundings_;
   Peers peers_;
+  DefinitionCache definitions_;
   std::uint64_t num_unsent_ = 0;
 };
 

@@ -10,8 +10,8 @@
 
 namespace proofmass::wire {
 
-/// Size limits of an encoded message, bytes. Only a CampaignDefinition may be as large as the
-/// first.
+/// Size limits of an encoded campaign and of an encoded message, bytes. A definition travels in
+/// parts.
 inline constexpr std::size_t definition_size_max = std::size_t{64} << 20;
 inline constexpr std::size_t message_size_max = std::size_t{4} << 20;
 

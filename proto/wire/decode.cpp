@@ -34,7 +34,7 @@ Packet read_packet(const proto::Envelope& envelope) {
 
 std::variant<Packet, DecodeError> decode(std::string_view bytes) {
   detail::silence_protobuf();
-  if (bytes.size() > definition_size_max) return too_large(bytes.size(), definition_size_max);
+  if (bytes.size() > message_size_max) return too_large(bytes.size(), message_size_max);
   proto::Envelope envelope;
   const bool is_parsed =
       detail::has_fields_at_most(bytes, *proto::Envelope::descriptor(), fields_max) &&
@@ -49,9 +49,6 @@ std::variant<Packet, DecodeError> decode(std::string_view bytes) {
   }
   if (envelope.message_case() == proto::Envelope::MESSAGE_NOT_SET) {
     return DecodeError{DecodeFault::empty, "message = none (must be of a known kind)"};
-  }
-  if (!envelope.has_campaign_definition() && bytes.size() > message_size_max) {
-    return too_large(bytes.size(), message_size_max);
   }
   try {
     return read_packet(envelope);

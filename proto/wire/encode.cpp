@@ -2,7 +2,6 @@
 
 #include "core/error.hpp"
 #include "proto/proofmass.pb.h"
-#include "proto/wire/campaign_codec.hpp"
 #include "proto/wire/codec.hpp"
 
 namespace proofmass::wire {
@@ -51,17 +50,26 @@ void write(const Reject& reject, proto::Envelope& envelope) {
 
 void write(const CampaignRequest& request, proto::Envelope& envelope) {
   envelope.mutable_campaign_request()->set_campaign(request.campaign.value);
+  envelope.mutable_campaign_request()->set_offset(request.offset);
 }
 
-void write(const CampaignDefinition& definition, proto::Envelope& envelope) {
-  PROOFMASS_EXPECT(definition.definition != nullptr);
-  proto::CampaignDefinition& message = *envelope.mutable_campaign_definition();
-  message.set_campaign(definition.campaign.value);
-  detail::encode_campaign(*definition.definition, *message.mutable_definition());
+void write(const DefinitionPart& part, proto::Envelope& envelope) {
+  proto::DefinitionPart& message = *envelope.mutable_definition_part();
+  message.set_campaign(part.campaign.value);
+  message.set_offset(part.offset);
+  message.set_total_size(part.total_size);
+  message.set_checksum(part.checksum);
+  message.set_content(part.content);
 }
 
 void write(const Forget& forget, proto::Envelope& envelope) {
   envelope.mutable_forget()->set_campaign(forget.campaign.value);
+  envelope.mutable_forget()->set_num_runs(forget.num_runs);
+}
+
+void write(const NotServed& not_served, proto::Envelope& envelope) {
+  envelope.mutable_not_served()->set_campaign(not_served.campaign.value);
+  write_ranges(not_served.ranges, *envelope.mutable_not_served()->mutable_ranges());
 }
 
 void write(const RunLease& lease, proto::Envelope& envelope) {
@@ -124,6 +132,7 @@ void write(const Heartbeat& heartbeat, proto::Envelope& envelope) {
     content.set_num_orbits_done(batch.num_orbits_done);
     write_ranges(batch.ranges, *content.mutable_ranges());
   }
+  for (const HeldRuns& held : heartbeat.set_aside) write_held(held, *message.add_set_aside());
 }
 
 void write(const Bye& bye, proto::Envelope& envelope) {
@@ -143,11 +152,9 @@ std::string encode(const Packet& packet) {
   envelope.set_epoch(packet.header.epoch.value);
   envelope.set_sequence(packet.header.sequence);
   std::visit([&](const auto& content) { write(content, envelope); }, packet.message);
-  const bool is_definition = std::holds_alternative<CampaignDefinition>(packet.message);
-  const std::size_t size_max = is_definition ? definition_size_max : message_size_max;
-  if (envelope.ByteSizeLong() > size_max) {
+  if (envelope.ByteSizeLong() > message_size_max) {
     throw InvalidArgument(fmt::format("message size = {} bytes (must be at most {})",
-                                      envelope.ByteSizeLong(), size_max));
+                                      envelope.ByteSizeLong(), message_size_max));
   }
   return envelope.SerializeAsString();
 }

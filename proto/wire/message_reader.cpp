@@ -8,8 +8,8 @@
 
 #include "core/error.hpp"
 #include "proto/proofmass.pb.h"
-#include "proto/wire/campaign_codec.hpp"
 #include "proto/wire/checks.hpp"
+#include "proto/wire/codec.hpp"
 
 namespace proofmass::wire::detail {
 namespace {
@@ -99,17 +99,33 @@ Message read(const proto::Reject& message) {
 }
 
 Message read(const proto::CampaignRequest& message) {
-  return CampaignRequest{.campaign = checked_campaign(message.campaign())};
+  require_in(message.offset(), 0, definition_size_max - 1, "offset");
+  return CampaignRequest{.campaign = checked_campaign(message.campaign()),
+                         .offset = message.offset()};
 }
 
-Message read(const proto::CampaignDefinition& message) {
-  return CampaignDefinition{
-      .campaign = checked_campaign(message.campaign()),
-      .definition = std::make_shared<const Campaign>(decode_campaign(message.definition()))};
+Message read(const proto::DefinitionPart& message) {
+  require_in(message.total_size(), 1, definition_size_max, "total_size");
+  require_in(message.content().size(), 1,
+             std::min<std::uint64_t>(definition_part_size_max, message.total_size()),
+             "content size");
+  require_in(message.offset(), 0, message.total_size() - message.content().size(), "offset");
+  return DefinitionPart{.campaign = checked_campaign(message.campaign()),
+                        .offset = message.offset(),
+                        .total_size = message.total_size(),
+                        .checksum = message.checksum(),
+                        .content = message.content()};
 }
 
 Message read(const proto::Forget& message) {
-  return Forget{.campaign = checked_campaign(message.campaign())};
+  require_in(message.num_runs(), 1, num_runs_max, "num_runs");
+  return Forget{.campaign = checked_campaign(message.campaign()), .num_runs = message.num_runs()};
+}
+
+Message read(const proto::NotServed& message) {
+  NotServed not_served{.campaign = checked_campaign(message.campaign()), .ranges = {}};
+  if (message.ranges_size() > 0) not_served.ranges = read_ranges(message.ranges());
+  return not_served;
 }
 
 Message read(const proto::RunLease& message) {
@@ -206,6 +222,7 @@ Message read(const proto::ResultAck& message) {
 Message read(const proto::Heartbeat& message) {
   require_in(message.num_runs_max(), 0, runs_per_lease_max, "num_runs_max");
   require_count(message.held_size(), 0, ranges_per_message_max, "held");
+  require_count(message.set_aside_size(), 0, ranges_per_message_max, "set_aside");
   require_count(message.computing_size(), 0, slots_max, "computing");
   Heartbeat heartbeat{.num_runs_max = message.num_runs_max(),
                       .num_orbits_done = message.num_orbits_done(),
@@ -213,6 +230,9 @@ Message read(const proto::Heartbeat& message) {
                       .computing = {}};
   std::size_t num_held = 0;
   for (const auto& held : message.held()) heartbeat.held.push_back(read_held(held, num_held));
+  for (const auto& held : message.set_aside()) {
+    heartbeat.set_aside.push_back(read_held(held, num_held));
+  }
   std::size_t num_computing = 0;
   for (const auto& batch : message.computing()) {
     heartbeat.computing.push_back({.campaign = checked_campaign(batch.campaign()),
@@ -246,10 +266,12 @@ Message read_message(const proto::Envelope& envelope) {
       return read(envelope.reject());
     case proto::Envelope::kCampaignRequest:
       return read(envelope.campaign_request());
-    case proto::Envelope::kCampaignDefinition:
-      return read(envelope.campaign_definition());
+    case proto::Envelope::kDefinitionPart:
+      return read(envelope.definition_part());
     case proto::Envelope::kForget:
       return read(envelope.forget());
+    case proto::Envelope::kNotServed:
+      return read(envelope.not_served());
     case proto::Envelope::kRunLease:
       return read(envelope.run_lease());
     case proto::Envelope::kRetract:

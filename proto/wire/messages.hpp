@@ -17,11 +17,12 @@
 namespace proofmass::wire {
 
 /// Grows with every change that an older peer would misunderstand.
-inline constexpr std::uint32_t protocol_version = 3;
+inline constexpr std::uint32_t protocol_version = 4;
 
 inline constexpr std::uint32_t runs_per_lease_max = 4096;  ///< Also of a batch of results.
 inline constexpr std::size_t ranges_per_message_max = 4096;
 inline constexpr std::uint32_t slots_max = 1024;
+inline constexpr std::size_t definition_part_size_max = std::size_t{256} << 10;  ///< Bytes.
 
 /// Number of a worker's registration with a coordinator, from 1.
 struct WorkerId {
@@ -117,12 +118,12 @@ struct Welcome {
 
 /// The values are sent: never renumber.
 enum class RejectReason : std::uint8_t {
-  not_registered = 1,  ///< Say Hello (again); the only reason that is not final.
-  incompatible = 2,    ///< Other protocol, model or reference digest.
-  malformed = 3,       ///< Something that the worker sent broke the rules.
-  full = 4,            ///< The coordinator serves as many workers as it can.
-  quarantined = 5,     ///< Too much was lost on this host.
-  revoked = 6,         ///< The worker's key is not on the list any more.
+  not_registered = 1,  ///< Say Hello (again).
+  incompatible = 2,    ///< Other protocol, model or reference digest. Final.
+  malformed = 3,       ///< Something sent broke the rules: nothing more is heard on the connection.
+  full = 4,            ///< The coordinator serves as many workers as it can; ask later.
+  quarantined = 5,     ///< Too much crashed on this host; ask later.
+  revoked = 6,         ///< The worker's key is not on the list any more. Final.
 };
 
 /// Coordinator → worker: not registered, and why.
@@ -131,22 +132,35 @@ struct Reject {
   std::string text;  ///< For people.
 };
 
-/// Worker → coordinator: asks for the definition of a campaign of which it was lent runs.
+/// Worker → coordinator: asks for a part of the definition of a campaign of which it was lent runs.
 struct CampaignRequest {
   CampaignId campaign;
+  std::uint64_t offset = 0;  ///< Bytes that it has; below definition_size_max.
 };
 
-/// Coordinator → worker: the answer.
-struct CampaignDefinition {
+/// Coordinator → worker: the answer, a part of what encode_definition() returns. It starts at the
+/// offset that was asked for, or at 0 if that is beyond the end.
+struct DefinitionPart {
   CampaignId campaign;
-  /// Without the `table` values, which come with each lease. Shared by the coordinator's state and
-  /// all messages under way, because an environment table may have millions of numbers.
-  std::shared_ptr<const Campaign> definition;
+  std::uint64_t offset = 0;
+  std::uint64_t total_size = 0;  ///< Bytes of the whole; 1 to definition_size_max.
+  std::uint64_t checksum = 0;    ///< wire::checksum() of the whole.
+  std::string content;           ///< 1 to definition_part_size_max bytes, within the whole.
 };
 
-/// Coordinator → worker: drop all runs and results of a campaign that is not served (any more).
+/// Coordinator → worker: the campaign is finished or cancelled. Drop its runs below `num_runs`, and
+/// their results. Runs from there on may belong to an extension that this coordinator does not
+/// know.
 struct Forget {
   CampaignId campaign;
+  std::uint64_t num_runs = num_runs_max;  ///< 1 to num_runs_max.
+};
+
+/// Coordinator → worker: results of these runs cannot be taken now, because the campaign is not
+/// served or has fewer runs. Keep the results and offer them again later; drop what waits.
+struct NotServed {
+  CampaignId campaign;
+  std::vector<RunRange> ranges;  ///< At most ranges_per_message_max; none: the whole campaign.
 };
 
 /// Coordinator → worker: runs that are lent to it.
@@ -210,6 +224,9 @@ struct Heartbeat {
   /// ranges_per_message_max ranges.
   std::vector<HeldRuns> held;
   std::vector<ComputedBatch> computing;  ///< At most slots_max.
+  /// Finished runs whose results the coordinator did not take (NotServed); together with `held` at
+  /// most ranges_per_message_max ranges.
+  std::vector<HeldRuns> set_aside = {};
 };
 
 struct HeartbeatAck {};  ///< Coordinator → worker: the coordinator lives.
@@ -222,9 +239,9 @@ struct Bye {
 struct Drain {};  ///< Coordinator → worker: deliver what you hold, then say Bye and end.
 struct Stop {};   ///< Coordinator → worker: drop what you hold and end.
 
-using Message = std::variant<Hello, Welcome, Reject, CampaignRequest, CampaignDefinition, Forget,
-                             RunLease, Retract, GiveBack, ResultBatch, ResultAck, Heartbeat,
-                             HeartbeatAck, Bye, Drain, Stop>;
+using Message = std::variant<Hello, Welcome, Reject, CampaignRequest, DefinitionPart, Forget,
+                             NotServed, RunLease, Retract, GiveBack, ResultBatch, ResultAck,
+                             Heartbeat, HeartbeatAck, Bye, Drain, Stop>;
 
 /// A message as it travels.
 struct Packet {

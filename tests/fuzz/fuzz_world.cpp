@@ -71,6 +71,10 @@ class World final : public coordinator::Outbox {
   void send(wire::WorkerId worker, wire::Message message) override {
     desk_.send(worker, std::move(message));
   }
+  void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+                       const std::shared_ptr<const Campaign>& definition) override {
+    desk_.send_definition(worker, request, definition);
+  }
   void store(Arrival arrival) override {
     const auto& run = arrival.computed.result.run;
     PROOFMASS_EXPECT(run.value < fuzz_num_runs);

@@ -8,6 +8,8 @@
 #include <utility>
 #include <variant>
 
+#include "proto/wire/definition_codec.hpp"
+
 namespace proofmass::test {
 namespace {
 
@@ -89,7 +91,7 @@ void PlayedCoordinator::handle(wire::WorkerId worker, const wire::Packet& packet
   coordinator::State& state = life_->state;
   const TimePoint now = agenda_.now();
   if (const auto* const hello = std::get_if<wire::Hello>(&packet.message)) {
-    on_hello(state, worker, packet.header.session, *hello, now, *this);
+    on_hello(state, worker, packet.header.session, "", *hello, now, *this);
   } else if (const auto* const heartbeat = std::get_if<wire::Heartbeat>(&packet.message)) {
     on_heartbeat(state, worker, *heartbeat, packet.header.sequence, now, *this);
   } else if (const auto* const results = std::get_if<wire::ResultBatch>(&packet.message)) {
@@ -202,6 +204,11 @@ void PlayedCoordinator::send(wire::WorkerId worker, wire::Message message) {
   Peer& peer = life_->peers.at(worker);
   send_({.header = {.session = peer.session, .epoch = life_->epoch, .sequence = ++peer.num_sent},
          .message = std::move(message)});
+}
+
+void PlayedCoordinator::send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+                                        const std::shared_ptr<const Campaign>& definition) {
+  send(worker, wire::EncodedDefinition(*definition).part(request));
 }
 
 void PlayedCoordinator::write_later(wire::CampaignId id, std::function<void(PlayedFile&)> write) {

@@ -61,6 +61,8 @@ class PlayedCoordinator final : public coordinator::Outbox {
 
   // Outbox.
   void send(wire::WorkerId worker, wire::Message message) override;
+  void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+                       const std::shared_ptr<const Campaign>& definition) override;
   void store(coordinator::Arrival arrival) override;
   void compare(coordinator::Arrival arrival) override;
   void record(const coordinator::Loss& loss) override;

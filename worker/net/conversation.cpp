@@ -92,19 +92,20 @@ void Conversation::handle(const wire::Reject& reject, const wire::Header&, TimeP
   if (is_registered_) register_again(now);  // Otherwise a Hello is under way.
 }
 
-void Conversation::handle(const wire::CampaignDefinition& answer, const wire::Header&, TimePoint) {
-  if (requested_at_.erase(answer.campaign) == 0) return;
-  const std::size_t width = table_elements(answer.definition->dispersions).size();
-  if (agrees_on_table(answer.campaign, width)) {
-    execution_.define(answer.campaign, answer.definition);
-  }
+void Conversation::handle(const wire::DefinitionPart& part, const wire::Header&, TimePoint now) {
+  using Progress = wire::IncomingDefinition::Progress;
+  const auto wanted = wanted_.find(part.campaign);
+  if (wanted == wanted_.end()) return;
+  const Progress progress = wanted->second.incoming.add(part);
+  if (progress == Progress::advanced) return request(part.campaign, now);
+  if (progress == Progress::complete) define(part.campaign, now);
 }
 
 void Conversation::handle(const wire::Forget& forget, const wire::Header&, TimePoint) {
   const auto is_of_it = [&](const auto& entry) { return entry.first.first == forget.campaign; };
   std::erase_if(unfinished_, is_of_it);
   std::erase_if(unacknowledged_, is_of_it);
-  requested_at_.erase(forget.campaign);
+  wanted_.erase(forget.campaign);
   table_widths_.erase(forget.campaign);
   execution_.forget(forget.campaign);
   leave_if_done();
@@ -126,8 +127,8 @@ void Conversation::handle(const wire::RunLease& lease, const wire::Header&, Time
     for (const RunIndex run : indices_of(std::array{runs}))
       unfinished_[{lease.campaign, run}] = lease.attempt;
   }
-  const bool is_requested = requested_at_.contains(lease.campaign);
-  if (!execution_.is_defined(lease.campaign) && !is_requested) request(lease.campaign, now);
+  const bool is_wanted = wanted_.contains(lease.campaign);
+  if (!execution_.is_defined(lease.campaign) && !is_wanted) request(lease.campaign, now);
 }
 
 void Conversation::handle(const wire::Retract& retract, const wire::Header&, TimePoint) {
@@ -261,8 +262,9 @@ bool Conversation::computes_other_batches() const {
 // Campaigns and leases.
 
 void Conversation::request(wire::CampaignId campaign, TimePoint now) {
-  requested_at_[campaign] = now;
-  send(wire::CampaignRequest{campaign});
+  WantedDefinition& wanted = wanted_[campaign];
+  wanted.request_due_at = now + config_.request_interval;
+  send(wire::CampaignRequest{.campaign = campaign, .offset = wanted.incoming.num_bytes()});
 }
 
 void Conversation::request_definitions(TimePoint now) {
@@ -270,9 +272,25 @@ void Conversation::request_definitions(TimePoint now) {
     const auto first = unfinished_.lower_bound({entry.first, RunIndex{0}});
     return first == unfinished_.end() || first->first.first != entry.first;
   };
-  std::erase_if(requested_at_, has_no_run);
-  for (const auto& [campaign, requested_at] : requested_at_) {
-    if (now - requested_at >= config_.request_interval) request(campaign, now);
+  std::erase_if(wanted_, has_no_run);
+  for (const auto& [campaign, wanted] : wanted_) {
+    if (now >= wanted.request_due_at) request(campaign, now);
+  }
+}
+
+/// A definition that makes no sense, though the protocol is the same, is a fault of the
+/// coordinator's program. It is asked for again in a while, as the program may be exchanged.
+void Conversation::define(wire::CampaignId campaign, TimePoint now) {
+  WantedDefinition& wanted = wanted_.at(campaign);
+  const auto taken = wanted.incoming.take();
+  if (std::holds_alternative<wire::DecodeError>(taken)) {
+    wanted.request_due_at = now + config_.request_again_after;
+    return;
+  }
+  const auto& definition = std::get<std::shared_ptr<const Campaign>>(taken);
+  wanted_.erase(campaign);
+  if (agrees_on_table(campaign, table_elements(definition->dispersions).size())) {
+    execution_.define(campaign, definition);
   }
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/wire/definition_codec.hpp"
 #include "proto/wire/messages.hpp"
 #include "worker/execution/execution.hpp"
 
@@ -31,7 +32,8 @@ struct ConversationConfig {
   /// which a thousand workers of a coordinator that restarts come one after the other.
   Duration hello_delay = std::chrono::milliseconds(250);
   Duration hello_delay_max = std::chrono::seconds(32);
-  Duration request_interval = std::chrono::seconds(1);  ///< Of a definition that does not come.
+  Duration request_interval = std::chrono::seconds(1);  ///< Of a definition that does not come ...
+  Duration request_again_after = std::chrono::seconds(60);  ///< ... or that makes no sense.
   /// Until a result without an acknowledgement is sent again; doubles from the first to the second.
   Duration resend_after = std::chrono::seconds(5);
   Duration resend_after_max = std::chrono::seconds(60);
@@ -99,6 +101,11 @@ class Conversation {
     Duration resend_after;  ///< From then on.
   };
 
+  struct WantedDefinition {
+    wire::IncomingDefinition incoming;
+    TimePoint request_due_at;  ///< When to ask (again) for the part that is missing.
+  };
+
   /// The worker takes no more runs and ends when it holds none.
   struct Leaving {
     wire::LossReason reason = wire::LossReason::drained;
@@ -107,7 +114,7 @@ class Conversation {
 
   void handle(const wire::Welcome& welcome, const wire::Header& header, TimePoint now);
   void handle(const wire::Reject& reject, const wire::Header& header, TimePoint now);
-  void handle(const wire::CampaignDefinition& answer, const wire::Header& header, TimePoint now);
+  void handle(const wire::DefinitionPart& part, const wire::Header& header, TimePoint now);
   void handle(const wire::Forget& forget, const wire::Header& header, TimePoint now);
   void handle(const wire::RunLease& lease, const wire::Header& header, TimePoint now);
   void handle(const wire::Retract& retract, const wire::Header& header, TimePoint now);
@@ -122,6 +129,7 @@ class Conversation {
   void register_again(TimePoint now);
   void request(wire::CampaignId campaign, TimePoint now);
   void request_definitions(TimePoint now);
+  void define(wire::CampaignId campaign, TimePoint now);
   [[nodiscard]] bool agrees_on_table(wire::CampaignId campaign, std::size_t width);
   [[nodiscard]] std::vector<RunRange> new_runs(const wire::RunLease& lease);
   void send_heartbeat(TimePoint now);
@@ -160,8 +168,8 @@ class Conversation {
 
   /// Table values of one run, as the first lease or the definition of a campaign has them.
   std::map<wire::CampaignId, std::size_t> table_widths_;
-  std::map<wire::CampaignId, TimePoint> requested_at_;  ///< Definitions that runs wait for.
-  std::map<RunKey, wire::Attempt> unfinished_;          ///< All runs that the execution has.
+  std::map<wire::CampaignId, WantedDefinition> wanted_;  ///< Definitions that runs wait for.
+  std::map<RunKey, wire::Attempt> unfinished_;           ///< All runs that the execution has.
   std::map<RunKey, SentResult> unacknowledged_;
   std::optional<Leaving> leaving_;
   std::optional<Ending> ending_;

@@ -13,6 +13,7 @@
 #include <variant>
 
 #include "core/error.hpp"
+#include "proto/wire/checksum.hpp"
 #include "proto/wire/codec.hpp"
 
 namespace proofmass::worker {
@@ -22,15 +23,6 @@ constexpr std::size_t size_bytes = 4;
 constexpr std::size_t checksum_bytes = 8;
 /// No message travels by this header: the conversation makes the one that does.
 constexpr wire::Header record_header{.session = {1}, .epoch = {}, .sequence = 0};
-
-/// FNV-1a, 64 bits: tells a record that was written to its end from one that was not.
-std::uint64_t checksum(std::string_view bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char byte : bytes) {
-    hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
-  }
-  return hash;
-}
 
 std::string little_endian(std::uint64_t value, std::size_t num_bytes) {
   std::string bytes;
@@ -49,7 +41,7 @@ std::uint64_t from_little_endian(std::string_view bytes) {
 std::string record_of(const wire::ResultBatch& batch) {
   const std::string payload = wire::encode({.header = record_header, .message = batch});
   return little_endian(payload.size(), size_bytes) +
-         little_endian(checksum(payload), checksum_bytes) + payload;
+         little_endian(wire::checksum(payload), checksum_bytes) + payload;
 }
 
 /// The payload at the start of the bytes; nothing if they do not start with a whole record.
@@ -60,7 +52,7 @@ std::optional<std::string_view> payload_at(std::string_view bytes) {
   if (bytes.size() - head_bytes < size) return std::nullopt;
   const std::string_view payload = bytes.substr(head_bytes, size);
   const std::uint64_t expected = from_little_endian(bytes.substr(size_bytes, checksum_bytes));
-  if (checksum(payload) != expected) return std::nullopt;
+  if (wire::checksum(payload) != expected) return std::nullopt;
   return payload;
 }
 

@@ -57,7 +57,7 @@ class Rounds final : public Outbox {
                             .former = {}};
     for (std::uint64_t i = 1; i <= num_workers; ++i) {
       workers_[WorkerId{i}].batches.resize(num_threads);
-      on_hello(state_, WorkerId{i}, SessionId{i}, hello, {}, *this);
+      on_hello(state_, WorkerId{i}, SessionId{i}, "", hello, {}, *this);
       on_heartbeat(state_, WorkerId{i},
                    {.num_runs_max = wire::runs_per_lease_max, .held = {}, .computing = {}}, 1, {},
                    *this);
@@ -88,6 +88,8 @@ class Rounds final : public Outbox {
       worker.queue.push_back({.attempt = lease->attempt, .run = {run}});
     }
   }
+  void send_definition(WorkerId, const wire::CampaignRequest&,
+                       const std::shared_ptr<const Campaign>&) override {}
   void store(Arrival arrival) override { stored_.push_back(arrival.computed.result.run); }
   void compare(Arrival) override { ADD_FAILURE() << "a run was computed twice"; }
   void record(const Loss&) override { ADD_FAILURE() << "runs were lost"; }

@@ -81,7 +81,7 @@ TEST_F(BlameTest, ACrashIsKnownFromTheNextProcess) {
   outbox.forget();
   wire::Hello successor = hello();
   successor.former = wire::FormerSession{session_of(first), LossReason::crashed, 11};
-  on_hello(state, second, session_of(second), successor, now, outbox);
+  on_hello(state, second, session_of(second), "", successor, now, outbox);
   EXPECT_EQ(suspects(), Runs{{0}});
   EXPECT_FALSE(state.workers.contains(first));
   outbox.forget();
@@ -234,7 +234,7 @@ TEST_F(BlameTest, FiveCrashesInARowQuarantineAHostAndItsBlameIsWithdrawn) {
                      "runs_lost worker=1 runs=8..9 attempt=1 reason=crashed"}));
   EXPECT_FALSE(outbox.take_losses().at(0).is_blamed);
 
-  on_hello(state, second, session_of(second), hello(1, "bad"), now, outbox);
+  on_hello(state, second, session_of(second), "", hello(1, "bad"), now, outbox);
   const auto reject = outbox.take_sent<wire::Reject>(second);
   EXPECT_EQ(reject.reason, wire::RejectReason::quarantined);
   EXPECT_EQ(reject.text, "host = bad (too much crashed there)");
@@ -369,7 +369,7 @@ TEST_F(BlameTest, ASuspectThatIsAllAWorkerHoldsGoesOnThere) {
   stored.finished = {{{1}, 1}};
   stored.blamed = {{.run = {0}, .num_crashes = 1, .attempt = {1}}};
   on_campaign(state, one, stored, now, outbox);
-  on_hello(state, first, session_of(first), hello(), now, outbox);
+  on_hello(state, first, session_of(first), "", hello(), now, outbox);
   outbox.forget();
   heartbeat(first, {held(one, {{0}, 1}, 2)});
   EXPECT_TRUE(state.leases.at(*campaign(one).lent.find({0})).is_alone);

@@ -166,12 +166,27 @@ TEST_F(CampaignTest, ThatIsExtendedGoesOn) {
   EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{1}, 1}));
 }
 
-TEST_F(CampaignTest, ThatIsRemovedLeavesNothing) {
+TEST_F(CampaignTest, ThatIsRemovedIsForgottenIfItHasEnded) {
+  add_campaign(one, 1);
+  add_campaign(two, 1);
+  add_worker(first);
+  complete(first, one, {0});
+  on_cancel(state, two, outbox);
+  outbox.forget();
+  for (const CampaignId id : {one, two}) {
+    on_removed(state, id, outbox);
+    EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, id);
+    deliver(first, id, {0});
+    EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, id);
+  }
+}
+
+TEST_F(CampaignTest, ThatIsRemovedBeforeItsEndLeavesOnlyResultsOfWorkers) {
   add_campaign(one, 10);
   add_worker(first);
   outbox.forget();
   on_removed(state, one, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, one);
+  EXPECT_EQ(outbox.take_sent<wire::NotServed>(first).campaign, one);
   EXPECT_TRUE(state.campaigns.empty());
   EXPECT_TRUE(state.leases.empty());
   outbox.forget();

@@ -72,7 +72,7 @@ class DispatchFixture : public testing::Test {
 
   /// A worker that is registered and takes what it is lent.
   void add_worker(WorkerId id, std::uint32_t num_slots = 1, const std::string& host = "host") {
-    on_hello(state, id, session_of(id), hello(num_slots, host), now, outbox);
+    on_hello(state, id, session_of(id), "", hello(num_slots, host), now, outbox);
     outbox.drop_sent<wire::Welcome>(id);
     (void)outbox.take_events();
     heartbeat(id);

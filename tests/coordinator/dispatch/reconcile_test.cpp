@@ -59,7 +59,7 @@ TEST_F(ReconcileTest, AnAdoptedRunIsGivenBackUnderTheAttemptThatTheWorkerKnows) 
   on_tick(state, now, outbox);  // Run 0 is pending for its second attempt.
   add_campaign(two, 1);
   outbox.forget();
-  on_hello(state, first, session_of(first), hello(), now, outbox);
+  on_hello(state, first, session_of(first), "", hello(), now, outbox);
   outbox.forget();
   heartbeat(first, {held(one, {{0}, 1}, 1)}, {}, 1);
   EXPECT_EQ(state.leases.at(*campaign(one).lent.find({0})).attempt, Attempt{2});
@@ -108,10 +108,22 @@ TEST_F(ReconcileTest, ADeliveredRunNeedsNothing) {
   heartbeat(first, {held(one, {{0}, 3})});
 }
 
-TEST_F(ReconcileTest, ACampaignThatIsNotServedIsForgotten) {
+// It may be served later, when its file can be opened: its results must not be thrown away.
+TEST_F(ReconcileTest, ACampaignThatIsNotServedIsKept) {
   lend_one();
   heartbeat(first, {held(one, {{0}, 1}), held(two, {{0}, 5})});
-  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, two);
+  const auto not_served = outbox.take_sent<wire::NotServed>(first);
+  EXPECT_EQ(not_served.campaign, two);
+  EXPECT_TRUE(not_served.ranges.empty());
+}
+
+TEST_F(ReconcileTest, ACampaignThatHasEndedIsForgotten) {
+  lend_one();
+  on_ended(state, two, 5);
+  heartbeat(first, {held(one, {{0}, 1}), held(two, {{0}, 5})});
+  const auto forget = outbox.take_sent<wire::Forget>(first);
+  EXPECT_EQ(forget.campaign, two);
+  EXPECT_EQ(forget.num_runs, 5U);
 }
 
 TEST_F(ReconcileTest, RunsThatAreGivenBackAreLentAgain) {
@@ -138,7 +150,7 @@ TEST_F(ReconcileTest, AfterARestartNothingIsLentUntilAllHaveSaidWhatTheyHold) {
   add_worker(first);
   add_worker(third);
   outbox.expect_nothing_more();
-  on_hello(state, second, session_of(second), hello(), now, outbox);
+  on_hello(state, second, session_of(second), "", hello(), now, outbox);
   outbox.forget();
   heartbeat(second, {held(one, {{0}, 1})});
   EXPECT_EQ(state.leases.at(*campaign(one).lent.find({0})).worker, second);
@@ -163,7 +175,7 @@ TEST_F(ReconcileTest, AfterARestartOneThatCrashedMeanwhileIsNotAwaited) {
   add_campaign(one, 3);
   wire::Hello successor = hello();
   successor.former = wire::FormerSession{session_of(second), LossReason::crashed, 11};
-  on_hello(state, first, session_of(first), successor, now, outbox);
+  on_hello(state, first, session_of(first), "", successor, now, outbox);
   outbox.forget();
   heartbeat(first);
   (void)outbox.take_sent<wire::RunLease>(first);
@@ -173,7 +185,7 @@ TEST_F(ReconcileTest, AfterARestartOneThatCrashedMeanwhileIsNotAwaited) {
 TEST_F(ReconcileTest, AfterARestartAResultIsTakenAtOnce) {
   begin({session_of(first)});
   add_campaign(one, 1);
-  on_hello(state, first, session_of(first), hello(), now, outbox);
+  on_hello(state, first, session_of(first), "", hello(), now, outbox);
   outbox.forget();
   deliver(first, one, {0}, 3);
   EXPECT_EQ(outbox.stored().at(0).attempt, Attempt{3});

@@ -22,6 +22,10 @@ class RecordingOutbox final : public coordinator::Outbox {
   void send(wire::WorkerId worker, wire::Message message) override {
     sent_.emplace_back(worker, std::move(message));
   }
+  void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+                       const std::shared_ptr<const Campaign>& definition) override {
+    definitions_.push_back({worker, request, definition});
+  }
   void store(coordinator::Arrival arrival) override { stored_.push_back(std::move(arrival)); }
   void compare(coordinator::Arrival arrival) override { compared_.push_back(std::move(arrival)); }
   void record(const coordinator::Loss& loss) override { losses_.push_back(loss); }
@@ -38,6 +42,19 @@ class RecordingOutbox final : public coordinator::Outbox {
     sent_.erase(sent_.begin());
     EXPECT_EQ(to, worker);
     return std::get<Content>(message);
+  }
+
+  /// A part of a definition that was to be sent.
+  struct SentDefinition {
+    wire::WorkerId worker;
+    wire::CampaignRequest request;
+    std::shared_ptr<const Campaign> definition;
+  };
+  SentDefinition take_definition() {
+    if (definitions_.empty()) throw std::logic_error("no definition was sent");
+    SentDefinition definition = definitions_.front();
+    definitions_.erase(definitions_.begin());
+    return definition;
   }
 
   /// Drops a message of this kind to this worker, which there must be among others.
@@ -64,6 +81,7 @@ class RecordingOutbox final : public coordinator::Outbox {
   /// Drops all that has been written down: what another test checks.
   void forget() {
     sent_.clear();
+    definitions_.clear();
     stored_.clear();
     compared_.clear();
     losses_.clear();
@@ -75,12 +93,14 @@ class RecordingOutbox final : public coordinator::Outbox {
     for (const auto& [to, message] : sent_) {
       ADD_FAILURE() << "message of kind " << message.index() << " to worker " << to.value;
     }
+    EXPECT_EQ(definitions_.size(), 0U);
     EXPECT_EQ(take_stored().size(), 0U);
     EXPECT_EQ(take_compared().size(), 0U);
     EXPECT_EQ(take_losses().size(), 0U);
     EXPECT_EQ(take_given_up().size(), 0U);
     EXPECT_EQ(take_events(), std::vector<std::string>{});
     sent_.clear();
+    definitions_.clear();
   }
 
  private:
@@ -91,6 +111,7 @@ class RecordingOutbox final : public coordinator::Outbox {
   }
 
   std::vector<std::pair<wire::WorkerId, wire::Message>> sent_;
+  std::vector<SentDefinition> definitions_;
   std::vector<coordinator::Arrival> stored_;
   std::vector<coordinator::Arrival> compared_;
   std::vector<coordinator::Loss> losses_;

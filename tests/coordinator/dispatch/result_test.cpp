@@ -128,9 +128,22 @@ TEST_F(ResultTest, OfARunThatWasGivenUpIsTaken) {
   outbox.forget();
 }
 
-TEST_F(ResultTest, OfAnUnknownCampaignIsForgotten) {
+TEST_F(ResultTest, OfACampaignThatIsNotServedIsKept) {
+  deliver(first, two, {0});
+  const auto not_served = outbox.take_sent<wire::NotServed>(first);
+  EXPECT_EQ(not_served.campaign, two);
+  EXPECT_TRUE(not_served.ranges.empty());
+}
+
+TEST_F(ResultTest, OfACampaignThatHasEndedIsForgottenUntilItIsServedAgain) {
+  on_ended(state, two, 1);
   deliver(first, two, {0});
   EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, two);
+  add_campaign(two, 1);
+  EXPECT_TRUE(state.ended.empty());
+  deliver(first, two, {0});
+  EXPECT_EQ(outbox.take_stored(), Runs{{0}});
+  outbox.forget();
 }
 
 TEST_F(ResultTest, BeyondTheCampaignEndsTheWorker) {

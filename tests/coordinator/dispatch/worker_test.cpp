@@ -10,7 +10,7 @@ using namespace std::chrono_literals;
 class WorkerTest : public DispatchFixture {
  protected:
   void refuse(const wire::Hello& said, wire::RejectReason reason, const std::string& text) {
-    on_hello(state, second, session_of(second), said, now, outbox);
+    on_hello(state, second, session_of(second), "", said, now, outbox);
     const auto reject = outbox.take_sent<wire::Reject>(second);
     EXPECT_EQ(reject.reason, reason);
     EXPECT_EQ(reject.text, text);
@@ -21,7 +21,7 @@ class WorkerTest : public DispatchFixture {
 
 TEST_F(WorkerTest, IsWelcomed) {
   begin();
-  on_hello(state, first, session_of(first), hello(3), now, outbox);
+  on_hello(state, first, session_of(first), "", hello(3), now, outbox);
   const auto welcome = outbox.take_sent<wire::Welcome>(first);
   EXPECT_EQ(welcome.worker, first);
   EXPECT_EQ(welcome.heartbeat_interval_s, 5.0);
@@ -35,7 +35,7 @@ TEST_F(WorkerTest, IsAnsweredAgainAndKeepsItsLeases) {
   add_campaign(one, 10);
   add_worker(first);
   (void)outbox.take_sent<wire::RunLease>(first);
-  on_hello(state, first, session_of(first), hello(), now, outbox);
+  on_hello(state, first, session_of(first), "", hello(), now, outbox);
   (void)outbox.take_sent<wire::Welcome>(first);
   EXPECT_EQ(state.leases.size(), 1U);
   EXPECT_EQ(state.num_slots, 1U);
@@ -67,14 +67,14 @@ TEST_F(WorkerTest, IsNotAnsweredIfTooManySayHello) {
   config.hellos_per_s_max = 2.0;
   begin();
   for (int i = 0; i < 5; ++i) {
-    on_hello(state, first, session_of(first), hello(), now, outbox);
+    on_hello(state, first, session_of(first), "", hello(), now, outbox);
   }
   (void)outbox.take_sent<wire::Welcome>(first);
   (void)outbox.take_sent<wire::Welcome>(first);
   (void)outbox.take_events();
   outbox.expect_nothing_more();
   now += 500ms;
-  on_hello(state, first, session_of(first), hello(), now, outbox);
+  on_hello(state, first, session_of(first), "", hello(), now, outbox);
   (void)outbox.take_sent<wire::Welcome>(first);
 }
 
@@ -106,18 +106,28 @@ TEST_F(WorkerTest, IsGivenTheDefinitionsThatItAsksFor) {
   add_campaign(one, 1);
   add_worker(first);
   outbox.forget();
+  on_campaign_request(state, first, {.campaign = one, .offset = 7}, now, outbox);
+  const auto sent = outbox.take_definition();
+  EXPECT_EQ(sent.worker, first);
+  EXPECT_EQ(sent.request.campaign, one);
+  EXPECT_EQ(sent.request.offset, 7U);
+  EXPECT_EQ(sent.definition, campaign(one).definition);
+}
+
+TEST_F(WorkerTest, IsToldWhichCampaignsAreNotServed) {
+  begin();
+  add_worker(first);
   on_campaign_request(state, first, {.campaign = one}, now, outbox);
-  const auto definition = outbox.take_sent<wire::CampaignDefinition>(first);
-  EXPECT_EQ(definition.campaign, one);
-  EXPECT_EQ(definition.definition, campaign(one).definition);
-  on_campaign_request(state, first, {.campaign = two}, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, two);
+  EXPECT_EQ(outbox.take_sent<wire::NotServed>(first).campaign, one);
+  on_ended(state, one, 1);
+  on_campaign_request(state, first, {.campaign = one}, now, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::Forget>(first).campaign, one);
 }
 
 TEST_F(WorkerTest, IsLentNothingBeforeItHasSaidWhatItHolds) {
   begin();
   add_campaign(one, 1);
-  on_hello(state, first, session_of(first), hello(), now, outbox);
+  on_hello(state, first, session_of(first), "", hello(), now, outbox);
   (void)outbox.take_sent<wire::Welcome>(first);
   (void)outbox.take_events();
   on_tick(state, now, outbox);
@@ -185,7 +195,7 @@ TEST_F(WorkerTest, AnyMessageIsASignOfLife) {
   for (int i = 0; i < 3; ++i) {
     now += 50s;
     on_campaign_request(state, first, {.campaign = one}, now, outbox);
-    (void)outbox.take_sent<wire::CampaignDefinition>(first);
+    (void)outbox.take_definition();
     on_tick(state, now, outbox);
   }
 }
@@ -250,7 +260,7 @@ TEST_F(WorkerTest, MayRegisterToDeliverWhileTheServiceDrains) {
   begin();
   add_campaign(one, 5);
   on_drain(state, outbox);
-  on_hello(state, first, session_of(first), hello(), now, outbox);
+  on_hello(state, first, session_of(first), "", hello(), now, outbox);
   (void)outbox.take_sent<wire::Welcome>(first);
   (void)outbox.take_sent<wire::Drain>(first);
   (void)outbox.take_events();
@@ -267,7 +277,7 @@ TEST_F(WorkerTest, IsToldToStopAgainAndAgain) {
   (void)outbox.take_sent<wire::Stop>(first);
   heartbeat(first);
   (void)outbox.take_sent<wire::Stop>(first);
-  on_hello(state, second, session_of(second), hello(), now, outbox);
+  on_hello(state, second, session_of(second), "", hello(), now, outbox);
   (void)outbox.take_sent<wire::Stop>(second);
 }
 

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "core/error.hpp"
+#include "proto/wire/definition_codec.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -118,30 +119,39 @@ TEST(Codec, KeepsAWelcome) {
   EXPECT_EQ(bits(welcome.heartbeat_interval_s), bits(0.1));
 }
 
-TEST(Codec, KeepsEveryBitOfACampaign) {
-  const auto sent = std::make_shared<const Campaign>(unusual_campaign());
-  const CampaignDefinition definition =
-      round_trip(CampaignDefinition{.campaign = {6}, .definition = sent});
+Campaign definition_round_trip(const Campaign& campaign) {
+  const auto decoded = decode_definition(encode_definition(campaign));
+  return *std::get<std::shared_ptr<const Campaign>>(decoded);
+}
 
-  EXPECT_EQ(definition.campaign, CampaignId{6});
-  const Campaign& got = *definition.definition;
-  EXPECT_EQ(got.name, sent->name);
-  EXPECT_EQ(got.seed, sent->seed);
-  EXPECT_EQ(got.num_runs, sent->num_runs);
-  EXPECT_EQ(field_bits(got.scenario), field_bits(sent->scenario));
-  EXPECT_EQ(got.scenario.sessions, sent->scenario.sessions);
-  EXPECT_EQ(got.dispersions, sent->dispersions);
-  EXPECT_EQ(got.environment_file, sent->environment_file);
-  EXPECT_EQ(got.environment_table, sent->environment_table);
+TEST(Codec, KeepsEveryBitOfACampaign) {
+  const Campaign sent = unusual_campaign();
+  const Campaign got = definition_round_trip(sent);
+  EXPECT_EQ(got.name, sent.name);
+  EXPECT_EQ(got.seed, sent.seed);
+  EXPECT_EQ(got.num_runs, sent.num_runs);
+  EXPECT_EQ(field_bits(got.scenario), field_bits(sent.scenario));
+  EXPECT_EQ(got.scenario.sessions, sent.scenario.sessions);
+  EXPECT_EQ(got.dispersions, sent.dispersions);
+  EXPECT_EQ(got.environment_file, sent.environment_file);
+  EXPECT_EQ(got.environment_table, sent.environment_table);
   EXPECT_TRUE(std::signbit(got.environment_table[0].linear_m_s2[1]));
 }
 
 TEST(Codec, LeavesTableColumnsOut) {
   Campaign campaign = unusual_campaign();
   campaign.table_columns = {std::vector<double>(12345, 1e-3)};
-  const CampaignDefinition definition = round_trip(CampaignDefinition{
-      .campaign = {6}, .definition = std::make_shared<const Campaign>(campaign)});
-  EXPECT_TRUE(definition.definition->table_columns.empty());
+  EXPECT_TRUE(definition_round_trip(campaign).table_columns.empty());
+}
+
+TEST(Codec, KeepsAPartOfADefinition) {
+  const DefinitionPart part = round_trip(DefinitionPart{
+      .campaign = {6}, .offset = 5, .total_size = 8, .checksum = ~0ULL, .content = {"\0\xff", 2}});
+  EXPECT_EQ(part.campaign, CampaignId{6});
+  EXPECT_EQ(part.offset, 5U);
+  EXPECT_EQ(part.total_size, 8U);
+  EXPECT_EQ(part.checksum, ~0ULL);
+  EXPECT_EQ(part.content, std::string("\0\xff", 2));
 }
 
 TEST(Codec, KeepsARejectWithItsReason) {
@@ -151,8 +161,20 @@ TEST(Codec, KeepsARejectWithItsReason) {
 }
 
 TEST(Codec, KeepsWhichCampaignIsMeant) {
-  EXPECT_EQ(round_trip(CampaignRequest{.campaign = {9}}).campaign, CampaignId{9});
-  EXPECT_EQ(round_trip(Forget{.campaign = {1ULL << 63}}).campaign, CampaignId{1ULL << 63});
+  const CampaignRequest request = round_trip(CampaignRequest{.campaign = {9}, .offset = 1234567});
+  EXPECT_EQ(request.campaign, CampaignId{9});
+  EXPECT_EQ(request.offset, 1234567U);
+  const Forget forget = round_trip(Forget{.campaign = {1ULL << 63}, .num_runs = 12});
+  EXPECT_EQ(forget.campaign, CampaignId{1ULL << 63});
+  EXPECT_EQ(forget.num_runs, 12U);
+}
+
+TEST(Codec, KeepsWhichRunsAreNotServed) {
+  const std::vector<RunRange> ranges{{{5}, 2}, {{9}, 1}};
+  const NotServed some = round_trip(NotServed{.campaign = {9}, .ranges = ranges});
+  EXPECT_EQ(some.campaign, CampaignId{9});
+  EXPECT_EQ(some.ranges, ranges);
+  EXPECT_TRUE(round_trip(NotServed{.campaign = {9}, .ranges = {}}).ranges.empty()) << "all";
 }
 
 TEST(Codec, KeepsALeaseWithItsTableValues) {
@@ -272,17 +294,20 @@ TEST(Codec, HasRoomForTheLargestLeaseAndBatch) {
   EXPECT_EQ(round_trip(batch).results.size(), batch.results.size());
 }
 
-std::string encoded_definition() {
-  return encode(
-      {.header = some_header,
-       .message = CampaignDefinition{
-           .campaign = {6}, .definition = std::make_shared<const Campaign>(unusual_campaign())}});
+std::string encoded_part() {
+  const EncodedDefinition definition(unusual_campaign());
+  return encode({.header = some_header, .message = definition.part({.campaign = {6}})});
 }
 
 TEST(Codec, SurvivesAnyTruncation) {
-  const std::string bytes = encoded_definition();
+  const std::string bytes = encoded_part();
+  const std::string definition = encode_definition(unusual_campaign());
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     const auto decoded = decode(std::string_view(bytes).substr(0, size));
+    ASSERT_TRUE(std::holds_alternative<DecodeError>(decoded)) << size;
+  }
+  for (std::size_t size = 0; size < definition.size(); ++size) {
+    const auto decoded = decode_definition(std::string_view(definition).substr(0, size));
     ASSERT_TRUE(std::holds_alternative<DecodeError>(decoded)) << size;
   }
 }
@@ -294,13 +319,14 @@ TEST(Codec, SurvivesRandomBytesAndRandomDamage) {
       .campaign = {3},
       .attempt = {1},
       .results = {{.result = some_result({1}, RunStatus::completed), .compute_s = 1.0}}};
-  const std::array<std::string, 3> good{encode({.header = some_header, .message = batch}),
+  const std::array<std::string, 4> good{encode_definition(unusual_campaign()),
+                                        encode({.header = some_header, .message = batch}),
                                         encode({.header = some_header,
                                                 .message = Heartbeat{.num_runs_max = 1,
                                                                      .num_orbits_done = 5,
                                                                      .held = {some_runs},
                                                                      .computing = {}}}),
-                                        encoded_definition()};
+                                        encoded_part()};
   std::size_t num_refused = 0;
   for (int i = 0; i < 20000; ++i) {
     std::string bytes = good[random() % good.size()];
@@ -311,7 +337,8 @@ TEST(Codec, SurvivesRandomBytesAndRandomDamage) {
     for (std::uint64_t hits = random() % 4; hits > 0 && !bytes.empty(); --hits) {
       bytes[random() % bytes.size()] = static_cast<char>(random());
     }
-    if (std::holds_alternative<DecodeError>(decode(bytes))) ++num_refused;
+    const bool is_refused = std::holds_alternative<DecodeError>(decode(bytes));
+    if (is_refused && std::holds_alternative<DecodeError>(decode_definition(bytes))) ++num_refused;
   }
   EXPECT_GT(num_refused, 5000U);
 }

@@ -1,7 +1,5 @@
 // What a peer may not send: each rule of the decoder, broken by one change of a good message.
 
-#include <memory>
-
 #include "tests/proto/wire/refusal.hpp"
 
 namespace proofmass::wire {
@@ -25,8 +23,8 @@ const RunLease good_lease{.campaign = {1},
                           .is_alone = false,
                           .table_values = {1.0, 2.0}};
 const Welcome good_welcome{.worker = {1}, .heartbeat_interval_s = 1.0};
-const CampaignDefinition good_definition{.campaign = {1},
-                                         .definition = std::make_shared<const Campaign>()};
+const DefinitionPart good_part{
+    .campaign = {1}, .offset = 2, .total_size = 5, .checksum = 1, .content = "abc"};
 const ResultBatch good_batch{.campaign = {1}, .attempt = {1}, .results = {ComputedRun{}}};
 const HeldRuns good_runs{.campaign = {1}, .attempt = {1}, .ranges = {{.first = {0}, .count = 1}}};
 const GiveBack good_give_back{.reason = LossReason::drained, .runs = {good_runs}};
@@ -58,22 +56,16 @@ std::string refusal_of_give_back(const std::function<void(proto::GiveBack&)>& ch
   return refusal(good_give_back, [&](auto& envelope) { change(*envelope.mutable_give_back()); });
 }
 
+std::string refusal_of_part(const std::function<void(proto::DefinitionPart&)>& change) {
+  return refusal(good_part, [&](auto& envelope) { change(*envelope.mutable_definition_part()); });
+}
+
 // Envelopes.
 
 TEST(MalformedEnvelope, OfTooManyBytesIsNotParsed) {
-  const DecodeError error = refusal_of(std::string(definition_size_max + 1, 'x'));
+  const DecodeError error = refusal_of(std::string(message_size_max + 1, 'x'));
   EXPECT_EQ(error.fault, DecodeFault::too_large);
-  EXPECT_EQ(error.text, "message size = 67108865 bytes (must be at most 67108864)");
-}
-
-TEST(MalformedEnvelope, MayBeLargeForADefinitionOnly) {
-  proto::Envelope envelope;
-  envelope.set_protocol_version(protocol_version);
-  envelope.mutable_reject()->set_reason(proto::REJECT_REASON_FULL);
-  envelope.mutable_reject()->set_text(std::string(message_size_max, 'x'));
-  const DecodeError error = refusal_of(envelope.SerializeAsString());
-  EXPECT_EQ(error.fault, DecodeFault::too_large);
-  EXPECT_EQ(error.text, "message size = 4194318 bytes (must be at most 4194304)");
+  EXPECT_EQ(error.text, "message size = 4194305 bytes (must be at most 4194304)");
 }
 
 TEST(MalformedEnvelope, ThatIsNoneIsUnparsable) {
@@ -99,7 +91,7 @@ TEST(MalformedEnvelope, OfAnotherVersionIsRefused) {
   envelope.mutable_bye();
   const DecodeError error = refusal_of(envelope.SerializeAsString());
   EXPECT_EQ(error.fault, DecodeFault::wrong_version);
-  EXPECT_EQ(error.text, "protocol_version = 1 (must be 3)");
+  EXPECT_EQ(error.text, "protocol_version = 1 (must be 4)");
 }
 
 TEST(MalformedEnvelope, WithoutAMessageIsRefused) {
@@ -164,15 +156,71 @@ TEST(MalformedResultAck, NamesRuns) {
       "run = 1000000000 (must be in [0, 999999999])");
 }
 
+TEST(MalformedDefinitionPart, LiesWithinTheWhole) {
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_total_size(0); }),
+            "total_size = 0 (must be in [1, 67108864])");
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_total_size(definition_size_max + 1); }),
+            "total_size = 67108865 (must be in [1, 67108864])");
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_total_size(2); }),
+            "content size = 3 (must be in [1, 2])");
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_offset(3); }),
+            "offset = 3 (must be in [0, 2])");
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_offset(~0ULL); }),
+            "offset = 18446744073709551615 (must be in [0, 2])");
+}
+
+TEST(MalformedDefinitionPart, HasABoundedContent) {
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.clear_content(); }),
+            "content size = 0 (must be in [1, 5])");
+  EXPECT_EQ(refusal_of_part([](auto& part) {
+              part.set_total_size(definition_size_max);
+              part.set_content(std::string(definition_part_size_max + 1, 'x'));
+            }),
+            "content size = 262145 (must be in [1, 262144])");
+}
+
+TEST(MalformedCampaignRequest, AsksForAPartThatMayExist) {
+  EXPECT_EQ(refusal(CampaignRequest{.campaign = {1}},
+                    [](auto& envelope) {
+                      envelope.mutable_campaign_request()->set_offset(definition_size_max);
+                    }),
+            "offset = 67108864 (must be in [0, 67108863])");
+}
+
+TEST(MalformedForget, HasANumberOfRuns) {
+  const auto with = [](std::uint64_t num_runs) {
+    return refusal(Forget{.campaign = {1}},
+                   [&](auto& envelope) { envelope.mutable_forget()->set_num_runs(num_runs); });
+  };
+  EXPECT_EQ(with(0), "num_runs = 0 (must be in [1, 1000000000])");
+  EXPECT_EQ(with(num_runs_max + 1), "num_runs = 1000000001 (must be in [1, 1000000000])");
+}
+
+TEST(MalformedNotServed, HasRangesOfRuns) {
+  const NotServed good{.campaign = {1}, .ranges = good_runs.ranges};
+  EXPECT_EQ(refusal(good,
+                    [](auto& envelope) {
+                      envelope.mutable_not_served()->mutable_ranges(0)->set_count(0);
+                    }),
+            "range count = 0 (must be in [1, 1000000000])");
+  EXPECT_EQ(refusal(good,
+                    [](auto& envelope) {
+                      for (int i = 0; i < 4096; ++i) {
+                        envelope.mutable_not_served()->add_ranges()->set_count(1);
+                      }
+                    }),
+            "ranges = 4097 entries (must be in [1, 4096])");
+}
+
 TEST(MalformedCampaignNumber, IsNotZero) {
   const std::string text = "campaign = 0 (must not be 0)";
   EXPECT_EQ(refusal(CampaignRequest{.campaign = {1}},
                     [](auto& envelope) { envelope.mutable_campaign_request()->clear_campaign(); }),
             text);
-  EXPECT_EQ(
-      refusal(good_definition,
-              [](auto& envelope) { envelope.mutable_campaign_definition()->clear_campaign(); }),
-      text);
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.clear_campaign(); }), text);
+  EXPECT_EQ(refusal(NotServed{.campaign = {1}, .ranges = {}},
+                    [](auto& envelope) { envelope.mutable_not_served()->clear_campaign(); }),
+            text);
   EXPECT_EQ(refusal(Forget{.campaign = {1}},
                     [](auto& envelope) { envelope.mutable_forget()->clear_campaign(); }),
             text);

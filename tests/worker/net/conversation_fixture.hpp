@@ -109,6 +109,11 @@ inline wire::RunLease lease(std::uint64_t first, std::uint64_t count, std::uint3
   return {.campaign = campaign, .runs = {{first}, count}, .attempt = {attempt}, .table_values = {}};
 }
 
+/// A definition of one part.
+inline wire::DefinitionPart definition(wire::CampaignId campaign, const Campaign& content = {}) {
+  return wire::EncodedDefinition(content).part({.campaign = campaign});
+}
+
 inline std::vector<wire::HeldRuns> held(std::uint64_t first, std::uint64_t count,
                                         std::uint32_t attempt = 1) {
   return {{campaign_1, {attempt}, {{{first}, count}}}};

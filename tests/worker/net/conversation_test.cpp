@@ -212,7 +212,7 @@ TEST_F(ConversationTest, AsksForACampaignUntilItComes) {
   tick_after(100ms);
   EXPECT_EQ(take_sent<wire::CampaignRequest>().campaign, campaign_2);
 
-  const wire::CampaignDefinition answer{campaign_2, std::make_shared<const Campaign>()};
+  const wire::DefinitionPart answer = definition(campaign_2);
   receive(answer);
   EXPECT_TRUE(execution.is_defined(campaign_2));
   receive(answer);  // To the other request.
@@ -228,7 +228,7 @@ TEST_F(ConversationTest, AsksNoMoreForACampaignWithoutRuns) {
   receive(wire::Retract{campaign_1, {{{0}, 1}}});
   (void)take_sent<wire::GiveBack>();
   tick_after(1500ms);
-  receive(wire::CampaignDefinition{campaign_1, std::make_shared<const Campaign>()});
+  receive(definition(campaign_1));
   EXPECT_FALSE(execution.is_defined(campaign_1));
 }
 
@@ -244,10 +244,82 @@ TEST_F(ConversationTest, ForgetsACampaign) {
   EXPECT_EQ(conversation->num_unfinished(), 1U);
 }
 
-std::shared_ptr<const Campaign> definition_with_table() {
+/// Of more than one part, as far as the conversation is concerned.
+std::vector<wire::DefinitionPart> split(const wire::DefinitionPart& whole) {
+  wire::DefinitionPart first = whole;
+  wire::DefinitionPart second = whole;
+  first.content.resize(100);
+  second.content.erase(0, 100);
+  second.offset = 100;
+  return {first, second};
+}
+
+TEST_F(ConversationTest, AsksForADefinitionPartByPart) {
+  start();
+  register_here();
+  receive(lease(0, 1));
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  const auto parts = split(definition(campaign_1));
+  receive(parts[1]);  // Not asked for: what comes before it is missing.
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  receive(parts[0]);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 100U);
+  receive(parts[0]);  // Repeated by the network.
+  tick_after(999ms);
+  EXPECT_TRUE(sent.empty());
+  tick_after(1ms);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 100U) << "it was lost";
+  EXPECT_FALSE(execution.is_defined(campaign_1));
+  receive(parts[1]);
+  EXPECT_TRUE(execution.is_defined(campaign_1));
+}
+
+TEST_F(ConversationTest, BeginsADefinitionAnewThatHasChanged) {
+  start();
+  register_here();
+  receive(lease(0, 1));
+  (void)take_sent<wire::CampaignRequest>();
+  Campaign extended;
+  extended.num_runs += 1;
+  const auto old_parts = split(definition(campaign_1));
+  const auto new_parts = split(definition(campaign_1, extended));
+  receive(old_parts[0]);
+  (void)take_sent<wire::CampaignRequest>();
+  receive(new_parts[1]);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  receive(new_parts[0]);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 100U);
+  receive(new_parts[1]);
+  EXPECT_TRUE(execution.is_defined(campaign_1));
+}
+
+TEST_F(ConversationTest, AsksAgainForADefinitionThatMakesNoSense) {
+  start();
+  register_here();
+  receive(lease(0, 1));
+  (void)take_sent<wire::CampaignRequest>();
+  wire::DefinitionPart damaged = definition(campaign_1);
+  damaged.content.front() ^= 1;
+  receive(damaged);
+  EXPECT_FALSE(execution.is_defined(campaign_1));
+  for (int i = 0; i < 59; ++i) {
+    tick_after(1s);
+    std::erase_if(sent, [](const wire::Packet& packet) {
+      return std::holds_alternative<wire::Heartbeat>(packet.message);
+    });
+    EXPECT_TRUE(sent.empty()) << i;
+  }
+  tick_after(1s);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  sent.clear();
+  receive(definition(campaign_1));
+  EXPECT_TRUE(execution.is_defined(campaign_1));
+}
+
+Campaign definition_with_table() {
   Campaign campaign;
   campaign.dispersions[0] = {.law = Law::table, .file = "f", .column = "c"};
-  return std::make_shared<const Campaign>(campaign);
+  return campaign;
 }
 
 TEST_F(ConversationTest, EndsIfALeaseLacksTableValues) {
@@ -255,7 +327,7 @@ TEST_F(ConversationTest, EndsIfALeaseLacksTableValues) {
   register_here();
   receive(lease(0, 2));
   (void)take_sent<wire::CampaignRequest>();
-  receive(wire::CampaignDefinition{campaign_1, definition_with_table()});
+  receive(definition(campaign_1, definition_with_table()));
   expect_ending(Ending::Kind::failed, "table_values = 1 for each run (must be 0)");
 }
 
@@ -266,7 +338,7 @@ TEST_F(ConversationTest, EndsIfALeaseHasOtherTableValuesThanTheOneBefore) {
   two.table_values = {1.5, 2.5};
   receive(two);
   (void)take_sent<wire::CampaignRequest>();
-  receive(wire::CampaignDefinition{campaign_1, definition_with_table()});
+  receive(definition(campaign_1, definition_with_table()));
   EXPECT_FALSE(conversation->ending().has_value());
   receive(lease(2, 1));
   expect_ending(Ending::Kind::failed, "table_values = 0 for each run (must be 1)");

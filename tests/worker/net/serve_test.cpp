@@ -10,6 +10,7 @@
 
 #include "core/error.hpp"
 #include "proto/wire/codec.hpp"
+#include "proto/wire/definition_codec.hpp"
 #include "tests/worker/temporary_directory.hpp"
 #include "worker/execution/executor.hpp"
 
@@ -58,7 +59,7 @@ class Coordinator {
     send(
         wire::RunLease{.campaign = campaign, .runs = {{0}, 2}, .attempt = {1}, .table_values = {}});
     (void)receive<wire::CampaignRequest>();
-    send(wire::CampaignDefinition{campaign, std::make_shared<const Campaign>()});
+    send(wire::EncodedDefinition(Campaign{}).part({.campaign = campaign}));
     return receive<wire::ResultBatch>();
   }
 
@@ -197,7 +198,7 @@ TEST_F(ServeTest, DeliversAlthoughMessagesAreLost) {
   }
   (void)coordinator.receive<wire::CampaignRequest>();
   for (int i = 0; i < 20; ++i) {
-    coordinator.send(wire::CampaignDefinition{campaign, std::make_shared<const Campaign>()});
+    coordinator.send(wire::EncodedDefinition(Campaign{}).part({.campaign = campaign}));
   }
   EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 1U);
   for (int i = 0; i < 20; ++i) coordinator.send(wire::Stop{});
