@@ -7,6 +7,9 @@
 
 namespace proofmass::worker {
 
+/// All that a campaign may have.
+inline constexpr RunRange all_runs{{0}, num_runs_max};
+
 /// Runs in ascending order, each once, as the fewest ranges.
 [[nodiscard]] std::vector<RunRange> ranges_of(std::span<const RunIndex> runs);
 

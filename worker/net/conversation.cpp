@@ -48,28 +48,22 @@ Conversation::Conversation(wire::SessionId session, wire::Hello hello, Execution
       execution_(execution),
       send_(std::move(send)),
       config_(config),
-      heard_at_(now) {
+      heard_at_(now),
+      refusal_delay_(config.refusal_delay),
+      refused_at_(now) {
   PROOFMASS_EXPECT(session.value != 0);
   register_again(now);
-}
-
-void Conversation::restore(std::vector<KeptResult> results) {
-  for (KeptResult& result : results) {
-    const RunKey key{result.campaign, result.computed.result.run};
-    unacknowledged_[key] = {.attempt = result.attempt,
-                            .computed = result.computed,
-                            .due_at = TimePoint::min(),
-                            .resend_after = config_.resend_after};
-  }
 }
 
 // What arrives.
 
 void Conversation::on_packet(const wire::Packet& packet, TimePoint now) {
-  if (ending_ || packet.header.session != session_) return;
+  // Who is refused before a session could be read is told so with another one.
+  const bool is_reject = std::holds_alternative<wire::Reject>(packet.message);
+  if (ending_ || (packet.header.session != session_ && !is_reject)) return;
   heard_at_ = now;
-  const bool is_about_registration = std::holds_alternative<wire::Welcome>(packet.message) ||
-                                     std::holds_alternative<wire::Reject>(packet.message);
+  const bool is_about_registration =
+      is_reject || std::holds_alternative<wire::Welcome>(packet.message);
   // What another coordinator process has said before it ended means nothing to the present one.
   if (!is_about_registration && packet.header.epoch != epoch_) return;
   std::visit([&](const auto& content) { handle(content, packet.header, now); }, packet.message);
@@ -79,17 +73,30 @@ void Conversation::handle(const wire::Welcome& welcome, const wire::Header& head
   if (is_registered_) return;  // The answer to a repeated Hello.
   is_registered_ = true;
   epoch_ = header.epoch;
+  welcome_sequence_ = header.sequence;
+  noted_refusals_.clear();
   heartbeat_interval_ = std::chrono::duration_cast<Duration>(
       std::chrono::duration<double>(welcome.heartbeat_interval_s));
   send_heartbeat(now);
   repeat_results(now);
 }
 
-void Conversation::handle(const wire::Reject& reject, const wire::Header&, TimePoint now) {
-  if (reject.reason != wire::RejectReason::not_registered) {
-    return end(Ending::Kind::failed, "refused by the coordinator: " + reject.text);
+void Conversation::handle(const wire::Reject& reject, const wire::Header& header, TimePoint now) {
+  // One that was overtaken by the Welcome after it.
+  const bool is_late = header.epoch == epoch_ && header.sequence < welcome_sequence_;
+  if (is_registered_ && is_late) return;
+  switch (reject.reason) {
+    case wire::RejectReason::not_registered:
+      if (is_registered_) register_again(now);  // Otherwise a Hello is under way.
+      return;
+    case wire::RejectReason::incompatible:
+    case wire::RejectReason::revoked:
+      return end(Ending::Kind::failed, "refused by the coordinator: " + reject.text);
+    case wire::RejectReason::malformed:
+    case wire::RejectReason::full:
+    case wire::RejectReason::quarantined:
+      return come_again(reject, now);
   }
-  if (is_registered_) register_again(now);  // Otherwise a Hello is under way.
 }
 
 void Conversation::handle(const wire::DefinitionPart& part, const wire::Header&, TimePoint now) {
@@ -102,13 +109,33 @@ void Conversation::handle(const wire::DefinitionPart& part, const wire::Header&,
 }
 
 void Conversation::handle(const wire::Forget& forget, const wire::Header&, TimePoint) {
-  const auto is_of_it = [&](const auto& entry) { return entry.first.first == forget.campaign; };
-  std::erase_if(unfinished_, is_of_it);
-  std::erase_if(unacknowledged_, is_of_it);
-  wanted_.erase(forget.campaign);
-  table_widths_.erase(forget.campaign);
-  execution_.forget(forget.campaign);
+  const RunRange known{{0}, forget.num_runs};
+  for (const RunIndex run : execution_.drop_waiting(forget.campaign, std::array{known})) {
+    unfinished_.erase({forget.campaign, run});
+  }
+  // What is computed from num_runs on is of an extension, and goes on.
+  const auto next = unfinished_.lower_bound({forget.campaign, RunIndex{forget.num_runs}});
+  if (next == unfinished_.end() || next->first.first != forget.campaign) {
+    std::erase_if(unfinished_,
+                  [&](const auto& entry) { return entry.first.first == forget.campaign; });
+    wanted_.erase(forget.campaign);
+    table_widths_.erase(forget.campaign);
+    execution_.forget(forget.campaign);
+  }
+  if (const std::size_t count = drop_results(forget.campaign, known); count > 0) {
+    note(Notice::Severity::warning,
+         fmt::format("results_forgotten campaign={:016x} results={} (finished or cancelled)",
+                     forget.campaign.value, count));
+  }
   leave_if_done();
+}
+
+void Conversation::handle(const wire::NotServed& not_served, const wire::Header&, TimePoint) {
+  std::vector<RunRange> ranges = not_served.ranges;
+  if (ranges.empty()) ranges.push_back(all_runs);
+  give_back(wire::LossReason::retracted, not_served.campaign,
+            execution_.drop_waiting(not_served.campaign, ranges));
+  set_aside(not_served.campaign, ranges);
 }
 
 void Conversation::handle(const wire::RunLease& lease, const wire::Header&, TimePoint now) {
@@ -137,7 +164,10 @@ void Conversation::handle(const wire::Retract& retract, const wire::Header&, Tim
 }
 
 void Conversation::handle(const wire::ResultAck& ack, const wire::Header&, TimePoint) {
-  for (const RunIndex run : ack.runs) unacknowledged_.erase({ack.campaign, run});
+  for (const RunIndex run : ack.runs) {
+    const auto found = unacknowledged_.find({ack.campaign, run});
+    if (found != unacknowledged_.end()) drop_result(found);
+  }
   leave_if_done();
 }
 
@@ -183,22 +213,19 @@ void Conversation::on_tick(TimePoint now) {
   watch_time(now);
   if (ending_) return;
   if (!is_registered_) {
-    if (now >= hello_due_at_) say_hello(now);
-    return;
+    if (now < hello_due_at_) return;
+    if (std::exchange(is_closed_out_, false)) {
+      wants_connection_ = true;
+      hello_due_at_ = now + hello_delay_;  // Unless on_connected() comes first.
+      return;
+    }
+    return say_hello(now);
   }
   request_definitions(now);
   send_due_results(now);
   const Duration since_heartbeat = now - heartbeat_at_;
   const bool has_news = since_heartbeat >= config_.news_interval && computes_other_batches();
   if (has_news || since_heartbeat >= heartbeat_interval_) send_heartbeat(now);
-}
-
-std::vector<KeptResult> Conversation::unacknowledged() const {
-  std::vector<KeptResult> results;
-  for (const auto& [key, sent] : unacknowledged_) {
-    results.push_back({key.first, sent.attempt, sent.computed});
-  }
-  return results;
 }
 
 // Registration.
@@ -217,7 +244,25 @@ void Conversation::register_again(TimePoint now) {
   say_hello(now);
 }
 
+/// What stands in the way may pass: there are too many workers, or a person releases the host.
+void Conversation::come_again(const wire::Reject& reject, TimePoint now) {
+  if (std::exchange(is_refused_, true)) return;  // The answer to a repeated Hello.
+  if (now - refused_at_ >= config_.refusal_memory) refusal_delay_ = config_.refusal_delay;
+  refused_at_ = now;
+  is_registered_ = false;
+  is_closed_out_ = reject.reason == wire::RejectReason::malformed;
+  const double jitter = 0.25 * fraction_from(session_.value + num_sent_);
+  hello_due_at_ = now + times(1.0 + jitter, refusal_delay_);
+  hello_delay_ = config_.hello_delay;
+  refusal_delay_ = std::min(2 * refusal_delay_, config_.refusal_delay_max);
+  if (!noted_refusals_.insert(reject.reason).second) return;
+  note(Notice::Severity::error,
+       fmt::format("refused reason=\"{}\" (asks again every {} to {} s)", reject.text,
+                   whole_seconds(config_.refusal_delay), whole_seconds(config_.refusal_delay_max)));
+}
+
 void Conversation::say_hello(TimePoint now) {
+  is_refused_ = false;
   send(hello_);
   const double jitter = 0.25 * fraction_from(session_.value + num_sent_);
   hello_due_at_ = now + times(1.0 + jitter, hello_delay_);
@@ -225,25 +270,33 @@ void Conversation::say_hello(TimePoint now) {
 }
 
 /// What is not acknowledged counts against the credit, so that a coordinator that cannot store
-/// results does not fill this worker's memory.
+/// results does not fill this worker's memory. What is set aside takes half of it at most, as long
+/// as there is room, so that the worker goes on with other campaigns.
 std::uint32_t Conversation::credit() const {
   if (leaving_) return 0;
-  const std::size_t kept = std::min<std::size_t>(unacknowledged_.size(), wire::runs_per_lease_max);
-  return static_cast<std::uint32_t>(wire::runs_per_lease_max - kept);
+  constexpr std::size_t credit_max = wire::runs_per_lease_max;
+  const std::size_t num_kept = unacknowledged_.size();
+  const std::size_t used = num_kept - num_set_aside_ + std::min(num_set_aside_, credit_max / 2);
+  const std::size_t room = config_.num_kept_max - std::min(config_.num_kept_max, num_kept);
+  return static_cast<std::uint32_t>(std::min(room, credit_max - std::min(credit_max, used)));
 }
 
 void Conversation::send_heartbeat(TimePoint now) {
   heartbeat_at_ = now;
   std::vector<HeldRun> held;
+  std::vector<HeldRun> aside;
   held.reserve(unfinished_.size() + unacknowledged_.size());
   for (const auto& [key, attempt] : unfinished_) held.push_back({key.first, attempt, key.second});
   for (const auto& [key, result] : unacknowledged_) {
-    held.push_back({key.first, result.attempt, key.second});
+    (result.is_set_aside ? aside : held).push_back({key.first, result.attempt, key.second});
   }
   wire::Heartbeat heartbeat{.num_runs_max = credit(),
                             .num_orbits_done = execution_.num_orbits_done(),
                             .held = grouped(std::move(held), wire::ranges_per_message_max),
                             .computing = {}};
+  // Runs that are not listed here may be lent to others as well; runs not listed above are.
+  const std::size_t room = wire::ranges_per_message_max - num_ranges(heartbeat.held);
+  heartbeat.set_aside = grouped(std::move(aside), room);
   reported_batches_.clear();
   for (RunningBatch& batch : execution_.computing()) {
     reported_batches_.push_back(batch.number);
@@ -283,9 +336,10 @@ void Conversation::request_definitions(TimePoint now) {
 void Conversation::define(wire::CampaignId campaign, TimePoint now) {
   WantedDefinition& wanted = wanted_.at(campaign);
   const auto taken = wanted.incoming.take();
-  if (std::holds_alternative<wire::DecodeError>(taken)) {
+  if (const auto* const error = std::get_if<wire::DecodeError>(&taken)) {
     wanted.request_due_at = now + config_.request_again_after;
-    return;
+    return note(Notice::Severity::error, fmt::format("malformed_definition campaign={:016x} {}",
+                                                     campaign.value, error->text));
   }
   const auto& definition = std::get<std::shared_ptr<const Campaign>>(taken);
   wanted_.erase(campaign);
@@ -332,61 +386,6 @@ void Conversation::give_back(wire::LossReason reason, wire::CampaignId campaign,
   // Without a registration, the next heartbeat says the same by not naming them.
   if (held.empty() || !is_registered_) return;
   send(wire::GiveBack{reason, grouped(std::move(held), wire::ranges_per_message_max)});
-}
-
-// Results.
-
-std::vector<Conversation::RunKey> Conversation::keep_finished(TimePoint now) {
-  std::vector<RunKey> runs;
-  for (FinishedRun& finished : execution_.take_finished()) {
-    const RunKey key{finished.campaign, finished.computed.result.run};
-    const auto found = unfinished_.find(key);
-    PROOFMASS_EXPECT(found != unfinished_.end());
-    unacknowledged_[key] = {.attempt = found->second,
-                            .computed = finished.computed,
-                            .due_at = now,
-                            .resend_after = config_.resend_after};
-    unfinished_.erase(found);
-    runs.push_back(key);
-  }
-  return runs;
-}
-
-void Conversation::repeat_results(TimePoint now) {
-  for (auto& [key, result] : unacknowledged_) {
-    result.due_at = now;
-    result.resend_after = config_.resend_after;
-  }
-  send_due_results(now);
-}
-
-/// As many as one message may have; the next tick has the others.
-void Conversation::send_due_results(TimePoint now) {
-  std::vector<RunKey> runs;
-  for (const auto& [key, result] : unacknowledged_) {
-    if (runs.size() == wire::runs_per_lease_max) break;
-    if (result.due_at <= now) runs.push_back(key);
-  }
-  send_results(runs, now);
-}
-
-/// @pre All of them are kept.
-void Conversation::send_results(std::span<const RunKey> runs, TimePoint now) {
-  std::map<std::pair<wire::CampaignId, wire::Attempt>, wire::ResultBatch> batches;
-  for (const RunKey& run : runs) {
-    SentResult& result = unacknowledged_.at(run);
-    wire::ResultBatch& batch = batches[{run.first, result.attempt}];
-    batch.campaign = run.first;
-    batch.attempt = result.attempt;
-    batch.results.push_back(result.computed);
-    result.due_at = now + result.resend_after;
-    result.resend_after = std::min(2 * result.resend_after, config_.resend_after_max);
-    if (batch.results.size() == wire::runs_per_lease_max) {
-      send(std::exchange(batch, {}));
-      batches.erase({run.first, result.attempt});
-    }
-  }
-  for (auto& [key, batch] : batches) send(std::move(batch));
 }
 
 }  // namespace proofmass::worker

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -26,12 +27,24 @@ struct Ending {
   std::string reason;  ///< For people.
 };
 
+/// Something that is worth a line in the log.
+struct Notice {
+  enum class Severity : std::uint8_t { info, warning, error };
+  Severity severity = Severity::info;
+  std::string text;  ///< `results_forgotten campaign=7 results=12`.
+};
+
 /// Times of a worker's conversation.
 struct ConversationConfig {
   /// Between a Hello and the next; doubles from the first to the second, plus up to a quarter, by
   /// which a thousand workers of a coordinator that restarts come one after the other.
   Duration hello_delay = std::chrono::milliseconds(250);
   Duration hello_delay_max = std::chrono::seconds(32);
+  /// Between a refusal that is not final and the next Hello; doubles and varies likewise. Refusals
+  /// that are so much apart begin anew.
+  Duration refusal_delay = std::chrono::seconds(15);
+  Duration refusal_delay_max = std::chrono::seconds(60);
+  Duration refusal_memory = std::chrono::minutes(5);
   Duration request_interval = std::chrono::seconds(1);  ///< Of a definition that does not come ...
   Duration request_again_after = std::chrono::seconds(60);  ///< ... or that makes no sense.
   /// Until a result without an acknowledgement is sent again; doubles from the first to the second.
@@ -45,6 +58,9 @@ struct ConversationConfig {
   /// Kept free at the end of the drain or walltime, for results to be sent and acknowledged.
   Duration delivery_time = std::chrono::seconds(5);
   std::optional<TimePoint> walltime_end = {};  ///< When the process must have ended.
+  /// Results that are not acknowledged and runs at hand, altogether: a coordinator that cannot take
+  /// results must not fill this worker's memory.
+  std::size_t num_kept_max = 65'536;
 };
 
 /// A worker's side of the protocol, without socket, clock, thread or random device: registers,
@@ -68,6 +84,10 @@ class Conversation {
   void on_packet(const wire::Packet& packet, TimePoint now);
   /// Messages sent before had nowhere to go.
   void on_connected(TimePoint now);
+  /// True, once, if nothing more is heard on the present connection: another one is to be made.
+  [[nodiscard]] bool take_reconnection() { return std::exchange(wants_connection_, false); }
+  /// What has happened since the last call.
+  [[nodiscard]] std::vector<Notice> take_notices() { return std::exchange(notices_, {}); }
   /// The coordinator does not let this worker in. It may some day; until then nothing else changes.
   void on_refused(const std::string& reason);
   /// The execution has something new to take.
@@ -86,6 +106,8 @@ class Conversation {
   [[nodiscard]] bool is_registered() const { return is_registered_; }
   [[nodiscard]] bool is_leaving() const { return leaving_.has_value(); }
   [[nodiscard]] std::size_t num_unacknowledged() const { return unacknowledged_.size(); }
+  /// Those among them that the coordinator could not take: it does not serve their campaigns.
+  [[nodiscard]] std::size_t num_set_aside() const { return num_set_aside_; }
   /// Results without an acknowledgement, in order of campaign and run.
   [[nodiscard]] std::vector<KeptResult> unacknowledged() const;
   /// Runs that wait or are being computed.
@@ -99,6 +121,7 @@ class Conversation {
     wire::ComputedRun computed;
     TimePoint due_at;       ///< When to send it (again).
     Duration resend_after;  ///< From then on.
+    bool is_set_aside = false;
   };
 
   struct WantedDefinition {
@@ -116,6 +139,7 @@ class Conversation {
   void handle(const wire::Reject& reject, const wire::Header& header, TimePoint now);
   void handle(const wire::DefinitionPart& part, const wire::Header& header, TimePoint now);
   void handle(const wire::Forget& forget, const wire::Header& header, TimePoint now);
+  void handle(const wire::NotServed& not_served, const wire::Header& header, TimePoint now);
   void handle(const wire::RunLease& lease, const wire::Header& header, TimePoint now);
   void handle(const wire::Retract& retract, const wire::Header& header, TimePoint now);
   void handle(const wire::ResultAck& ack, const wire::Header& header, TimePoint now);
@@ -127,6 +151,7 @@ class Conversation {
   void send(wire::Message message);
   void say_hello(TimePoint now);
   void register_again(TimePoint now);
+  void come_again(const wire::Reject& reject, TimePoint now);
   void request(wire::CampaignId campaign, TimePoint now);
   void request_definitions(TimePoint now);
   void define(wire::CampaignId campaign, TimePoint now);
@@ -135,6 +160,9 @@ class Conversation {
   void send_heartbeat(TimePoint now);
   [[nodiscard]] bool computes_other_batches() const;
   [[nodiscard]] std::uint32_t credit() const;
+  void drop_result(std::map<RunKey, SentResult>::iterator result);
+  [[nodiscard]] std::size_t drop_results(wire::CampaignId campaign, RunRange runs);
+  void set_aside(wire::CampaignId campaign, std::span<const RunRange> ranges);
   [[nodiscard]] std::vector<RunKey> keep_finished(TimePoint now);
   void repeat_results(TimePoint now);
   void send_due_results(TimePoint now);
@@ -148,6 +176,7 @@ class Conversation {
   void leave_if_done();
   void leave(const std::string& reason);
   void end(Ending::Kind kind, std::string reason);
+  void note(Notice::Severity severity, std::string text);
 
   wire::SessionId session_;
   wire::Hello hello_;
@@ -162,6 +191,13 @@ class Conversation {
   TimePoint heard_at_;
   TimePoint hello_due_at_;
   Duration hello_delay_{};
+  std::uint64_t welcome_sequence_ = 0;  ///< Of the newest Welcome.
+  bool is_refused_ = false;             ///< Since the last Hello.
+  Duration refusal_delay_{};
+  TimePoint refused_at_;
+  std::set<wire::RejectReason> noted_refusals_;  ///< Since the last Welcome.
+  bool is_closed_out_ = false;                   ///< The next Hello needs another connection.
+  bool wants_connection_ = false;
   TimePoint heartbeat_at_;
   std::vector<std::uint64_t> reported_batches_;  ///< By the heartbeat sent last.
   std::string refusal_;  ///< Why there is no connection; empty if not known.
@@ -171,6 +207,8 @@ class Conversation {
   std::map<wire::CampaignId, WantedDefinition> wanted_;  ///< Definitions that runs wait for.
   std::map<RunKey, wire::Attempt> unfinished_;           ///< All runs that the execution has.
   std::map<RunKey, SentResult> unacknowledged_;
+  std::size_t num_set_aside_ = 0;  ///< Of those.
+  std::vector<Notice> notices_;
   std::optional<Leaving> leaving_;
   std::optional<Ending> ending_;
 };

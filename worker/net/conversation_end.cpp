@@ -9,12 +9,6 @@
 // How a conversation ends. While it does, it takes no more runs.
 
 namespace proofmass::worker {
-namespace {
-
-constexpr RunRange all_runs{{0}, num_runs_max};
-
-}  // namespace
-
 void Conversation::on_drain_request(TimePoint now) {
   if (ending_ || (leaving_ && leaving_->deadline)) return;
   begin_to_leave({.reason = wire::LossReason::preempted, .deadline = now + config_.drain_time},
@@ -83,6 +77,12 @@ void Conversation::leave_if_done() {
 void Conversation::leave(const std::string& reason) {
   if (is_registered_) send(wire::Bye{leaving_->reason});
   end(Ending::Kind::done, reason);
+}
+
+/// As many as a log can take in at a time; whoever serves the conversation takes them at once.
+void Conversation::note(Notice::Severity severity, std::string text) {
+  constexpr std::size_t notices_max = 100;
+  if (notices_.size() < notices_max) notices_.push_back({severity, std::move(text)});
 }
 
 void Conversation::end(Ending::Kind kind, std::string reason) {

@@ -80,6 +80,8 @@ class CoordinatorLink::Parts {
     }
   }
 
+  void drop_unsent() { socket_.set(zmq::sockopt::linger, 0); }
+
   bool take_connected() { return can_send_ && std::exchange(is_newly_connected_, false); }
   std::optional<std::string> take_refusal() { return monitor_.take_refusal(); }
 
@@ -106,15 +108,23 @@ class CoordinatorLink::Parts {
 };
 
 CoordinatorLink::CoordinatorLink(const std::string& endpoint, const wire::ClientSecurity& security,
-                                 const std::optional<wire::FaultPlan>& faults) {
+                                 const std::optional<wire::FaultPlan>& faults)
+    : endpoint_(endpoint), security_(security), faults_(faults), parts_(make_parts()) {}
+
+std::unique_ptr<CoordinatorLink::Parts> CoordinatorLink::make_parts() const {
   try {
-    parts_ = std::make_unique<Parts>(endpoint, security, faults);
+    return std::make_unique<Parts>(endpoint_, security_, faults_);
   } catch (const zmq::error_t& error) {
-    throw Error(fmt::format("connect = {} ({})", endpoint, error.what()));
+    throw Error(fmt::format("connect = {} ({})", endpoint_, error.what()));
   }
 }
 
 CoordinatorLink::~CoordinatorLink() = default;
+
+void CoordinatorLink::reconnect() {
+  parts_->drop_unsent();
+  parts_ = make_parts();
+}
 
 void CoordinatorLink::wait(std::span<const int> descriptors, Duration time_max) {
   parts_->wait(descriptors, time_max);

@@ -28,6 +28,9 @@ class CoordinatorLink {
   CoordinatorLink(const CoordinatorLink&) = delete;
   CoordinatorLink& operator=(const CoordinatorLink&) = delete;
 
+  /// Leaves the connection, with what has not been sent, and makes another one.
+  void reconnect();
+
   /// Waits until there is something to receive or one of the descriptors is readable, at most for
   /// this time.
   void wait(std::span<const int> descriptors, Duration time_max);
@@ -43,6 +46,11 @@ class CoordinatorLink {
 
  private:
   class Parts;
+  [[nodiscard]] std::unique_ptr<Parts> make_parts() const;
+
+  std::string endpoint_;
+  wire::ClientSecurity security_;
+  std::optional<wire::FaultPlan> faults_;
   std::unique_ptr<Parts> parts_;
 };
 

@@ -22,4 +22,10 @@ std::vector<wire::HeldRuns> grouped(std::vector<HeldRun> runs, std::size_t num_r
   return groups;
 }
 
+std::size_t num_ranges(const std::vector<wire::HeldRuns>& held) {
+  std::size_t count = 0;
+  for (const wire::HeldRuns& runs : held) count += runs.ranges.size();
+  return count;
+}
+
 }  // namespace proofmass::worker

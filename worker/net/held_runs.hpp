@@ -22,4 +22,7 @@ struct HeldRun {
 [[nodiscard]] std::vector<wire::HeldRuns> grouped(std::vector<HeldRun> runs,
                                                   std::size_t num_ranges_max);
 
+/// Ranges of all of them together.
+[[nodiscard]] std::size_t num_ranges(const std::vector<wire::HeldRuns>& held);
+
 }  // namespace proofmass::worker

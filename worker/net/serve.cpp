@@ -88,9 +88,11 @@ class Notices {
     const auto watchdog = init_system_.watchdog_interval();
     if (watchdog && take_turn(watchdog_at_, now, *watchdog)) notify("WATCHDOG=1");
     if (take_turn(status_at_, now, status_interval)) {
-      notify(fmt::format("STATUS={}, {} runs at hand, {} results not acknowledged",
-                         conversation_.is_registered() ? "registered" : "not registered",
-                         conversation_.num_unfinished(), conversation_.num_unacknowledged()));
+      notify(fmt::format(
+          "STATUS={}, {} runs at hand, {} results not acknowledged, {} of them not served now",
+          conversation_.is_registered() ? "registered" : "not registered",
+          conversation_.num_unfinished(), conversation_.num_unacknowledged(),
+          conversation_.num_set_aside()));
     }
   }
 
@@ -135,6 +137,7 @@ class Service {
       if (progress_.take()) conversation_.on_progress(now);
       heed_signals(now);
       if (take_turn(tick_at, now, tick_interval)) on_tick(now);
+      log_notices();
     }
     notices_.stopping();
     keeping_.finish();
@@ -195,8 +198,25 @@ class Service {
 
   void on_tick(TimePoint now) {
     conversation_.on_tick(now);
+    if (conversation_.take_reconnection()) link_.reconnect();
     keeping_.on_tick(now);
     notices_.on_tick(now);
+  }
+
+  void log_notices() {
+    for (const Notice& notice : conversation_.take_notices()) {
+      switch (notice.severity) {
+        case Notice::Severity::info:
+          spdlog::info(notice.text);
+          break;
+        case Notice::Severity::warning:
+          spdlog::warn(notice.text);
+          break;
+        case Notice::Severity::error:
+          spdlog::error(notice.text);
+          break;
+      }
+    }
   }
 
   const wire::Wake& progress_;

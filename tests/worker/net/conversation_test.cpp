@@ -109,13 +109,6 @@ TEST_F(ConversationTest, IgnoresWhatWasMeantForOthers) {
   EXPECT_FALSE(conversation->ending().has_value());
 }
 
-TEST_F(ConversationTest, EndsIfItIsRefused) {
-  start();
-  (void)take_sent<wire::Hello>();
-  receive(wire::Reject{.reason = wire::RejectReason::incompatible, .text = "other model"});
-  expect_ending(Ending::Kind::failed, "refused by the coordinator: other model");
-}
-
 TEST_F(ConversationTest, GivesUpACoordinatorThatIsSilent) {
   start({.give_up_after = 60s});
   (void)take_sent<wire::Hello>();

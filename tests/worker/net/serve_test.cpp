@@ -13,6 +13,7 @@
 #include "proto/wire/definition_codec.hpp"
 #include "tests/worker/temporary_directory.hpp"
 #include "worker/execution/executor.hpp"
+#include "worker/spool/spool.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -47,6 +48,8 @@ class Coordinator {
   void send(wire::Message message) {
     send_bytes(wire::encode({{session, epoch, ++num_sent_}, std::move(message)}));
   }
+  /// The connection on which the last message came.
+  [[nodiscard]] const std::string& peer() const { return peer_; }
   void send_bytes(const std::string& bytes) {
     socket_.send(zmq::buffer(peer_), zmq::send_flags::sndmore);
     socket_.send(zmq::buffer(bytes));
@@ -145,6 +148,52 @@ TEST_F(ServeTest, IsNotDisturbedByRubbish) {
   coordinator.send(wire::Stop{});  // Of no coordinator that the worker has registered with.
   coordinator.send(wire::Reject{.reason = wire::RejectReason::revoked, .text = "enough"});
   EXPECT_EQ(ending.get().reason, "refused by the coordinator: enough");
+}
+
+// The coordinator listens no more to a connection on which something broke the rules.
+TEST_F(ServeTest, ComesAgainOnAnotherConnectionIfItIsClosedOut) {
+  config.conversation.refusal_delay = std::chrono::milliseconds(50);
+  Coordinator coordinator(config.endpoint);
+  std::future<Ending> ending = start_worker();
+  (void)coordinator.have_two_runs_computed();
+  const std::string first_connection = coordinator.peer();
+  coordinator.send(wire::Reject{.reason = wire::RejectReason::malformed, .text = "bad"});
+  (void)coordinator.receive<wire::Hello>();
+  EXPECT_NE(coordinator.peer(), first_connection);
+  coordinator.send(wire::Welcome{.worker = {1}, .heartbeat_interval_s = 1.0});
+  EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 2U);
+  coordinator.send(wire::Stop{});
+  EXPECT_EQ(ending.get().reason, "told to stop");
+}
+
+// 160 results of a campaign that was not served for a moment were once deleted without a word.
+TEST_F(ServeTest, KeepsItsSpoolWhileACampaignIsNotServed) {
+  config.spool = directory / "spool";
+  Coordinator coordinator(config.endpoint);
+  std::future<Ending> first = start_worker();
+  (void)coordinator.have_two_runs_computed();
+  coordinator.send(wire::Stop{});
+  EXPECT_EQ(first.get().reason, "told to stop");
+
+  std::future<Ending> second = start_worker();
+  (void)coordinator.receive<wire::Hello>();
+  coordinator.send(wire::Welcome{.worker = {2}, .heartbeat_interval_s = 0.05});
+  EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 2U);
+  coordinator.send(wire::NotServed{.campaign = campaign, .ranges = {}});
+  while (coordinator.receive<wire::Heartbeat>().set_aside.empty()) {
+  }
+  coordinator.send(wire::Stop{});
+  EXPECT_EQ(second.get().reason, "told to stop");
+  EXPECT_EQ(Spool(*config.spool, "m").former_results().size(), 2U);
+
+  std::future<Ending> third = start_worker();
+  (void)coordinator.receive<wire::Hello>();
+  coordinator.send(wire::Welcome{.worker = {3}, .heartbeat_interval_s = 1.0});
+  EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 2U);
+  coordinator.send(wire::Forget{.campaign = campaign, .num_runs = 2});
+  coordinator.send(wire::Drain{});
+  EXPECT_EQ(third.get().reason, "drained");
+  EXPECT_FALSE(std::filesystem::exists(*config.spool));
 }
 
 TEST_F(ServeTest, KeepsResultsForTheNextWorkerInItsSpool) {

@@ -1,0 +1,134 @@
+// What a worker does that the coordinator does not let in.
+
+#include "tests/worker/net/conversation_fixture.hpp"
+
+namespace proofmass::worker {
+namespace {
+
+using namespace std::chrono_literals;
+using wire::RejectReason;
+
+class RefusalTest : public ConversationTest {
+ protected:
+  void refuse(RejectReason reason) {
+    receive(wire::Reject{.reason = reason, .text = "not now"}, first_epoch);
+  }
+  [[nodiscard]] std::vector<std::string> notices() {
+    std::vector<std::string> texts;
+    for (const Notice& notice : conversation->take_notices()) texts.push_back(notice.text);
+    return texts;
+  }
+  /// Until it says something, in steps of 100 ms.
+  Duration time_until_next_message() {
+    const TimePoint start_at = now;
+    while (sent.empty() && now - start_at < 10min) tick_after(100ms);
+    return now - start_at;
+  }
+};
+
+TEST_F(RefusalTest, IsFinalIfItIsIncompatibleOrItsKeyRevoked) {
+  for (const RejectReason reason : {RejectReason::incompatible, RejectReason::revoked}) {
+    start();
+    (void)take_sent<wire::Hello>();
+    refuse(reason);
+    expect_ending(Ending::Kind::failed, "refused by the coordinator: not now");
+  }
+}
+
+TEST_F(RefusalTest, IsNotFinalIfThereAreTooManyWorkersOrTooMuchCrashed) {
+  for (const RejectReason reason : {RejectReason::full, RejectReason::quarantined}) {
+    start();
+    (void)take_sent<wire::Hello>();
+    Duration least = 15s;
+    for (int i = 0; i < 5; ++i) {
+      refuse(reason);
+      refuse(reason);  // The answer to a repeated Hello.
+      const Duration passed = time_until_next_message();
+      EXPECT_GE(passed, least);
+      EXPECT_LE(passed, least + least / 4 + 100ms);
+      (void)take_sent<wire::Hello>();
+      EXPECT_FALSE(conversation->take_reconnection());
+      least = std::min<Duration>(2 * least, 60s);
+    }
+    EXPECT_EQ(notices(),
+              std::vector<std::string>{"refused reason=\"not now\" (asks again every 15 to 60 s)"})
+        << "once";
+    receive(welcome);
+    (void)take_sent<wire::Heartbeat>();
+    EXPECT_TRUE(conversation->is_registered());
+    EXPECT_FALSE(conversation->ending().has_value());
+  }
+}
+
+TEST_F(RefusalTest, NeedsAnotherConnectionIfSomethingBrokeTheRules) {
+  register_with_campaign();
+  (void)compute(lease(10, 1));
+  refuse(RejectReason::malformed);
+  EXPECT_FALSE(conversation->is_registered());
+  EXPECT_FALSE(conversation->take_reconnection()) << "not at once";
+  Duration passed{};
+  while (!conversation->take_reconnection()) {
+    tick_after(100ms);
+    passed += 100ms;
+    ASSERT_LT(passed, 20s);
+    ASSERT_TRUE(sent.empty()) << "nobody listens";
+  }
+  EXPECT_GE(passed, 15s);
+  EXPECT_FALSE(conversation->take_reconnection()) << "once";
+  conversation->on_connected(now);
+  (void)take_sent<wire::Hello>();
+  receive(welcome);
+  EXPECT_EQ(take_sent<wire::Heartbeat>().held, held(10, 1));
+  EXPECT_EQ(take_sent<wire::ResultBatch>().results.size(), 1U) << "what it computed is kept";
+}
+
+// Who cannot be understood at all is told so without the name of a session.
+TEST_F(RefusalTest, IsHeardUnderAnySession) {
+  start();
+  (void)take_sent<wire::Hello>();
+  conversation->on_packet(
+      {{{1}, first_epoch, 1}, wire::Reject{.reason = RejectReason::malformed, .text = "bad"}}, now);
+  tick_after(1s);
+  EXPECT_TRUE(sent.empty());
+}
+
+TEST_F(RefusalTest, GoesOnComputingMeanwhile) {
+  register_with_campaign();
+  receive(lease(10, 2));
+  refuse(RejectReason::full);
+  EXPECT_EQ(execution.num_abandons, 0);
+  execution.finish_lease();
+  conversation->on_progress(now);
+  EXPECT_EQ(conversation->num_unacknowledged(), 2U);
+}
+
+// The network may hold a refusal back until a later Hello was accepted.
+TEST_F(RefusalTest, ThatIsOvertakenByTheWelcomeMeansNothing) {
+  start();
+  (void)take_sent<wire::Hello>();
+  conversation->on_packet({{own_session, first_epoch, 2}, welcome}, now);
+  (void)take_sent<wire::Heartbeat>();
+  for (const RejectReason reason : {RejectReason::full, RejectReason::not_registered}) {
+    conversation->on_packet(
+        {{own_session, first_epoch, 1}, wire::Reject{.reason = reason, .text = ""}}, now);
+    EXPECT_TRUE(conversation->is_registered());
+  }
+}
+
+TEST_F(RefusalTest, LongAfterTheOneBeforeBeginsAnew) {
+  start();
+  (void)take_sent<wire::Hello>();
+  refuse(RejectReason::full);
+  (void)time_until_next_message();
+  (void)take_sent<wire::Hello>();
+  refuse(RejectReason::full);
+  now += 300s;
+  conversation->on_tick(now);
+  (void)take_sent<wire::Hello>();
+  refuse(RejectReason::full);
+  EXPECT_LE(time_until_next_message(), 19s);
+  (void)take_sent<wire::Hello>();
+}
+
+}  // namespace
+}  // namespace proofmass::worker
