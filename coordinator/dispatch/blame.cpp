@@ -39,7 +39,7 @@ RunsByCampaign computed_runs(const State& state, const Worker& worker) {
 }
 
 /// Blame from this host means nothing.
-void withdraw(State& state, CampaignId id, const std::string& host) {
+void withdraw(State& state, CampaignId id, const HostId& host) {
   CampaignState& campaign = state.campaigns.at(id);
   for (auto next = campaign.suspects.begin(); next != campaign.suspects.end();) {
     const auto current = next++;
@@ -57,12 +57,13 @@ void withdraw(State& state, CampaignId id, const std::string& host) {
   }
 }
 
-void quarantine(State& state, const std::string& host, std::uint32_t num_crashes, Outbox& outbox) {
+void quarantine(State& state, const HostId& host, std::uint32_t num_crashes, Outbox& outbox) {
   state.quarantined.insert(host);
   for (const auto& [id, campaign] : state.campaigns) withdraw(state, id, host);
   outbox.log({.severity = Severity::error,
               .kind = "host_quarantined",
-              .text = fmt::format("host={} crashes={}", host, num_crashes)});
+              .text = fmt::format("host={} crashes={}{}", host.name, num_crashes,
+                                  host.key.empty() ? "" : " key=" + host.key)});
 }
 
 /// A run that is stored is beyond suspicion; its audit is given up instead, like a run.
@@ -80,7 +81,7 @@ void count_audit_crash(State& state, CampaignId id, RunIndex run, Outbox& outbox
 
 /// A run that is suspected already will be tried alone; only then does a crash tell more.
 RunSet blame_runs(CampaignState& campaign, const RunSet& accused, Certainty certainty,
-                  const std::string& host) {
+                  const HostId& host) {
   RunSet blamed;
   for (const RunRange& range : accused.ranges()) {
     for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
@@ -110,8 +111,9 @@ RunsByCampaign split_audits(const State& state, RunsByCampaign& accused) {
 
 RunsByCampaign blame(State& state, WorkerId id, RunsByCampaign accused, Certainty certainty,
                      Outbox& outbox) {
-  const std::string host = state.workers.at(id).host;
-  if (state.quarantined.contains(host)) return {};
+  const HostId host = state.workers.at(id).host;
+  // A process that was lent nothing says nothing: anybody can start and end some.
+  if (state.quarantined.contains(host) || state.workers.at(id).num_lent == 0) return {};
   const std::uint32_t num_crashes = ++state.hosts.at(host).num_crashes;
   if (num_crashes >= state.config.crashes_per_host_max) {
     quarantine(state, host, num_crashes, outbox);

@@ -7,6 +7,7 @@
 #include "coordinator/dispatch/dispatch.hpp"
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
+#include "coordinator/dispatch/workers.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
@@ -89,6 +90,7 @@ void on_campaign(State& state, CampaignId id, const StoredCampaign& stored, Time
   detail::make_pending(state, id, std::move(open), {1}, outbox);
   restore_audits(campaign, stored);
   if (campaign.phase == Phase::finished && !is_finished(campaign)) campaign.phase = Phase::active;
+  detail::adopt_set_aside(state, id, now);
   detail::sort_served(state);
   detail::settle(state, now, outbox);
 }
@@ -102,6 +104,7 @@ void on_extended(State& state, CampaignId id, std::shared_ptr<const Campaign> de
   campaign.definition = std::move(definition);
   if (campaign.phase == Phase::finished) campaign.phase = Phase::active;
   detail::make_pending(state, id, RunSet(added), {1}, outbox);
+  detail::adopt_set_aside(state, id, now);
   detail::sort_served(state);
   detail::lend_to_hungry(state, now, outbox);
 }

@@ -19,7 +19,8 @@ namespace {
 double seconds(Duration duration) { return std::chrono::duration<double>(duration).count(); }
 
 /// Why a worker that says Hello cannot be taken; nothing if it can.
-std::optional<wire::Reject> refusal(const State& state, const wire::Hello& hello) {
+std::optional<wire::Reject> refusal(const State& state, const HostId& host,
+                                    const wire::Hello& hello) {
   using wire::RejectReason;
   if (hello.model_version != model_version) {
     return wire::Reject{.reason = RejectReason::incompatible,
@@ -32,7 +33,7 @@ std::optional<wire::Reject> refusal(const State& state, const wire::Hello& hello
         .text = fmt::format("reference_digest = {:016x} (must be {:016x}, the coordinator's)",
                             hello.reference_digest, state.config.reference_digest)};
   }
-  if (state.quarantined.contains(hello.host)) {
+  if (state.quarantined.contains(host)) {
     return wire::Reject{.reason = RejectReason::quarantined,
                         .text = fmt::format("host = {} (too much crashed there)", hello.host)};
   }
@@ -44,12 +45,27 @@ std::optional<wire::Reject> refusal(const State& state, const wire::Hello& hello
   return std::nullopt;
 }
 
-void register_worker(State& state, WorkerId id, SessionId session, const wire::Hello& hello,
-                     TimePoint now, Outbox& outbox) {
+/// Forgets the host of this key that has been without workers for the longest, if there are too
+/// many: a key that makes up names must not fill the memory, nor make those of others forgotten.
+void limit_hosts(State& state, const std::string& key) {
+  const auto first = state.hosts.lower_bound({.key = key, .name = ""});
+  auto oldest = state.hosts.end();
+  std::size_t count = 0;
+  for (auto host = first; host != state.hosts.end() && host->first.key == key; ++host, ++count) {
+    if (host->second.num_workers > 0) continue;
+    if (oldest == state.hosts.end() || host->second.left_at < oldest->second.left_at) oldest = host;
+  }
+  if (count <= state.config.hosts_per_key_max || oldest == state.hosts.end()) return;
+  state.quarantined.erase(oldest->first);
+  state.hosts.erase(oldest);
+}
+
+void register_worker(State& state, WorkerId id, SessionId session, const HostId& host,
+                     const wire::Hello& hello, TimePoint now, Outbox& outbox) {
   Worker& worker = state.workers[id];
   worker.session = session;
   worker.name = hello.worker_name;
-  worker.host = hello.host;
+  worker.host = host;
   worker.process_id = hello.process_id;
   worker.num_slots = hello.num_slots;
   worker.registered_at = now;
@@ -57,7 +73,8 @@ void register_worker(State& state, WorkerId id, SessionId session, const wire::H
   worker.heartbeat_at = now;
   worker.retracted_at = now - state.config.heartbeat_interval;
   state.num_slots += worker.num_slots;
-  ++state.hosts[worker.host].num_workers;
+  ++state.hosts[host].num_workers;
+  limit_hosts(state, host.key);
   outbox.log(
       {.severity = Severity::info,
        .kind = "worker_registered",
@@ -77,15 +94,28 @@ bool take_hello_allowance(State& state, TimePoint now) {
   return true;
 }
 
-/// The process before this one crashed: that is sooner known than that it is silent.
-void note_former(State& state, const wire::FormerSession& former, Outbox& outbox) {
+/// The process before this one crashed: that is sooner known than that it is silent. Nobody but the
+/// same key on the same host may say so.
+void note_former(State& state, const HostId& host, const wire::FormerSession& former,
+                 Outbox& outbox) {
   state.awaited.erase(former.session);
   const auto found =
       std::find_if(state.workers.begin(), state.workers.end(),
                    [&](const auto& item) { return item.second.session == former.session; });
-  if (found != state.workers.end()) {
+  if (found != state.workers.end() && found->second.host == host) {
     detail::part_with(state, found->first, former.reason, outbox);
   }
+}
+
+/// Ends the registration that has been silent for the longest if no more workers can be taken: its
+/// process may be gone. If it is not, it registers again.
+void make_room(State& state, TimePoint now, Outbox& outbox) {
+  const auto silent = std::min_element(
+      state.workers.begin(), state.workers.end(),
+      [](const auto& a, const auto& b) { return a.second.heard_at < b.second.heard_at; });
+  if (silent == state.workers.end()) return;
+  if (now - silent->second.heard_at < state.config.suspect_after) return;
+  detail::part_with(state, silent->first, LossReason::silent, outbox);
 }
 
 /// Registered workers are answered again: the answer before may have been lost.
@@ -145,12 +175,16 @@ void reject_unregistered(WorkerId id, Outbox& outbox) {
 
 void on_hello(State& state, WorkerId id, SessionId session, const std::string& key,
               const wire::Hello& hello, TimePoint now, Outbox& outbox) {
-  (void)key;
   if (!take_hello_allowance(state, now)) return;
   if (state.is_stopped) return outbox.send(id, wire::Stop{});
-  if (hello.former) note_former(state, *hello.former, outbox);
+  const HostId host{.key = key, .name = hello.host};
+  if (hello.former) note_former(state, host, *hello.former, outbox);
   const bool is_new = !state.workers.contains(id);
-  const auto reject = is_new ? refusal(state, hello) : std::nullopt;
+  auto reject = is_new ? refusal(state, host, hello) : std::nullopt;
+  if (reject && reject->reason == wire::RejectReason::full) {
+    make_room(state, now, outbox);
+    reject = refusal(state, host, hello);
+  }
   if (reject) {
     state.awaited.erase(session);
     outbox.log({.severity = Severity::warning,
@@ -158,7 +192,7 @@ void on_hello(State& state, WorkerId id, SessionId session, const std::string& k
                 .text = fmt::format("name={} {}", hello.worker_name, reject->text)});
     outbox.send(id, *reject);
   } else {
-    if (is_new) register_worker(state, id, session, hello, now, outbox);
+    if (is_new) register_worker(state, id, session, host, hello, now, outbox);
     state.workers.at(id).heard_at = now;
     welcome(state, id, outbox);
   }
@@ -166,8 +200,11 @@ void on_hello(State& state, WorkerId id, SessionId session, const std::string& k
 }
 
 bool on_release_host(State& state, const std::string& host, TimePoint now, Outbox& outbox) {
-  if (state.quarantined.erase(host) == 0) return false;
-  state.hosts[host].num_crashes = 0;
+  const auto is_named = [&](const HostId& id) { return id.name == host; };
+  if (std::erase_if(state.quarantined, is_named) == 0) return false;
+  for (auto& [id, content] : state.hosts) {
+    if (is_named(id)) content.num_crashes = 0;
+  }
   outbox.log({.kind = "host_released", .text = fmt::format("host={}", host)});
   detail::lend_to_hungry(state, now, outbox);
   return true;
@@ -212,7 +249,9 @@ void on_give_back(State& state, WorkerId id, const wire::GiveBack& give_back, Ti
     }
     const std::set<LeaseId> leases = worker->leases;
     for (const LeaseId lease_id : leases) {
-      const Lease& lease = state.leases.at(lease_id);
+      const auto found = state.leases.find(lease_id);
+      if (found == state.leases.end()) continue;  // It ended with one before it.
+      const Lease& lease = found->second;
       if (lease.campaign != held.campaign || lease.known_as != held.attempt) continue;
       const RunSet lost = lease.remaining.overlap(runs);
       if (!lost.empty()) detail::lose(state, lease_id, lost, give_back.reason, {}, outbox);

@@ -110,7 +110,7 @@ void check_lease(const State& state, LeaseId id, const Lease& lease) {
 
 void check_workers(const State& state) {
   std::uint64_t num_slots = 0;
-  std::map<std::string, std::uint32_t> num_workers;
+  std::map<HostId, std::uint32_t> num_workers;
   for (const auto& [id, worker] : state.workers) {
     std::uint64_t num_lent = 0;
     std::uint64_t num_alone = 0;

@@ -254,22 +254,22 @@ void send_retract(WorkerId worker, CampaignId campaign, const RunSet& runs, Outb
 
 void remove_worker(State& state, WorkerId id, LossReason reason, const RunsByCampaign& blamed,
                    Outbox& outbox) {
-  const std::set<LeaseId> leases = state.workers.at(id).leases;
-  for (const LeaseId lease_id : leases) {
-    // A run that is lost may go on as the worker's own copy; that lease ends below, too.
-    const auto found = state.leases.find(lease_id);
-    if (found == state.leases.end()) continue;
-    const auto guilty = blamed.find(found->second.campaign);
-    const RunSet runs = found->second.remaining;
+  const Worker& worker = state.workers.at(id);
+  while (!worker.leases.empty()) {
+    const LeaseId lease_id = *worker.leases.begin();
+    const Lease& lease = state.leases.at(lease_id);
+    const auto guilty = blamed.find(lease.campaign);
+    const RunSet runs = lease.remaining;
     lose(state, lease_id, runs, reason, guilty == blamed.end() ? RunSet() : guilty->second, outbox);
   }
-  const Worker& worker = state.workers.at(id);
-  PROOFMASS_EXPECT(worker.leases.empty());
   state.num_slots -= worker.num_slots;
-  const auto host = state.hosts.find(worker.host);
-  --host->second.num_workers;
-  const auto& [num_workers, num_crashes, num_results] = host->second;
-  if (num_workers == 0 && num_crashes == 0 && num_results == 0) state.hosts.erase(host);
+  const auto found = state.hosts.find(worker.host);
+  Host& host = found->second;
+  --host.num_workers;
+  host.left_at = std::max(host.left_at, worker.heard_at);
+  if (host.num_workers == 0 && host.num_crashes == 0 && host.num_results == 0) {
+    state.hosts.erase(found);
+  }
   state.hungry.erase(id);
   state.awaited.erase(worker.session);
   state.workers.erase(id);

@@ -33,9 +33,10 @@ Duration patience(const State& state, CampaignId id) {
     if (campaign->second.run_time_s > 0.0) orbit_time_s = campaign->second.run_time_s;
     if (campaign->second.orbit_time_s > 0.0) orbit_time_s = campaign->second.orbit_time_s;
   }
+  constexpr double patience_s_max = 1e6;  // A worker may claim any time.
+  const double patience_s = std::min(patience_s_max, config.hung_after_orbits * orbit_time_s);
   return std::max(config.hung_after_min,
-                  std::chrono::duration_cast<Duration>(
-                      std::chrono::duration<double>(config.hung_after_orbits * orbit_time_s)));
+                  std::chrono::duration_cast<Duration>(std::chrono::duration<double>(patience_s)));
 }
 
 }  // namespace

@@ -115,7 +115,20 @@ void settle_surplus(State& state, WorkerId id, CampaignId campaign_id, const Hel
     open = {};
   }
   if (!rest.empty()) send_retract(id, campaign_id, rest, outbox);
-  if (!open.empty()) worker.unleased[campaign_id] = std::move(open);
+  if (!open.empty()) worker.unleased[campaign_id].add(open);
+}
+
+/// Takes out the runs that the campaign does not have: the worker keeps their results.
+void settle_foreign(State& state, WorkerId id, CampaignId campaign_id, HeldByAttempt& held,
+                    Outbox& outbox) {
+  const RunRange known{{0}, state.campaigns.at(campaign_id).definition->num_runs};
+  RunSet foreign = all_of(held);
+  foreign.remove(known);
+  if (foreign.empty()) return;
+  for (auto& [attempt, runs] : held) runs.remove(foreign);
+  std::erase_if(held, [](const auto& item) { return item.second.empty(); });
+  outbox.send(id, wire::NotServed{.campaign = campaign_id, .ranges = foreign.ranges()});
+  state.workers.at(id).unleased[campaign_id] = std::move(foreign);
 }
 
 /// Runs that the worker was lent long ago and does not hold have not arrived.
@@ -123,7 +136,9 @@ void settle_missing(State& state, WorkerId id, const std::map<CampaignId, RunSet
                     TimePoint now, Outbox& outbox) {
   const std::set<LeaseId> leases = state.workers.at(id).leases;
   for (const LeaseId lease_id : leases) {
-    const Lease& lease = state.leases.at(lease_id);
+    const auto lease_found = state.leases.find(lease_id);
+    if (lease_found == state.leases.end()) continue;  // It ended with one before it.
+    const Lease& lease = lease_found->second;
     if (now - lease.lent_at < state.config.arrival_max) continue;
     RunSet missing = lease.remaining;
     const auto found = held.find(lease.campaign);
@@ -154,6 +169,32 @@ bool is_wanted(const State& state, CampaignId id) {
          found->second.phase != Phase::finished;
 }
 
+/// Runs of one campaign that the worker holds.
+void settle_held(State& state, WorkerId id, CampaignId campaign, HeldByAttempt held, TimePoint now,
+                 Outbox& outbox) {
+  if (state.campaigns.contains(campaign)) settle_foreign(state, id, campaign, held, outbox);
+  if (held.empty()) return;
+  if (is_wanted(state, campaign)) {
+    settle_surplus(state, id, campaign, held, now, outbox);
+  } else {
+    send_not_served(state, id, campaign, outbox);
+    state.workers.at(id).unleased[campaign].add(all_of(held));
+  }
+}
+
+/// Runs of one campaign whose results the worker could not deliver. If the campaign is served now,
+/// they are lent to it: it will deliver them, and nobody else needs to compute them.
+void settle_set_aside(State& state, WorkerId id, CampaignId campaign_id, TimePoint now,
+                      Outbox& outbox) {
+  if (is_wanted(state, campaign_id)) {
+    const Adoption adoption{state, id, campaign_id, now};
+    const auto& set_aside = state.workers.at(id).set_aside.at(campaign_id);
+    for (const auto& [attempt, runs] : set_aside) adoption.adopt(attempt, runs);
+  } else if (state.campaigns.contains(campaign_id) || state.ended.contains(campaign_id)) {
+    send_not_served(state, id, campaign_id, outbox);
+  }
+}
+
 }  // namespace
 
 void reconcile(State& state, WorkerId id, const wire::Heartbeat& heartbeat, TimePoint now,
@@ -164,17 +205,31 @@ void reconcile(State& state, WorkerId id, const wire::Heartbeat& heartbeat, Time
     held[runs.campaign][runs.attempt].add(RunSet(runs.ranges));
     all_held[runs.campaign].add(RunSet(runs.ranges));
   }
-  state.workers.at(id).unleased.clear();
-  for (const auto& [campaign, runs] : held) {
-    if (is_wanted(state, campaign)) {
-      settle_surplus(state, id, campaign, runs, now, outbox);
-    } else {
-      send_not_served(state, id, campaign, outbox);
-      state.workers.at(id).unleased[campaign] = all_of(runs);
-    }
+  Worker& worker = state.workers.at(id);
+  worker.unleased.clear();
+  worker.set_aside.clear();
+  for (const wire::HeldRuns& runs : heartbeat.set_aside) {
+    worker.set_aside[runs.campaign][runs.attempt].add(RunSet(runs.ranges));
+    all_held[runs.campaign].add(RunSet(runs.ranges));
+  }
+  for (auto& [campaign, runs] : held) {
+    settle_held(state, id, campaign, std::move(runs), now, outbox);
+  }
+  for (const auto& [campaign, runs] : worker.set_aside) {
+    settle_set_aside(state, id, campaign, now, outbox);
   }
   settle_missing(state, id, all_held, now, outbox);
   repeat_retracts(state, id, outbox);
+}
+
+void adopt_set_aside(State& state, CampaignId campaign, TimePoint now) {
+  if (!is_wanted(state, campaign)) return;
+  for (const auto& [id, worker] : state.workers) {
+    const auto found = worker.set_aside.find(campaign);
+    if (found == worker.set_aside.end()) continue;
+    const Adoption adoption{state, id, campaign, now};
+    for (const auto& [attempt, runs] : found->second) adoption.adopt(attempt, runs);
+  }
 }
 
 }  // namespace proofmass::coordinator::detail

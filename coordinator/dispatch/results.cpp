@@ -94,10 +94,26 @@ struct Intake {
   }
 };
 
-bool is_foreign(const CampaignState& campaign, const wire::ResultBatch& batch) {
-  return std::any_of(batch.results.begin(), batch.results.end(), [&](const auto& computed) {
-    return computed.result.run.value >= campaign.definition->num_runs;
-  });
+bool is_foreign(const CampaignState& campaign, const wire::ComputedRun& computed) {
+  return computed.result.run.value >= campaign.definition->num_runs;
+}
+
+/// Runs of the batch that the campaign does not have. That is no fault of the worker: the file may
+/// be an older copy, and the runs come back when it is extended again.
+RunSet foreign_runs(const CampaignState& campaign, const wire::ResultBatch& batch) {
+  RunSet foreign;
+  for (const wire::ComputedRun& computed : batch.results) {
+    if (is_foreign(campaign, computed)) foreign.add({computed.result.run, 1});
+  }
+  return foreign;
+}
+
+/// A run that was given up has come after all: the campaign is finished again once it is stored.
+void reopen_if_unfinished(State& state, CampaignState& campaign) {
+  const std::uint64_t num_ended = campaign.committed.size() + campaign.given_up.size();
+  if (campaign.phase != Phase::finished || num_ended == campaign.definition->num_runs) return;
+  campaign.phase = Phase::active;
+  detail::sort_served(state);
 }
 
 /// The rule that a result of the batch breaks, as `run 7: num_draws = 0 (...)`; empty if none does.
@@ -114,14 +130,19 @@ std::string broken_rule(const CampaignState& campaign, const wire::ResultBatch& 
 
 /// The worker and its host can compute: what they show with every result.
 void count_results(State& state, Worker& worker, CampaignId id, const wire::ResultBatch& batch) {
+  CampaignState& campaign = state.campaigns.at(id);
+  const auto num_results = static_cast<std::uint64_t>(
+      std::count_if(batch.results.begin(), batch.results.end(),
+                    [&](const auto& computed) { return !is_foreign(campaign, computed); }));
+  if (num_results == 0) return;
   Host& host = state.hosts.at(worker.host);
   host.num_crashes = 0;
-  host.num_results += batch.results.size();
-  worker.num_results += batch.results.size();
-  CampaignState& campaign = state.campaigns.at(id);
+  host.num_results += num_results;
+  worker.num_results += num_results;
   double& own_s = worker.run_time_s[id];
   const auto unleased = worker.unleased.find(id);
   for (const wire::ComputedRun& computed : batch.results) {
+    if (is_foreign(campaign, computed)) continue;
     add_run_time(computed.elapsed_s, own_s);
     add_run_time(computed.elapsed_s, campaign.run_time_s);
     if (unleased != worker.unleased.end()) unleased->second.remove(computed.result.run);
@@ -142,10 +163,9 @@ void on_results(State& state, WorkerId id, const wire::ResultBatch& batch, TimeP
     return detail::send_not_served(state, id, batch.campaign, outbox);
   }
   CampaignState& campaign = found->second;
-  if (is_foreign(campaign, batch)) {
-    outbox.send(id, wire::Reject{.reason = wire::RejectReason::malformed,
-                                 .text = "run = beyond the campaign (must be below num_runs)"});
-    return on_gone(state, id, LossReason::protocol, now, outbox);
+  const RunSet foreign = foreign_runs(campaign, batch);
+  if (!foreign.empty()) {
+    outbox.send(id, wire::NotServed{.campaign = batch.campaign, .ranges = foreign.ranges()});
   }
   if (const std::string broken = broken_rule(campaign, batch); !broken.empty()) {
     outbox.send(id, wire::Reject{.reason = wire::RejectReason::malformed, .text = broken});
@@ -153,13 +173,16 @@ void on_results(State& state, WorkerId id, const wire::ResultBatch& batch, TimeP
   }
   count_results(state, *worker, batch.campaign, batch);
   Intake intake{state, id, batch.campaign, campaign, batch.attempt, outbox, {}, {}};
-  for (const wire::ComputedRun& computed : batch.results) intake.take(computed);
+  for (const wire::ComputedRun& computed : batch.results) {
+    if (!is_foreign(campaign, computed)) intake.take(computed);
+  }
   if (!intake.durable.empty()) {
     send_acks(state, batch.campaign, {{id, std::move(intake.durable)}}, outbox);
   }
   for (const auto& [holder, runs] : intake.holders) {
     detail::send_retract(holder, batch.campaign, runs, outbox);
   }
+  reopen_if_unfinished(state, campaign);
   detail::lend(state, id, now, outbox);
 }
 
@@ -190,9 +213,9 @@ void on_committed(State& state, CampaignId id, std::span<const RunIndex> runs, T
 void on_compared(State& state, CampaignId id, RunIndex run, WorkerId worker, bool is_equal,
                  TimePoint now, Outbox& outbox) {
   const auto found = state.campaigns.find(id);
-  if (found == state.campaigns.end()) return;
+  // The campaign may have been removed meanwhile, and added again.
+  if (found == state.campaigns.end() || found->second.num_comparing == 0) return;
   CampaignState& campaign = found->second;
-  PROOFMASS_EXPECT(campaign.num_comparing > 0);
   const bool was_backed_up = detail::is_backed_up(state, campaign);
   --campaign.num_comparing;
   ++campaign.num_audited;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "core/error.hpp"
@@ -30,6 +31,11 @@ bool is_quiet(const State& state) {
     if (!campaign.delivered.empty() || campaign.num_comparing > 0) return false;
   }
   return true;
+}
+
+bool is_quarantined(const State& state, const std::string& host) {
+  return std::any_of(state.quarantined.begin(), state.quarantined.end(),
+                     [&](const HostId& id) { return id.name == host; });
 }
 
 std::string runs_held_text(const State& state, WorkerId worker) {

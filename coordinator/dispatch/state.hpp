@@ -23,6 +23,15 @@ namespace proofmass::coordinator {
 using TimePoint = std::chrono::steady_clock::time_point;
 using Duration = std::chrono::steady_clock::duration;
 
+/// A computer as the workers with one key present it. What they say about it, and what happens to
+/// them there, counts for this key alone: a key cannot put the hosts of another one under
+/// suspicion.
+struct HostId {
+  std::string key;   ///< Public key of the workers; empty without keys.
+  std::string name;  ///< As the workers have it.
+  auto operator<=>(const HostId&) const = default;
+};
+
 /// Settings of the dispatch.
 struct DispatchConfig {
   Duration heartbeat_interval = std::chrono::seconds(5);  ///< Asked of every worker.
@@ -46,7 +55,8 @@ struct DispatchConfig {
   /// have said what they hold, or until this has passed.
   Duration reattach_wait = std::chrono::seconds(15);
   std::size_t num_workers_max = 4096;
-  double hellos_per_s_max = 500.0;  ///< More are not answered; workers repeat them.
+  std::size_t hosts_per_key_max = 4096;  ///< Remembered; those with workers are not forgotten.
+  double hellos_per_s_max = 500.0;       ///< More are not answered; workers repeat them.
   /// Digest of core's reference simulation, as this coordinator computes it.
   std::uint64_t reference_digest = 0;
 };
@@ -61,7 +71,7 @@ struct Progress {
 struct Worker {
   SessionId session;
   std::string name;
-  std::string host;
+  HostId host;
   std::uint64_t process_id = 0;
   std::uint32_t num_slots = 1;
   TimePoint registered_at;
@@ -77,6 +87,8 @@ struct Worker {
   std::uint64_t num_alone = 0;  ///< Suspects on its leases; nothing else is lent with one.
   /// Open runs that it holds though they are not lent to it, as the newest heartbeat has it.
   std::map<CampaignId, RunSet> unleased;
+  /// Finished runs whose results could not be taken (NotServed), as the newest heartbeat has it.
+  std::map<CampaignId, std::map<Attempt, RunSet>> set_aside;
   /// Until then it may get runs that were taken off its leases: a heartbeat without them proves
   /// nothing.
   TimePoint clear_at;
@@ -117,7 +129,7 @@ struct Suspicion {
     std::uint32_t num_alone = 0;
   };
   std::uint32_t num_crashes = 0;
-  std::map<std::string, OnHost> hosts;  ///< Of the present epoch.
+  std::map<HostId, OnHost> hosts;  ///< Of the present epoch.
 };
 
 /// A result on its way to the store, with the workers that wait for the acknowledgement; the first
@@ -194,6 +206,7 @@ struct Host {
   std::uint32_t num_workers = 0;  ///< Registered.
   std::uint32_t num_crashes = 0;  ///< Since one of its workers last delivered a result.
   std::uint64_t num_results = 0;
+  TimePoint left_at;  ///< Its last worker was heard then, if it has none.
 };
 
 /// All that the dispatch knows. Only the functions of dispatch.hpp change it.
@@ -210,8 +223,8 @@ struct State {
   std::uint64_t next_lease = 1;
   std::uint64_t num_slots = 0;  ///< Of all workers.
   std::set<WorkerId> hungry;    ///< Workers that were lent less than they would take.
-  std::map<std::string, Host> hosts;
-  std::set<std::string> quarantined;  ///< Hosts that are lent nothing.
+  std::map<HostId, Host> hosts;
+  std::set<HostId> quarantined;  ///< Hosts that are lent nothing.
   /// Sessions that should be attached and have not said yet what they hold.
   std::set<SessionId> awaited;
   TimePoint awaited_until{};
@@ -231,6 +244,9 @@ struct State {
 
 /// True if no result is expected or on its way to the store any more.
 [[nodiscard]] bool is_quiet(const State& state);
+
+/// True if workers on a host of this name, with whatever key, are lent nothing.
+[[nodiscard]] bool is_quarantined(const State& state, const std::string& host);
 
 /// Runs on the worker's leases, of all campaigns, as text for logs.
 [[nodiscard]] std::string runs_held_text(const State& state, WorkerId worker);

@@ -106,7 +106,7 @@ class Copying {
         const auto found = copies.find(run);
         if (suspects.contains(run) || (found != copies.end() && !may_copy(found->second))) continue;
         const Attempt newest = found == copies.end() ? lease.attempt : found->second.newest;
-        runs_[{lease.campaign, {newest.value + 1}}].add({run, 1});
+        runs_[{lease.campaign, after(newest)}].add({run, 1});
         --num_left_;
       }
     }

@@ -19,6 +19,10 @@ void part_with_hung(State& state, WorkerId id, const wire::ComputedBatch& batch,
 void reconcile(State& state, WorkerId id, const wire::Heartbeat& heartbeat, TimePoint now,
                Outbox& outbox);
 
+/// A campaign is served, or has more runs than before: what workers computed of it without being
+/// able to deliver it is lent to them.
+void adopt_set_aside(State& state, CampaignId campaign, TimePoint now);
+
 /// Notes how far the worker's batches are.
 void note_progress(State& state, Worker& worker, const wire::Heartbeat& heartbeat, TimePoint now);
 

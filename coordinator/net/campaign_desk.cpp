@@ -189,7 +189,7 @@ wire::ClientReply CampaignDesk::carry_out(const wire::WorkersRequest&, TimePoint
     reply.workers.push_back(
         {.id = id,
          .name = worker.name,
-         .host = worker.host,
+         .host = worker.host.name,
          .process_id = worker.process_id,
          .num_slots = worker.num_slots,
          .num_lent = worker.num_lent,

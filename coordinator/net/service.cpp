@@ -359,7 +359,7 @@ std::string Service::runs_held_text(WorkerId worker) const {
 }
 
 bool Service::is_quarantined(const std::string& host) const {
-  return parts_->state().quarantined.contains(host);
+  return coordinator::is_quarantined(parts_->state(), host);
 }
 
 void Service::worker_ended(WorkerId worker, LossReason reason) {

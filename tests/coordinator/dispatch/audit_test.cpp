@@ -127,7 +127,7 @@ TEST_F(AuditTest, ThatCrashesEveryWorkerIsGivenUp) {
   Strings events;
   for (int i = 0; i < 8 && !campaign(one).audits.empty(); ++i) {
     const WorkerId id = state.leases.at(campaign(one).audits.at({0})).worker;
-    state.hosts.at("host").num_crashes = 0;
+    state.hosts.at({"", "host"}).num_crashes = 0;
     crash(id);
     events = outbox.take_events();
     outbox.forget();

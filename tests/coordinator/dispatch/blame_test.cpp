@@ -24,7 +24,7 @@ class BlameTest : public DispatchFixture {
   /// A worker on a host that has shown that it can compute.
   void add_proven_worker(WorkerId id, std::uint32_t num_slots, const std::string& host) {
     add_worker(id, num_slots, host);
-    state.hosts.at(host).num_results = 1;
+    state.hosts.at({"", host}).num_results = 1;
     outbox.forget();
   }
 
@@ -133,7 +133,7 @@ TEST_F(BlameTest, ARunThatCrashesThreeTimesIsGivenUp) {
   crash(first);
   EXPECT_EQ(outbox.take_given_up(), Runs{{0}});
   EXPECT_TRUE(is_finished(campaign(one)));
-  EXPECT_EQ(state.hosts.at("host").num_crashes, 0U) << "the run was the cause";
+  EXPECT_EQ(state.hosts.at({"", "host"}).num_crashes, 0U) << "the run was the cause";
   const Strings events = outbox.take_events();
   EXPECT_EQ(events.at(2), "run_given_up run=0 crashes=3");
   EXPECT_EQ(events.at(3),
@@ -146,7 +146,7 @@ TEST_F(BlameTest, OnlyACrashAloneTellsAgainstASuspect) {
   add_worker(first, 3);
   const auto count = [&](std::uint64_t run) {
     const auto& suspicion = campaign(one).suspects.at({run});
-    return std::pair(suspicion.num_crashes, suspicion.hosts.at("host").num_alone);
+    return std::pair(suspicion.num_crashes, suspicion.hosts.at({"", "host"}).num_alone);
   };
   crash(first);
   for (const std::uint64_t run : {0U, 1U, 2U}) EXPECT_EQ(count(run), std::pair(1U, 0U));
@@ -227,7 +227,7 @@ TEST_F(BlameTest, FiveCrashesInARowQuarantineAHostAndItsBlameIsWithdrawn) {
   crash(first);
   EXPECT_TRUE(suspects().empty());
   EXPECT_TRUE(campaign(one).pending_suspects.empty());
-  EXPECT_TRUE(state.quarantined.contains("bad"));
+  EXPECT_TRUE(is_quarantined(state, "bad"));
   EXPECT_EQ(outbox.take_events(),
             (Strings{"worker_gone worker=1 name=w reason=crashed orbits=0",
                      "host_quarantined host=bad crashes=5",
@@ -244,7 +244,7 @@ TEST_F(BlameTest, FiveCrashesInARowQuarantineAHostAndItsBlameIsWithdrawn) {
 TEST_F(BlameTest, AWorkerOnAQuarantinedHostIsLentNothingButMayDeliver) {
   add_campaign(one, 3);
   add_worker(first);
-  state.quarantined.insert("host");
+  state.quarantined.insert({"", "host"});
   outbox.forget();
   deliver(first, one, {0});
   EXPECT_EQ(outbox.take_stored(), Runs{{0}});
@@ -261,7 +261,7 @@ TEST_F(BlameTest, AResultEndsARowOfCrashes) {
     outbox.forget();
   }
   EXPECT_TRUE(state.quarantined.empty());
-  EXPECT_EQ(state.hosts.at("host").num_crashes, 4U);
+  EXPECT_EQ(state.hosts.at({"", "host"}).num_crashes, 4U);
 }
 
 // A host on which nothing has ever finished is as likely the cause as the run.

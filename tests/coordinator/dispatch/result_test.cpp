@@ -146,16 +146,6 @@ TEST_F(ResultTest, OfACampaignThatHasEndedIsForgottenUntilItIsServedAgain) {
   outbox.forget();
 }
 
-TEST_F(ResultTest, BeyondTheCampaignEndsTheWorker) {
-  deliver(first, one, {0, 10});
-  const auto reject = outbox.take_sent<wire::Reject>(first);
-  EXPECT_EQ(reject.reason, wire::RejectReason::malformed);
-  EXPECT_EQ(reject.text, "run = beyond the campaign (must be below num_runs)");
-  EXPECT_TRUE(state.workers.empty());
-  EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::protocol);
-  (void)outbox.take_events();
-}
-
 TEST_F(ResultTest, WithoutAnEstimateIsCounted) {
   on_results(state, first,
              {.campaign = one,
