@@ -8,8 +8,6 @@
 #include <utility>
 #include <variant>
 
-#include "proto/wire/definition_codec.hpp"
-
 namespace proofmass::test {
 namespace {
 
@@ -60,38 +58,80 @@ void PlayedCoordinator::add_file(wire::CampaignId id, const coordinator::StoredC
 void PlayedCoordinator::start() {
   life_.emplace();
   life_->epoch = {random_.number()};
-  life_->state = coordinator::initial_state(quick_config(), attached_, agenda_.now());
-  for (auto& [id, file] : files_) {
-    on_campaign(life_->state, id, found_in(file), agenda_.now(), *this);
-    if (file.is_failing) on_store_failed(life_->state, id, "no space", *this);
+  coordinator::DispatchConfig config = quick_config();
+  config.num_workers_max = num_workers_max_;
+  life_->state = coordinator::initial_state(config, attached_, agenda_.now());
+  for (const auto& [id, file] : files_) {
+    if (file.is_shut) {
+      ++num_events_["file_not_opened"];
+    } else if (file.phase == Phase::finished && file.is_complete() && random_.happens(0.5)) {
+      ++num_events_["finished_file_left_out"];
+      on_ended(life_->state, id, file.num_runs());
+    } else {
+      serve(id);
+    }
   }
   after_event();
+}
+
+void PlayedCoordinator::serve(wire::CampaignId id) {
+  const PlayedFile& file = files_.at(id);
+  on_campaign(life_->state, id, found_in(file), agenda_.now(), *this);
+  if (file.is_failing) on_store_failed(life_->state, id, "no space", *this);
 }
 
 void PlayedCoordinator::kill() {
   attached_.clear();
   for (const auto& [id, worker] : life_->state.workers) attached_.insert(worker.session);
   life_.reset();
+  for (auto& [id, file] : files_) {
+    if (file.is_nameless) restore_copy(id);
+  }
 }
 
-void PlayedCoordinator::receive(const wire::Packet& packet) {
+void PlayedCoordinator::receive(const wire::Packet& packet, const std::string& key) {
   if (!life_) return;
-  const wire::WorkerId worker = meet(packet.header.session);
+  if (is_stalled()) {
+    life_->waiting.emplace_back(packet, key);
+    return;
+  }
+  const wire::WorkerId worker = meet(packet.header.session, key);
   const bool is_hello = std::holds_alternative<wire::Hello>(packet.message);
   if (is_hello) life_->peers.at(worker).said_hello = true;
   if (packet.header.epoch != life_->epoch && !is_hello) {
     coordinator::reject_unregistered(worker, *this);
   } else {
-    handle(worker, packet);
+    handle(worker, packet, key);
   }
   after_event();
 }
 
-void PlayedCoordinator::handle(wire::WorkerId worker, const wire::Packet& packet) {
+void PlayedCoordinator::stall(Duration duration) {
+  if (!life_ || is_stalled()) return;
+  ++num_events_["service_stalled"];
+  life_->stalled_until = agenda_.now() + duration;
+  agenda_.add(duration, [this, epoch = life_->epoch] {
+    if (life_ && life_->epoch == epoch) go_on();
+  });
+}
+
+/// All that was sent meanwhile arrives at once.
+void PlayedCoordinator::go_on() {
+  life_->stalled_until = TimePoint{};
+  if (random_.happens(0.3)) tick();
+  for (const auto& [packet, key] : std::exchange(life_->waiting, {})) {
+    ++num_events_["message_waited"];
+    receive(packet, key);
+  }
+  for (const auto& [id, file] : files_) flush(id);
+}
+
+void PlayedCoordinator::handle(wire::WorkerId worker, const wire::Packet& packet,
+                               const std::string& key) {
   coordinator::State& state = life_->state;
   const TimePoint now = agenda_.now();
   if (const auto* const hello = std::get_if<wire::Hello>(&packet.message)) {
-    on_hello(state, worker, packet.header.session, "", *hello, now, *this);
+    on_hello(state, worker, packet.header.session, key, *hello, now, *this);
   } else if (const auto* const heartbeat = std::get_if<wire::Heartbeat>(&packet.message)) {
     on_heartbeat(state, worker, *heartbeat, packet.header.sequence, now, *this);
   } else if (const auto* const results = std::get_if<wire::ResultBatch>(&packet.message)) {
@@ -108,13 +148,13 @@ void PlayedCoordinator::handle(wire::WorkerId worker, const wire::Packet& packet
 }
 
 void PlayedCoordinator::tick() {
-  if (!life_) return;
+  if (!life_ || is_stalled()) return;
   on_tick(life_->state, agenda_.now(), *this);
   after_event();
 }
 
 void PlayedCoordinator::pause_or_resume(wire::CampaignId id) {
-  if (!life_) return;
+  if (!is_served(id)) return;
   if (life_->state.campaigns.at(id).phase == Phase::active) {
     on_pause(life_->state, id, *this);
   } else {
@@ -124,7 +164,7 @@ void PlayedCoordinator::pause_or_resume(wire::CampaignId id) {
 }
 
 void PlayedCoordinator::cancel_or_resume(wire::CampaignId id) {
-  if (!life_) return;
+  if (!is_served(id)) return;
   if (life_->state.campaigns.at(id).phase == Phase::cancelled) {
     on_resume(life_->state, id, agenda_.now(), *this);
   } else {
@@ -134,72 +174,124 @@ void PlayedCoordinator::cancel_or_resume(wire::CampaignId id) {
 }
 
 void PlayedCoordinator::resume_all() {
-  if (!life_) return;
-  for (const auto& [id, file] : files_) on_resume(life_->state, id, agenda_.now(), *this);
+  for (const auto& [id, file] : files_) {
+    if (is_served(id)) on_resume(life_->state, id, agenda_.now(), *this);
+  }
+  if (life_) after_event();
+}
+
+void PlayedCoordinator::extend(wire::CampaignId id, std::uint64_t num_runs) {
+  PlayedFile& file = files_.at(id);
+  if (!life_ || is_stalled() || file.is_shut || file.is_failing || file.num_runs() >= num_runs) {
+    return;
+  }
+  ++num_events_["campaign_extended"];
+  if (!life_->state.campaigns.contains(id)) serve(id);  // It was finished, and left out.
+  Campaign extended = *file.stored.definition;
+  extended.num_runs = num_runs;
+  file.stored.definition = std::make_shared<const Campaign>(extended);
+  on_extended(life_->state, id, file.stored.definition, agenda_.now(), *this);
   after_event();
+}
+
+bool PlayedCoordinator::release_host(const std::string& host) {
+  if (!life_ || is_stalled()) return false;
+  const bool is_released = on_release_host(life_->state, host, agenda_.now(), *this);
+  after_event();
+  return is_released;
 }
 
 void PlayedCoordinator::fail_storage(wire::CampaignId id) {
   files_.at(id).is_failing = true;
-  if (life_) on_store_failed(life_->state, id, "no space", *this);
+  if (is_served(id)) on_store_failed(life_->state, id, "no space", *this);
 }
 
 void PlayedCoordinator::recover_storage(wire::CampaignId id) {
-  files_.at(id).is_failing = false;
-  if (!life_) return;
+  PlayedFile& file = files_.at(id);
+  file.is_failing = false;
+  file.is_nameless = false;
+  if (!life_ || !life_->state.campaigns.contains(id)) return;
   on_store_recovered(life_->state, id, agenda_.now(), *this);
   flush(id);
 }
 
-bool PlayedCoordinator::is_done() const {
-  if (!life_) return false;
-  for (const auto& [id, campaign] : life_->state.campaigns) {
-    if (campaign.phase != Phase::finished || !is_finished(campaign)) return false;
-  }
-  return true;
+void PlayedCoordinator::copy_file(wire::CampaignId id) {
+  if (files_.at(id).is_failing) return;
+  copies_[id] = files_.at(id);
 }
 
-wire::WorkerId PlayedCoordinator::meet(wire::SessionId session) {
+void PlayedCoordinator::lose_name(wire::CampaignId id) {
+  if (!is_served(id) || !copies_.contains(id)) return;
+  ++num_events_["name_lost"];
+  files_.at(id).is_nameless = true;
+  fail_storage(id);
+}
+
+void PlayedCoordinator::restore_copy(wire::CampaignId id) {
+  const auto copy = copies_.find(id);
+  if (copy == copies_.end()) return;
+  PlayedFile& file = files_.at(id);
+  if (copy->second.num_commits.size() < file.num_commits.size()) {
+    ++num_events_["results_lost_with_a_file"];
+  }
+  if (copy->second.num_runs() < file.num_runs()) ++num_events_["extension_lost_with_a_file"];
+  const bool is_shut = file.is_shut;
+  file = copy->second;
+  file.is_shut = is_shut;
+}
+
+void PlayedCoordinator::open(wire::CampaignId id) {
+  PlayedFile& file = files_.at(id);
+  if (!file.is_shut) return;
+  if (life_ && is_stalled()) {
+    return agenda_.add(life_->stalled_until - agenda_.now() + 1ms, [this, id] { open(id); });
+  }
+  file.is_shut = false;
+  if (!life_) return;
+  ++num_events_["file_opened_late"];
+  serve(id);
+  after_event();
+}
+
+bool PlayedCoordinator::is_stalled() const { return agenda_.now() < life_->stalled_until; }
+
+bool PlayedCoordinator::is_served(wire::CampaignId id) const {
+  return life_ && !is_stalled() && life_->state.campaigns.contains(id);
+}
+
+bool PlayedCoordinator::is_done(wire::CampaignId id) const {
+  if (!life_) return false;
+  const auto campaign = life_->state.campaigns.find(id);
+  if (campaign == life_->state.campaigns.end()) return life_->state.ended.contains(id);
+  return campaign->second.phase == Phase::finished && is_finished(campaign->second);
+}
+
+bool PlayedCoordinator::is_done() const {
+  return std::all_of(files_.begin(), files_.end(),
+                     [&](const auto& item) { return is_done(item.first); });
+}
+
+wire::WorkerId PlayedCoordinator::meet(wire::SessionId session, const std::string& key) {
   const auto [found, is_new] = life_->workers.try_emplace(session);
   if (is_new) {
     found->second = {life_->workers.size()};
-    life_->peers[found->second].session = session;
+    life_->peers[found->second] = {.session = session, .key = key};
   }
   return found->second;
 }
 
 void PlayedCoordinator::after_event() {
   check_invariants(life_->state);
-  for (auto& [id, file] : files_) file.phase = life_->state.campaigns.at(id).phase;
-}
-
-void PlayedCoordinator::check_sent(wire::WorkerId worker, const wire::Message& message) const {
-  const auto peer = life_->peers.find(worker);
-  ASSERT_TRUE(peer != life_->peers.end()) << "sent to a peer that has said nothing";
-  if (!std::holds_alternative<wire::Reject>(message)) {
-    EXPECT_TRUE(peer->second.said_hello) << "sent to a peer that has not said Hello";
-  }
-  if (const auto* const ack = std::get_if<wire::ResultAck>(&message)) {
-    for (const RunIndex run : ack->runs) {
-      EXPECT_TRUE(files_.at(ack->campaign).num_commits.contains(run))
-          << "acknowledged before the commit";
-    }
-  }
-  const auto* const lease = std::get_if<wire::RunLease>(&message);
-  if (lease == nullptr) return;
-  const PlayedFile& file = files_.at(lease->campaign);
-  for (RunIndex run = lease->runs.first; run.value < lease->runs.end(); ++run.value) {
-    EXPECT_TRUE(
-        !file.num_commits.contains(run) ||
-        coordinator::is_audited(file.stored.definition->seed, run, file.stored.audit_fraction))
-        << "what was finished is computed again";
-  }
+  for (const auto& [id, campaign] : life_->state.campaigns) files_.at(id).phase = campaign.phase;
 }
 
 void PlayedCoordinator::send(wire::WorkerId worker, wire::Message message) {
   check_sent(worker, message);
   if (const auto* const lease = std::get_if<wire::RunLease>(&message)) {
     attempt_max_ = std::max(attempt_max_, lease->attempt.value);
+  }
+  if (const auto* const not_served = std::get_if<wire::NotServed>(&message)) {
+    ++num_events_[not_served->ranges.empty() ? "campaign_not_served" : "runs_not_served"];
   }
   Peer& peer = life_->peers.at(worker);
   send_({.header = {.session = peer.session, .epoch = life_->epoch, .sequence = ++peer.num_sent},
@@ -208,7 +300,13 @@ void PlayedCoordinator::send(wire::WorkerId worker, wire::Message message) {
 
 void PlayedCoordinator::send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
                                         const std::shared_ptr<const Campaign>& definition) {
-  send(worker, wire::EncodedDefinition(*definition).part(request));
+  ++num_events_["definition_sent"];
+  auto known = definitions_.find(definition.get());
+  if (known == definitions_.end()) {
+    const wire::EncodedDefinition encoded(*definition);
+    known = definitions_.emplace(definition.get(), std::pair(definition, encoded)).first;
+  }
+  send(worker, known->second.second.part(request));
 }
 
 void PlayedCoordinator::write_later(wire::CampaignId id, std::function<void(PlayedFile&)> write) {
@@ -222,7 +320,7 @@ void PlayedCoordinator::write_later(wire::CampaignId id, std::function<void(Play
 
 void PlayedCoordinator::flush(wire::CampaignId id) {
   PlayedFile& file = files_.at(id);
-  if (file.is_failing) return;
+  if (file.is_failing || is_stalled()) return;
   for (const auto& write : std::exchange(life_->writes[id], {})) write(file);
   after_event();
 }
@@ -248,6 +346,9 @@ void PlayedCoordinator::compare(coordinator::Arrival arrival) {
 
 void PlayedCoordinator::record(const coordinator::Loss& loss) {
   ++num_events_[std::string(coordinator::name_of(loss.reason))];
+  const bool is_of_a_crash = coordinator::is_blamed(loss.reason);
+  const bool is_honest = life_->peers.at(loss.worker).key == honest_key;
+  EXPECT_TRUE(may_crash_ || !is_of_a_crash || !is_honest) << "a liar has ended an honest worker";
   if (!loss.is_blamed) return;
   write_later(loss.campaign, [loss](PlayedFile& file) {
     for (RunIndex run = loss.runs.first; run.value < loss.runs.end(); ++run.value) {
@@ -271,6 +372,9 @@ void PlayedCoordinator::log(coordinator::Event event) {
     const double now_s = std::chrono::duration<double>(agenda_.now().time_since_epoch()).count();
     std::printf("%9.3f %.*s %s\n", now_s, static_cast<int>(event.kind.size()), event.kind.data(),
                 event.text.c_str());
+  }
+  if (event.kind == "host_quarantined" && !may_crash_) {
+    EXPECT_EQ(event.text.find(honest_key), std::string::npos) << event.text;
   }
   if (event.kind == "audit_given_up") {
     unsigned long long run = 0;

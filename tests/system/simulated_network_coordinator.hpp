@@ -8,9 +8,11 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "coordinator/dispatch/dispatch.hpp"
+#include "proto/wire/definition_codec.hpp"
 #include "tests/system/simulated_network_execution.hpp"
 #include "tests/system/simulated_network_time.hpp"
 
@@ -26,9 +28,23 @@ struct PlayedFile {
   std::set<RunIndex> audits_given_up;
   std::map<RunIndex, coordinator::StoredCampaign::Blamed> blamed;
   bool is_failing = false;  ///< Nothing can be stored for now.
+  /// It has lost its name: if the coordinator ends before that is mended, what is left is the copy.
+  bool is_nameless = false;
+  bool is_shut = false;  ///< It cannot be opened for now.
+
+  [[nodiscard]] std::uint64_t num_runs() const { return stored.definition->num_runs; }
+  /// Every run is committed or given up.
+  [[nodiscard]] bool is_complete() const {
+    return num_commits.size() + given_up.size() == num_runs();
+  }
 };
 
-/// The real dispatch, with what surrounds it played: it can be killed and started again.
+/// The keys of those who speak to the coordinator.
+inline const std::string honest_key = "honest";
+inline const std::string liar_key = "liar";
+
+/// The real dispatch, with what surrounds it played: it can be killed and started again, its files
+/// can be missing or older than they were, and the thread that serves it can stall.
 class PlayedCoordinator final : public coordinator::Outbox {
  public:
   using Send = std::function<void(const wire::Packet&)>;
@@ -36,11 +52,17 @@ class PlayedCoordinator final : public coordinator::Outbox {
   PlayedCoordinator(Agenda& agenda, Randomness& random, Send send);
 
   void add_file(wire::CampaignId id, const coordinator::StoredCampaign& stored);
+  void set_num_workers_max(std::size_t count) { num_workers_max_ = count; }
+  /// From now on nothing that happens to an honest worker may count as a crash.
+  void expect_no_crashes() { may_crash_ = false; }
+
   /// @pre It does not run.
   void start();
   void kill();
-  void receive(const wire::Packet& packet);
+  void receive(const wire::Packet& packet, const std::string& key = honest_key);
   void tick();
+  /// Its thread does nothing for so long; what is sent to it waits.
+  void stall(Duration duration);
 
   void pause_or_resume(wire::CampaignId id);
   void cancel_or_resume(wire::CampaignId id);
@@ -48,11 +70,29 @@ class PlayedCoordinator final : public coordinator::Outbox {
   void recover_storage(wire::CampaignId id);
   /// Ends all that people have done.
   void resume_all();
+  /// Somebody asks for so many runs.
+  void extend(wire::CampaignId id, std::uint64_t num_runs);
+  bool release_host(const std::string& host);
+
+  /// Somebody copies the file.
+  void copy_file(wire::CampaignId id);
+  /// The file loses its name, if there is a copy of it to fall back to.
+  void lose_name(wire::CampaignId id);
+  /// Puts the copy in the place of the file, if there is one. @pre It does not run.
+  void restore_copy(wire::CampaignId id);
+  /// The file cannot be opened. @pre It does not run.
+  void shut(wire::CampaignId id) { files_.at(id).is_shut = true; }
+  /// It can, and is if the coordinator runs.
+  void open(wire::CampaignId id);
 
   [[nodiscard]] bool is_running() const { return life_.has_value(); }
+  [[nodiscard]] bool is_stalled() const;
+  [[nodiscard]] bool is_served(wire::CampaignId id) const;
+  [[nodiscard]] bool is_done(wire::CampaignId id) const;
   [[nodiscard]] bool is_done() const;
   /// @pre It runs.
   [[nodiscard]] const coordinator::State& state() const { return life_->state; }
+  [[nodiscard]] wire::Epoch epoch() const { return life_->epoch; }
   [[nodiscard]] const std::map<wire::CampaignId, PlayedFile>& files() const { return files_; }
   [[nodiscard]] std::uint32_t attempt_max() const { return attempt_max_; }
   [[nodiscard]] const std::map<std::string, std::uint64_t>& num_events() const {
@@ -72,6 +112,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
  private:
   struct Peer {
     wire::SessionId session;
+    std::string key;
     std::uint64_t num_sent = 0;
     bool said_hello = false;
   };
@@ -82,11 +123,19 @@ class PlayedCoordinator final : public coordinator::Outbox {
     std::map<wire::SessionId, wire::WorkerId> workers;
     std::map<wire::WorkerId, Peer> peers;
     std::map<wire::CampaignId, std::deque<std::function<void(PlayedFile&)>>> writes;
+    TimePoint stalled_until{};
+    std::deque<std::pair<wire::Packet, std::string>> waiting;  ///< And the keys of their senders.
   };
 
-  wire::WorkerId meet(wire::SessionId session);
-  void handle(wire::WorkerId worker, const wire::Packet& packet);
+  wire::WorkerId meet(wire::SessionId session, const std::string& key);
+  void handle(wire::WorkerId worker, const wire::Packet& packet, const std::string& key);
+  void serve(wire::CampaignId id);
+  void go_on();
   void check_sent(wire::WorkerId worker, const wire::Message& message) const;
+  void check_lease(const wire::RunLease& lease) const;
+  void check_forget(const wire::Forget& forget) const;
+  void check_not_served(const wire::NotServed& not_served) const;
+  void check_reject(const wire::Reject& reject, const Peer& peer) const;
   void after_event();
   /// Does it later and in order, unless the process has ended by then; a failing file waits.
   void write_later(wire::CampaignId id, std::function<void(PlayedFile&)> write);
@@ -96,8 +145,14 @@ class PlayedCoordinator final : public coordinator::Outbox {
   Randomness& random_;
   Send send_;
   std::map<wire::CampaignId, PlayedFile> files_;
+  std::map<wire::CampaignId, PlayedFile> copies_;  ///< Older than the files.
+  std::size_t num_workers_max_ = 4096;
+  bool may_crash_ = true;
   std::set<wire::SessionId> attached_;
   std::optional<Life> life_;
+  /// As it was encoded last: a campaign has one definition for long.
+  std::map<const Campaign*, std::pair<std::shared_ptr<const Campaign>, wire::EncodedDefinition>>
+      definitions_;
   std::uint32_t attempt_max_ = 0;
   std::map<std::string, std::uint64_t> num_events_;
 };

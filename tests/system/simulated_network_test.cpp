@@ -1,15 +1,17 @@
 // Dispatch and conversation, the real ones, under a network that loses, repeats, delays and
-// reorders messages and is cut, with workers and coordinators that die, and everything else that
-// goes wrong in a campaign of some days; all from a seed. Each world ends with every run committed
-// once.
+// reorders messages and is cut, with workers and coordinators that die, files that are missing or
+// older than they were, hosts that lie, and everything else that goes wrong in a campaign of some
+// days; all from a seed. Each world ends with every run committed once; no worker throws a result
+// away that somebody may need, and none that does nothing wrong is sent away.
 //
 // PROOFMASS_SEED=n replays one world and prints the coordinator's log; PROOFMASS_SEEDS=n plays the
-// first n worlds.
+// first n worlds; PROOFMASS_TOTALS=1 prints how often each event occurred.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <optional>
@@ -42,6 +44,9 @@ struct Totals {
     incidents.num_restarts += others.num_restarts;
     incidents.num_given_up += others.num_given_up;
     incidents.num_compared += others.num_compared;
+    incidents.num_spooled += others.num_spooled;
+    incidents.num_lies += others.num_lies;
+    incidents.num_released += others.num_released;
     attempt_max = std::max(attempt_max, world.coordinator().attempt_max());
     for (const auto& [kind, count] : world.coordinator().num_events()) events[kind] += count;
   }
@@ -78,9 +83,20 @@ TEST_P(SimulatedNetwork, EveryRunIsCommittedExactlyOnce) {
   EXPECT_GT(totals.incidents.num_given_up, num_worlds / 4);
   EXPECT_GT(totals.incidents.num_compared, 5 * num_worlds);
   EXPECT_GT(totals.attempt_max, 10U);
-  for (const char* const kind : {"silent", "hung", "never_arrived", "retracted", "preempted",
-                                 "host_quarantined", "storage_recovered", "worker_refused"}) {
+  EXPECT_GT(totals.incidents.num_spooled, num_worlds / 4);
+  EXPECT_GT(totals.incidents.num_lies, num_worlds);
+  EXPECT_GT(totals.incidents.num_released, num_worlds / 100);
+  for (const char* const kind :
+       {"silent", "hung", "never_arrived", "retracted", "preempted", "host_quarantined",
+        "storage_recovered", "worker_refused", "file_not_opened", "file_opened_late",
+        "finished_file_left_out", "name_lost", "results_lost_with_a_file", "campaign_extended",
+        "extension_lost_with_a_file", "campaign_not_served", "runs_not_served", "service_stalled",
+        "message_waited"}) {
     EXPECT_GT(totals.events[kind], num_worlds / 25) << kind;
+  }
+  if (std::getenv("PROOFMASS_TOTALS") == nullptr) return;
+  for (const auto& [kind, count] : totals.events) {
+    std::printf("%s %llu\n", kind.c_str(), static_cast<unsigned long long>(count));
   }
 }
 

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <tuple>
 #include <utility>
+#include <variant>
 
 #include "core/simulation/run.hpp"
 
@@ -14,13 +16,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// From then on nothing bad happens, but for poison: a campaign must come to its end.
-constexpr Duration calm_after = 300s;
 constexpr Duration deadline = 2h;  // Of simulated time.
-constexpr double never_s = 1e9;
-
-constexpr wire::CampaignId urgent{11};
-constexpr wire::CampaignId other{7};
 
 }  // namespace
 
@@ -29,16 +25,19 @@ World::World(std::uint64_t seed)
         transmit(packet.header.session, [this, packet] { arrive(packet); });
       }) {
   draw_weather();
+  draw_troubles();
   add_campaigns();
   const std::size_t num_machines = 2 + random_.below(3);
+  if (weather_.is_full) coordinator_.set_num_workers_max(num_machines);
   for (std::size_t i = 0; i < num_machines; ++i) {
     machines_.push_back({.host = fmt::format("h{}", next_host_++),
                          .num_threads = 1 + random_.below(2),
                          .num_lanes = 1 + random_.below(4),
-                         .is_bad = weather_.has_bad_machine && i == 0});
+                         .is_bad = weather_.has_bad_machine && i == 0,
+                         .spool = {}});
     agenda_.add(random_.duration(3.0), [this, i] { start_process(i, std::nullopt); });
   }
-  coordinator_.start();
+  start_coordinator();
   tick_coordinator();
   plan();
 }
@@ -59,7 +58,7 @@ void World::draw_weather() {
               .failure_s = sometimes(0.3, 20.0, 100.0),
               .pause_s = sometimes(0.3, 10.0, 60.0),
               .cancel_s = sometimes(0.15, 20.0, 100.0),
-              .has_bad_machine = random_.happens(0.1),
+              .has_bad_machine = random_.happens(0.2),
               .has_accident = random_.happens(0.3)};
   if (weather_.has_bad_machine) weather_.has_accident = false;  // Together they look like poison.
 }
@@ -78,7 +77,8 @@ void World::add_campaigns() {
     constexpr std::array fractions{0.0, 0.0, 0.3, 1.0};
     stored.audit_fraction = fractions.at(random_.below(fractions.size()));
     coordinator_.add_file(id, stored);
-    add_poison(id, num_runs);
+    num_runs_wanted_[id] = weather_.extension_s < never_s ? num_runs + 12 : num_runs;
+    if (weather_.lie_s >= never_s) add_poison(id, num_runs_wanted_[id]);
   }
 }
 
@@ -90,14 +90,23 @@ void World::add_poison(wire::CampaignId id, std::uint64_t num_runs) {
 void World::plan() {
   repeat(weather_.restart_s, [this] { restart_coordinator(); });
   repeat(weather_.blackout_s, [this] { blackout_until_ = agenda_.now() + random_.duration(50.0); });
+  repeat(weather_.thread_stall_s, [this] {
+    if (coordinator_.is_running()) coordinator_.stall(random_.duration(30.0));
+  });
+  repeat(weather_.lie_s, [this] { lie(); });
   for (const wire::CampaignId id : {urgent, other}) {
-    repeat(weather_.pause_s, [this, id] { coordinator_.pause_or_resume(id); });
-    repeat(weather_.cancel_s, [this, id] { coordinator_.cancel_or_resume(id); });
-    repeat(weather_.failure_s, [this, id] {
-      coordinator_.fail_storage(id);
-      agenda_.add(random_.duration(40.0), [this, id] { coordinator_.recover_storage(id); });
-    });
+    plan_campaign(id);
+    plan_troubles(id);
   }
+}
+
+void World::plan_campaign(wire::CampaignId id) {
+  repeat(weather_.pause_s, [this, id] { coordinator_.pause_or_resume(id); });
+  repeat(weather_.cancel_s, [this, id] { coordinator_.cancel_or_resume(id); });
+  repeat(weather_.failure_s, [this, id] {
+    coordinator_.fail_storage(id);
+    agenda_.add(random_.duration(40.0), [this, id] { coordinator_.recover_storage(id); });
+  });
 }
 
 void World::repeat(double mean_s, const std::function<void()>& what) {
@@ -120,7 +129,8 @@ void World::repeat_for(wire::SessionId session, double mean_s,
   });
 }
 
-bool World::is_calm() const { return agenda_.now() - TimePoint{} >= calm_after; }
+/// From some time on nothing bad happens, but for poison: a campaign must come to its end.
+bool World::is_calm() const { return agenda_.now() - TimePoint{} >= 300s; }
 
 World::Process* World::find(wire::SessionId session) {
   const auto found = processes_.find(session);
@@ -128,8 +138,15 @@ World::Process* World::find(wire::SessionId session) {
 }
 
 void World::run() {
-  while (!coordinator_.is_done() && agenda_.now() < TimePoint{} + deadline) agenda_.step();
-  ASSERT_TRUE(coordinator_.is_done()) << "not finished in two hours";
+  while (!is_over() && agenda_.now() < TimePoint{} + deadline) agenda_.step();
+  ASSERT_TRUE(is_over()) << "not finished in two hours";
+}
+
+bool World::is_over() const {
+  return coordinator_.is_done() &&
+         std::all_of(num_runs_wanted_.begin(), num_runs_wanted_.end(), [&](const auto& item) {
+           return coordinator_.files().at(item.first).num_runs() == item.second;
+         });
 }
 
 void World::check_end() {
@@ -142,7 +159,11 @@ void World::check_end() {
           poison_.crashing.contains({id, run}) || poison_.hanging.contains({id, run});
       EXPECT_NE(is_committed, is_poison) << "campaign " << id.value << " run " << run.value;
       if (!is_committed) {
-        EXPECT_TRUE(coordinator_.state().campaigns.at(id).given_up.contains(run)) << run.value;
+        const auto served = coordinator_.state().campaigns.find(id);
+        EXPECT_TRUE(served == coordinator_.state().campaigns.end()
+                        ? file.given_up.contains(run)
+                        : served->second.given_up.contains(run))
+            << run.value;
         ++incidents_.num_given_up;
         continue;
       }
@@ -181,14 +202,43 @@ void World::arrive(const wire::Packet& packet) {
     agenda_.add(process->stalled_until - agenda_.now(), [this, packet] { arrive(packet); });
     return;
   }
-  process->conversation->on_packet(packet, agenda_.now());
+  receive(*process, packet);
   end_if_over(session);
+}
+
+/// A message takes no result from a worker but by an acknowledgement, or if it says that runs of
+/// just these numbers are to be forgotten.
+void World::receive(Process& process, const wire::Packet& packet) {
+  worker::Conversation& conversation = *process.conversation;
+  const auto* const forget = std::get_if<wire::Forget>(&packet.message);
+  const auto num_kept = [&] {
+    if (forget == nullptr) return conversation.num_unacknowledged();
+    std::size_t count = 0;
+    for (const worker::KeptResult& result : conversation.unacknowledged()) {
+      const bool is_forgotten = result.campaign == forget->campaign &&
+                                result.computed.result.run.value < forget->num_runs;
+      if (!is_forgotten) ++count;
+    }
+    return count;
+  };
+  const std::size_t num_before = num_kept();
+  conversation.on_packet(packet, agenda_.now());
+  if (!std::holds_alternative<wire::ResultAck>(packet.message)) {
+    EXPECT_EQ(num_kept(), num_before) << "results were thrown away";
+  }
+  const auto* const reject = std::get_if<wire::Reject>(&packet.message);
+  const bool is_quarantined =
+      reject != nullptr && reject->reason == wire::RejectReason::quarantined;
+  if (!is_quarantined || std::exchange(process.is_heeded, true)) return;
+  agenda_.add(random_.duration(60.0),
+              [this, session = packet.header.session] { heed_quarantine(session); });
 }
 
 void World::tick_coordinator() {
   if (is_calm()) {
-    if (!coordinator_.is_running()) coordinator_.start();
+    if (!coordinator_.is_running()) start_coordinator();
     coordinator_.resume_all();
+    end_troubles();
   }
   coordinator_.tick();
   agenda_.add(1s, [this] { tick_coordinator(); });
@@ -199,7 +249,7 @@ void World::restart_coordinator() {
   ++incidents_.num_restarts;
   coordinator_.kill();
   agenda_.add(random_.duration(20.0), [this] {
-    if (!coordinator_.is_running()) coordinator_.start();
+    if (!coordinator_.is_running()) start_coordinator();
   });
 }
 
@@ -217,6 +267,8 @@ void World::start_process(std::size_t machine, std::optional<wire::FormerSession
                           .former = former};
   worker::ConversationConfig config;
   config.hello_delay_max = 8s;
+  config.refusal_delay = 5s;
+  config.refusal_delay_max = 15s;
   config.resend_after_max = 20s;
   config.drain_time = 20s;
   Process& process = processes_[session];
@@ -227,6 +279,10 @@ void World::start_process(std::size_t machine, std::optional<wire::FormerSession
   };
   process.conversation = std::make_unique<worker::Conversation>(session, hello, *process.execution,
                                                                 send, agenda_.now(), config);
+  std::vector<worker::KeptResult> spooled;
+  for (const auto& [run, result] : on.spool) spooled.push_back(result);
+  incidents_.num_spooled += spooled.size();
+  process.conversation->restore(std::move(spooled));
   tick_process(session);
   compute(session);
   plan_process(session);
@@ -254,6 +310,7 @@ void World::tick_process(wire::SessionId session) {
   if (process == nullptr) return;
   if (agenda_.now() >= process->stalled_until) {
     process->conversation->on_tick(agenda_.now());
+    if (weather_.has_spools) spool(*process);
     end_if_over(session);
   }
   agenda_.add(500ms, [this, session] { tick_process(session); });
@@ -295,15 +352,16 @@ void World::replace(wire::SessionId session) {
   agenda_.add(random_.duration(10.0), [this, machine] { start_process(machine, std::nullopt); });
 }
 
-/// A host that the coordinator does not want is exchanged for another one.
+/// A worker that does nothing wrong ends only when it is asked to.
 void World::end_if_over(wire::SessionId session) {
-  const Process& process = processes_.at(session);
+  Process& process = processes_.at(session);
   const auto ending = process.conversation->ending();
   if (!ending) return;
-  if (ending->kind == worker::Ending::Kind::failed) {
-    EXPECT_NE(ending->reason.find("too much crashed there"), std::string::npos) << ending->reason;
-    machines_.at(process.machine).host = fmt::format("h{}", next_host_++);
-    machines_.at(process.machine).is_bad = false;
+  EXPECT_EQ(ending->kind, worker::Ending::Kind::done) << ending->reason;
+  if (weather_.has_spools) {
+    for (const worker::KeptResult& result : process.conversation->unacknowledged()) {
+      machines_.at(process.machine).spool[{result.campaign, result.computed.result.run}] = result;
+    }
   }
   replace(session);
 }

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,10 @@
 #include "worker/net/conversation.hpp"
 
 namespace proofmass::test {
+
+constexpr wire::CampaignId urgent{11};
+constexpr wire::CampaignId other{7};
+constexpr double never_s = 1e9;
 
 /// How bad a world is; drawn from its seed. Times are mean times between events.
 struct Weather {
@@ -30,6 +35,16 @@ struct Weather {
   double failure_s = 0.0;   ///< Of the storage of a campaign.
   double pause_s = 0.0;
   double cancel_s = 0.0;
+  double copy_s = 0.0;           ///< Somebody copies a campaign's file.
+  double name_s = 0.0;           ///< A file loses its name for a while.
+  double thread_stall_s = 0.0;   ///< Of the coordinator's service thread.
+  double lie_s = 0.0;            ///< Somebody says of an honest host that it crashed.
+  double extension_s = 0.0;      ///< Somebody asks for more runs of a campaign.
+  double shut = 0.0;             ///< Probability that a file cannot be opened at a start.
+  double restored = 0.0;         ///< Probability that a coordinator starts with an older copy.
+  bool is_stubborn = false;      ///< The later campaign's file opens once the other is finished.
+  bool is_full = false;          ///< The coordinator takes no more workers than there are machines.
+  bool has_spools = false;       ///< Results survive a worker's process.
   bool has_bad_machine = false;  ///< One on which every batch crashes.
   bool has_accident = false;     ///< One crash for no reason of ours.
 };
@@ -41,6 +56,9 @@ struct Incidents {
   std::uint64_t num_restarts = 0;
   std::uint64_t num_given_up = 0;
   std::uint64_t num_compared = 0;
+  std::uint64_t num_spooled = 0;  ///< Results that a process took over from the one before it.
+  std::uint64_t num_lies = 0;
+  std::uint64_t num_released = 0;  ///< Hosts from quarantine.
 };
 
 /// A coordinator and its workers under a simulated network and clock. Dispatch and conversation are
@@ -64,6 +82,7 @@ class World {
     std::size_t num_threads = 1;
     std::size_t num_lanes = 1;
     bool is_bad = false;
+    std::map<RunKey, worker::KeptResult> spool;
   };
   struct Process {
     std::size_t machine = 0;
@@ -71,12 +90,18 @@ class World {
     std::unique_ptr<worker::Conversation> conversation;
     TimePoint cut_until{};
     TimePoint stalled_until{};
+    bool is_heeded = false;      ///< Somebody has seen that its host is quarantined.
+    std::set<RunKey> unspooled;  ///< Results without an acknowledgement at the last look.
+    TimePoint spooled_at{};
   };
 
   void draw_weather();
+  void draw_troubles();
   void add_campaigns();
   void add_poison(wire::CampaignId id, std::uint64_t num_runs);
   void plan();
+  void plan_campaign(wire::CampaignId id);
+  void plan_troubles(wire::CampaignId id);
   /// Makes it happen again and again, until the weather is calm.
   void repeat(double mean_s, const std::function<void()>& what);
   /// The same while a process lives.
@@ -95,8 +120,19 @@ class World {
 
   void transmit(wire::SessionId session, const std::function<void()>& arrive);
   void arrive(const wire::Packet& packet);
+  void receive(Process& process, const wire::Packet& packet);
   void tick_coordinator();
   void restart_coordinator();
+  void start_coordinator();
+  [[nodiscard]] bool is_over() const;
+
+  // Troubles with files, threads and liars.
+  void open_later(wire::CampaignId id);
+  void end_troubles();
+  void lie();
+  void say_as_liar(wire::SessionId session, wire::Message message);
+  void heed_quarantine(wire::SessionId session);
+  void spool(Process& process);
 
   Randomness random_;
   Weather weather_;
@@ -107,6 +143,8 @@ class World {
   std::map<wire::SessionId, Process> processes_;
   TimePoint blackout_until_{};
   std::uint64_t next_host_ = 0;
+  std::map<wire::CampaignId, std::uint64_t> num_runs_wanted_;
+  std::uint64_t num_liar_messages_ = 0;
   Incidents incidents_;
 };
 

@@ -1,0 +1,75 @@
+#include <gtest/gtest.h>
+
+#include <variant>
+
+#include "tests/system/simulated_network_coordinator.hpp"
+
+// What a coordinator may send, whatever has happened to it.
+
+namespace proofmass::test {
+
+using coordinator::Phase;
+
+void PlayedCoordinator::check_sent(wire::WorkerId worker, const wire::Message& message) const {
+  const auto peer = life_->peers.find(worker);
+  ASSERT_TRUE(peer != life_->peers.end()) << "sent to a peer that has said nothing";
+  if (const auto* const reject = std::get_if<wire::Reject>(&message)) {
+    check_reject(*reject, peer->second);
+  } else {
+    EXPECT_TRUE(peer->second.said_hello) << "sent to a peer that has not said Hello";
+  }
+  if (const auto* const ack = std::get_if<wire::ResultAck>(&message)) {
+    for (const RunIndex run : ack->runs) {
+      EXPECT_TRUE(files_.at(ack->campaign).num_commits.contains(run))
+          << "acknowledged before the commit";
+    }
+  }
+  if (const auto* const lease = std::get_if<wire::RunLease>(&message)) check_lease(*lease);
+  if (const auto* const forget = std::get_if<wire::Forget>(&message)) check_forget(*forget);
+  if (const auto* const not_served = std::get_if<wire::NotServed>(&message)) {
+    check_not_served(*not_served);
+  }
+}
+
+/// A worker that does nothing wrong is never told that it must not come back.
+void PlayedCoordinator::check_reject(const wire::Reject& reject, const Peer& peer) const {
+  const bool may_come_again = reject.reason == wire::RejectReason::not_registered ||
+                              reject.reason == wire::RejectReason::full ||
+                              reject.reason == wire::RejectReason::quarantined;
+  EXPECT_TRUE(may_come_again || peer.key == liar_key) << reject.text;
+}
+
+void PlayedCoordinator::check_lease(const wire::RunLease& lease) const {
+  const PlayedFile& file = files_.at(lease.campaign);
+  EXPECT_GE(lease.attempt.value, 1U);
+  EXPECT_LE(lease.runs.end(), file.num_runs());
+  for (RunIndex run = lease.runs.first; run.value < lease.runs.end(); ++run.value) {
+    EXPECT_TRUE(
+        !file.num_commits.contains(run) ||
+        coordinator::is_audited(file.stored.definition->seed, run, file.stored.audit_fraction))
+        << "what was finished is computed again";
+  }
+}
+
+/// Results are dropped only if nobody needs them.
+void PlayedCoordinator::check_forget(const wire::Forget& forget) const {
+  const PlayedFile& file = files_.at(forget.campaign);
+  EXPECT_LE(forget.num_runs, file.num_runs()) << "forgets runs that the file does not know";
+  const auto served = life_->state.campaigns.find(forget.campaign);
+  const Phase phase = served == life_->state.campaigns.end() ? file.phase : served->second.phase;
+  EXPECT_TRUE(phase == Phase::finished || phase == Phase::cancelled)
+      << "forgets a campaign that may be served later";
+}
+
+void PlayedCoordinator::check_not_served(const wire::NotServed& not_served) const {
+  const auto served = life_->state.campaigns.find(not_served.campaign);
+  if (not_served.ranges.empty()) {
+    EXPECT_TRUE(served == life_->state.campaigns.end()) << "refuses what is served";
+    return;
+  }
+  for (const RunRange& range : not_served.ranges) {
+    EXPECT_GE(range.first.value, files_.at(not_served.campaign).num_runs());
+  }
+}
+
+}  // namespace proofmass::test
