@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -27,7 +28,8 @@ class Speaker {
                       .content = wire::encode({.header = header, .message = std::move(message)})});
   }
 
-  void say_hello(const std::string& host) {
+  void say_hello(const std::string& host,
+                 const std::optional<wire::FormerSession>& former = std::nullopt) {
     say(wire::Hello{.worker_name = "w",
                     .host = host,
                     .process_id = 1000,
@@ -35,8 +37,16 @@ class Speaker {
                     .model_version = std::string(model_version),
                     .build = "b",
                     .reference_digest = fuzz_reference_digest,
-                    .former = {}},
+                    .former = former},
         wire::Epoch{});
+  }
+
+  /// Runs whose results were not taken before; besides some that it holds.
+  void set_aside(wire::CampaignId campaign, RunRange runs, std::uint32_t attempt) {
+    wire::Heartbeat heartbeat{.num_runs_max = 8, .held = {}, .computing = {}};
+    heartbeat.held = {{.campaign = campaign, .attempt = {1}, .ranges = {{{0}, 2}}}};
+    heartbeat.set_aside = {{.campaign = campaign, .attempt = {attempt}, .ranges = {runs}}};
+    say(std::move(heartbeat));
   }
 
   /// Runs [first, first + count) are held; the first of them are being computed.
@@ -115,6 +125,7 @@ std::string worker_that_delivers() {
   worker.say_hello("h");
   worker.beat(fuzz_campaign, 0, 0);
   worker.say(wire::CampaignRequest{.campaign = fuzz_campaign});
+  worker.say(wire::CampaignRequest{.campaign = fuzz_campaign, .offset = 1000});
   worker.beat(fuzz_campaign, 0, 8);
   worker.deliver(fuzz_campaign, 0, 4);
   steps.push_back(happening(StepKind::commit, 3));
@@ -241,10 +252,27 @@ std::string liars() {
   lie([](Speaker& worker) { worker.beat(fuzz_campaign, last, 2); });
   lie([](Speaker& worker) { worker.beat(fuzz_campaign, last, 1, attempt_max); });
   lie([](Speaker& worker) { worker.beat({.value = 9}, 0, 1); });
+  lie([](Speaker& worker) { worker.set_aside(fuzz_campaign, {{1}, num_runs_max - 1}, 7); });
   lie([](Speaker& worker) { worker.give_back(fuzz_campaign, last, 2); });
   lie([](Speaker& worker) { worker.give_back(fuzz_table_campaign, 0, num_runs_max); });
   steps.push_back(elapsed(70));
   steps.push_back(elapsed(70));
+  return to_bytes(steps);
+}
+
+/// Processes that hold runs and are said to have crashed, by the same host and by others.
+std::string hosts_that_lie() {
+  std::vector<Step> steps;
+  for (std::uint8_t i = 0; i < 7; ++i) {
+    Speaker worker(steps, i, 11U + i);
+    const wire::SessionId former{10U + i};
+    worker.say_hello(i == 3 ? "g" : "h", wire::FormerSession{.session = former, .signal = 11});
+    if (i != 2) worker.beat(fuzz_campaign, 0, 0);
+  }
+  steps.push_back(elapsed(16));  // Some make room for others.
+  Speaker late(steps, 7, 30);
+  late.say_hello("h");
+  late.set_aside(fuzz_table_campaign, {{2}, 4}, 2);
   return to_bytes(steps);
 }
 
@@ -300,7 +328,14 @@ std::string coordinator_messages() {
                      .table_values = {0.5, 0.25}});
   add(wire::Retract{.campaign = fuzz_campaign, .ranges = {runs}});
   add(wire::ResultAck{.campaign = fuzz_campaign, .runs = {{3}, {4}}});
-  add(wire::Forget{.campaign = fuzz_campaign});
+  add(wire::Forget{.campaign = fuzz_campaign, .num_runs = 20});
+  add(wire::NotServed{.campaign = fuzz_campaign, .ranges = {}});
+  add(wire::NotServed{.campaign = fuzz_campaign, .ranges = {runs}});
+  add(wire::DefinitionPart{.campaign = fuzz_campaign,
+                           .offset = 2,
+                           .total_size = 5,
+                           .checksum = 0xcbf29ce484222325U,
+                           .content = "abc"});
   add(wire::HeartbeatAck{});
   add(wire::Drain{});
   add(wire::Stop{});
@@ -314,6 +349,7 @@ std::map<std::string, std::string> seed_inputs() {
           {"campaign_that_is_controlled.bin", campaign_that_is_controlled()},
           {"client_messages.bin", client_messages()},
           {"coordinator_messages.bin", coordinator_messages()},
+          {"hosts_that_lie.bin", hosts_that_lie()},
           {"liars.bin", liars()},
           {"run_that_crashes_workers.bin", run_that_crashes_workers()},
           {"stranger.bin", stranger()},
