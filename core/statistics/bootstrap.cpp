@@ -91,13 +91,18 @@ double acceleration(const std::vector<Group>& groups) {
     left_out.push_back(rest.standard_deviation());
   }
   const double mean = compensated_sum(left_out) / static_cast<double>(left_out.size());
+  double largest = 0.0;
+  for (const double value : left_out) largest = std::max(largest, std::abs(mean - value));
+  if (largest <= 0.0) return 0.0;
+  // The ratio has no unit. With the largest difference near 1, exactly by a power of two, no cube
+  // leaves the range of a double.
+  const int exponent = std::ilogb(largest);
   CompensatedSum squares, cubes;
   for (const double value : left_out) {
-    const double difference = mean - value;
+    const double difference = std::scalbn(mean - value, -exponent);
     squares.add(difference * difference);
     cubes.add(difference * difference * difference);
   }
-  if (squares.value() <= 0.0) return 0.0;
   return cubes.value() / (6.0 * squares.value() * std::sqrt(squares.value()));
 }
 

@@ -142,6 +142,7 @@ def act_out(world, moments):
         elif fault in begun:
             fault.end()
             world.tell(f"{fault} ends")
+            world.watch()  # What the fault ended is not held against it later.
             world.num_active -= 1
             world.quiet_since = time.monotonic()
     return len(begun)
@@ -274,6 +275,7 @@ def carry_out(options, seed, directory):
         moments = draw_faults(world)
         begin_campaigns(world)
         report["num_faults"] = act_out(world, moments)
+        pass_time(world, time.monotonic() + 2 * fault_world.RESTART_DELAY_S)
         remove_fault_plans(world)
         report["healed_s"] = round(wait_until_done(world), 1)
         end_all(world)

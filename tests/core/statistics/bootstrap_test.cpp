@@ -88,5 +88,19 @@ TEST(BootstrapDeviationInterval, RefusesWhatItCannotWorkWith) {
       "confidence = 0 (must be in (0, 1))");
 }
 
+// A campaign file may hold errors whose cubes no double can hold.
+TEST(BootstrapDeviationInterval, DoesNotDependOnTheUnit) {
+  std::vector<double> values;
+  for (int i = 0; i < 20; ++i) values.push_back((i * 7) % 11);
+  const Interval expected = bootstrap_deviation_interval(values, 0.95).value();
+  for (const double unit : {0x1p300, 0x1p-300, 0x1p-480}) {
+    std::vector<double> others = values;
+    for (double& value : others) value *= unit;
+    const Interval interval = bootstrap_deviation_interval(others, 0.95).value();
+    EXPECT_EQ(interval.lower / unit, expected.lower) << unit;
+    EXPECT_EQ(interval.upper / unit, expected.upper) << unit;
+  }
+}
+
 }  // namespace
 }  // namespace proofmass
