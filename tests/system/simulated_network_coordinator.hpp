@@ -76,6 +76,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
 
   /// Somebody copies the file.
   void copy_file(wire::CampaignId id);
+  [[nodiscard]] bool has_copy(wire::CampaignId id) const { return copies_.contains(id); }
   /// The file loses its name, if there is a copy of it to fall back to.
   void lose_name(wire::CampaignId id);
   /// Puts the copy in the place of the file, if there is one. @pre It does not run.

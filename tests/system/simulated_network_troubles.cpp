@@ -23,7 +23,7 @@ void World::draw_troubles() {
   const bool has_old_copies = random_.happens(0.35);
   const bool has_shut_files = random_.happens(0.35);
   if (has_old_copies || has_shut_files) weather_.restart_s = 5.0 + random_.uniform(25.0);
-  weather_.copy_s = has_old_copies ? 2.0 + random_.uniform(20.0) : never_s;
+  weather_.copy_s = has_old_copies ? 2.0 + random_.uniform(10.0) : never_s;
   weather_.name_s = has_old_copies ? sometimes(0.5, 10.0, 40.0) : never_s;
   weather_.extension_s = has_old_copies ? sometimes(0.7, 5.0, 20.0) : never_s;
   weather_.restored = has_old_copies ? 0.3 + random_.uniform(0.6) : 0.0;
@@ -31,6 +31,11 @@ void World::draw_troubles() {
   weather_.is_stubborn = random_.happens(0.1);
   weather_.is_full = random_.happens(0.15);
   weather_.has_spools = random_.happens(0.5);
+  if (weather_.is_stubborn) {
+    // Workers have results of it when it is shut, and leave them to the next process.
+    weather_.restart_s = 5.0 + random_.uniform(15.0);
+    weather_.has_spools = true;
+  }
   if (weather_.lie_s >= never_s) return;
   // Only then is it known that every crash was a lie.
   weather_.has_bad_machine = false;
@@ -41,8 +46,8 @@ void World::draw_troubles() {
 
 void World::plan_troubles(wire::CampaignId id) {
   repeat(weather_.copy_s, [this, id] {
-    // Some forget to make copies, and are left with old ones.
-    if (random_.happens(0.5)) coordinator_.copy_file(id);
+    // Some forget to make other copies, and are left with an old one.
+    if (!coordinator_.has_copy(id) || random_.happens(0.1)) coordinator_.copy_file(id);
   });
   repeat(weather_.name_s, [this, id] {
     if (!coordinator_.is_running()) return;
@@ -55,7 +60,8 @@ void World::plan_troubles(wire::CampaignId id) {
 void World::start_coordinator() {
   for (const wire::CampaignId id : {urgent, other}) {
     if (!is_calm() && random_.happens(weather_.restored)) coordinator_.restore_copy(id);
-    const bool is_stubborn = weather_.is_stubborn && id == other;
+    const bool is_stubborn = weather_.is_stubborn && id == other && incidents_.num_restarts > 0 &&
+                             !coordinator_.files().at(id).is_complete();
     if (!is_stubborn && (is_calm() || !random_.happens(weather_.shut))) continue;
     coordinator_.shut(id);
     if (!is_stubborn) open_later(id);
