@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
@@ -139,6 +140,11 @@ bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
   for (auto& [file, store, definition] : campaigns) {
     update_statistics(store, definition->scenario);
     has_given_up = has_given_up || !store.given_up_runs().empty();
+    if (const std::optional<std::string> reason = store.rest()) {
+      log({.severity = Severity::warning,
+           .kind = "write_ahead_log_kept",
+           .text = fmt::format("file={} reason=\"{}\"", file.string(), *reason)});
+    }
   }
   log({.kind = "coordinator_ended", .text = fmt::format("campaigns={}", campaigns.size())});
   return has_given_up;

@@ -56,6 +56,19 @@ CoordinatorStart coordinator_start(wire::Epoch epoch, const std::string& version
           .version = version};
 }
 
+/// What is logged of a campaign file that lost its name and has it back.
+std::string_view kind_of(FileReturn file_return) {
+  switch (file_return) {
+    case FileReturn::restored:
+      return "campaign_file_restored";
+    case FileReturn::replaced:
+      return "campaign_file_replaced";
+    case FileReturn::log_made_anew:
+      return "write_ahead_log_restored";
+  }
+  return "campaign_file_restored";
+}
+
 std::set<SessionId> attached_sessions(const std::vector<ServedCampaign>& campaigns) {
   std::set<SessionId> attached;
   for (const ServedCampaign& campaign : campaigns) {
@@ -276,6 +289,12 @@ class Service::Parts final : public Outbox {
          .kind = "write_ahead_log_grown",
          .text = fmt::format("size_bytes={} (somebody reads an old state of the file)", grown.size),
          .campaign = grown.campaign});
+  }
+  void complete(const FileReturned& returned) {
+    log({.severity = Severity::warning,
+         .kind = kind_of(returned.kind),
+         .text = fmt::format("runs={}", state_.campaigns.at(returned.campaign).committed.size()),
+         .campaign = returned.campaign});
   }
   void complete(const LogKept& kept) {
     log({.severity = Severity::warning,

@@ -171,6 +171,13 @@ struct Summary {
   bool operator==(const Summary&) const = default;
 };
 
+/// How a campaign file got back the name that it had lost.
+enum class FileReturn : std::uint8_t {
+  restored,       ///< Nothing had the name.
+  replaced,       ///< An older copy of the campaign had it.
+  log_made_anew,  ///< The file had it, but its write-ahead log was removed.
+};
+
 /// What became of the deliveries of one commit.
 struct CommitSummary {
   std::uint64_t num_new = 0;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <charconv>
+#include <exception>
 #include <functional>
 #include <optional>
 #include <system_error>
@@ -18,6 +19,7 @@
 #include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/detail/integrity.hpp"
 #include "coordinator/store/detail/parts.hpp"
+#include "coordinator/store/detail/rescue.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
@@ -78,13 +80,6 @@ std::unique_ptr<detail::StoreLock> lock_if_free(const std::filesystem::path& pat
   }
 }
 
-// Removes an unfinished file, its rollback journal with it.
-void remove_draft(const std::filesystem::path& draft) {
-  std::error_code ignored;
-  std::filesystem::remove(draft, ignored);
-  std::filesystem::remove(std::filesystem::path(draft).concat("-journal"), ignored);
-}
-
 void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
                  std::string_view definition) {
   Database database(draft, Access::create);
@@ -96,21 +91,6 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
   detail::replace_budgets(database,
                           {.before = before, .after_worst = nullptr, .after_mean = nullptr});
   transaction.commit();
-}
-
-// A file appears under its name complete, or not at all.
-void appear_complete(const std::filesystem::path& path,
-                     const std::function<void(const std::filesystem::path&)>& write) {
-  const std::filesystem::path draft = std::filesystem::path(path).concat(".unfinished");
-  remove_draft(draft);
-  try {
-    write(draft);
-  } catch (...) {
-    remove_draft(draft);
-    throw;
-  }
-  std::filesystem::rename(draft, path);
-  detail::synchronise_directory_of(path);
 }
 
 void replace_all(Database& database, const CampaignStatistics& statistics, const Budget& before,
@@ -125,7 +105,16 @@ void replace_all(Database& database, const CampaignStatistics& statistics, const
 }  // namespace
 
 Store::Store(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
-Store::~Store() = default;
+
+Store::~Store() {
+  if (parts_ == nullptr) return;
+  try {
+    (void)return_to_place();
+  } catch (const std::exception&) {
+    // Whoever must know calls rest() before.
+  }
+}
+
 Store::Store(Store&&) noexcept = default;
 Store& Store::operator=(Store&&) noexcept = default;
 
@@ -135,8 +124,9 @@ Store Store::create(const std::filesystem::path& path, const Campaign& campaign,
   detail::check_directory_of(path);
   auto lock = std::make_unique<detail::StoreLock>(path);
   check_absence(path);
-  appear_complete(
-      path, [&](const std::filesystem::path& draft) { write_draft(draft, campaign, definition); });
+  detail::appear_complete(path, detail::IfThere::keep, [&](const std::filesystem::path& draft) {
+    write_draft(draft, campaign, definition);
+  });
   return Store(std::make_unique<Parts>(path, std::move(lock)));
 }
 
@@ -328,7 +318,7 @@ CommitSummary Store::write(std::span<const Entry> entries) {
   }
   CommitSummary summary;
   try {
-    parts_->change([&](Database& database) {
+    parts_->commit([&](Database& database) {
       if (!parts_->rows) parts_->rows.emplace(database);
       summary = parts_->rows->write(entries);
       wire::kill_point(wire::KillPoint::before_commit);
@@ -342,7 +332,36 @@ CommitSummary Store::write(std::span<const Entry> entries) {
 
 bool Store::has_lost_its_log() const { return parts_->is_log_lost; }
 
-std::optional<std::string> Store::rest() { return parts_->rest(); }
+std::optional<std::string> Store::rest() {
+  (void)return_to_place();
+  return parts_->rest();
+}
+
+std::optional<FileReturn> Store::return_to_place() {
+  if (!parts_->place) return std::nullopt;
+  const detail::Placement placement = parts_->place->look();
+  switch (placement) {
+    case detail::Placement::in_place:
+      return std::nullopt;
+    case detail::Placement::log_removed:
+      parts_->renew_log();
+      return FileReturn::log_made_anew;
+    case detail::Placement::without_directory:
+      parts_->check_place();
+      return std::nullopt;
+    case detail::Placement::removed:
+    case detail::Placement::replaced:
+      break;
+  }
+  const std::filesystem::path path = parts_->place->path();
+  if (!parts_->lock || !parts_->lock->is_in_place()) {
+    parts_->lock = std::make_unique<detail::StoreLock>(path);
+  }
+  detail::restore_name(path, parts_->database, *parts_->place, placement);
+  auto fresh = std::make_unique<Parts>(path, std::move(parts_->lock));
+  parts_ = std::move(fresh);
+  return placement == detail::Placement::removed ? FileReturn::restored : FileReturn::replaced;
+}
 
 CommitSummary Store::commit(std::span<const Delivery> deliveries) {
   return write(std::vector<Entry>(deliveries.begin(), deliveries.end()));
@@ -442,12 +461,13 @@ void Store::back_up(const std::filesystem::path& destination) const {
   check_name(destination);
   const detail::StoreLock lock(destination);
   check_absence(destination);
-  appear_complete(destination, [&](const std::filesystem::path& draft) {
-    Database copy(draft, Access::create);
-    parts_->database.copy_to(copy);
-    // What is copied may say that there is a log.
-    copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
-  });
+  detail::appear_complete(
+      destination, detail::IfThere::keep, [&](const std::filesystem::path& draft) {
+        Database copy(draft, Access::create);
+        parts_->database.copy_to(copy);
+        // What is copied may say that there is a log.
+        copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
+      });
 }
 
 }  // namespace proofmass::coordinator

@@ -58,7 +58,9 @@ class Store {
   static void annotate(const std::filesystem::path& path,
                        const std::vector<Annotation>& annotations);
 
-  /// Closes the file. Of a coordinator's, no other file (log, lock) remains unless somebody reads.
+  /// Closes the file. One that has lost its name gets it back if that is possible, as
+  /// return_to_place() does. Of a coordinator's, no other file (log, lock) remains unless somebody
+  /// reads.
   ~Store();
   Store(Store&&) noexcept;
   Store& operator=(Store&&) noexcept;
@@ -142,8 +144,20 @@ class Store {
 
   /// To be called when nothing more is expected: folds the write-ahead log into the file, which is
   /// whole without it until the next change. Waits for nobody.
+  /// A file that has lost its name gets it back before.
   /// @return Why the log is still needed: somebody reads an old state of the file. Or nothing.
+  /// @throws StoreError as return_to_place() does.
   std::optional<std::string> rest();
+
+  /// Gives a file back its name that somebody removed, renamed or replaced while it was open: an
+  /// open file keeps all that was stored, but nobody finds it and it ends with the process.
+  ///
+  /// If nothing has the name, a copy of the open file gets it. So does it if the name is that of an
+  /// older copy of the campaign, all of whose results are in the open file. A removed write-ahead
+  /// log is made anew. Costs one look at the directory if all is well.
+  /// @return What was done, if anything.
+  /// @throws StoreError with the reason if it cannot be done now; to be tried again.
+  std::optional<FileReturn> return_to_place();
 
   /// Whether open() found that the file needs a log and that there was none: runs whose results
   /// were in it are missing, and are computed again. The event `log_lost` says so.

@@ -73,6 +73,7 @@ struct StoreWriter::Parts {
   void run();
   void serve_request(Lock& lock);
   void write_due(Lock& lock);
+  void look_at_all(Lock& lock);
   void write_all(wire::CampaignId campaign, Lock& lock);
   void fold(wire::CampaignId campaign, Lock& lock);
   bool write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock);
@@ -91,6 +92,9 @@ struct StoreWriter::Parts {
   std::deque<Request> requests;
   std::vector<Completion> completions;
   bool is_ending = false;
+  TimePoint look_at =
+      std::chrono::steady_clock::now() +
+      config.look_after;  // When to look at files of which nothing is to be written.
 
   std::thread thread;  // Begins when all else is there.
 };
@@ -154,6 +158,7 @@ void StoreWriter::Parts::run() {
     const std::optional<TimePoint> due = next_due_time();
     if (due && *due <= std::chrono::steady_clock::now()) {
       write_due(lock);
+      look_at_all(lock);
     } else if (due) {
       changed.wait_until(lock, *due);
     } else {
@@ -185,7 +190,7 @@ void StoreWriter::Parts::write_due(Lock& lock) {
   for (const wire::CampaignId campaign : ids()) {
     const std::optional<TimePoint> due = due_time(file(campaign), times);
     if (!due || *due > now) continue;
-    if (is_written_out(file(campaign))) {
+    if (!file(campaign).retry_at && is_written_out(file(campaign))) {
       fold(campaign, lock);
     } else {
       write_some(campaign, entries_per_commit_max, lock);
@@ -193,10 +198,19 @@ void StoreWriter::Parts::write_due(Lock& lock) {
   }
 }
 
+/// Gives files back the names that they lost while nothing was to be written.
+void StoreWriter::Parts::look_at_all(Lock& lock) {
+  if (std::chrono::steady_clock::now() < look_at) return;
+  for (const wire::CampaignId campaign : ids()) {
+    if (!file(campaign).retry_at) write_some(campaign, 0, lock);
+  }
+  look_at = std::chrono::steady_clock::now() + config.look_after;
+}
+
 /// Writes all that waits now, until something fails; not what is added meanwhile.
 void StoreWriter::Parts::write_all(wire::CampaignId campaign, Lock& lock) {
   std::size_t num_left = file(campaign).waiting.size();
-  bool is_written = file(campaign).writing.empty() || write_some(campaign, 0, lock);
+  bool is_written = write_some(campaign, 0, lock);
   while (is_written && num_left > 0) {
     const std::size_t num_entries = std::min(num_left, entries_per_commit_max);
     is_written = write_some(campaign, num_entries, lock);
@@ -207,6 +221,7 @@ void StoreWriter::Parts::write_all(wire::CampaignId campaign, Lock& lock) {
 
 /// Brings a file of which nothing waits to rest.
 void StoreWriter::Parts::fold(wire::CampaignId campaign, Lock& lock) {
+  if (!write_some(campaign, 0, lock)) return;  // Gives the file its name back if need be.
   OpenFile& open_file = file(campaign);
   open_file.rest_at.reset();  // What is added meanwhile sets it again.
   lock.unlock();
@@ -231,7 +246,7 @@ void StoreWriter::Parts::fold(wire::CampaignId campaign, Lock& lock) {
 /// stays: only the thread itself removes one.
 bool StoreWriter::Parts::write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock) {
   OpenFile& open_file = file(campaign);
-  if (open_file.writing.empty()) {
+  if (open_file.writing.empty() && num_max > 0) {
     open_file.waiting.take(num_max, open_file.writing, std::chrono::steady_clock::now());
   }
   lock.unlock();
@@ -256,6 +271,9 @@ void StoreWriter::Parts::finish_write(wire::CampaignId campaign, OpenFile& open_
     if (has_failed_before) return;
     completions.emplace_back(StoreFailed{.campaign = campaign, .text = *attempted.failure});
     return;
+  }
+  if (attempted.file_return) {
+    completions.emplace_back(FileReturned{.campaign = campaign, .kind = *attempted.file_return});
   }
   open_file.retry_at.reset();
   std::vector<RunIndex> runs = detail::delivered_runs(open_file.writing);
@@ -283,6 +301,7 @@ void StoreWriter::Parts::watch_log(wire::CampaignId campaign, OpenFile& open_fil
 
 std::optional<TimePoint> StoreWriter::Parts::next_due_time() const {
   std::optional<TimePoint> next;
+  if (!files.empty()) next = look_at;
   for (const auto& [campaign, file] : files) {
     const std::optional<TimePoint> due = due_time(file, times);
     if (due && (!next || *due < *next)) next = due;
@@ -315,6 +334,7 @@ void StoreWriter::open(wire::CampaignId campaign, Store store) {
     OpenFile file{.store = std::move(store),
                   .waiting = detail::WaitingEntries(parts_->config.num_records_max),
                   .writing = {},
+                  .unconfirmed = {},
                   .retry_at = {},
                   .known = {},
                   .rest_at = {}};

@@ -22,6 +22,9 @@ struct WriterConfig {
   /// What nobody waits for, such as events and losses, causes a commit of its own after this time.
   std::chrono::steady_clock::duration record_after = std::chrono::seconds(1);
   std::chrono::steady_clock::duration retry_after = std::chrono::seconds(5);  ///< After a failure.
+  /// How often files are looked at of which nothing is to be written: they may have lost their
+  /// name.
+  std::chrono::steady_clock::duration look_after = std::chrono::seconds(2);
   /// Entries other than results that wait for one file, at most; further ones are counted and
   /// dropped.
   std::size_t num_records_max = 100'000;
@@ -79,8 +82,15 @@ struct LogFolded {
   wire::CampaignId campaign;
 };
 
-using Completion = std::variant<Committed, Compared, StoreFailed, StoreRecovered, LogGrown,
-                                LogShrunk, LogKept, LogFolded>;
+/// A campaign file had been removed, renamed or replaced by an older copy, and has its name back,
+/// with all that was stored in it.
+struct FileReturned {
+  wire::CampaignId campaign;
+  FileReturn kind = FileReturn::restored;
+};
+
+using Completion = std::variant<FileReturned, Committed, Compared, StoreFailed, StoreRecovered,
+                                LogGrown, LogShrunk, LogKept, LogFolded>;
 
 /// Writes to campaign files, in a thread of its own: a service never waits for a disk.
 ///

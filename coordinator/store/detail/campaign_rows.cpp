@@ -35,10 +35,17 @@ void insert_dispersion_values(Database& database, const Campaign& campaign,
                               std::uint64_t first_run) {
   Statement insert = database.prepare("INSERT INTO dispersion_value VALUES (?, ?, ?)");
   const std::vector<std::size_t> elements = table_elements(campaign.dispersions);
-  PROOFMASS_EXPECT(elements.size() == campaign.table_columns.size());
+  if (elements.size() != campaign.table_columns.size()) {
+    throw StoreError(fmt::format("dispersion tables = {} (must be {}, one for each such quantity)",
+                                 campaign.table_columns.size(), elements.size()));
+  }
   for (std::size_t i = 0; i < elements.size(); ++i) {
     const std::vector<double>& values = campaign.table_columns[i];
-    PROOFMASS_EXPECT(values.size() >= campaign.num_runs);
+    if (values.size() < campaign.num_runs) {
+      throw StoreError(
+          fmt::format("dispersion.{} = table of {} values (must be {}, one for each run)",
+                      drawn_names()[elements[i]], values.size(), campaign.num_runs));
+    }
     for (std::uint64_t run = first_run; run < campaign.num_runs; ++run) {
       insert.run(drawn_names()[elements[i]], run, values[run]);
     }
@@ -57,6 +64,10 @@ void check_same_values(std::string_view drawn_name, const std::vector<double>& g
   if (stored.size() != num_runs) {
     throw StoreError(fmt::format("dispersion.{} = table (the campaign file holds no values for it)",
                                  drawn_name));
+  }
+  if (given.size() < stored.size()) {
+    throw StoreError(fmt::format("dispersion.{} = table of {} values (the campaign file has {})",
+                                 drawn_name, given.size(), stored.size()));
   }
   for (std::size_t run = 0; run < stored.size(); ++run) {
     if (given[run] == stored[run]) continue;

@@ -60,7 +60,7 @@ void append_run(std::vector<RunRange>& ranges, RunIndex run) {
 
 CampaignControl read_control(const Database& database) {
   Statement select = database.prepare("SELECT phase, priority, audit_fraction FROM campaign");
-  PROOFMASS_EXPECT(select.step());
+  if (!select.step()) database.refuse_as_damaged("it has no campaign");
   return {.phase = read_phase(database, select.text(0)),
           .priority = static_cast<int>(select.integer(1)),
           .audit_fraction = select.real(2)};
@@ -73,7 +73,7 @@ void write_control(const Database& database, const CampaignControl& control) {
 
 StopPlan read_stop_plan(const Database& database) {
   Statement select = database.prepare("SELECT stop_rule, num_runs_max, failures_max FROM campaign");
-  PROOFMASS_EXPECT(select.step());
+  if (!select.step()) database.refuse_as_damaged("it has no campaign");
   return {.stop_rule = select.text(0),
           .num_runs_max = select.optional_count(1),
           .failures_max = select.optional_count(2)};

@@ -70,7 +70,9 @@ void Statement::bind(int position, std::int64_t value) {
 }
 
 void Statement::bind(int position, std::uint64_t value) {
-  PROOFMASS_EXPECT(value <= static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()));
+  if (value > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max())) {
+    database_->refuse(fmt::format("a number to be stored = {} (must be below 2⁶³)", value));
+  }
   bind(position, static_cast<std::int64_t>(value));
 }
 
@@ -87,7 +89,9 @@ void Statement::bind(int position, const std::optional<double>& value) {
 }
 
 void Statement::bind(int position, double value) {
-  PROOFMASS_EXPECT(std::isfinite(value));
+  if (!std::isfinite(value)) {
+    database_->refuse(fmt::format("a number to be stored = {} (must be finite)", value));
+  }
   check(sqlite3_bind_double(statement_.get(), position, value));
 }
 
@@ -207,19 +211,19 @@ Statement Database::prepare(std::string_view sql) const {
 
 std::int64_t Database::integer(std::string_view sql) const {
   Statement statement = prepare(sql);
-  PROOFMASS_EXPECT(statement.step());
+  if (!statement.step()) refuse_as_damaged(fmt::format("no row for {}", sql));
   return statement.integer(0);
 }
 
 std::string Database::text(std::string_view sql) const {
   Statement statement = prepare(sql);
-  PROOFMASS_EXPECT(statement.step());
+  if (!statement.step()) refuse_as_damaged(fmt::format("no row for {}", sql));
   return statement.text(0);
 }
 
 std::uint64_t Database::count(std::string_view sql) const {
   Statement statement = prepare(sql);
-  PROOFMASS_EXPECT(statement.step());
+  if (!statement.step()) refuse_as_damaged(fmt::format("no row for {}", sql));
   return statement.count(0);
 }
 
@@ -252,6 +256,10 @@ bool Database::fold_log(Fold fold) {
                                                          : "PRAGMA wal_checkpoint(PASSIVE)");
   if (!row.step()) return false;
   return row.integer(0) == 0 && row.integer(1) == row.integer(2);
+}
+
+void Database::leave_names_alone() {
+  sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
 }
 
 void Database::refuse(std::string_view what) const {

@@ -41,10 +41,11 @@ class Statement {
   }
 
   void bind(int position, std::int64_t value);
-  void bind(int position, std::uint64_t value);  ///< @pre value < 2⁶³.
+  /// @throws StoreError if the value is not below 2⁶³.
+  void bind(int position, std::uint64_t value);
   void bind(int position, std::uint32_t value);
   /// Binds the value, or NULL. A zero loses its sign: SQLite keeps none in a column of type REAL.
-  /// @pre The value is finite; SQLite would turn NaN into NULL.
+  /// @throws StoreError if the value is not finite; SQLite would turn NaN into NULL.
   void bind(int position, const std::optional<double>& value);
   void bind(int position, double value);
   void bind(int position, const std::optional<std::uint64_t>& value);  ///< The value, or NULL.
@@ -101,7 +102,8 @@ class Database {
   void execute(const std::string& sql);
   [[nodiscard]] Statement prepare(std::string_view sql) const;
 
-  /// First column of the first row of a query that has one.
+  /// First column of the first row of a query.
+  /// @throws StoreError if there is no row: the file is damaged.
   [[nodiscard]] std::int64_t integer(std::string_view sql) const;
   [[nodiscard]] std::uint64_t count(std::string_view sql) const;  ///< As Statement::count().
   [[nodiscard]] std::string text(std::string_view sql) const;
@@ -121,6 +123,10 @@ class Database {
   /// Copies the write-ahead log into the file. True if all of it is there now and, if so asked, the
   /// log is empty; false if somebody reads an older state, or writes.
   [[nodiscard]] bool fold_log(Fold fold);
+
+  /// To be called if the file has lost its name: what has it now is not touched when the connection
+  /// is closed.
+  void leave_names_alone();
 
   /// @throws StoreError `campaign file = path (what)`.
   [[noreturn]] void refuse(std::string_view what) const;

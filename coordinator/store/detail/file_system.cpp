@@ -10,10 +10,12 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <system_error>
 
 #include "coordinator/store/store_error.hpp"
 
@@ -51,7 +53,9 @@ constexpr std::array<std::string_view, 16> network_fuse_types{
     "fuse.rclone",    "fuse.s3fs",    "fuse.seaweedfs", "fuse.sshfs"};
 
 std::filesystem::path directory_of(const std::filesystem::path& path) {
-  return std::filesystem::absolute(path).parent_path();
+  std::error_code error;
+  const std::filesystem::path absolute = std::filesystem::absolute(path, error);
+  return (error ? path : absolute).parent_path();
 }
 
 }  // namespace
@@ -115,6 +119,46 @@ void synchronise_directory_of(const std::filesystem::path& path) {
   if (!is_done) {
     throw StoreError(fmt::format("directory = {} ({})", directory, std::strerror(error)));
   }
+}
+
+namespace {
+
+// Removes an unfinished file, its rollback journal with it.
+void remove_draft(const std::filesystem::path& draft) {
+  std::error_code ignored;
+  std::filesystem::remove(draft, ignored);
+  std::filesystem::remove(std::filesystem::path(draft).concat("-journal"), ignored);
+}
+
+// Not all file systems know how to keep what is there; the name was free a moment ago.
+bool rename_to(const std::filesystem::path& draft, const std::filesystem::path& path,
+               IfThere if_there) {
+  if (if_there == IfThere::keep) {
+    if (::renameat2(AT_FDCWD, draft.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0) {
+      return true;
+    }
+    if (errno != EINVAL && errno != ENOSYS) return false;
+  }
+  return ::rename(draft.c_str(), path.c_str()) == 0;
+}
+
+}  // namespace
+
+void appear_complete(const std::filesystem::path& path, IfThere if_there,
+                     const std::function<void(const std::filesystem::path& draft)>& write) {
+  const std::filesystem::path draft = std::filesystem::path(path).concat(".unfinished");
+  remove_draft(draft);
+  try {
+    write(draft);
+    if (!rename_to(draft, path, if_there)) {
+      throw StoreError(fmt::format("campaign file = {} (cannot be given its name: {})",
+                                   path.string(), std::strerror(errno)));
+    }
+  } catch (...) {
+    remove_draft(draft);
+    throw;
+  }
+  synchronise_directory_of(path);
 }
 
 }  // namespace proofmass::coordinator::detail

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -20,6 +21,15 @@ namespace proofmass::coordinator::detail {
 /// @throws StoreError if new files cannot stand beside `path`: no such directory, or a network file
 ///         system below it.
 void check_directory_of(const std::filesystem::path& path);
+
+/// What becomes of a file that has the name already.
+enum class IfThere : std::uint8_t { keep, replace };
+
+/// Lets `write` make a file beside `path`, which then takes that name: complete or not at all, and
+/// durable.
+/// @throws StoreError if that cannot be done, or if the name is taken and is to be kept.
+void appear_complete(const std::filesystem::path& path, IfThere if_there,
+                     const std::function<void(const std::filesystem::path& draft)>& write);
 
 /// Makes the directory entry of `path` durable.
 void synchronise_directory_of(const std::filesystem::path& path);

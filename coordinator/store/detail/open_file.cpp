@@ -18,13 +18,22 @@ std::optional<TimePoint> due_time(const OpenFile& file, const CommitTimes& times
   return std::min(due, *urgent_since + times.commit_after);
 }
 
+// What is committed while the file loses its name is in the open file, and so in the copy that gets
+// the name: it is durable once the file has its name, and must not be written twice.
 Attempted try_to_write(OpenFile& file) {
+  Attempted attempted;
   try {
-    CommitSummary summary = file.store.write(file.writing);
-    return {.summary = std::move(summary), .failure = {}, .log_size = file.store.log_size()};
+    attempted.file_return = file.store.return_to_place();
+    if (!file.unconfirmed && !file.writing.empty()) {
+      file.unconfirmed = file.store.write(file.writing);
+    }
+    if (const auto file_return = file.store.return_to_place()) attempted.file_return = file_return;
+    attempted.summary = std::exchange(file.unconfirmed, std::nullopt).value_or(CommitSummary{});
   } catch (const std::exception& error) {
-    return {.summary = {}, .failure = error.what(), .log_size = file.store.log_size()};
+    attempted.failure = error.what();
   }
+  attempted.log_size = file.store.log_size();
+  return attempted;
 }
 
 std::optional<std::string> try_to_rest(Store& store) {

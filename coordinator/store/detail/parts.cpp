@@ -67,7 +67,10 @@ Store::Parts::Parts(const std::filesystem::path& file)
 }
 
 Store::Parts::Parts(const std::filesystem::path& file, std::unique_ptr<detail::StoreLock> held_lock)
-    : path(file), lock(std::move(held_lock)), database(file, Access::read_write) {
+    : path(file),
+      lock(std::move(held_lock)),
+      place(std::make_unique<detail::FilePlace>(file)),
+      database(file, Access::read_write) {
   detail::configure(database);
   detail::check_campaign_file(database, file);
   detail::check_after_unclean_end(database);
@@ -81,14 +84,20 @@ Store::Parts::Parts(const std::filesystem::path& file, std::unique_ptr<detail::S
   detail::check_results(database);
   is_perhaps_marked_ = says_that_log_is_needed(database);
   is_log_lost = is_perhaps_marked_ && !has_log;
+  place->remember_log();
+  check_place();
 }
 
 // Readers cannot open a file in WAL mode on read-only media, so that a closed one is in the other.
 // With somebody reading, a step fails at once and the log stays: nothing is lost by that.
 Store::Parts::~Parts() {
-  if (!lock) return;
+  if (!place) return;
   try {
     rows.reset();
+    if (place->look() != detail::Placement::in_place) {
+      database.leave_names_alone();
+      return;
+    }
     if (rest()) return;
     database.execute("PRAGMA busy_timeout = 0; PRAGMA journal_mode = DELETE");
   } catch (const StoreError&) {
@@ -97,6 +106,35 @@ Store::Parts::~Parts() {
 }
 
 void Store::Parts::change(const std::function<void(Database&)>& action) {
+  commit(action);
+  check_place();
+}
+
+void Store::Parts::check_place() const {
+  switch (place ? place->look() : detail::Placement::in_place) {
+    case detail::Placement::in_place:
+      return;
+    case detail::Placement::removed:
+      database.refuse("was removed or renamed while it was served");
+    case detail::Placement::replaced:
+      database.refuse("was replaced by another file while it was served");
+    case detail::Placement::log_removed:
+      database.refuse("lost its write-ahead log, which was removed while it was served");
+    case detail::Placement::without_directory:
+      database.refuse("lost its directory, which was removed or renamed while it was served");
+  }
+}
+
+// Leaving the mode folds the log in, which is still open, and entering it makes another one.
+void Store::Parts::renew_log() {
+  rows.reset();
+  if (const std::optional<std::string> reason = rest()) database.refuse(*reason);
+  database.execute("PRAGMA journal_mode = DELETE; PRAGMA journal_mode = WAL");
+  (void)says_that_log_is_needed(database);  // Reading opens the new log.
+  place->remember_log();
+}
+
+void Store::Parts::commit(const std::function<void(Database&)>& action) {
   mark_log_as_needed();
   Transaction transaction(database);
   action(database);
@@ -106,7 +144,7 @@ void Store::Parts::change(const std::function<void(Database&)>& action) {
 // The mark reaches the file itself before anything that a copy of the file alone would lack. A
 // reader of an old state may hold it up: the next change tries again.
 void Store::Parts::mark_log_as_needed() {
-  if (!lock || is_marked_) return;
+  if (!place || is_marked_) return;
   is_perhaps_marked_ = true;
   database.execute("UPDATE campaign SET is_log_needed = 1 WHERE NOT is_log_needed");
   is_marked_ = database.fold_log(detail::Fold::what_no_reader_needs);

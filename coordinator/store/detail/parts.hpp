@@ -8,6 +8,7 @@
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/entry_rows.hpp"
+#include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/detail/store_lock.hpp"
 #include "coordinator/store/store.hpp"
 
@@ -37,15 +38,22 @@ struct Store::Parts {
   Parts(const Parts&) = delete;
   Parts& operator=(const Parts&) = delete;
 
-  /// Stores what `action` changes, durable when it returns, or nothing.
+  /// Stores what `action` changes, durable in the open file when it returns, or nothing.
+  void commit(const std::function<void(detail::Database&)>& action);
+  /// The same, and the file must have its name afterwards.
   void change(const std::function<void(detail::Database&)>& action);
+  /// @throws StoreError if the file has lost its name, or its log has.
+  void check_place() const;
+  /// Gives the open file a log where its log was removed.
+  void renew_log();
 
   /// Folds the log into the file, which is whole without it afterwards. Does not wait for readers:
   /// returns why it could not.
   [[nodiscard]] std::optional<std::string> rest();
 
   std::filesystem::path path;
-  std::unique_ptr<detail::StoreLock> lock;  ///< Of a coordinator; a reader has none.
+  std::unique_ptr<detail::StoreLock> lock;   ///< Of a coordinator; a reader has none.
+  std::unique_ptr<detail::FilePlace> place;  ///< The same. Closed after the database.
   detail::Database database;
   std::optional<detail::EntryRows> rows;  ///< Prepared when they are first needed.
   bool is_log_lost = false;  ///< The file needed a log when it was opened; none was there.

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -61,6 +62,14 @@ std::uint64_t digest_with(std::uint64_t digest, const ParameterArray& values) {
   return digest;
 }
 
+// A column holds 64 bits.
+std::uint32_t read_number(const Statement& row, int column) {
+  const std::uint64_t value = row.count(column);
+  if (value <= std::numeric_limits<std::uint32_t>::max()) return static_cast<std::uint32_t>(value);
+  row.refuse_as_damaged(
+      fmt::format("{} = {} of run {}", row.column_name(column), value, row.count(0)));
+}
+
 RunStatus read_status(const Statement& row) {
   const std::int64_t status = row.integer(1);
   const bool is_known = status >= static_cast<std::int64_t>(RunStatus::completed) &&
@@ -94,7 +103,9 @@ bool ResultRows::insert(const RunResult& result) {
 
 RunResult ResultRows::read(RunIndex run) {
   select_.bind_all(run.value);
-  PROOFMASS_EXPECT(select_.step());
+  if (!select_.step()) {
+    database_.refuse_as_damaged(fmt::format("run_result lacks run {}", run.value));
+  }
   const RunResult result = read_result(select_);
   select_.finish();
   return result;
@@ -107,8 +118,8 @@ Statement select_results(const Database& database) {
 RunResult read_result(const Statement& row) {
   RunResult result{.run = RunIndex{row.count(0)},
                    .status = read_status(row),
-                   .num_draws = static_cast<std::uint32_t>(row.integer(2)),
-                   .num_rounds = static_cast<std::uint32_t>(row.integer(3))};
+                   .num_draws = read_number(row, 2),
+                   .num_rounds = read_number(row, 3)};
   for (const ParameterInfo& info : parameter_infos()) {
     result.truth[index(info.parameter)] = row.real(truth_column(info));
     result.estimate[index(info.parameter)] = row.real(estimate_column(info));
@@ -148,8 +159,10 @@ void check_delivery(const Delivery& delivery, std::uint64_t num_runs) {
   } catch (const Error& error) {
     throw StoreError(fmt::format("run_result.{}", error.what()));
   }
-  if (!std::isfinite(delivery.compute_s)) {
-    throw StoreError(fmt::format("delivery.compute_s = {} (must be finite; run {})",
+  // A sum over all runs of a campaign stays finite, and so does what people make of it.
+  constexpr double compute_s_max = 1e9;
+  if (!(delivery.compute_s >= 0.0 && delivery.compute_s <= compute_s_max)) {
+    throw StoreError(fmt::format("delivery.compute_s = {} (must be in [0, 1e9]; run {})",
                                  delivery.compute_s, result.run.value));
   }
 }

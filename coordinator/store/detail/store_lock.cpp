@@ -11,6 +11,7 @@
 #include <cstring>
 #include <fstream>
 #include <string>
+#include <system_error>
 
 #include "coordinator/store/store_error.hpp"
 
@@ -47,6 +48,13 @@ bool is_file_at(int descriptor, const std::filesystem::path& path) {
          opened.st_dev == present.st_dev && opened.st_ino == present.st_ino;
 }
 
+std::filesystem::path lock_path(const std::filesystem::path& campaign_file) {
+  std::error_code error;
+  std::filesystem::path path = std::filesystem::weakly_canonical(campaign_file, error);
+  if (error) path = campaign_file;
+  return path.concat(".lock");
+}
+
 int acquire(const std::filesystem::path& path) {
   const int descriptor = open_lock_file(path);
   if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0 && is_file_at(descriptor, path))
@@ -59,15 +67,17 @@ int acquire(const std::filesystem::path& path) {
 }  // namespace
 
 StoreLock::StoreLock(const std::filesystem::path& campaign_file)
-    : path_(std::filesystem::weakly_canonical(campaign_file).concat(".lock")),
-      descriptor_(acquire(path_)) {
+    : path_(lock_path(campaign_file)), descriptor_(acquire(path_)) {
   // For people only: the lock holds even if this cannot be written.
   std::ofstream(path_) << this_process() << '\n';
 }
 
+// Somebody may have removed the file, and another process may have made one.
 StoreLock::~StoreLock() {
-  ::unlink(path_.c_str());
+  if (is_in_place()) ::unlink(path_.c_str());
   ::close(descriptor_);
 }
+
+bool StoreLock::is_in_place() const { return is_file_at(descriptor_, path_); }
 
 }  // namespace proofmass::coordinator::detail

@@ -12,6 +12,8 @@ class StoreLock {
   /// writable.
   explicit StoreLock(const std::filesystem::path& campaign_file);
   ~StoreLock();  ///< Removes the lock file.
+  /// Whether the lock file still has its name, without which it keeps nobody away.
+  [[nodiscard]] bool is_in_place() const;
   StoreLock(const StoreLock&) = delete;
   StoreLock& operator=(const StoreLock&) = delete;
 

@@ -88,7 +88,7 @@ std::int64_t WorkerRows::key_of(wire::SessionId session) {
       .prepare("INSERT INTO worker (session, name, host) VALUES (?, '', '') ON CONFLICT DO NOTHING")
       .run(digits);
   select_key_.bind_all(digits);
-  PROOFMASS_EXPECT(select_key_.step());
+  if (!select_key_.step()) database_.refuse_as_damaged("worker lacks session " + digits);
   const std::int64_t key = select_key_.integer(0);
   select_key_.finish();
   keys_.emplace(session, key);
@@ -98,7 +98,7 @@ std::int64_t WorkerRows::key_of(wire::SessionId session) {
 std::string WorkerRows::name_of(wire::SessionId session) {
   Statement select = database_.prepare("SELECT name FROM worker WHERE worker_key = ?");
   select.bind_all(key_of(session));
-  PROOFMASS_EXPECT(select.step());
+  if (!select.step()) database_.refuse_as_damaged("worker lacks a row that is referred to");
   return select.text(0);
 }
 
@@ -110,7 +110,7 @@ void WorkerRows::count_result(std::int64_t worker, double compute_s) {
 
 void WorkerRows::write_counts(std::int64_t now_unix_s) {
   Statement update = database_.prepare(
-      "UPDATE worker SET num_results = num_results + ?, compute_s = compute_s + ?,"
+      "UPDATE worker SET num_results = num_results + ?, compute_s = min(compute_s + ?, 1e15),"
       " last_result_unix_s = ? WHERE worker_key = ?");
   for (const auto& [worker, count] : counts_) {
     update.run(count.num_results, count.compute_s, now_unix_s, worker);

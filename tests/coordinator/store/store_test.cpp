@@ -204,7 +204,7 @@ TEST_F(StoreTest, RefusesANumberThatIsNotFinite) {
   deliveries[1] = delivery_of(1);
   deliveries[1].compute_s = std::numeric_limits<double>::infinity();
   EXPECT_EQ(store_error_of([&] { store.commit(deliveries); }),
-            "delivery.compute_s = inf (must be finite; run 1)");
+            "delivery.compute_s = inf (must be in [0, 1e9]; run 1)");
   EXPECT_THAT(store.finished_runs(), IsEmpty());
 }
 

@@ -21,7 +21,8 @@ inline coordinator::WriterConfig patient_config() {
   return {.commit_runs_max = 1'000'000,
           .commit_after = std::chrono::hours(1),
           .record_after = std::chrono::hours(1),
-          .retry_after = std::chrono::hours(1)};
+          .retry_after = std::chrono::hours(1),
+          .look_after = std::chrono::hours(1)};
 }
 
 /// As in the texts of WriterTest.
@@ -97,6 +98,17 @@ class WriterTest : public StoreTest {
     return "failed " + failed.text;
   }
   static std::string text_of(const coordinator::StoreRecovered&) { return "recovered"; }
+  static std::string text_of(const coordinator::FileReturned& returned) {
+    switch (returned.kind) {
+      case coordinator::FileReturn::restored:
+        return "restored";
+      case coordinator::FileReturn::replaced:
+        return "replaced";
+      case coordinator::FileReturn::log_made_anew:
+        return "log made anew";
+    }
+    return "returned";
+  }
   static std::string text_of(const coordinator::LogGrown&) { return "log grown"; }
   static std::string text_of(const coordinator::LogShrunk&) { return "log shrunk"; }
   static std::string text_of(const coordinator::LogKept&) { return "log kept"; }

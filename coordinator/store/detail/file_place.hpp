@@ -1,0 +1,63 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace proofmass::coordinator::detail {
+
+/// Where the open file of a coordinator is now.
+enum class Placement : std::uint8_t {
+  in_place,
+  removed,            ///< Nothing has its name any more: it was removed or renamed.
+  replaced,           ///< Another file has its name.
+  log_removed,        ///< It has its name, but its write-ahead log has not.
+  without_directory,  ///< Its directory was removed or renamed.
+};
+
+/// Holds an open campaign file by the file itself, whatever becomes of its name: no two
+/// coordinators have one file, also where both lock files were removed. The advisory lock ends with
+/// the process.
+///
+/// Constructed before a connection to the file is opened and destroyed after it is closed: closing
+/// it ends the locks that SQLite has on the file in this process.
+class FilePlace {
+ public:
+  /// @throws StoreError if another coordinator has the file.
+  explicit FilePlace(const std::filesystem::path& file);
+  ~FilePlace();
+  FilePlace(const FilePlace&) = delete;
+  FilePlace& operator=(const FilePlace&) = delete;
+
+  /// To be called once the connection has opened the write-ahead log.
+  void remember_log();
+
+  [[nodiscard]] Placement look() const;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }  ///< Canonical.
+
+  /// Removes the log, and its index, that lie beside the name and belong to this file. A log that
+  /// came with another file stays.
+  void remove_own_log() const;
+
+ private:
+  /// Names a file whatever its name.
+  struct Identity {
+    dev_t device = 0;
+    ino_t number = 0;
+
+    bool operator==(const Identity&) const = default;
+  };
+
+  /// Of the file with this name; zeros if there is none.
+  [[nodiscard]] static Identity identity_at(const std::filesystem::path& path);
+
+  std::filesystem::path path_;
+  int descriptor_;
+  Identity file_;
+  Identity log_;
+  Identity index_;
+};
+
+}  // namespace proofmass::coordinator::detail
