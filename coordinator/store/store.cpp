@@ -206,8 +206,10 @@ std::string Store::created_utc() const {
 std::string Store::owner() const { return parts_->database.text("SELECT owner FROM campaign"); }
 
 void Store::set_owner(std::string_view owner) {
-  parts_->change(
-      [&](Database& database) { database.prepare("UPDATE campaign SET owner = ?").run(owner); });
+  parts_->change([&](Database& database) {
+    database.prepare("UPDATE campaign SET owner = ?").run(owner);
+    detail::write_table_digest(database);
+  });
 }
 
 std::string Store::table_digest() const {
@@ -277,6 +279,10 @@ std::vector<RunRange> Store::compared_runs() const {
 }
 
 std::vector<RunRange> Store::given_up_runs() const {
+  if (parts_->database.integer("SELECT EXISTS (SELECT 1 FROM run_failure"
+                               " WHERE run_index IN (SELECT run_index FROM delivery))") != 0) {
+    parts_->database.refuse_as_damaged("a run is given up and has a result");
+  }
   return detail::read_runs(parts_->database, "SELECT run_index FROM run_failure ORDER BY 1");
 }
 
@@ -368,9 +374,13 @@ CommitSummary Store::commit(std::span<const Delivery> deliveries) {
 }
 
 void Store::for_each_result(const std::function<void(const RunResult&)>& visit) const {
-  Statement row = detail::select_results(parts_->database);
-  while (row.step()) visit(detail::read_result(row));
+  ResultReader reader = results();
+  while (const std::optional<RunResult> result = reader.next()) visit(*result);
 }
+
+ResultReader Store::results() const { return ResultReader(parts_->database); }
+
+ResultReader Store::results(RunRange runs) const { return ResultReader(parts_->database, runs); }
 
 void Store::write_statistics(const CampaignStatistics& statistics, const Budget& before,
                              const Budget& after_worst, const Budget& after_mean,
@@ -432,6 +442,15 @@ std::vector<std::string> Store::stop_check_differences(
         }
       },
       tables, detail::FurtherRows::ignore);
+}
+
+bool Store::has_statistics() const {
+  return parts_->database.integer(
+             "SELECT EXISTS (SELECT 1 FROM statistic WHERE percentile_50 IS NOT NULL)") != 0;
+}
+
+void Store::refuse_as_damaged(std::string_view what) const {
+  parts_->database.refuse_as_damaged(what);
 }
 
 bool Store::has_older_statistics() const {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "coordinator/store/records.hpp"
+#include "coordinator/store/result_reader.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/campaign/budget.hpp"
 #include "core/campaign/campaign.hpp"
@@ -166,8 +167,12 @@ class Store {
   /// Stores results like write().
   CommitSummary commit(std::span<const Delivery> deliveries);
 
-  /// Calls visit(result) for each finished run, in run order. Zeros have no sign.
+  /// Calls visit(result) for each finished run, in strictly ascending order. Zeros have no sign.
+  /// @throws StoreError as ResultReader::next() does.
   void for_each_result(const std::function<void(const RunResult&)>& visit) const;
+  /// The same one by one.
+  [[nodiscard]] ResultReader results() const;
+  [[nodiscard]] ResultReader results(RunRange runs) const;  ///< Of some of the runs.
 
   /// Replaces the stored statistics and budgets, and the summary of what they were computed from.
   /// @param after_worst  With each parameter's worst error; ignored while no run has an estimate.
@@ -193,6 +198,10 @@ class Store {
   /// What rows of `stop_check` have other than these; there may be more of them.
   [[nodiscard]] std::vector<std::string> stop_check_differences(
       std::span<const StopCheckRow> expected) const;
+  /// True if statistics of a program since version 5 are there: a summary was written with them.
+  [[nodiscard]] bool has_statistics() const;
+  /// @throws StoreError `campaign file = path (is damaged: what; restore it from a copy)`.
+  [[noreturn]] void refuse_as_damaged(std::string_view what) const;
   /// True if the statistics are those of a program before version 5: seven numbers, no summary.
   [[nodiscard]] bool has_older_statistics() const;
 

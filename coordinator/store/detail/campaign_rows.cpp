@@ -116,10 +116,16 @@ EnvironmentTable read_environment_table(const Database& database) {
 
 std::vector<double> read_dispersion_values(const Database& database, std::string_view drawn_name) {
   Statement select =
-      database.prepare("SELECT value FROM dispersion_value WHERE name = ? ORDER BY run_index");
+      database.prepare("SELECT value, run_index FROM dispersion_value WHERE name = ? ORDER BY 2");
   select.bind_all(drawn_name);
   std::vector<double> values;
-  while (select.step()) values.push_back(select.real(0));
+  while (select.step()) {
+    if (select.count(1) != values.size()) {
+      database.refuse_as_damaged(fmt::format("dispersion_value of {}: run {} follows {} values",
+                                             drawn_name, select.count(1), values.size()));
+    }
+    values.push_back(select.real(0));
+  }
   return values;
 }
 

@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 
+#include "coordinator/store/detail/table_digest.hpp"
 #include "coordinator/store/detail/worker_rows.hpp"
 #include "coordinator/store/store_error.hpp"
 
@@ -47,6 +50,17 @@ class RunLookup {
   Statement select_;
 };
 
+// Ranges that overlap, or runs that the campaign does not have, would be counted by everybody else.
+void check_next_run(const Statement& row, std::span<const RunRange> ranges,
+                    std::uint64_t num_runs) {
+  const std::uint64_t run = row.count(0);
+  if (!ranges.empty() && run < ranges.back().end()) {
+    row.refuse_as_damaged(fmt::format("run {} comes after run {}", run, ranges.back().end() - 1));
+  }
+  if (run < num_runs) return;
+  row.refuse_as_damaged(fmt::format("row of run {}, of {} there are", run, num_runs));
+}
+
 /// Appends to ranges that end before the run.
 void append_run(std::vector<RunRange>& ranges, RunIndex run) {
   if (!ranges.empty() && ranges.back().end() == run.value) {
@@ -61,9 +75,17 @@ void append_run(std::vector<RunRange>& ranges, RunIndex run) {
 CampaignControl read_control(const Database& database) {
   Statement select = database.prepare("SELECT phase, priority, audit_fraction FROM campaign");
   if (!select.step()) database.refuse_as_damaged("it has no campaign");
+  const std::int64_t priority = select.integer(1);
+  const double audit_fraction = select.real(2);
+  if (priority < std::numeric_limits<int>::min() || priority > std::numeric_limits<int>::max()) {
+    database.refuse_as_damaged(fmt::format("priority = {}", priority));
+  }
+  if (!(audit_fraction >= 0.0 && audit_fraction <= 1.0)) {
+    database.refuse_as_damaged(fmt::format("audit_fraction = {}", audit_fraction));
+  }
   return {.phase = read_phase(database, select.text(0)),
-          .priority = static_cast<int>(select.integer(1)),
-          .audit_fraction = select.real(2)};
+          .priority = static_cast<int>(priority),
+          .audit_fraction = audit_fraction};
 }
 
 void write_control(const Database& database, const CampaignControl& control) {
@@ -86,6 +108,7 @@ void write_stop_plan(const Database& database, const StopPlan& plan) {
           " phase = iif(phase = 'finished' AND ?1 <> ''"
           " AND (stop_rule, num_runs_max, failures_max) IS NOT (?1, ?2, ?3), 'active', phase)")
       .run(plan.stop_rule, plan.num_runs_max, plan.failures_max);
+  write_table_digest(database);
 }
 
 std::optional<StoredStopCheck> read_last_stop_check(const Database& database,
@@ -134,7 +157,13 @@ void replace_stop_check(const Database& database, std::uint64_t num_runs,
 std::vector<RunRange> read_runs(const Database& database, std::string_view sql) {
   Statement select = database.prepare(sql);
   std::vector<RunRange> ranges;
-  while (select.step()) append_run(ranges, RunIndex{select.count(0)});
+  if (!select.step()) return ranges;
+  // Of the same state of the file as the rows, as the query is under way.
+  const std::uint64_t num_runs = database.count("SELECT num_runs FROM campaign");
+  do {
+    check_next_run(select, ranges, num_runs);
+    append_run(ranges, RunIndex{select.count(0)});
+  } while (select.step());
   return ranges;
 }
 

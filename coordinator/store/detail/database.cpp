@@ -292,11 +292,14 @@ Transaction::~Transaction() { roll_back(database_); }
 
 void Transaction::commit() { database_.execute("COMMIT"); }
 
-ReadTransaction::ReadTransaction(Database& database) : database_(database) {
-  database_.execute("BEGIN");
+ReadTransaction::ReadTransaction(Database& database)
+    : database_(database), is_within_another_(database.in_transaction()) {
+  if (!is_within_another_) database_.execute("BEGIN");
 }
 
-ReadTransaction::~ReadTransaction() { roll_back(database_); }
+ReadTransaction::~ReadTransaction() {
+  if (!is_within_another_) roll_back(database_);
+}
 
 StepLimit::StepLimit(const Database& database, int num_steps) : database_(database) {
   sqlite3_progress_handler(

@@ -163,6 +163,7 @@ class Transaction {
 };
 
 /// While it lives, all that is read is of one state of the file, whatever others write meanwhile.
+/// In a transaction that is under way it adds nothing.
 class ReadTransaction {
  public:
   explicit ReadTransaction(Database& database);
@@ -172,6 +173,7 @@ class ReadTransaction {
 
  private:
   Database& database_;
+  bool is_within_another_;
 };
 
 /// While it lives, a statement fails that takes more than so many steps of SQLite's machine.

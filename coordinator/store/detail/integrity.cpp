@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
@@ -24,6 +27,18 @@ void check_references(const Database& database) {
       fmt::format("is damaged: row {} of {} refers to no row of {}; restore it from a "
                   "copy",
                   select.integer(1), select.text(0), select.text(2)));
+}
+
+// Tables of one row; SQLite's own check lets the conditions of their keys be.
+void check_single_rows(const Database& database) {
+  for (const std::string_view key : {"campaign_id FROM campaign", "summary_id FROM summary"}) {
+    Statement select = database.prepare(fmt::format("SELECT {}", key));
+    for (std::int64_t must = 1; select.step(); ++must) {
+      if (must == 1 && select.integer(0) == must) continue;
+      database.refuse_as_damaged(
+          fmt::format("{} = {} (must be 1)", select.column_name(0), select.integer(0)));
+    }
+  }
 }
 
 /// Whether the next row has this run and number.
@@ -65,10 +80,12 @@ void check_standouts(const Database& database) {
 struct Deliveries {
   std::uint64_t count = 0;
   double compute_s = 0.0;
+  std::optional<std::int64_t> last_unix_s;  ///< The newest of them.
 };
 
 std::map<std::int64_t, Deliveries> read_deliveries(const Database& database) {
-  Statement select = database.prepare("SELECT run_index, worker, compute_s FROM delivery");
+  Statement select =
+      database.prepare("SELECT run_index, worker, compute_s, received_unix_s FROM delivery");
   std::map<std::int64_t, Deliveries> by_worker;
   while (select.step()) {
     const double compute_s = select.real(2);
@@ -80,6 +97,8 @@ std::map<std::int64_t, Deliveries> read_deliveries(const Database& database) {
     Deliveries& deliveries = by_worker[select.integer(1)];
     ++deliveries.count;
     deliveries.compute_s += compute_s;
+    deliveries.last_unix_s =
+        std::max(deliveries.last_unix_s.value_or(select.integer(3)), select.integer(3));
   }
   return by_worker;
 }
@@ -92,12 +111,17 @@ bool are_close(double stored_s, const Deliveries& deliveries) {
   return std::abs(stored_s - deliveries.compute_s) <= tolerance;
 }
 
-// `num_results` and `compute_s` of a worker follow from its deliveries. A second delivery of a run
-// counts for nobody.
+std::string shown(std::optional<std::int64_t> time_unix_s) {
+  return time_unix_s ? fmt::to_string(*time_unix_s) : "NULL";
+}
+
+// `num_results`, `compute_s` and `last_result_unix_s` of a worker follow from its deliveries. A
+// second delivery of a run counts for nobody.
 void check_workers(const Database& database) {
   const std::map<std::int64_t, Deliveries> by_worker = read_deliveries(database);
-  Statement select =
-      database.prepare("SELECT worker_key, num_results, compute_s FROM worker ORDER BY worker_key");
+  Statement select = database.prepare(
+      "SELECT worker_key, num_results, compute_s, last_result_unix_s FROM worker"
+      " ORDER BY worker_key");
   while (select.step()) {
     const auto found = by_worker.find(select.integer(0));
     const Deliveries deliveries = found == by_worker.end() ? Deliveries{} : found->second;
@@ -110,6 +134,11 @@ void check_workers(const Database& database) {
       database.refuse_as_damaged(
           fmt::format("worker.compute_s of worker_key {} = {} (must be {}, of its deliveries)",
                       select.integer(0), select.real(2), deliveries.compute_s));
+    }
+    if (select.shown(3) != shown(deliveries.last_unix_s)) {
+      database.refuse_as_damaged(fmt::format(
+          "worker.last_result_unix_s of worker_key {} = {} (must be {}, of its deliveries)",
+          select.integer(0), select.shown(3), shown(deliveries.last_unix_s)));
     }
   }
 }
@@ -141,6 +170,7 @@ void check_integrity(const Database& database) {
   if (finding != "ok") database.refuse_as_damaged(finding);
   check_schema(database, schema_version());
   check_references(database);
+  check_single_rows(database);
   check_standouts(database);
   check_workers(database);
   check_audits(database);

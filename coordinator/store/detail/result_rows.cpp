@@ -78,6 +78,16 @@ RunStatus read_status(const Statement& row) {
   row.refuse_as_damaged(fmt::format("status = {} of run {}", status, row.count(0)));
 }
 
+// SQLite would read a missing number as 0.
+double read_value(const Statement& row, int column, bool is_known) {
+  const std::optional<double> value = row.optional_real(column);
+  if (is_known && !value) {
+    row.refuse_as_damaged(
+        fmt::format("{} = NULL of run {}", row.column_name(column), row.count(0)));
+  }
+  return value.value_or(0.0);
+}
+
 }  // namespace
 
 ResultRows::ResultRows(const Database& database)
@@ -115,14 +125,19 @@ Statement select_results(const Database& database) {
   return database.prepare(select_sql("ORDER BY run_index"));
 }
 
+Statement select_results_in_range(const Database& database) {
+  return database.prepare(select_sql("WHERE run_index >= ? AND run_index < ? ORDER BY run_index"));
+}
+
 RunResult read_result(const Statement& row) {
   RunResult result{.run = RunIndex{row.count(0)},
                    .status = read_status(row),
                    .num_draws = read_number(row, 2),
                    .num_rounds = read_number(row, 3)};
   for (const ParameterInfo& info : parameter_infos()) {
-    result.truth[index(info.parameter)] = row.real(truth_column(info));
-    result.estimate[index(info.parameter)] = row.real(estimate_column(info));
+    result.truth[index(info.parameter)] = read_value(row, truth_column(info), result.has_truth());
+    result.estimate[index(info.parameter)] =
+        read_value(row, estimate_column(info), result.has_estimate());
   }
   return result;
 }

@@ -25,8 +25,13 @@ class ResultRows {
   Statement select_;
 };
 
-/// All results in run order; read_result() takes one from its current row.
+/// All results in run order, or those of the runs [?1, ?2); read_result() takes one from its
+/// current row.
 [[nodiscard]] Statement select_results(const Database& database);
+[[nodiscard]] Statement select_results_in_range(const Database& database);
+
+/// @throws StoreError if a number has another type than the schema gives it, or is out of the range
+/// of its field: the file is damaged.
 [[nodiscard]] RunResult read_result(const Statement& row);
 
 /// Whether two results of one run agree in everything that means something.

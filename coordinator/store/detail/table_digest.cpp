@@ -5,16 +5,26 @@
 namespace proofmass::coordinator::detail {
 namespace {
 
-constexpr int num_environment_columns = 7;
+constexpr int num_environment_numbers = 7;
+
+// How the campaign is served is left out: it changes while a coordinator has the file.
+void add_campaign(const Database& database, Sha256& hash) {
+  Statement row = database.prepare(
+      "SELECT name, seed, num_runs, definition, model_version, build, created_utc, campaign_uid,"
+      " owner, stop_rule, num_runs_max, failures_max FROM campaign");
+  if (!row.step()) database.refuse_as_damaged("it has no campaign");
+  for (int column = 0; column < row.num_columns(); ++column) hash.add(row.shown(column));
+}
 
 void add_environment(const Database& database, Sha256& hash) {
   hash.add(database.count("SELECT count(*) FROM environment_row"));
   Statement row = database.prepare(
-      "SELECT time_s, linear_x_m_s2, linear_y_m_s2, linear_z_m_s2,"
+      "SELECT position, time_s, linear_x_m_s2, linear_y_m_s2, linear_z_m_s2,"
       " angular_x_rad_s2, angular_y_rad_s2, angular_z_rad_s2 FROM environment_row"
       " ORDER BY position");
   while (row.step()) {
-    for (int column = 0; column < num_environment_columns; ++column) hash.add(row.real(column));
+    hash.add(row.count(0));
+    for (int column = 1; column <= num_environment_numbers; ++column) hash.add(row.real(column));
   }
 }
 
@@ -33,6 +43,7 @@ void add_dispersions(const Database& database, Sha256& hash) {
 
 std::string compute_table_digest(const Database& database) {
   Sha256 hash;
+  add_campaign(database, hash);
   add_environment(database, hash);
   add_dispersions(database, hash);
   return hash.finish();

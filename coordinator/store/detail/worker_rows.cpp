@@ -111,7 +111,7 @@ void WorkerRows::count_result(std::int64_t worker, double compute_s) {
 void WorkerRows::write_counts(std::int64_t now_unix_s) {
   Statement update = database_.prepare(
       "UPDATE worker SET num_results = num_results + ?, compute_s = min(compute_s + ?, 1e15),"
-      " last_result_unix_s = ? WHERE worker_key = ?");
+      " last_result_unix_s = max(ifnull(last_result_unix_s, ?3), ?3) WHERE worker_key = ?4");
   for (const auto& [worker, count] : counts_) {
     update.run(count.num_results, count.compute_s, now_unix_s, worker);
   }

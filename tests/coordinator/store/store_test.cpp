@@ -260,27 +260,41 @@ TEST_F(StoreTest, KeepsTheDigestOfItsTables) {
   store.extend(campaign_with_data(4), "");
   const std::string digest_of_four = store.table_digest();
   EXPECT_NE(digest_of_four, digest_of_three);
-  EXPECT_EQ(Store::create(directory() / "whole.db", campaign_with_data(4), "").table_digest(),
-            digest_of_four);
+  store.set_stop_plan({.stop_rule = "std(a_c13) within 5%", .num_runs_max = 9, .failures_max = 2});
+  store.set_owner("anna");
+  EXPECT_EQ(store.computed_table_digest(), store.table_digest());
+  const std::string stored = store.table_digest();
+  EXPECT_NE(stored, digest_of_four);
   for (const std::string change :
        {"UPDATE environment_row SET linear_y_m_s2 = linear_y_m_s2 + 1e-12 WHERE position = 2",
         "DELETE FROM environment_row WHERE position = 1",
         "UPDATE dispersion_value SET value = value + 1e-12 WHERE run_index = 3",
-        "UPDATE dispersion_value SET run_index = 9 WHERE run_index = 2"}) {
+        "UPDATE dispersion_value SET run_index = 9 WHERE run_index = 2",
+        "UPDATE campaign SET name = 'x'", "UPDATE campaign SET seed = '2'",
+        "UPDATE campaign SET num_runs = 5", "UPDATE campaign SET definition = 'x'",
+        "UPDATE campaign SET model_version = 'x'", "UPDATE campaign SET build = 'x'",
+        "UPDATE campaign SET created_utc = 'x'", "UPDATE campaign SET campaign_uid = 7",
+        "UPDATE campaign SET owner = 'bert'", "UPDATE campaign SET stop_rule = ''",
+        "UPDATE campaign SET num_runs_max = NULL", "UPDATE campaign SET failures_max = 3"}) {
     const std::filesystem::path copy = directory() / "copy.db";
     store.back_up(copy);
     test::change(copy, change);
     const Store changed = Store::open_read_only(copy);
-    EXPECT_EQ(changed.table_digest(), digest_of_four);
-    EXPECT_NE(changed.computed_table_digest(), digest_of_four) << change;
+    EXPECT_EQ(changed.table_digest(), stored);
+    EXPECT_NE(changed.computed_table_digest(), stored) << change;
     std::filesystem::remove(copy);
   }
 }
 
-// The SHA-256 of two numbers of rows, both 0, by another program (python3 -m hashlib).
-TEST_F(StoreTest, HasTheKnownDigestOfEmptyTables) {
-  EXPECT_EQ(Store::create(file(), campaign_of(3), "").table_digest(),
-            "374708fff7719dd5979ec875d56cd2286f6d3cf7ec317a3b25632aab28ec37bb");
+// The SHA-256 of twelve texts and of two numbers of rows, both 0, by another program (hashlib of
+// Python).
+TEST_F(StoreTest, HasTheKnownDigestOfADefinition) {
+  (void)Store::create(file(), campaign_of(3), "d");
+  test::change(file(),
+               "UPDATE campaign SET model_version = 'm', build = 'b', created_utc = 'c',"
+               " campaign_uid = 7");
+  EXPECT_EQ(Store::open_read_only(file()).computed_table_digest(),
+            "0753982e9827140148cb3d05834de860d34d8a47458e39cbf0c68e92853bf560");
 }
 
 TEST_F(StoreTest, KeepsItsOwner) {
