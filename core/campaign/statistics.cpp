@@ -19,16 +19,6 @@ std::vector<double> magnitudes_of(std::span<const double> errors) {
   return magnitudes;
 }
 
-ErrorStatistic error_statistic(std::span<const double> errors) {
-  const Moments about = moments(errors);
-  return {.bias = about.mean,
-          .bias_interval = mean_interval(about, default_confidence),
-          .rms = about.rms,
-          .standard_deviation = about.standard_deviation,
-          .deviation_interval = normal_deviation_interval(about, default_confidence),
-          .skewness = about.skewness};
-}
-
 std::array<PercentileStatistic, percentile_levels.size()> percentiles_of(
     std::span<const double> magnitudes) {
   const std::vector<double> ascending = sorted(magnitudes);
@@ -43,6 +33,15 @@ std::array<PercentileStatistic, percentile_levels.size()> percentiles_of(
 }
 
 }  // namespace
+
+ErrorStatistic error_statistic(const Moments& about) {
+  return {.bias = about.mean,
+          .bias_interval = mean_interval(about, default_confidence),
+          .rms = about.rms,
+          .standard_deviation = about.standard_deviation,
+          .deviation_interval = normal_deviation_interval(about, default_confidence),
+          .skewness = about.skewness};
+}
 
 ParameterArray CampaignStatistics::worst_errors() const {
   ParameterArray errors{};
@@ -96,7 +95,7 @@ AccuracyStatistic StatisticsAccumulator::accuracy(Parameter parameter) const {
           .mean_interval = mean_interval(about, default_confidence),
           .deviation_interval = bootstrap_deviation_interval(magnitudes, default_confidence),
           .percentiles = percentiles_of(magnitudes),
-          .error = error_statistic(errors_[index(parameter)])};
+          .error = error_statistic(moments(errors_[index(parameter)]))};
 }
 
 }  // namespace proofmass

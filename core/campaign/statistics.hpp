@@ -9,6 +9,7 @@
 #include "core/campaign/parameter.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/statistics/interval.hpp"
+#include "core/statistics/moments.hpp"
 #include "core/statistics/sum.hpp"
 
 namespace proofmass {
@@ -32,6 +33,9 @@ struct ErrorStatistic {
   std::optional<Interval> deviation_interval;  ///< By the chi-square law: for normal errors.
   double skewness = 0.0;                       ///< Adjusted, see Moments.
 };
+
+/// Of the moments of these errors.
+[[nodiscard]] ErrorStatistic error_statistic(const Moments& about);
 
 /// |estimate − truth| of one parameter over the runs that have an estimate. Intervals are of 95 %.
 struct AccuracyStatistic {
@@ -63,7 +67,8 @@ struct CampaignStatistics {
 };
 
 /// Accumulates results in run order, so that the statistics do not depend on the order in which
-/// runs arrived at the store. Keeps 88 bytes a run: order statistics and second passes need all.
+/// runs arrived at the store. Keeps 88 bytes a run, as order statistics and second passes need all;
+/// StatisticsPasses yields the same bits of results that are too many for that.
 class StatisticsAccumulator {
  public:
   /// @param objectives  Largest acceptable |error| of each parameter, SI.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "core/statistics/interval.hpp"
 
@@ -28,5 +29,38 @@ inline constexpr std::size_t num_bootstrap_groups_max = 1024;
 /// @throws InvalidArgument if a value is not finite or confidence is not in (0, 1).
 [[nodiscard]] std::optional<Interval> bootstrap_deviation_interval(std::span<const double> values,
                                                                    double confidence);
+
+/// The groups of bootstrap_deviation_interval(), for values that are seen one by one.
+class BootstrapGroups {
+ public:
+  /// @param count  Values that will be added, at least 3.
+  /// @param mean   Their compensated sum, divided by their count.
+  BootstrapGroups(std::size_t count, double mean);
+
+  void add(double value);
+  /// @pre All values were added.
+  [[nodiscard]] std::optional<Interval> deviation_interval(double confidence) const;
+
+ private:
+  /// Count and sums of d and d² of some values, d being the difference to the mean of all.
+  struct Group {
+    double count = 0.0;
+    double sum = 0.0;
+    double squares = 0.0;
+
+    void operator+=(const Group& other);
+    [[nodiscard]] double standard_deviation() const;
+  };
+
+  [[nodiscard]] Group total() const;
+  [[nodiscard]] std::vector<double> resampled_deviations() const;
+  [[nodiscard]] double acceleration() const;
+
+  std::size_t count_;
+  double mean_;
+  std::size_t num_added_ = 0;
+  std::size_t current_ = 0;  ///< The group that the next value is of, if below its end.
+  std::vector<Group> groups_;
+};
 
 }  // namespace proofmass

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <utility>
 
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
+#include "core/statistics/sum.hpp"
 
 namespace proofmass {
 namespace {
@@ -31,23 +33,27 @@ struct SignedRanks {
   std::size_t count = 0;
 };
 
-SignedRanks signed_ranks(std::span<const double> differences) {
-  std::vector<double> magnitudes;
-  std::vector<bool> is_positive;
-  for (const double difference : differences) {
-    if (difference == 0.0) continue;
-    magnitudes.push_back(std::abs(difference));
-    is_positive.push_back(difference > 0.0);
+// Sorts the differences, of which only the sign and the order of magnitudes count.
+SignedRanks signed_ranks(std::vector<double> differences) {
+  std::erase(differences, 0.0);
+  std::ranges::sort(differences, {}, [](double difference) { return std::abs(difference); });
+  SignedRanks result{.count = differences.size()};
+  CompensatedSum square_sum;
+  for (std::size_t first = 0; first < differences.size();) {
+    std::size_t end = first;
+    std::size_t num_positive = 0;
+    for (; end < differences.size() && std::abs(differences[end]) == std::abs(differences[first]);
+         ++end) {
+      if (differences[end] > 0.0) ++num_positive;
+    }
+    // Equal ones share the mean of the ranks first + 1 to end.
+    const double rank = 0.5 * static_cast<double>(first + 1 + end);
+    result.positive_sum += rank * static_cast<double>(num_positive);
+    square_sum.add(rank * rank * static_cast<double>(end - first));
+    result.has_equal = result.has_equal || end - first > 1;
+    first = end;
   }
-  SignedRanks result{.count = magnitudes.size()};
-  if (magnitudes.empty()) return result;
-  const std::vector<double> ranks = average_ranks(magnitudes);
-  for (std::size_t i = 0; i < ranks.size(); ++i) {
-    if (is_positive[i]) result.positive_sum += ranks[i];
-    result.square_sum += ranks[i] * ranks[i];
-  }
-  std::sort(magnitudes.begin(), magnitudes.end());
-  result.has_equal = std::ranges::adjacent_find(magnitudes) != magnitudes.end();
+  result.square_sum = square_sum.value();
   return result;
 }
 
@@ -127,9 +133,12 @@ double law_p_value(std::uint64_t m, std::uint64_t n, std::uint64_t distance) {
   return kolmogorov_upper(root * static_cast<double>(distance) / product);
 }
 
-/// Welch's t with the degrees of freedom of Satterthwaite.
-void compare_means(const Moments& first, const Moments& second, double confidence,
-                   UnpairedComparison& comparison) {
+}  // namespace
+
+// Welch's t with the degrees of freedom of Satterthwaite.
+UnpairedComparison compare_means(const Moments& first, const Moments& second, double confidence) {
+  detail::check_fraction("confidence", confidence);
+  UnpairedComparison comparison;
   const auto squared_error = [](const Moments& one) {
     return one.standard_deviation * one.standard_deviation / static_cast<double>(one.count);
   };
@@ -138,7 +147,8 @@ void compare_means(const Moments& first, const Moments& second, double confidenc
   comparison.mean_difference = second.mean - first.mean;
   if (a + b <= 0.0) {
     comparison.mean_p_value = comparison.mean_difference == 0.0 ? 1.0 : 0.0;
-    return;
+    comparison.p_value = comparison.mean_p_value;
+    return comparison;
   }
   // From the shares of the squared error: the square of a large one leaves the range of a double.
   const double share_a = a / (a + b);
@@ -150,9 +160,9 @@ void compare_means(const Moments& first, const Moments& second, double confidenc
   comparison.mean_p_value = student_two_sided(comparison.mean_difference / error, degrees);
   comparison.interval = Interval{comparison.mean_difference - half_width,
                                  comparison.mean_difference + half_width, confidence};
+  comparison.p_value = comparison.mean_p_value;
+  return comparison;
 }
-
-}  // namespace
 
 PairedComparison compare_paired(std::span<const double> first, std::span<const double> second,
                                 double confidence) {
@@ -161,9 +171,13 @@ PairedComparison compare_paired(std::span<const double> first, std::span<const d
   detail::check_values("second", second, 1);
   std::vector<double> differences(first.size());
   std::ranges::transform(second, first, differences.begin(), std::minus<>());
+  return compare_differences(std::move(differences), confidence);
+}
+
+PairedComparison compare_differences(std::vector<double> differences, double confidence) {
   const Moments about = moments(differences);
   PairedComparison comparison;
-  comparison.num_pairs = first.size();
+  comparison.num_pairs = differences.size();
   comparison.mean_difference = about.mean;
   comparison.interval = mean_interval(about, confidence);
   for (const double difference : differences) {
@@ -171,7 +185,7 @@ PairedComparison compare_paired(std::span<const double> first, std::span<const d
     if (difference < 0.0) ++comparison.num_smaller;
   }
   comparison.sign_p_value = sign_p_value(comparison.num_larger, comparison.num_smaller);
-  comparison.rank_p_value = rank_p_value(signed_ranks(differences));
+  comparison.rank_p_value = rank_p_value(signed_ranks(std::move(differences)));
   return comparison;
 }
 
@@ -180,15 +194,14 @@ UnpairedComparison compare_unpaired(std::span<const double> first, std::span<con
   detail::check_fraction("confidence", confidence);
   detail::check_values("first", first, 2);
   detail::check_values("second", second, 2);
-  UnpairedComparison comparison;
-  compare_means(moments(first), moments(second), confidence, comparison);
+  UnpairedComparison comparison = compare_means(moments(first), moments(second), confidence);
   const std::uint64_t distance = scaled_distance(sorted(first), sorted(second));
   comparison.distance = static_cast<double>(distance) / static_cast<double>(first.size()) /
                         static_cast<double>(second.size());
   comparison.law_p_value = law_p_value(first.size(), second.size(), distance);
-  comparison.p_value = std::min(first.size(), second.size()) < num_welch_min
-                           ? std::max(comparison.mean_p_value, comparison.law_p_value)
-                           : comparison.mean_p_value;
+  if (std::min(first.size(), second.size()) < num_welch_min) {
+    comparison.p_value = std::max(comparison.mean_p_value, comparison.law_p_value);
+  }
   return comparison;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/statistics/interval.hpp"
+#include "core/statistics/moments.hpp"
 
 namespace proofmass {
 
@@ -26,6 +27,10 @@ struct PairedComparison {
 /// must be in (0, 1).
 [[nodiscard]] PairedComparison compare_paired(std::span<const double> first,
                                               std::span<const double> second, double confidence);
+
+/// The same of the differences second − first. Ranks need all of them; nothing else is kept.
+[[nodiscard]] PairedComparison compare_differences(std::vector<double> differences,
+                                                   double confidence);
 
 /// Two campaigns with draws of their own; differences are second − first.
 struct UnpairedComparison {
@@ -50,6 +55,11 @@ inline constexpr std::size_t num_welch_min = 100;
 [[nodiscard]] UnpairedComparison compare_unpaired(std::span<const double> first,
                                                   std::span<const double> second,
                                                   double confidence);
+
+/// The same by the means alone, of num_welch_min values at least on either side: `distance` is 0
+/// and `law_p_value` 1.
+[[nodiscard]] UnpairedComparison compare_means(const Moments& first, const Moments& second,
+                                               double confidence);
 
 /// P-values such that comparing each with α errs in any of them with probability α at most
 /// [Holm1979]; in the given order.

@@ -1,7 +1,6 @@
 #include "core/statistics/interval.hpp"
 
 #include <cmath>
-#include <cstddef>
 
 #include "core/error.hpp"
 #include "core/statistics/detail/check.hpp"
@@ -68,26 +67,31 @@ std::optional<Interval> normal_deviation_interval(const Moments& moments, double
   return Interval{bound(1.0 - tail), bound(tail), confidence};
 }
 
-std::optional<Interval> percentile_interval(std::span<const double> ascending, double level,
-                                            double confidence) {
+std::optional<IntervalPlaces> percentile_interval_places(std::size_t n, double level,
+                                                         double confidence) {
   detail::check_fraction("level", level);
   detail::check_fraction("confidence", confidence);
-  const std::size_t n = ascending.size();
   const double one_sided = 0.5 + 0.5 * confidence;
   const std::optional<Place> from_below = lower_place(n, level, one_sided);
   // The upper bound is the lower one of the values turned round.
   const std::optional<Place> from_above = lower_place(n, 1.0 - level, one_sided);
   if (!from_below || !from_above) return std::nullopt;
 
-  const auto between = [](double from, double to, double weight) {
-    return weight == 0.0 ? from : from + weight * (to - from);
-  };
   const std::size_t low = from_below->rank - 1;
   const std::size_t high = n - from_above->rank;
-  return Interval{
-      between(ascending[low], ascending[low + (low + 1 < n ? 1 : 0)], from_below->weight),
-      between(ascending[high], ascending[high - (high > 0 ? 1 : 0)], from_above->weight),
-      confidence};
+  return IntervalPlaces{
+      .lower = {.from = low, .to = low + (low + 1 < n ? 1 : 0), .weight = from_below->weight},
+      .upper = {.from = high, .to = high - (high > 0 ? 1 : 0), .weight = from_above->weight}};
+}
+
+std::optional<Interval> percentile_interval(std::span<const double> ascending, double level,
+                                            double confidence) {
+  const auto places = percentile_interval_places(ascending.size(), level, confidence);
+  if (!places) return std::nullopt;
+  const auto value_at = [&](const OrderPlace& place) {
+    return place.between(ascending[place.from], ascending[place.to]);
+  };
+  return Interval{value_at(places->lower), value_at(places->upper), confidence};
 }
 
 Interval probability_interval(double num_hits, double num_runs, double confidence) {

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 
 #include "core/statistics/moments.hpp"
+#include "core/statistics/order.hpp"
 
 namespace proofmass {
 
@@ -36,6 +38,15 @@ inline constexpr double default_confidence = 0.95;
 /// @param level      In (0, 1).
 [[nodiscard]] std::optional<Interval> percentile_interval(std::span<const double> ascending,
                                                           double level, double confidence);
+
+/// The places whose values are the bounds of percentile_interval().
+struct IntervalPlaces {
+  OrderPlace lower;
+  OrderPlace upper;
+};
+[[nodiscard]] std::optional<IntervalPlaces> percentile_interval_places(std::size_t count,
+                                                                       double level,
+                                                                       double confidence);
 
 /// Of a probability, from `num_hits` events in `num_runs` > 0: exact and conservative
 /// (Clopper-Pearson).

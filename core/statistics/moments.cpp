@@ -4,28 +4,9 @@
 #include <cmath>
 
 #include "core/statistics/detail/check.hpp"
-#include "core/statistics/sum.hpp"
 
 namespace proofmass {
 namespace {
-
-/// Sums of x², d, d² and d³ with d = x − centre.
-struct PowerSums {
-  CompensatedSum raw_squares, differences, squares, cubes;
-};
-
-PowerSums power_sums(std::span<const double> values, double centre) {
-  PowerSums sums;
-  for (const double value : values) {
-    const double difference = value - centre;
-    const double square = difference * difference;
-    sums.raw_squares.add(value * value);
-    sums.differences.add(difference);
-    sums.squares.add(square);
-    sums.cubes.add(square * difference);
-  }
-  return sums;
-}
 
 // G1 from central sums: Σ(x − mean)² and Σ(x − mean)³.
 double adjusted_skewness(double n, double squares, double cubes) {
@@ -37,20 +18,34 @@ double adjusted_skewness(double n, double squares, double cubes) {
 
 }  // namespace
 
+void MomentSums::add(double value) {
+  const double difference = value - centre_;
+  const double square = difference * difference;
+  ++count_;
+  raw_squares_.add(value * value);
+  differences_.add(difference);
+  squares_.add(square);
+  cubes_.add(square * difference);
+}
+
+Moments MomentSums::moments() const {
+  const auto n = static_cast<double>(count_);
+  const double offset = differences_.value() / n;
+  const double raw = squares_.value();
+  const double squares = std::max(raw - n * offset * offset, 0.0);
+  const double cubes = cubes_.value() - 3.0 * offset * raw + 2.0 * n * offset * offset * offset;
+  return {.count = count_,
+          .mean = centre_ + offset,
+          .standard_deviation = count_ < 2 ? 0.0 : std::sqrt(squares / (n - 1.0)),
+          .rms = std::sqrt(raw_squares_.value() / n),
+          .skewness = adjusted_skewness(n, squares, cubes)};
+}
+
 Moments moments(std::span<const double> values) {
   detail::check_values("values", values, 1);
-  const auto n = static_cast<double>(values.size());
-  const double centre = compensated_sum(values) / n;
-  const PowerSums sums = power_sums(values, centre);
-  const double offset = sums.differences.value() / n;
-  const double raw = sums.squares.value();
-  const double squares = std::max(raw - n * offset * offset, 0.0);
-  const double cubes = sums.cubes.value() - 3.0 * offset * raw + 2.0 * n * offset * offset * offset;
-  return {.count = values.size(),
-          .mean = centre + offset,
-          .standard_deviation = values.size() < 2 ? 0.0 : std::sqrt(squares / (n - 1.0)),
-          .rms = std::sqrt(sums.raw_squares.value() / n),
-          .skewness = adjusted_skewness(n, squares, cubes)};
+  MomentSums sums(compensated_sum(values) / static_cast<double>(values.size()));
+  for (const double value : values) sums.add(value);
+  return sums.moments();
 }
 
 }  // namespace proofmass

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <span>
 
+#include "core/statistics/sum.hpp"
+
 namespace proofmass {
 
 /// Moments of values in their order.
@@ -26,5 +28,21 @@ struct Moments {
 
 /// @throws InvalidArgument if there is no value or one is not finite.
 [[nodiscard]] Moments moments(std::span<const double> values);
+
+/// The second pass of moments(), for values that are seen one by one.
+class MomentSums {
+ public:
+  /// @param centre  Compensated sum of all values, divided by their count.
+  explicit MomentSums(double centre) : centre_(centre) {}
+
+  void add(double value);
+  /// @pre All values were added; at least one.
+  [[nodiscard]] Moments moments() const;
+
+ private:
+  double centre_;
+  std::size_t count_ = 0;
+  CompensatedSum raw_squares_, differences_, squares_, cubes_;  ///< Of x², d, d² and d³.
+};
 
 }  // namespace proofmass

@@ -27,16 +27,20 @@ std::vector<double> sorted(std::span<const double> values) {
   return ascending;
 }
 
-double percentile(std::span<const double> ascending, double level) {
-  detail::check_values("values", ascending, 1);
+OrderPlace percentile_place(std::size_t count, double level) {
   if (!(level >= 0.0 && level <= 1.0)) {
     throw InvalidArgument(fmt::format("level = {} (must be in [0, 1])", level));
   }
-  const double place = static_cast<double>(ascending.size() - 1) * level;
+  const double place = static_cast<double>(count - 1) * level;
   const auto below = static_cast<std::size_t>(place);
-  if (below + 1 >= ascending.size()) return ascending.back();
-  const double weight = place - static_cast<double>(below);
-  return ascending[below] + weight * (ascending[below + 1] - ascending[below]);
+  if (below + 1 >= count) return {.from = count - 1, .to = count - 1, .weight = 0.0};
+  return {.from = below, .to = below + 1, .weight = place - static_cast<double>(below)};
+}
+
+double percentile(std::span<const double> ascending, double level) {
+  detail::check_values("values", ascending, 1);
+  const OrderPlace place = percentile_place(ascending.size(), level);
+  return place.between(ascending[place.from], ascending[place.to]);
 }
 
 std::vector<std::size_t> ascending_order(std::span<const double> values) {

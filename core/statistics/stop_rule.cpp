@@ -5,11 +5,8 @@
 #include <charconv>
 #include <cmath>
 
-#include "core/statistics/bootstrap.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/detail/phrase.hpp"
-#include "core/statistics/moments.hpp"
-#include "core/statistics/order.hpp"
 
 namespace proofmass {
 namespace {
@@ -39,25 +36,21 @@ void read_statistic(detail::Phrase& phrase, StopRule& rule) {
   }
 }
 
-StopCheck estimated(const StopRule& rule, std::span<const double> errors) {
+StopCheck estimated(const StopRule& rule, const ValuePasses& errors) {
   StopCheck check;
   switch (rule.statistic) {
-    case StopRule::Statistic::mean: {
-      const Moments about = moments(errors);
-      check.estimate = about.mean;
-      check.interval = mean_interval(about, default_confidence);
+    case StopRule::Statistic::mean:
+      check.estimate = errors.moments().mean;
+      check.interval = mean_interval(errors.moments(), default_confidence);
       break;
-    }
     case StopRule::Statistic::standard_deviation:
-      check.estimate = moments(errors).standard_deviation;
-      check.interval = bootstrap_deviation_interval(errors, default_confidence);
+      check.estimate = errors.moments().standard_deviation;
+      check.interval = errors.deviation_interval();
       break;
-    case StopRule::Statistic::percentile: {
-      const std::vector<double> ascending = sorted(errors);
-      check.estimate = percentile(ascending, rule.level);
-      check.interval = percentile_interval(ascending, rule.level, default_confidence);
+    case StopRule::Statistic::percentile:
+      check.estimate = errors.percentile(rule.level);
+      check.interval = errors.percentile_interval(rule.level);
       break;
-    }
   }
   return check;
 }
@@ -86,9 +79,24 @@ std::uint64_t next_stop_check(std::uint64_t num_runs) {
   return count;
 }
 
+ValuePasses::Wanted wanted_by(const StopRule& rule) {
+  ValuePasses::Wanted wanted;
+  if (rule.statistic == StopRule::Statistic::percentile) wanted.levels = {rule.level};
+  wanted.has_deviation_interval = rule.statistic == StopRule::Statistic::standard_deviation;
+  return wanted;
+}
+
 StopCheck check_stop_rule(const StopRule& rule, std::span<const double> errors) {
   detail::check_values("errors", errors, 0);
-  if (errors.empty()) return {};
+  ValuePasses passes(wanted_by(rule));
+  do {
+    for (const double error : errors) passes.add(error);
+  } while (passes.end_pass());
+  return check_stop_rule(rule, passes);
+}
+
+StopCheck check_stop_rule(const StopRule& rule, const ValuePasses& errors) {
+  if (errors.count() == 0) return {};
   StopCheck check = estimated(rule, errors);
   if (!check.interval) return check;
   const double half_width = 0.5 * (check.interval->upper - check.interval->lower);

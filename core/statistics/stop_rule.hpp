@@ -7,6 +7,7 @@
 
 #include "core/campaign/parameter.hpp"
 #include "core/statistics/interval.hpp"
+#include "core/statistics/value_passes.hpp"
 
 namespace proofmass {
 
@@ -48,5 +49,10 @@ struct StopCheck {
 /// those that have an estimate.
 /// @throws InvalidArgument if an error is not finite.
 [[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, std::span<const double> errors);
+
+/// The same of errors that were seen in passes.
+/// @param errors  Made for wanted_by(rule); no further pass is needed.
+[[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, const ValuePasses& errors);
+[[nodiscard]] ValuePasses::Wanted wanted_by(const StopRule& rule);
 
 }  // namespace proofmass
