@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,16 +19,25 @@
 
 namespace proofmass::coordinator {
 
-/// A campaign that is compared with another: 184 bytes a run.
+/// Results in run order, one a call; empty after the last.
+using ResultStream = std::function<std::optional<RunResult>()>;
+
+/// A campaign that is compared with another.
 struct ComparedCampaign {
   Campaign campaign;
   std::string model_version;
   std::string build;
-  std::vector<RunResult> results;  ///< In run order.
   std::uint64_t num_given_up = 0;  ///< Runs without a result.
+  /// Begins with the first result, the same ones each time: they are read several times and not
+  /// kept.
+  std::function<ResultStream()> open_results;
 };
 
-/// @throws StoreError or CampaignFileError if the file cannot be read, Interrupted.
+/// Holds the results against the stored digest and names the campaign of the file. The Store
+/// outlives what is returned, and one state of the file is read meanwhile
+/// (Store::read_one_state()).
+/// @throws StoreError or CampaignFileError if the file cannot be read or holds other results than
+///         were stored, see check_digest(); Interrupted; so do the streams.
 [[nodiscard]] ComparedCampaign read_compared(const Store& store, const IsStopped& is_stopped);
 
 /// |estimate − truth| of one parameter over the runs of one side that are compared, SI.
@@ -70,6 +80,9 @@ struct CampaignComparison {
 /// Compares the runs with an estimate: those that both campaigns have, run by run, if their seed
 /// and the truths of all common runs agree to the last bit, and else all of each. P-values are of
 /// Wilcoxon's signed ranks for pairs and of UnpairedComparison else; intervals are of 95 %.
+///
+/// Keeps 8 bytes a run, as ranks need all differences of a parameter, and 128 MB of several
+/// parameters' at a time to save passes.
 [[nodiscard]] CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                                    const ComparedCampaign& second);
 

@@ -20,20 +20,21 @@ std::string heading() {
 
 }  // namespace
 
-void walk_results(const Store& store, const IsStopped& is_stopped,
-                  const std::function<void(const RunResult&)>& visit) {
+WalkedResults walk_results(const Store& store, const IsStopped& is_stopped,
+                           const std::function<void(const RunResult&)>& visit) {
   constexpr std::uint64_t visits_between_questions = 1024;
   std::uint64_t num_visits = 0;
-  store.for_each_result([&](const RunResult& result) {
+  return walk_checked(store, [&](const RunResult& result) {
     if (num_visits++ % visits_between_questions == 0 && is_stopped()) throw Interrupted();
     visit(result);
   });
 }
 
 void export_csv(const Store& store, TextOutput& output, const IsStopped& is_stopped) {
+  check_definition_digest(store);
   output.write(heading());
   fmt::memory_buffer line;
-  walk_results(store, is_stopped, [&](const RunResult& result) {
+  (void)walk_results(store, is_stopped, [&](const RunResult& result) {
     line.clear();
     const auto end = std::back_inserter(line);
     fmt::format_to(end, "{},{},{},{}", result.run.value, name_of(result.status), result.num_draws,

@@ -76,9 +76,9 @@ Check check_stored_statistics(const Store& store, const Scenario& scenario,
                               const ResultScan& scan) {
   const std::optional<Summary> summary = store.summary();
   if (!summary) return check_first(store, scenario);
-  if (summary->num_finished == scan.runs.size() && summary->digest == scan.digest &&
+  if (summary->num_finished == num_runs_in(scan.runs) && summary->digest == scan.digest &&
       scan.num_violations == 0) {
-    return check_current(store, scenario, *summary, scan.accumulator.statistics());
+    return check_current(store, scenario, *summary, read_results(store, scenario).statistics);
   }
   Lines lines = store.budget_differences(budget_before_calibration(scenario));
   const std::uint64_t num_counted =
@@ -91,22 +91,9 @@ Check check_stored_statistics(const Store& store, const Scenario& scenario,
   return Check::not_checked("they are not of the results that are in the file");
 }
 
-namespace {
-
-/// Runs [0, n) that are finished, and were before any stop check of as many runs: none of them was
-/// ever given up, to be finished later.
-std::uint64_t num_held(const Store& store, const ResultScan& scan) {
-  std::uint64_t num_runs = 0;
-  while (num_runs < scan.runs.size() && scan.runs[num_runs].value == num_runs) ++num_runs;
-  return std::min(num_runs, store.num_before_blame());
-}
-
-}  // namespace
-
 Check check_stored_stop_checks(const Store& store, const ResultScan& scan) {
   if (scan.num_violations > 0) return Check::not_checked("a result breaks its rule");
-  const std::uint64_t num_runs = num_held(store, scan);
-  Lines lines = stop_check_differences(store, scan.accumulator, num_runs);
+  Lines lines = stop_check_differences(store);
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
   const auto num_checks = static_cast<std::uint64_t>(store.stop_checks().size());
   return Check::holds(num_checks == 0 ? "none" : fmt::format("{} of a stop rule", num_checks));

@@ -5,6 +5,7 @@
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/archive/text_output.hpp"
+#include "coordinator/report/digest_check.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/run_result.hpp"
 
@@ -15,8 +16,9 @@ namespace proofmass::coordinator {
 // Memory does not grow with the runs, and a coordinator may write meanwhile: what is exported are
 // the runs that were stored at one instant.
 //
-// All throw ArchiveError if the output cannot be written, StoreError if the file cannot be read,
-// and Interrupted; then no file appears.
+// All throw ArchiveError if the output cannot be written, StoreError if the file cannot be read or
+// if its results or its definition are not those that were stored, see check_digest(), and
+// Interrupted; then no file appears. Standard output has the results by then.
 
 /// One line a run after a line of headings, as of RFC 4180; cells without a meaning are empty.
 void export_csv(const Store& store, TextOutput& output, const IsStopped& is_stopped);
@@ -30,9 +32,9 @@ void export_json(const Store& store, TextOutput& output, const IsStopped& is_sto
 void export_hdf5(const Store& store, const std::filesystem::path& file,
                  const IsStopped& is_stopped);
 
-/// Calls visit(result) for each finished run, in run order.
+/// walk_checked() with an end.
 /// @throws Interrupted soon after `is_stopped` says so.
-void walk_results(const Store& store, const IsStopped& is_stopped,
-                  const std::function<void(const RunResult&)>& visit);
+WalkedResults walk_results(const Store& store, const IsStopped& is_stopped,
+                           const std::function<void(const RunResult&)>& visit);
 
 }  // namespace proofmass::coordinator

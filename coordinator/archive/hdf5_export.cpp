@@ -13,7 +13,6 @@
 #include "coordinator/archive/draft_file.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
-#include "coordinator/report/digest.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -162,8 +161,6 @@ class Column {
     rows_.clear();
   }
 
-  [[nodiscard]] hsize_t num_rows() const { return num_written_ + rows_.size(); }
-
  private:
   const Writer* writer_;
   hid_t given_;
@@ -222,8 +219,6 @@ class Columns {
     for (Column<double>& column : values_) column.flush();
   }
 
-  [[nodiscard]] std::uint64_t num_runs() const { return run_index_.num_rows(); }
-
  private:
   Handle status_type_;
   Column<std::uint64_t> run_index_;
@@ -244,20 +239,18 @@ void describe_campaign(const Writer& writer, const Store& store) {
 
 void write_results(const Writer& writer, const Store& store, const IsStopped& is_stopped) {
   Columns columns(writer);
-  Digest digest;
-  walk_results(store, is_stopped, [&](const RunResult& result) {
-    columns.add(result);
-    digest.add(result);
-  });
+  const WalkedResults walked =
+      walk_results(store, is_stopped, [&](const RunResult& result) { columns.add(result); });
   columns.flush();
-  writer.set_count(writer.root(), "num_finished", columns.num_runs());
-  writer.set_text(writer.root(), "digest", digest.finish());
+  writer.set_count(writer.root(), "num_finished", walked.num_results);
+  writer.set_text(writer.root(), "digest", walked.digest);
 }
 
 }  // namespace
 
 void export_hdf5(const Store& store, const std::filesystem::path& file,
                  const IsStopped& is_stopped) {
+  check_definition_digest(store);
   DraftFile draft(file);
   Writer writer(draft);
   describe_campaign(writer, store);

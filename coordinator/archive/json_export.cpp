@@ -10,7 +10,6 @@
 
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
-#include "coordinator/report/digest.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -44,7 +43,7 @@ class RunLines {
     line_.clear();
     const auto end = std::back_inserter(line_);
     fmt::format_to(end, R"({}{{"run_index":{},"status":"{}","num_draws":{},"num_rounds":{})",
-                   num_runs_ == 0 ? "\n" : ",\n", result.run.value, name_of(result.status),
+                   is_first_ ? "\n" : ",\n", result.run.value, name_of(result.status),
                    result.num_draws, result.num_rounds);
     for (const ValueColumn& column : value_columns()) {
       const std::optional<double> value = column.value_in(result);
@@ -57,30 +56,26 @@ class RunLines {
     }
     line_.push_back('}');
     output_.write({line_.data(), line_.size()});
-    ++num_runs_;
+    is_first_ = false;
   }
-
-  [[nodiscard]] std::uint64_t num_runs() const { return num_runs_; }
 
  private:
   TextOutput& output_;
   fmt::memory_buffer line_;
-  std::uint64_t num_runs_ = 0;
+  bool is_first_ = true;
 };
 
 }  // namespace
 
 void export_json(const Store& store, TextOutput& output, const IsStopped& is_stopped) {
+  check_definition_digest(store);
   output.write(fmt::format("{{\"campaign\":{},\n\"columns\":{},\n\"runs\":[",
                            text_of(campaign_json(store)), text_of(columns_json())));
   RunLines lines(output);
-  Digest digest;
-  walk_results(store, is_stopped, [&](const RunResult& result) {
-    lines.add(result);
-    digest.add(result);
-  });
-  output.write(fmt::format("\n],\n\"num_finished\":{},\n\"digest\":\"{}\"}}\n", lines.num_runs(),
-                           digest.finish()));
+  const WalkedResults walked =
+      walk_results(store, is_stopped, [&](const RunResult& result) { lines.add(result); });
+  output.write(fmt::format("\n],\n\"num_finished\":{},\n\"digest\":\"{}\"}}\n", walked.num_results,
+                           walked.digest));
   output.finish();
 }
 

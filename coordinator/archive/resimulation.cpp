@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "coordinator/archive/result_columns.hpp"
+#include "core/campaign/run_ranges.hpp"
 #include "core/simulation/run.hpp"
 
 namespace proofmass::coordinator {
@@ -89,16 +90,20 @@ class Simulation {
 
 }  // namespace
 
-std::vector<RunIndex> chosen_runs(std::span<const RunIndex> runs, double fraction) {
-  if (runs.empty()) return {};
-  const double wanted = std::ceil(fraction * static_cast<double>(runs.size()));
-  const std::size_t count =
-      std::clamp(static_cast<std::size_t>(wanted), std::size_t{1}, runs.size());
-  std::vector<RunIndex> chosen;
-  for (std::size_t i = 0; i < count; ++i) {
-    chosen.push_back(runs[(2 * i + 1) * runs.size() / (2 * count)]);
+ChosenRuns::ChosenRuns(std::span<const RunRange> runs, double fraction)
+    : runs_(runs), num_runs_(num_runs_in(runs)), count_(0) {
+  if (num_runs_ == 0) return;
+  const double wanted = std::ceil(fraction * static_cast<double>(num_runs_));
+  count_ = std::clamp(static_cast<std::uint64_t>(wanted), std::uint64_t{1}, num_runs_);
+}
+
+RunIndex ChosenRuns::next(std::uint64_t i) {
+  const std::uint64_t place = (2 * i + 1) * num_runs_ / (2 * count_);
+  while (place - num_before_ >= runs_.front().count) {
+    num_before_ += runs_.front().count;
+    runs_ = runs_.subspan(1);
   }
-  return chosen;
+  return RunIndex{runs_.front().first.value + (place - num_before_)};
 }
 
 std::vector<ResultDifference> differences_of(const RunResult& stored, const RunResult& computed) {

@@ -2,14 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <iterator>
 #include <optional>
 #include <span>
 
-#include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/report/digest.hpp"
+#include "core/campaign/run_result.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -17,13 +15,10 @@ namespace {
 /// Holds results against what a simulation can yield.
 class Rules {
  public:
-  Rules(std::uint64_t num_runs, std::int64_t num_rounds_max, ResultScan& scan)
-      : num_runs_(num_runs), num_rounds_max_(num_rounds_max), scan_(scan) {}
+  Rules(std::int64_t num_rounds_max, ResultScan& scan)
+      : num_rounds_max_(num_rounds_max), scan_(scan) {}
 
   void check(const RunResult& result) {
-    if (result.run.value >= num_runs_) {
-      violate(result.run, fmt::format("must be below num_runs = {}", num_runs_));
-    }
     for (const std::string& broken : broken_count_rules(result, num_rounds_max_)) {
       violate(result.run, broken);
     }
@@ -42,53 +37,53 @@ class Rules {
   }
 
  private:
-  std::uint64_t num_runs_;
   std::int64_t num_rounds_max_;
   ResultScan& scan_;
 };
 
-std::vector<RunIndex> delivered_runs(const Store& store) {
-  std::vector<RunIndex> runs;
-  for (const RunRange& range : store.finished_runs()) {
-    for (std::uint64_t run = range.first.value; run < range.end(); ++run) runs.push_back({run});
+/// Appends to ranges that end before the run.
+void append(std::vector<RunRange>& ranges, RunIndex run) {
+  if (!ranges.empty() && ranges.back().end() == run.value) {
+    ++ranges.back().count;
+  } else {
+    ranges.push_back({.first = run, .count = 1});
   }
-  return runs;
 }
 
-std::vector<RunIndex> missing_in(std::span<const RunIndex> those, std::span<const RunIndex> these) {
-  std::vector<RunIndex> missing;
-  std::ranges::set_difference(these, those, std::back_inserter(missing));
-  return missing;
+/// Reports each of these runs that is not one of those; both ascending.
+void violate_missing(std::span<const RunRange> those, std::span<const RunRange> these,
+                     const std::string& what, Rules& rules) {
+  auto next = those.begin();
+  for (const RunRange& range : these) {
+    for (std::uint64_t run = range.first.value; run < range.end();) {
+      while (next != those.end() && next->end() <= run) ++next;
+      if (next != those.end() && next->first.value <= run) {
+        run = next->end();  // All of these are there.
+        continue;
+      }
+      rules.violate(RunIndex{run++}, what);
+    }
+  }
 }
 
 }  // namespace
 
 ResultScan scan_results(const Store& store, const Scenario& scenario, const IsStopped& is_stopped) {
-  ResultScan scan{.runs = {},
-                  .digest = {},
-                  .accumulator = StatisticsAccumulator(scenario.objectives),
-                  .num_violations = 0,
-                  .violations = {}};
-  Rules rules(store.num_runs(), scenario.estimation.num_rounds_max, scan);
+  ResultScan scan;
+  Rules rules(scenario.estimation.num_rounds_max, scan);
   Digest digest;
-  walk_results(store, is_stopped, [&](const RunResult& result) {
+  std::uint64_t num_visits = 0;
+  store.for_each_result([&](const RunResult& result) {
+    constexpr std::uint64_t visits_between_questions = 1024;
+    if (num_visits++ % visits_between_questions == 0 && is_stopped()) throw Interrupted();
     rules.check(result);
     digest.add(result);
-    if (scan.runs.empty() || scan.runs.back() < result.run) {
-      scan.accumulator.add(result);
-    } else {
-      rules.violate(result.run, "is out of order");  // In a damaged tree.
-    }
-    scan.runs.push_back(result.run);
+    append(scan.runs, result.run);
   });
-  const std::vector<RunIndex> delivered = delivered_runs(store);
   scan.digest = digest.finish();
-  for (const RunIndex run : missing_in(scan.runs, delivered)) {
-    rules.violate(run, "has a delivery and no result");
-  }
-  for (const RunIndex run : missing_in(delivered, scan.runs)) {
-    rules.violate(run, "has a result and no delivery");
-  }
+  const std::vector<RunRange> delivered = store.finished_runs();
+  violate_missing(scan.runs, delivered, "has a delivery and no result", rules);
+  violate_missing(delivered, scan.runs, "has a result and no delivery", rules);
   return scan;
 }
 

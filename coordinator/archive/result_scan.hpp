@@ -6,17 +6,16 @@
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/campaign/run_result.hpp"
+#include "core/campaign/identifiers.hpp"
 #include "core/campaign/scenario.hpp"
-#include "core/campaign/statistics.hpp"
 
 namespace proofmass::coordinator {
 
-/// What one pass over all results of a campaign file finds.
+/// What one pass over all results of a campaign file finds. Runs are ranges: memory does not grow
+/// with them unless every other one is missing.
 struct ResultScan {
-  std::vector<RunIndex> runs;         ///< Finished ones, ascending.
-  std::string digest;                 ///< Of their results.
-  StatisticsAccumulator accumulator;  ///< With their results.
+  std::vector<RunRange> runs;  ///< Finished ones, ascending.
+  std::string digest;          ///< Of their results.
   std::uint64_t num_violations = 0;
   std::vector<std::string> violations;  ///< The first ones: `run 3: num_draws = 0 (rule)`.
 };
@@ -27,7 +26,7 @@ inline constexpr std::uint64_t violations_named_max = 10;
 /// Reads all results and holds them against the rules of their status, and against the list of
 /// those who delivered them. Both are of one state of the file if Store::read_one_state() says so.
 ///
-/// @throws StoreError if the file cannot be read, Interrupted.
+/// @throws StoreError if the file cannot be read or has them in another order, Interrupted.
 [[nodiscard]] ResultScan scan_results(const Store& store, const Scenario& scenario,
                                       const IsStopped& is_stopped);
 

@@ -4,14 +4,25 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/report/digest_check.hpp"
 
 namespace proofmass::coordinator {
 
 Campaign stored_campaign(const Store& store) {
+  std::optional<Campaign> campaign;
+  store.read_one_state([&] {
+    check_definition_digest(store);
+    campaign = stored_campaign_unchecked(store);
+  });
+  return *std::move(campaign);
+}
+
+Campaign stored_campaign_unchecked(const Store& store) {
   std::vector<std::vector<double>> columns;
   for (std::size_t element = 0; element < num_drawn; ++element) {
     const std::array elements{element};

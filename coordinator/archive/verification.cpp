@@ -8,11 +8,12 @@
 
 #include "coordinator/archive/campaign_mark.hpp"
 #include "coordinator/archive/derived_checks.hpp"
-#include "coordinator/archive/export.hpp"
+#include "coordinator/archive/redraw.hpp"
 #include "coordinator/archive/resimulation.hpp"
 #include "coordinator/archive/result_scan.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/run_ranges.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -46,6 +47,7 @@ class Verification {
     make("statistics", [this] { return check_statistics(); });
     make("stop_checks", [this] { return check_stop_checks(); });
     make("audit", [this] { return check_contradictions(*store_); });
+    make("draws", [this] { return check_draws(); });
   }
 
   template <typename Make>
@@ -76,9 +78,16 @@ class Verification {
   }
 
   Check check_definition() {
-    campaign_ = stored_campaign(*store_);
+    campaign_ = stored_campaign_unchecked(*store_);
     std::vector<std::string> details =
         store_->parameter_differences(campaign_->scenario.objectives);
+    const std::string stored = store_->table_digest();  // Empty in a file from before version 6.
+    const std::string computed = store_->computed_table_digest();
+    if (!stored.empty() && computed != stored) {
+      details.push_back(
+          fmt::format("campaign.table_digest = {} (must be {}, that of definition and tables)",
+                      stored, computed));
+    }
     if (details.empty()) {
       return Check::holds(
           fmt::format("valid: seed {}, {} runs", campaign_->seed, campaign_->num_runs));
@@ -99,7 +108,8 @@ class Verification {
   Check check_results() {
     if (!campaign_) return Check::not_checked("the definition cannot be read");
     scan_ = scan_results(*store_, campaign_->scenario, is_stopped_);
-    const std::string counts = fmt::format("{} of {} runs", scan_->runs.size(), store_->num_runs());
+    const std::string counts =
+        fmt::format("{} of {} runs", num_runs_in(scan_->runs), store_->num_runs());
     if (scan_->num_violations == 0) return Check::holds(counts + ": each number obeys its rule");
     Check check = Check::fails(fmt::format("{}: {} {} broken", counts, scan_->num_violations,
                                            scan_->num_violations == 1 ? "rule is" : "rules are"));
@@ -118,7 +128,7 @@ class Verification {
     if (!summary) {
       return Check::not_checked("none is stored: a coordinator has the file, or was killed");
     }
-    const std::uint64_t num_now = scan_->runs.size();
+    const std::uint64_t num_now = num_runs_in(scan_->runs);
     if (num_now > summary->num_finished) {
       return Check::not_checked(
           fmt::format("it is of {} runs and {} are finished: a coordinator has the "
@@ -150,14 +160,41 @@ class Verification {
     return check_stored_stop_checks(*store_, *scan_);
   }
 
+  Check check_draws() {
+    if (!is_same_model_) return Check::not_checked("another model made the file");
+    if (!scan_) return Check::not_checked("the results cannot be read");
+    const Redraw redraw = redraw_runs(*store_, *campaign_, options_.num_threads, is_stopped_);
+    if (scan_->runs.empty()) return Check::not_checked("no run is finished");
+    if (redraw.num_drawn == 0) return Check::holds("no run has one");
+    if (redraw.num_different == 0) {
+      return Check::holds(
+          fmt::format("of {} runs made again: every truth is the same", redraw.num_drawn));
+    }
+    Check check = Check::fails(
+        fmt::format("of {} runs made again, of which {} {}", redraw.num_drawn, redraw.num_different,
+                    redraw.num_different == 1 ? "differs" : "differ"),
+        redraw.differences);
+    if (redraw.num_different > redraw.differences.size()) {
+      check.details.push_back(
+          fmt::format("and {} more", redraw.num_different - redraw.differences.size()));
+    }
+    return check;
+  }
+
   Check check_simulation() {
     if (!is_same_model_) return Check::not_checked("another model made the file");
     if (!scan_) return Check::not_checked("the results cannot be read");
-    const std::vector<RunResult> results = chosen_results();
-    if (results.empty()) return Check::not_checked("no run is finished");
-    const std::vector<ResultDifference> differences =
-        simulate_again(*campaign_, results, options_.num_threads, is_stopped_);
-    const std::string runs = fmt::format("{} of {} runs", results.size(), scan_->runs.size());
+    ChosenRuns chosen(scan_->runs, options_.fraction);
+    if (chosen.size() == 0) return Check::not_checked("no run is finished");
+    std::vector<ResultDifference> differences;
+    for (std::uint64_t done = 0; done < chosen.size();) {
+      const std::vector<RunResult> results = next_results(chosen, done);
+      const std::vector<ResultDifference> found =
+          simulate_again(*campaign_, results, options_.num_threads, is_stopped_);
+      differences.insert(differences.end(), found.begin(), found.end());
+      done += results.size();
+    }
+    const std::string runs = fmt::format("{} of {} runs", chosen.size(), num_runs_in(scan_->runs));
     if (differences.empty()) return Check::holds(runs + " simulated again: every bit is the same");
     return simulation_failure(runs, differences);
   }
@@ -182,15 +219,21 @@ class Verification {
     return check;
   }
 
-  // Results of the runs that are simulated again; one that is none of the campaign's cannot be.
-  std::vector<RunResult> chosen_results() {
-    std::vector<RunIndex> runs = scan_->runs;
-    std::erase_if(runs, [&](RunIndex run) { return run.value >= campaign_->num_runs; });
-    const std::vector<RunIndex> chosen = chosen_runs(runs, options_.fraction);
+  // Results of the next of the runs that are simulated again, so many that all threads are busy.
+  // Between them nothing is read: a coordinator that writes meanwhile can shorten its log.
+  std::vector<RunResult> next_results(ChosenRuns& chosen, std::uint64_t done) {
+    constexpr std::uint64_t num_at_a_time = 4096;
+    const std::uint64_t count = std::min(chosen.size() - done, num_at_a_time);
     std::vector<RunResult> results;
-    walk_results(*store_, is_stopped_, [&](const RunResult& result) {
-      if (std::ranges::binary_search(chosen, result.run)) results.push_back(result);
-    });
+    for (std::uint64_t i = done; i < done + count; ++i) {
+      if (is_stopped_()) throw Interrupted();
+      const RunIndex run = chosen.next(i);
+      const std::optional<RunResult> result = store_->results({run, 1}).next();
+      if (!result) {
+        store_->refuse_as_damaged(fmt::format("the result of run {} went away", run.value));
+      }
+      results.push_back(*result);
+    }
     return results;
   }
 

@@ -40,12 +40,13 @@ struct Check {
 /// How much is checked, and against what.
 struct VerifyOptions {
   double fraction = 0.01;       ///< Of the finished runs, simulated again; in [0, 1], one at least.
-  std::size_t num_threads = 1;  ///< That simulate; at least 1.
+  std::size_t num_threads = 1;  ///< That draw and simulate; at least 1.
   std::string_view model_version = proofmass::model_version;  ///< That of the simulation.
 };
 
 /// Checks whether a campaign file is whole and holds what its definition yields, in this order:
-/// file, integrity, definition, model, results, digest, statistics, stop_checks, audit, simulation.
+/// file, integrity, definition, model, results, digest, statistics, stop_checks, audit, draws,
+/// simulation.
 /// A check that fails ends none of the others that can still be made. Nothing is written, and a
 /// coordinator may write meanwhile.
 ///

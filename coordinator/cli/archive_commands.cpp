@@ -22,10 +22,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-ComparedCampaign read_file(const std::filesystem::path& file, const IsStopped& is_stopped) {
-  return read_compared(Store::open_read_only(file), is_stopped);
-}
-
 std::string text_of(const Note& note) {
   // Further lines of a note stand below its first.
   const std::string indent(note.time_utc.size() + 2, ' ');
@@ -59,8 +55,15 @@ int verify_database(const VerifyCommandOptions& options) {
 
 int compare_databases(const CompareOptions& options) {
   return run_until_stopped([&](const IsStopped& is_stopped) {
-    const CampaignComparison comparison = compare_campaigns(read_file(options.first, is_stopped),
-                                                            read_file(options.second, is_stopped));
+    const Store first = Store::open_read_only(options.first);
+    const Store second = Store::open_read_only(options.second);
+    CampaignComparison comparison;
+    first.read_one_state([&] {
+      second.read_one_state([&] {
+        comparison =
+            compare_campaigns(read_compared(first, is_stopped), read_compared(second, is_stopped));
+      });
+    });
     const auto print = options.format == AnswerFormat::json ? comparison_json : comparison_text;
     print_lines(print(comparison, options.first.string(), options.second.string()));
     return exit_done;

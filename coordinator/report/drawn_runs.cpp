@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "coordinator/report/digest_check.hpp"
 #include "core/campaign/draw.hpp"
 #include "core/campaign/run_ranges.hpp"
 
@@ -35,7 +36,7 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign,
   drawn.names = column_names();
   drawn.columns.resize(drawn.names.size());
   drawn.missing.num_given_up = num_runs_in(store.given_up_runs());
-  store.for_each_result([&](const RunResult& result) {
+  (void)walk_checked(store, [&](const RunResult& result) {
     if (drawn.runs.size() == num_runs_max) return;
     if (!result.has_estimate()) {
       drawn.missing.add(result);

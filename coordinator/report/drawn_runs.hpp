@@ -27,6 +27,7 @@ struct DrawnRuns {
 
 /// The first runs of a campaign file that have an estimate, `num_runs_max` of them at most.
 /// @param campaign  The definition in the file.
+/// @throws StoreError as walk_checked() does.
 [[nodiscard]] DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign,
                                         std::uint64_t num_runs_max);
 

@@ -2,19 +2,39 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "core/campaign/run_ranges.hpp"
+#include "core/campaign/statistics_passes.hpp"
 
 namespace proofmass::coordinator {
 
-std::string report_text(const Store& store, const Scenario& scenario) {
+namespace {
+
+// A run that is given up is one of those that lack a result, and as many as were counted with the
+// statistics.
+void check_given_up(const Store& store, const CampaignStatistics& statistics,
+                    std::uint64_t num_given_up) {
+  const std::optional<Summary> summary = store.summary();
+  if (summary && summary->num_finished == statistics.num_runs &&
+      num_given_up < summary->num_given_up) {
+    store.refuse_as_damaged(fmt::format("{} runs are given up, and its statistics are beside {}",
+                                        num_given_up, summary->num_given_up));
+  }
+}
+
+std::string report_of_one_state(const Store& store, const Scenario& scenario) {
   const ReadResults results = read_results(store, scenario);
   const CampaignStatistics& statistics = results.statistics;
+  const DigestCheck check = check_digest(store, statistics.num_runs, results.digest);
   const std::vector<RunRange> given_up = store.given_up_runs();
-  std::string text =
-      summary_text(store.name(), store.seed(), store.num_runs(), statistics, results.digest) +
-      given_up_text(given_up) + stop_text(store);
+  check_given_up(store, statistics, num_runs_in(given_up));
+  check_stop_checks(store);
+  std::string text = summary_text(store.name(), store.seed(), store.num_runs(), statistics,
+                                  results.digest, check) +
+                     given_up_text(given_up) + stop_text(store);
   for (const std::string& table :
        {accuracy_table(scenario, statistics), interval_table(statistics, num_runs_in(given_up)),
         budget_table(scenario, statistics)}) {
@@ -23,13 +43,26 @@ std::string report_text(const Store& store, const Scenario& scenario) {
   return text;
 }
 
+}  // namespace
+
+std::string report_text(const Store& store, const Scenario& scenario) {
+  std::string text;
+  store.read_one_state([&] { text = report_of_one_state(store, scenario); });
+  return text;
+}
+
 std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_t num_runs,
-                         const CampaignStatistics& statistics, std::string_view digest) {
+                         const CampaignStatistics& statistics, std::string_view digest,
+                         DigestCheck check) {
   const std::uint64_t num_imperfect =
       statistics.num_not_converged + statistics.num_not_finite + statistics.num_no_draw;
-  std::string text = fmt::format(
-      "Campaign  {}\nSeed      {}\nDigest    {}\nRuns      {} finished of {}, {} completed\n", name,
-      seed, digest, statistics.num_runs, num_runs, statistics.num_runs - num_imperfect);
+  std::string text = fmt::format("Campaign  {}\nSeed      {}\nDigest    {}\n", name, seed, digest);
+  if (check == DigestCheck::not_checked) {
+    text += fmt::format("          (not checked: no stored one of these {} runs)\n",
+                        statistics.num_runs);
+  }
+  text += fmt::format("Runs      {} finished of {}, {} completed\n", statistics.num_runs, num_runs,
+                      statistics.num_runs - num_imperfect);
   if (num_imperfect > 0) {
     text += fmt::format("          {} not converged, {} not finite, {} without draw\n",
                         statistics.num_not_converged, statistics.num_not_finite,
@@ -65,16 +98,20 @@ bool are_current(const Store& store) {
 }  // namespace
 
 ReadResults read_results(const Store& store, const Scenario& scenario) {
-  ReadResults results{
-      .accumulator = StatisticsAccumulator(scenario.objectives), .statistics = {}, .digest = {}};
-  Digest digest;
-  store.for_each_result([&](const RunResult& result) {
-    require_in_range(result);
-    results.accumulator.add(result);
-    digest.add(result);
+  StatisticsPasses passes(scenario.objectives);
+  ReadResults results;
+  store.read_one_state([&] {
+    Digest digest;
+    store.for_each_result([&](const RunResult& result) {
+      require_in_range(result);
+      passes.add(result);
+      digest.add(result);
+    });
+    while (passes.end_pass()) {
+      store.for_each_result([&](const RunResult& result) { passes.add(result); });
+    }
+    results = {.statistics = passes.statistics(), .digest = digest.finish()};
   });
-  results.statistics = results.accumulator.statistics();
-  results.digest = digest.finish();
   return results;
 }
 

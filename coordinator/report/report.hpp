@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "coordinator/report/digest_check.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/scenario.hpp"
 #include "core/campaign/statistics.hpp"
@@ -14,14 +15,18 @@ namespace proofmass::coordinator {
 
 /// Everything that `proofmass report` prints: summary and all tables, computed from the results in
 /// the file. Lines have at most 80 characters.
+/// @throws StoreError if results, given-up runs or stop checks are not what was stored; see
+///         check_digest().
 [[nodiscard]] std::string report_text(const Store& store, const Scenario& scenario);
 
 /// Name, seed, and how many runs ended how.
 /// @param num_runs  Runs wanted.
 /// @param digest    Of the results; see Digest.
+/// @param check     A line says so if the digest could not be checked.
 [[nodiscard]] std::string summary_text(std::string_view name, std::uint64_t seed,
                                        std::uint64_t num_runs, const CampaignStatistics& statistics,
-                                       std::string_view digest);
+                                       std::string_view digest,
+                                       DigestCheck check = DigestCheck::holds);
 
 /// The line that names the runs that were given up; empty if there are none.
 /// @param given_up  Ascending.
@@ -41,13 +46,15 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string budget_table(const Scenario& scenario,
                                        const CampaignStatistics& statistics);
 
-/// What one pass over the results of a campaign file yields.
+/// What the results of a campaign file yield.
 struct ReadResults {
-  StatisticsAccumulator accumulator;  ///< With all errors.
   CampaignStatistics statistics;
   std::string digest;
 };
 
+/// Reads all results, of one state of the file, as often as StatisticsPasses needs them: twice if
+/// they are many. Memory does not grow with them.
+/// @throws Error if a number is out of range, see require_in_range().
 [[nodiscard]] ReadResults read_results(const Store& store, const Scenario& scenario);
 
 /// Stores statistics, their digest, and the budgets that follow from them in the file.

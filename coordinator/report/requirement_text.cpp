@@ -4,9 +4,9 @@
 
 #include <cmath>
 
+#include "coordinator/report/digest_check.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "core/campaign/run_ranges.hpp"
-#include "core/campaign/statistics.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
@@ -22,6 +22,19 @@ std::string_view name_of(Verdict verdict) {
       return "undecided";
   }
   PROOFMASS_EXPECT(false);
+}
+
+/// Keeps the errors of one parameter, 8 bytes a run, at a time.
+void check(const Store& store, RequirementAnswer& answer) {
+  const Parameter parameter = answer.requirement.parameter;
+  answer.missing = {.num_given_up = num_runs_in(store.given_up_runs())};
+  std::vector<double> errors;
+  (void)walk_checked(store, [&](const RunResult& result) {
+    require_in_range(result);
+    answer.missing.add(result);
+    if (result.has_estimate()) errors.push_back(std::abs(result.error(parameter)));
+  });
+  answer.check = check_requirement(answer.requirement, errors, answer.missing.total());
 }
 
 std::string percent(double fraction) { return fmt::format("{:.4g} %", 100.0 * fraction); }
@@ -83,19 +96,8 @@ std::vector<RequirementAnswer> check_requirements(const Store& store,
     answers.push_back(
         {.text = text, .requirement = parse_requirement(text), .check = {}, .missing = {}});
   }
-  ParameterArray no_objectives{};
-  StatisticsAccumulator accumulator(no_objectives);
-  MissingEstimates missing{.num_given_up = num_runs_in(store.given_up_runs())};
-  store.for_each_result([&](const RunResult& result) {
-    require_in_range(result);
-    accumulator.add(result);
-    missing.add(result);
-  });
   for (RequirementAnswer& answer : answers) {
-    std::vector<double> errors = accumulator.errors(answer.requirement.parameter);
-    for (double& error : errors) error = std::abs(error);
-    answer.check = check_requirement(answer.requirement, errors, missing.total());
-    answer.missing = missing;
+    store.read_one_state([&] { check(store, answer); });
   }
   return answers;
 }

@@ -9,6 +9,7 @@
 
 #include "coordinator/report/report.hpp"
 #include "core/statistics/stop_rule.hpp"
+#include "core/statistics/value_passes.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -16,8 +17,15 @@ namespace {
 /// `std(a_c13)` of `std(a_c13) within 5%`.
 std::string_view statistic_of(std::string_view rule) { return rule.substr(0, rule.find(')') + 1); }
 
-StopCheck check_with(const StopRule& rule, std::vector<double> errors) {
-  for (double& error : errors) error = std::abs(error);
+/// The rule against the runs [0, num_runs) that have an estimate.
+StopCheck check_with(const StopRule& rule, const Store& store, std::uint64_t num_runs) {
+  ValuePasses errors(wanted_by(rule));
+  do {
+    ResultReader reader = store.results({RunIndex{0}, num_runs});
+    while (const std::optional<RunResult> result = reader.next()) {
+      if (result->has_estimate()) errors.add(std::abs(result->error(rule.parameter)));
+    }
+  } while (errors.end_pass());
   return check_stop_rule(rule, errors);
 }
 
@@ -32,15 +40,23 @@ std::optional<std::uint64_t> summarise_file(
     const std::filesystem::path& file, const Scenario& scenario,
     const std::function<void(const std::function<void(Store&)>&)>& write) {
   const Store reader = Store::open_read_only(file);
-  const ReadResults results = read_results(reader, scenario);
-  const StopPlan plan = reader.stop_plan();
+  ReadResults results;
+  StopPlan plan;
+  StopRule rule;
+  StopCheck check;
+  std::uint64_t num_runs = 0;
+  reader.read_one_state([&] {
+    results = read_results(reader, scenario);
+    plan = reader.stop_plan();
+    num_runs = reader.num_runs();
+    if (plan.stop_rule.empty()) return;
+    rule = parse_stop_rule(plan.stop_rule);
+    check = check_with(rule, reader, num_runs);
+  });
   if (plan.stop_rule.empty()) {
     write([&](Store& store) { write_statistics(store, scenario, results); });
     return std::nullopt;
   }
-  const StopRule rule = parse_stop_rule(plan.stop_rule);
-  const StopCheck check = check_with(rule, results.accumulator.errors(rule.parameter));
-  const std::uint64_t num_runs = reader.num_runs();
   write([&](Store& store) {
     write_statistics(store, scenario, results);
     store.record_stop_check(num_runs, statistic_of(plan.stop_rule), check);
@@ -51,15 +67,6 @@ std::optional<std::uint64_t> summarise_file(
 }
 
 namespace {
-
-/// Errors of the runs [0, num_runs) that have an estimate.
-std::vector<double> errors_of_first(const StatisticsAccumulator& results, Parameter parameter,
-                                    std::uint64_t num_runs) {
-  const std::vector<RunIndex>& runs = results.estimated_runs();
-  const auto end = std::ranges::lower_bound(runs, RunIndex{num_runs});
-  const std::vector<double>& errors = results.errors(parameter);
-  return {errors.begin(), errors.begin() + (end - runs.begin())};
-}
 
 /// A rule of the statistic that a row is of; empty if there is no such statistic.
 std::optional<StopRule> rule_of(const StopCheckRow& row) {
@@ -76,35 +83,39 @@ bool was_reached(const StopCheck& check, bool stored) {
   return *check.relative_half_width == 0.0 || stored;
 }
 
-StopCheckRow recomputed(const StopCheckRow& row, const StopRule& rule,
-                        const StatisticsAccumulator& results) {
+StopCheckRow recomputed(const StopCheckRow& row, const StopRule& rule, const Store& store) {
   StopCheckRow must = row;
-  must.check = check_with(rule, errors_of_first(results, rule.parameter, row.num_runs));
+  must.check = check_with(rule, store, row.num_runs);
   must.check.is_reached = was_reached(must.check, row.check.is_reached);
   return must;
 }
 
 /// The check that ended a campaign; empty if it has not ended, or has no rule.
-std::optional<StopCheckRow> deciding_check(const Store& store,
-                                           const StatisticsAccumulator& results) {
+std::optional<StopCheckRow> deciding_check(const Store& store) {
   const std::string text = store.stop_plan().stop_rule;
   if (text.empty() || store.control().phase != wire::CampaignPhase::finished) return std::nullopt;
   const StopRule rule = parse_stop_rule(text);
   const std::uint64_t num_runs = store.num_runs();
-  return StopCheckRow{
-      .statistic = std::string(statistic_of(text)),
-      .num_runs = num_runs,
-      .check = check_with(rule, errors_of_first(results, rule.parameter, num_runs))};
+  return StopCheckRow{.statistic = std::string(statistic_of(text)),
+                      .num_runs = num_runs,
+                      .check = check_with(rule, store, num_runs)};
+}
+
+/// Runs [0, n) that are finished, and were before any stop check of as many runs: none of them was
+/// ever given up, to be finished later.
+std::uint64_t num_held(const Store& store) {
+  const std::vector<RunRange> finished = store.finished_runs();
+  if (finished.empty() || finished.front().first.value != 0) return 0;
+  return std::min(finished.front().count, store.num_before_blame());
 }
 
 }  // namespace
 
-std::vector<std::string> stop_check_differences(const Store& store,
-                                                const StatisticsAccumulator& results,
-                                                std::uint64_t num_held) {
+std::vector<std::string> stop_check_differences(const Store& store) {
   std::vector<std::string> differences;
   std::vector<StopCheckRow> expected;
   const std::uint64_t num_runs = store.num_runs();
+  const std::uint64_t num_runs_held = num_held(store);
   for (const StopCheckRow& row : store.stop_checks()) {
     const std::optional<StopRule> rule = rule_of(row);
     if (!rule) {
@@ -113,16 +124,21 @@ std::vector<std::string> stop_check_differences(const Store& store,
     } else if (row.num_runs > num_runs) {
       differences.push_back(fmt::format("stop_check.num_runs of {} = {} (must be at most {})",
                                         row.statistic, row.num_runs, num_runs));
-    } else if (row.num_runs <= num_held) {
-      expected.push_back(recomputed(row, *rule, results));
+    } else if (row.num_runs <= num_runs_held) {
+      expected.push_back(recomputed(row, *rule, store));
     }
   }
   // Comes last: of two expected rows of one check, this one holds.
-  if (num_runs <= num_held) {
-    if (const auto deciding = deciding_check(store, results)) expected.push_back(*deciding);
+  if (num_runs <= num_runs_held) {
+    if (const auto deciding = deciding_check(store)) expected.push_back(*deciding);
   }
   std::ranges::copy(store.stop_check_differences(expected), std::back_inserter(differences));
   return differences;
+}
+
+void check_stop_checks(const Store& store) {
+  const std::vector<std::string> differences = stop_check_differences(store);
+  if (!differences.empty()) store.refuse_as_damaged(differences.front());
 }
 
 bool is_rule_missed(const Store& store) {

@@ -9,7 +9,6 @@
 
 #include "coordinator/store/store.hpp"
 #include "core/campaign/scenario.hpp"
-#include "core/campaign/statistics.hpp"
 
 namespace proofmass::coordinator {
 
@@ -29,12 +28,13 @@ std::optional<std::uint64_t> summarise_file(
 /// Beside the rows that are there, that of the campaign's rule and of all runs must be there once
 /// the campaign has ended.
 ///
-/// @param results   All that are stored, and no others.
-/// @param num_held  Rows of up to so many runs are held against the results: all of these runs are
-///                  finished, and were when the rule was checked.
-[[nodiscard]] std::vector<std::string> stop_check_differences(const Store& store,
-                                                              const StatisticsAccumulator& results,
-                                                              std::uint64_t num_held);
+/// Rows of n runs are held against the results if all runs below n are finished, and were when the
+/// rule was checked, as no loss was blamed on any of them.
+/// @pre All results are in range, and one state of the file is read.
+[[nodiscard]] std::vector<std::string> stop_check_differences(const Store& store);
+
+/// @throws StoreError `campaign file = x.db (is damaged: ...)` with the first of these differences.
+void check_stop_checks(const Store& store);
 
 /// What came of a campaign's stop rule, in two lines of at most 80 characters; empty if there is
 /// none or it was not checked.

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <string>
 
+#include "tests/coordinator/archive/damaged_file.hpp"
 #include "tests/system/campaign_process.hpp"
 
 namespace proofmass::test {
@@ -51,7 +52,7 @@ TEST_F(ArchiveProcess, VerifiesWhatWorkersComputedAndABackupOfIt) {
   change("copy.db", "UPDATE run_result SET num_rounds = num_rounds + 1 WHERE run_index = 20");
   EXPECT_EQ(proofmass("again", {"verify", "copy.db", "--fraction", "1"}).wait(), 1);
   EXPECT_TRUE(contains(output_of("again"), "run 20: num_rounds\n")) << output_of("again");
-  EXPECT_TRUE(contains(errors_of("again"), "copy.db: 2 of 10 checks fail")) << errors_of("again");
+  EXPECT_TRUE(contains(errors_of("again"), "copy.db: 2 of 11 checks fail")) << errors_of("again");
 }
 
 TEST_F(ArchiveProcess, WorksOnAFileThatIsBeingServed) {
@@ -69,6 +70,41 @@ TEST_F(ArchiveProcess, WorksOnAFileThatIsBeingServed) {
   for (const auto& [index, stored] : of_copy) EXPECT_EQ(stored, reference().at(index));
   EXPECT_EQ(proofmass("list", {"list"}).wait(), 0);
   EXPECT_TRUE(contains(output_of("list"), "tags: thesis")) << output_of("list");
+}
+
+// Whatever a file holds, no command ends by a signal: rows out of order reached an assertion.
+TEST_F(ArchiveProcess, RefusesAFileWhoseRowsAreOutOfOrder) {
+  for (const std::string table : {"run_result", "delivery"}) {
+    ASSERT_EQ(start(table, {"--workers", "1", "--runs", "12"}).wait(), 0) << errors_of(table);
+    const std::string file = table + ".db";
+    swap_keys(path(file), table, 3, 7);
+    const bool has_results = table == "delivery";
+    EXPECT_EQ(proofmass("verify", {"verify", file}).wait(), 1) << output_of("verify");
+    EXPECT_TRUE(contains(output_of("verify"), "is damaged: "));
+    EXPECT_EQ(proofmass("again", {"verify", file, "--fraction", "1"}).wait(), 1);
+    EXPECT_EQ(proofmass("report", {"report", file}).wait(), has_results ? 0 : 1);
+    EXPECT_EQ(proofmass("export", {"export", file}).wait(), has_results ? 0 : 1);
+    EXPECT_EQ(proofmass("compare", {"compare", file, "done.db"}).wait(), has_results ? 0 : 1);
+    EXPECT_EQ(proofmass("sensitivity", {"sensitivity", file}).wait(), 1) << "or too few runs";
+    EXPECT_EQ(proofmass("list", {"list", file}).wait(), 0);
+    EXPECT_EQ(start(table, {"--workers", "1", "--runs", "12"}).wait(), 1) << errors_of(table);
+    EXPECT_TRUE(contains(errors_of(table), "is damaged: ")) << errors_of(table);
+  }
+}
+
+// One bit of a number: its text would be another one, with nothing to show for it.
+TEST_F(ArchiveProcess, RefusesToPrintNumbersThatWereChanged) {
+  const std::string sql =
+      "UPDATE run_result SET estimate_k2d_s2_m = estimate_k2d_s2_m * 1.01 WHERE run_index = 20";
+  change("done.db", sql);
+  for (const std::string command :
+       {"report done.db", "export done.db", "sensitivity done.db", "compare done.db done.db"}) {
+    EXPECT_EQ(shell(programs + "/proofmass " + command + " > /dev/null 2> changed.err"), 1)
+        << command;
+    EXPECT_TRUE(
+        contains(read_file(path("changed.err")), "is damaged: the digest of its 32 results"))
+        << command << read_file(path("changed.err"));
+  }
 }
 
 TEST_F(ArchiveProcess, SaysThatAPipeIsClosedOrADiskIsFull) {

@@ -182,7 +182,7 @@ TEST_F(ArchiveCommands, VerifyEndsWithOneIfACheckFails) {
   EXPECT_EQ(verify_database({.database = database_}), exit_cannot_be_done);
   EXPECT_NE(testing::internal::GetCapturedStdout().find("file        FAILS"), std::string::npos);
   EXPECT_EQ(testing::internal::GetCapturedStderr(),
-            "proofmass: error: " + database_.string() + ": 1 of 10 checks fails\n");
+            "proofmass: error: " + database_.string() + ": 1 of 11 checks fails\n");
 }
 
 }  // namespace

@@ -1,0 +1,201 @@
+// A disk that changes bits: whatever is read from a campaign file is what was stored, or is
+// refused.
+
+#include <gtest/gtest.h>
+
+#include <exception>
+#include <fstream>
+#include <random>
+#include <string>
+
+#include "coordinator/archive/comparison.hpp"
+#include "coordinator/archive/comparison_text.hpp"
+#include "coordinator/archive/export.hpp"
+#include "coordinator/archive/listing.hpp"
+#include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/archive/verification.hpp"
+#include "coordinator/report/summarise.hpp"
+#include "tests/coordinator/archive/archive_fixture.hpp"
+#include "tests/coordinator/archive/damaged_file.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr const char* refused = "refused";
+
+class BitFlips : public test::StoreTest {
+ protected:
+  /// A campaign that has ended by a rule, with a run that was given up and one of each status.
+  void SetUp() override {
+    std::vector<RunResult> results = test::results_of_each_status(40);
+    results.pop_back();
+    Store store = test::store_of(file(), test::campaign_of(40), results);
+    const std::vector<Entry> entries{LostRuns{.runs = {RunIndex{39}, 1},
+                                              .attempt = {1},
+                                              .worker = test::session_1,
+                                              .reason = wire::LossReason::crashed,
+                                              .is_blamed = true},
+                                     GivenUpRun{.run = RunIndex{39}}};
+    (void)store.write(entries);
+    store.set_stop_plan(
+        {.stop_rule = "mean(k2c) within 90%", .num_runs_max = 40, .failures_max = {}});
+    (void)summarise_file(file(), Scenario{},
+                         [&](const std::function<void(Store&)>& action) { action(store); });
+    const Entry finished = CampaignControl{.phase = wire::CampaignPhase::finished};
+    (void)store.write({&finished, 1});
+  }
+
+  /// What a command prints of a file, or that it refuses it.
+  template <typename Print>
+  static std::string printed(const Print& print) {
+    try {
+      return print();
+    } catch (const Error&) {
+      return refused;
+    }
+  }
+
+  [[nodiscard]] std::string report_of(const std::filesystem::path& path) const {
+    return printed([&] {
+      const Store store = Store::open_read_only(path);
+      return report_text(store, stored_campaign(store).scenario);
+    });
+  }
+
+  [[nodiscard]] std::string export_of(const std::filesystem::path& path, bool is_json) const {
+    return printed([&] {
+      const Store store = Store::open_read_only(path);
+      TextOutput output(directory() / "export");
+      (is_json ? export_json : export_csv)(store, output, test::never_stopped);
+      return test::content_of(directory() / "export");
+    });
+  }
+
+  [[nodiscard]] std::string comparison_of(const std::filesystem::path& path) const {
+    return printed([&] {
+      const Store first = Store::open_read_only(path), second = Store::open_read_only(file());
+      return comparison_json(compare_campaigns(read_compared(first, test::never_stopped),
+                                               read_compared(second, test::never_stopped)),
+                             "a", "b");
+    });
+  }
+
+  /// Calls check(file, what) with `count` copies of the file, each of them with another bit
+  /// changed.
+  template <typename Check>
+  void for_each_flip(std::uint64_t seed, int count, const Check& check) {
+    const std::string bytes = test::content_of(file());
+    const std::filesystem::path damaged = directory() / "damaged.db";
+    std::mt19937_64 random(seed);
+    for (int i = 0; i < count; ++i) {
+      const std::uint64_t bit = random() % (8 * bytes.size());
+      std::string flipped = bytes;
+      flipped[bit / 8] = static_cast<char>(flipped[bit / 8] ^ (1 << (bit % 8)));
+      test::write_file(damaged, flipped);
+      check(damaged, "bit " + std::to_string(bit % 8) + " of byte " + std::to_string(bit / 8));
+    }
+  }
+
+  template <typename Print>
+  void expect_what_was_stored_or_refused(std::uint64_t seed, int count, const Print& print) {
+    const std::string expected = print(file());
+    ASSERT_NE(expected, refused);
+    int num_refused = 0;
+    for_each_flip(seed, count, [&](const std::filesystem::path& path, const std::string& what) {
+      const std::string text = print(path);
+      if (text == refused) {
+        ++num_refused;
+      } else {
+        EXPECT_EQ(text, expected) << what;
+      }
+    });
+    EXPECT_GT(num_refused, count / 20) << "nothing is looked at";
+  }
+};
+
+TEST_F(BitFlips, LeaveAReportAsItIsOrMakeItRefused) {
+  expect_what_was_stored_or_refused(
+      1, 700, [&](const std::filesystem::path& path) { return report_of(path); });
+}
+
+TEST_F(BitFlips, LeaveExportsAsTheyAreOrMakeThemRefused) {
+  expect_what_was_stored_or_refused(
+      2, 200, [&](const std::filesystem::path& path) { return export_of(path, false); });
+  expect_what_was_stored_or_refused(
+      3, 200, [&](const std::filesystem::path& path) { return export_of(path, true); });
+}
+
+TEST_F(BitFlips, LeaveAComparisonAsItIsOrMakeItRefused) {
+  expect_what_was_stored_or_refused(
+      4, 150, [&](const std::filesystem::path& path) { return comparison_of(path); });
+}
+
+// Nothing but an Error comes out, and nothing aborts.
+TEST_F(BitFlips, EndNoVerificationAndNoListing) {
+  for_each_flip(5, 100, [&](const std::filesystem::path& path, const std::string& what) {
+    (void)printed([&] {
+      const bool holds = verify(
+          path, {.model_version = "another, so that nothing is simulated"}, [](const Check&) {},
+          test::never_stopped);
+      EXPECT_FALSE(holds) << what;
+      return std::string();
+    });
+    (void)printed([&] { return listing_text(list_campaigns(std::vector{path})); });
+  });
+}
+
+/// Two rows of a table whose keys changed places.
+class RowsOutOfOrder : public BitFlips {
+ protected:
+  void expect_refusal(const std::string& reason) {
+    const auto message = [&](const auto& action) { return test::error_of(action); };
+    const Store store = Store::open_read_only(file());
+    const std::string expected = "campaign file = " + file().string() + " (is damaged: " + reason +
+                                 "; restore it from a copy)";
+    EXPECT_EQ(message([&] { (void)report_text(store, Scenario{}); }), expected);
+    EXPECT_EQ(message([&] { (void)read_results(store, Scenario{}); }), expected);
+    EXPECT_EQ(message([&] {
+                TextOutput output(directory() / "export");
+                export_csv(store, output, test::never_stopped);
+              }),
+              expected);
+    EXPECT_EQ(message([&] {
+                (void)summarise_file(file(), Scenario{}, [](const std::function<void(Store&)>&) {});
+              }),
+              expected);
+  }
+};
+
+TEST_F(RowsOutOfOrder, OfResultsAreRefused) {
+  // A file of one page of results.
+  std::filesystem::remove(file());
+  (void)test::store_of(file(), test::campaign_of(9), test::results_of_each_status(9));
+  test::swap_keys(file(), "run_result", 5, 2);
+  expect_refusal("result of run 3 comes after that of run 5");
+  std::string results;
+  EXPECT_FALSE(verify(
+      file(), {},
+      [&](const Check& check) {
+        if (check.name == "results") results = check.finding;
+      },
+      test::never_stopped));
+  EXPECT_NE(results.find("is damaged: result of run 3 comes after that of run 5"),
+            std::string::npos)
+      << results;
+}
+
+TEST_F(RowsOutOfOrder, OfDeliveriesAreRefused) {
+  test::swap_keys(file(), "delivery", 20, 30);
+  const Store store = Store::open_read_only(file());
+  EXPECT_EQ(test::error_of([&] { (void)store.finished_runs(); }),
+            "campaign file = " + file().string() +
+                " (is damaged: run 21 comes after run 30; restore it from a copy)");
+}
+
+TEST_F(RowsOutOfOrder, OfGivenUpRunsThatHaveResultsAreRefused) {
+  test::change(file(), "UPDATE run_failure SET run_index = 3");
+  EXPECT_EQ(report_of(file()), refused);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
