@@ -53,7 +53,7 @@ void limit(zmq::socket_t& socket, std::size_t message_size, int linger) {
 
 /// Campaigns come in by the clients' door, and go out to workers.
 std::size_t received_size_max(Domain domain) {
-  return domain == Domain::clients ? definition_size_max : message_size_max;
+  return domain == Domain::clients ? definition_size_max : router_message_size_max;
 }
 
 /// Without an authenticator nobody gets in, instead of everybody. The library takes this option

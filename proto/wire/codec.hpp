@@ -15,6 +15,10 @@ namespace proofmass::wire {
 inline constexpr std::size_t definition_size_max = std::size_t{64} << 20;
 inline constexpr std::size_t message_size_max = std::size_t{4} << 20;
 
+/// What a coordinator's socket takes at once, bytes. A peer that has shown no key yet may fill a
+/// buffer of this size. 4096 results, the largest message of a worker, need 0.8 MiB.
+inline constexpr std::size_t router_message_size_max = std::size_t{1} << 20;
+
 enum class DecodeFault : std::uint8_t {
   too_large,      ///< More bytes than its kind may have.
   unparsable,     ///< Not an envelope.

@@ -2,8 +2,8 @@
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
-#include <poll.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -25,12 +25,17 @@ class RawPeer {
   /// Connects; says nothing yet.
   /// @param endpoint  tcp://127.0.0.1:PORT.
   explicit RawPeer(const std::string& endpoint) : file_(socket(AF_INET, SOCK_STREAM, 0)) {
+    // So that a test ends whatever the other end does.
+    const timeval patience{.tv_sec = 5, .tv_usec = 0};
+    setsockopt(file_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    setsockopt(file_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     address.sin_port =
         htons(static_cast<std::uint16_t>(std::stoi(endpoint.substr(endpoint.rfind(':') + 1))));
     if (connect(file_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+      close(file_);
       throw std::runtime_error("cannot connect to " + endpoint);
     }
   }
@@ -54,9 +59,8 @@ class RawPeer {
     send(frame(command,
                "\x05READY\x0bSocket-Type\0\0\0\x06"
                "DEALER"s));
-    read_exactly(64);
-    const std::string head = read_exactly(2);
-    (void)read_exactly(static_cast<std::uint8_t>(head[1]));
+    (void)read_exactly(64);
+    (void)receive();
   }
 
   static constexpr char more = 1;
@@ -91,10 +95,20 @@ class RawPeer {
     }
   }
 
-  /// Sends what the other end takes at once; false if the connection is closed.
-  [[nodiscard]] bool send_some(std::string_view bytes) {
-    return ::send(file_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT) >= 0 ||
-           errno == EAGAIN;
+  /// Sends what the other end takes at once, and says how much; -1 if the connection is closed.
+  [[nodiscard]] ssize_t send_some(std::string_view bytes) {
+    const ssize_t count = ::send(file_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    return count < 0 && errno == EAGAIN ? 0 : count;
+  }
+
+  /// The body of the next frame.
+  [[nodiscard]] std::string receive() {
+    const std::string head = read_exactly(2);
+    constexpr int is_large = 2;
+    if ((head[0] & is_large) == 0) return read_exactly(static_cast<std::uint8_t>(head[1]));
+    std::uint64_t size = static_cast<std::uint8_t>(head[1]);
+    for (const char byte : read_exactly(7)) size = size << 8 | static_cast<std::uint8_t>(byte);
+    return read_exactly(size);
   }
 
   /// Hangs up so that the other end sees an error, whatever is still under way.

@@ -23,7 +23,7 @@ TEST(Router, LimitsWhatEachDoorTakes) {
   const auto router = [&](Domain domain) {
     return make_router(context, "bind", "tcp://127.0.0.1:*", {.domain = domain, .keys = {}});
   };
-  EXPECT_EQ(router(Domain::workers).get(zmq::sockopt::maxmsgsize), 4 * mebibyte);
+  EXPECT_EQ(router(Domain::workers).get(zmq::sockopt::maxmsgsize), mebibyte);
   EXPECT_EQ(router(Domain::clients).get(zmq::sockopt::maxmsgsize), 64 * mebibyte);
   EXPECT_EQ(make_dealer(context, {}).get(zmq::sockopt::maxmsgsize), 64 * mebibyte);
 }
@@ -64,7 +64,7 @@ TEST(Router, ClosesTheConnectionOfWhoSendsTooMuch) {
     if (is_sent && !monitor.is_connected()) is_closed = true;
     if (!is_sent && monitor.is_connected()) {
       is_sent =
-          dealer.send(zmq::message_t(4 * mebibyte + 1), zmq::send_flags::dontwait).has_value();
+          dealer.send(zmq::message_t(mebibyte + 1), zmq::send_flags::dontwait).has_value();
     }
   }
   EXPECT_TRUE(is_closed);
