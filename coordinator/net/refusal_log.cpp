@@ -17,7 +17,9 @@ std::string_view plain(std::string_view address) {
   return is_mapped ? address.substr(mapped.size()) : address;
 }
 
-std::string_view or_none(std::string_view text) { return text.empty() ? "none" : text; }
+std::string_view or_else(std::string_view text, std::string_view substitute) {
+  return text.empty() ? substitute : text;
+}
 
 }  // namespace
 
@@ -26,8 +28,9 @@ RefusalLog::RefusalLog(std::function<void(Event)> log) : log_(std::move(log)) {}
 void RefusalLog::refused(const Refusal& refusal, TimePoint now) {
   if (lines_.empty() || now - began_at_ >= period) begin_minute(now);
   std::string line =
-      fmt::format("domain={} address={} key={} reason=\"{}\"", or_none(refusal.domain),
-                  or_none(plain(refusal.address)), or_none(refusal.public_key), refusal.reason);
+      fmt::format("domain={} address={} key={} reason=\"{}\"", or_else(refusal.domain, "none"),
+                  or_else(plain(refusal.address), "unknown"), or_else(refusal.public_key, "none"),
+                  refusal.reason);
   if (lines_.contains(line)) return;
   if (lines_.size() >= lines_per_period_max) {
     ++num_left_out_;

@@ -92,7 +92,7 @@ TEST_F(Keys, KeepWorkersOutThatHaveNone) {
   start_coordinator();
   const Process worker = null_worker("plain");
   wait_for_log("plain", "give --keys");
-  wait_for_log("coordinator", "peer_refused domain=workers address=none key=none reason=\"");
+  wait_for_log("coordinator", "peer_refused domain=workers address=unknown key=none reason=\"");
   expect_nobody_got_in();
 }
 
@@ -136,7 +136,7 @@ TEST_F(Keys, KeepClientsOutThatHaveNoneOrTheWrongOne) {
                        "key = " + public_key("stranger", "client") + " (refused"));
   EXPECT_TRUE(contains(refusal_of_client(workers_endpoint, {"--keys", "keys"}),
                        "key = " + public_key("keys", "client") + " (refused"));
-  wait_for_log("coordinator", "peer_refused domain=clients address=none key=none reason=\"");
+  wait_for_log("coordinator", "peer_refused domain=clients address=unknown key=none reason=\"");
   wait_for_log("coordinator",
                "key=" + public_key("stranger", "client") + " reason=\"unknown key\"");
   wait_for_log("coordinator", "peer_refused domain=workers address=127.0.0.1 key=" +

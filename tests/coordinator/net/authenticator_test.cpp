@@ -169,7 +169,7 @@ TEST_F(AuthenticatorTest, RefusesAPlainPeer) {
   Peer peer(endpoint(Domain::workers), {});
   const std::string told = refusal(peer);
   EXPECT_TRUE(told.starts_with("coordinator = " + endpoint(Domain::workers) + " (")) << told;
-  const std::string who = "domain=workers address=none key=none ";
+  const std::string who = "domain=workers address=unknown key=none ";
   // Whichever end notices first breaks off.
   EXPECT_TRUE(logged() == who + "reason=\"without a key\"" ||
               logged() == who + "reason=\"ends during the handshake, as one without a key does\"")
@@ -184,7 +184,7 @@ TEST_F(AuthenticatorTest, RefusesWhoTrustsAnotherCoordinator) {
                                " (breaks the connection off: it has another key than "
                                "coordinator.pub, or none, or is no coordinator)");
   EXPECT_EQ(logged(),
-            "domain=workers address=none key=none reason=\"trusts the key of another "
+            "domain=workers address=unknown key=none reason=\"trusts the key of another "
             "coordinator\"");
 }
 

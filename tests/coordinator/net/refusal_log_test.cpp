@@ -38,7 +38,7 @@ TEST_F(RefusalLogTest, WritesAddressesPlainly) {
   ASSERT_EQ(events_.size(), 3u);
   EXPECT_EQ(events_[0].text, "domain=workers address=10.0.0.7 key=KEY reason=\"unknown key\"");
   EXPECT_EQ(events_[1].text, "domain=workers address=::ffff:1 key=KEY reason=\"unknown key\"");
-  EXPECT_EQ(events_[2].text, "domain=workers address=none key=none reason=\"unknown key\"");
+  EXPECT_EQ(events_[2].text, "domain=workers address=unknown key=none reason=\"unknown key\"");
 }
 
 TEST_F(RefusalLogTest, SaysTheSameOnceAMinute) {
