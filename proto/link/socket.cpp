@@ -90,7 +90,7 @@ zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
 
 zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& security) {
   zmq::socket_t socket(context, zmq::socket_type::dealer);
-  limit(socket, definition_size_max, linger_of_dealer);
+  limit(socket, message_size_max, linger_of_dealer);
   // Without a connection nothing is queued: whoever needs an answer asks again.
   socket.set(zmq::sockopt::immediate, true);
   socket.set(zmq::sockopt::reconnect_ivl, reconnect_interval_min);

@@ -25,7 +25,7 @@ TEST(Router, LimitsWhatEachDoorTakes) {
   };
   EXPECT_EQ(router(Domain::workers).get(zmq::sockopt::maxmsgsize), mebibyte);
   EXPECT_EQ(router(Domain::clients).get(zmq::sockopt::maxmsgsize), 64 * mebibyte);
-  EXPECT_EQ(make_dealer(context, {}).get(zmq::sockopt::maxmsgsize), 64 * mebibyte);
+  EXPECT_EQ(make_dealer(context, {}).get(zmq::sockopt::maxmsgsize), 4 * mebibyte);
 }
 
 TEST(Router, BindsAllKindsOfAddresses) {
