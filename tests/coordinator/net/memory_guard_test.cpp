@@ -1,0 +1,127 @@
+#include "coordinator/net/memory_guard.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstring>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t mebibyte = std::size_t{1} << 20;
+
+TEST(MemoryBound, IsExceededFromThreeQuartersOn) {
+  MemoryBound bound(400);
+  EXPECT_FALSE(bound.is_exceeded(300));
+  EXPECT_TRUE(bound.is_exceeded(301));
+  EXPECT_FALSE(bound.note_reset(50));
+  EXPECT_TRUE(bound.is_exceeded(301));
+}
+
+TEST(MemoryBound, WaitsForAQuarterMoreIfAResetDidNotHelp) {
+  MemoryBound bound(400);
+  EXPECT_TRUE(bound.is_exceeded(500));
+  EXPECT_TRUE(bound.note_reset(480));
+  EXPECT_EQ(bound.limit(), 600U);
+  EXPECT_FALSE(bound.is_exceeded(600));
+  EXPECT_TRUE(bound.is_exceeded(601));
+  EXPECT_FALSE(bound.note_reset(601));  // Told once.
+  EXPECT_FALSE(bound.is_exceeded(700));
+}
+
+TEST(MemoryBound, IsAsBeforeOnceMemoryIsLow) {
+  MemoryBound bound(400);
+  EXPECT_TRUE(bound.note_reset(480));
+  EXPECT_FALSE(bound.is_exceeded(300));
+  EXPECT_TRUE(bound.is_exceeded(301));
+  EXPECT_TRUE(bound.note_reset(480));
+}
+
+TEST(ResidentMemory, GrowsWithWhatIsUsed) {
+  const ResidentMemory memory;
+  const std::size_t before = memory.size();
+  const std::vector<char> used(64 * mebibyte, 'x');
+  EXPECT_GE(memory.size(), before + 60 * mebibyte);
+  EXPECT_LE(memory.size(), before + 80 * mebibyte);
+}
+
+/// Sockets that hold so much of this process's memory.
+class MemoryGuardTest : public testing::Test {
+ protected:
+  [[nodiscard]] MemoryGuard::Actions actions() {
+    return {.close =
+                [this] {
+                  const std::lock_guard lock(mutex);
+                  held.clear();
+                  held.shrink_to_fit();
+                },
+            .open =
+                [this] {
+                  const std::lock_guard lock(mutex);
+                  ++num_opened;
+                  return num_opened > num_failures;
+                },
+            .note =
+                [this](const Event& event) {
+                  const std::lock_guard lock(mutex);
+                  events.emplace_back(event.kind);
+                  changed.notify_all();
+                }};
+  }
+
+  std::vector<std::string> wait_for_events(std::size_t count) {
+    std::unique_lock lock(mutex);
+    changed.wait_for(lock, std::chrono::seconds(20), [&] { return events.size() >= count; });
+    return events;
+  }
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<char> held;
+  std::vector<std::string> events;
+  int num_opened = 0;
+  int num_failures = 0;
+  std::size_t size_at_start = ResidentMemory().size();
+};
+
+TEST_F(MemoryGuardTest, FreesWhatSocketsHold) {
+  const MemoryGuard guard((size_at_start + 60 * mebibyte) / 3 * 4, actions());
+  {
+    const std::lock_guard lock(mutex);
+    held.assign(100 * mebibyte, 'x');
+  }
+  EXPECT_EQ(wait_for_events(1), std::vector<std::string>{"sockets_reset"});
+  EXPECT_LT(ResidentMemory().size(), size_at_start + 20 * mebibyte);
+}
+
+TEST_F(MemoryGuardTest, TellsOnceOfWhatItCannotFree) {
+  const std::vector<char> needed(100 * mebibyte, 'x');
+  const MemoryGuard guard((size_at_start + 60 * mebibyte) / 3 * 4, actions());
+  (void)wait_for_events(2);
+  {
+    const std::lock_guard lock(mutex);
+    held.assign(100 * mebibyte, 'x');
+  }
+  EXPECT_EQ(wait_for_events(3),
+            (std::vector<std::string>{"sockets_reset", "memory_high", "sockets_reset"}));
+}
+
+TEST_F(MemoryGuardTest, TriesAgainUntilAnAddressCanBeHad) {
+  num_failures = 3;
+  const MemoryGuard guard((size_at_start + 60 * mebibyte) / 3 * 4, actions());
+  {
+    const std::lock_guard lock(mutex);
+    held.assign(100 * mebibyte, 'x');
+  }
+  EXPECT_EQ(wait_for_events(3),
+            (std::vector<std::string>{"sockets_reset", "sockets_unbound", "sockets_bound"}));
+  EXPECT_EQ(num_opened, 4);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

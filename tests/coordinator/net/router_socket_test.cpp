@@ -1,0 +1,100 @@
+#include "coordinator/net/router_socket.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <string>
+#include <thread>
+#include <zmq.hpp>
+
+#include "coordinator/net/handshake_watch.hpp"
+#include "proto/link/connection_monitor.hpp"
+#include "proto/link/key_files.hpp"
+#include "proto/link/socket.hpp"
+#include "tests/coordinator/cli/temporary_directory.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+class RouterSocketTest : public testing::Test {
+ protected:
+  /// What arrives, while `act` goes on, until something has.
+  std::string received(RouterSocket& router, const std::function<void()>& act) {
+    std::string text;
+    const auto deadline = Clock::now() + std::chrono::seconds(20);
+    while (text.empty() && Clock::now() < deadline) {
+      act();
+      router.receive(10, Clock::now(), [&](const Incoming& message) {
+        text = std::string(message.frames.front());
+        sender = message.from.routing_id;
+      });
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return text;
+  }
+
+  test::TemporaryDirectory directory;
+  std::string sender;
+  zmq::context_t context;
+  zmq::context_t peers_context;
+};
+
+TEST_F(RouterSocketTest, IsBoundToTheSameAddressAgainAndPeersComeBack) {
+  for (const std::string& where :
+       {std::string("tcp://127.0.0.1:*"), "ipc://" + (directory / "socket").string()}) {
+    RouterSocket router(context, "bind", where, {}, {});
+    const std::string endpoint = router.endpoint();
+    zmq::socket_t dealer = wire::make_dealer(peers_context, {});
+    dealer.connect(endpoint);
+    const auto say = [&](std::string_view text) {
+      return [&dealer, text] { dealer.send(zmq::buffer(text), zmq::send_flags::dontwait); };
+    };
+    EXPECT_EQ(received(router, say("before")), "before");
+    EXPECT_TRUE(router.send(sender, "to one who is there", Clock::now()));
+    for (int i = 0; i < 20; ++i) {
+      router.close();
+      EXPECT_EQ(router.handle(), nullptr);
+      EXPECT_FALSE(router.send(sender, "to nobody", Clock::now()));
+      ASSERT_TRUE(router.open()) << where << i;
+      EXPECT_EQ(router.endpoint(), endpoint);
+    }
+    EXPECT_FALSE(router.send(sender, "to one of before", Clock::now()));
+    EXPECT_EQ(received(router, say("after")), "after");
+  }
+}
+
+TEST_F(RouterSocketTest, SaysThatItsAddressCannotBeHadNow) {
+  RouterSocket router(context, "bind", "tcp://127.0.0.1:*", {}, {});
+  router.close();
+  {
+    const zmq::socket_t other = wire::make_router(context, "bind", router.endpoint(), {});
+    EXPECT_FALSE(router.open());
+    EXPECT_EQ(router.handle(), nullptr);
+  }
+  const auto deadline = Clock::now() + std::chrono::seconds(20);
+  bool is_open = false;
+  while (!is_open && Clock::now() < deadline) is_open = router.open();
+  EXPECT_TRUE(is_open);
+}
+
+TEST_F(RouterSocketTest, TellsOfFailedHandshakesAlsoWhenItWasBoundAgain) {
+  RouterSocket router(context, "bind", "tcp://127.0.0.1:*",
+                      {.domain = wire::Domain::workers, .keys = wire::make_key_pair()}, {});
+  router.close();
+  ASSERT_TRUE(router.open());
+  zmq::socket_t plain = wire::make_dealer(peers_context, {});
+  plain.connect(router.endpoint());
+  const auto deadline = Clock::now() + std::chrono::seconds(20);
+  bool is_told = false;
+  while (!is_told && Clock::now() < deadline) {
+    const auto event = router.take_event();
+    is_told = event && (event->kind & failed_handshakes) != 0;
+  }
+  EXPECT_TRUE(is_told);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
