@@ -1,7 +1,9 @@
 // Many workers in one process, whose runs cost nothing: what a coordinator has to bear.
 //
 // Prints a line of JSON once all workers are registered, and one each second from then on; ends
-// when the coordinator has told all of them to.
+// when the coordinator has told all of them to. With --idle there are connections beside them of
+// which nobody says anything, and with --churn some of those are replaced each second; without
+// workers it goes on until it is killed.
 
 #include <sys/epoll.h>
 #include <sys/resource.h>
@@ -12,7 +14,9 @@
 #include <array>
 #include <cerrno>
 #include <cstdio>
+#include <deque>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -24,6 +28,8 @@
 
 #include "core/simulation/reference_digest.hpp"
 #include "core/simulation/run.hpp"
+#include "proto/link/key_files.hpp"
+#include "proto/link/socket.hpp"
 #include "tests/benchmarks/swarm_worker.hpp"
 
 namespace {
@@ -38,7 +44,10 @@ constexpr std::chrono::seconds report_interval(1);
 
 struct SwarmOptions {
   test::SwarmWorkerConfig worker;
+  std::optional<std::filesystem::path> keys;
   int num_workers = 1000;
+  int num_idle = 0;
+  int num_replaced = 0;  ///< Of the idle ones, each second.
 };
 
 TimePoint time_now() { return std::chrono::steady_clock::now(); }
@@ -84,11 +93,54 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// Connections that say nothing.
+class IdleConnections {
+ public:
+  IdleConnections(zmq::context_t& context, const SwarmOptions& options)
+      : context_(context), options_(options) {
+    for (int i = 0; i < options.num_idle; ++i) sockets_.push_back(connected());
+  }
+
+  /// Closes the oldest ones that are connected, as many as are to be, and opens others.
+  void replace() {
+    for (int i = 0; i < options_.num_replaced && !sockets_.empty(); ++i) {
+      if (!is_connected(sockets_.front())) break;
+      sockets_.pop_front();
+      sockets_.push_back(connected());
+      ++num_replaced_;
+    }
+  }
+
+  [[nodiscard]] std::ptrdiff_t num_connected() {
+    return std::ranges::count_if(sockets_, [](auto& socket) { return is_connected(socket); });
+  }
+  [[nodiscard]] int num_replaced() const { return num_replaced_; }
+
+ private:
+  [[nodiscard]] zmq::socket_t connected() const {
+    zmq::socket_t socket = wire::make_dealer(context_, options_.worker.security);
+    socket.set(zmq::sockopt::linger, 0);
+    socket.connect(options_.worker.endpoint);
+    return socket;
+  }
+  /// It can send only then.
+  [[nodiscard]] static bool is_connected(zmq::socket_t& socket) {
+    return (socket.get(zmq::sockopt::events) & ZMQ_POLLOUT) != 0;
+  }
+
+  zmq::context_t& context_;
+  const SwarmOptions& options_;
+  std::deque<zmq::socket_t> sockets_;
+  int num_replaced_ = 0;
+};
+
 class Swarm {
  public:
-  explicit Swarm(const SwarmOptions& options) : epoll_(epoll_create1(EPOLL_CLOEXEC)) {
+  explicit Swarm(const SwarmOptions& options)
+      : epoll_(epoll_create1(EPOLL_CLOEXEC)),
+        context_(context_for(options)),
+        idle_(context_, options) {
     if (epoll_ < 0) throw std::system_error(errno, std::generic_category(), "epoll_create1");
-    context_.set(zmq::ctxopt::max_sockets, options.num_workers + 16);
     for (int i = 0; i < options.num_workers; ++i) add_worker(options.worker, i);
   }
 
@@ -116,8 +168,16 @@ class Swarm {
     }
   }
 
+  static zmq::context_t context_for(const SwarmOptions& options) {
+    zmq::context_t context;
+    // Replaced ones are there until the library has closed them.
+    context.set(zmq::ctxopt::max_sockets, options.num_workers + 2 * options.num_idle + 16);
+    return context;
+  }
+
   [[nodiscard]] bool is_over() const {
-    return std::ranges::all_of(workers_, [](const auto& worker) { return worker->has_ended(); });
+    return !workers_.empty() &&
+           std::ranges::all_of(workers_, [](const auto& worker) { return worker->has_ended(); });
   }
 
   void wait() {
@@ -140,8 +200,11 @@ class Swarm {
 
   void report(TimePoint now) {
     report_at_ = now + report_interval;
+    idle_.replace();
     std::cout << nlohmann::json{{"time_s", seconds(now - start_)},
                                 {"num_registered", num_registered()},
+                                {"num_idle_connected", idle_.num_connected()},
+                                {"num_idle_replaced", idle_.num_replaced()},
                                 {"num_leases", count_.num_leases},
                                 {"num_result_messages", count_.num_result_messages},
                                 {"num_results", count_.num_results},
@@ -176,6 +239,7 @@ class Swarm {
   std::optional<TimePoint> report_at_;  ///< Nothing before all are registered.
   int epoll_;
   zmq::context_t context_;
+  IdleConnections idle_;
   SwarmCount count_;
   std::vector<std::unique_ptr<SwarmWorker>> workers_;
 };
@@ -184,7 +248,12 @@ int run(int argc, char** argv) {
   CLI::App app("Many workers in one process, whose runs cost nothing.", "proofmass-swarm");
   SwarmOptions options;
   app.add_option("--connect", options.worker.endpoint, "Address of the coordinator")->required();
-  app.add_option("--workers", options.num_workers, "How many")->check(CLI::Range(1, 4096));
+  app.add_option("--workers", options.num_workers, "How many")->check(CLI::Range(0, 4096));
+  app.add_option("--keys", options.keys, "Directory with worker.key and coordinator.pub");
+  app.add_option("--idle", options.num_idle, "Connections beside them that say nothing")
+      ->check(CLI::Range(0, 100'000));
+  app.add_option("--churn", options.num_replaced, "Idle connections to replace each second")
+      ->check(CLI::Range(0, 100'000));
   app.add_option("--slots", options.worker.num_slots, "Of each")->check(CLI::Range(1, 1024));
   app.add_option("--runs-held", options.worker.runs_held_max, "Most runs that each has at a time")
       ->check(CLI::Range(1, 4096));
@@ -192,6 +261,9 @@ int run(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber);
   CLI11_PARSE(app, argc, argv);
   raise_descriptor_limit();
+  if (options.keys) {
+    options.worker.security = wire::read_client_security(*options.keys, wire::KeyRole::worker);
+  }
   Swarm(options).run();
   return 0;
 }

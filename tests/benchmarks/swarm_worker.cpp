@@ -20,9 +20,9 @@ double seconds(worker::Duration duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
-zmq::socket_t connected_dealer(zmq::context_t& context, const std::string& endpoint) {
-  zmq::socket_t socket = wire::make_dealer(context, {});
-  socket.connect(endpoint);
+zmq::socket_t connected_dealer(zmq::context_t& context, const SwarmWorkerConfig& config) {
+  zmq::socket_t socket = wire::make_dealer(context, config.security);
+  socket.connect(config.endpoint);
   return socket;
 }
 
@@ -34,7 +34,7 @@ SwarmWorker::SwarmWorker(zmq::context_t& context, const SwarmWorkerConfig& confi
     : runs_held_max_(config.runs_held_max),
       count_(count),
       execution_(config.elapsed_s),
-      socket_(connected_dealer(context, config.endpoint)),
+      socket_(connected_dealer(context, config)),
       conversation_(
           session, std::move(hello), execution_,
           [this](const wire::Packet& packet) { send(packet); }, now) {}

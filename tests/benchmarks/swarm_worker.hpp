@@ -9,6 +9,7 @@
 #include <vector>
 #include <zmq.hpp>
 
+#include "proto/link/security.hpp"
 #include "proto/wire/messages.hpp"
 #include "tests/benchmarks/null_execution.hpp"
 #include "worker/net/conversation.hpp"
@@ -31,6 +32,7 @@ struct SwarmCount {
 /// Settings of each worker of a swarm.
 struct SwarmWorkerConfig {
   std::string endpoint;
+  wire::ClientSecurity security;
   std::uint32_t num_slots = 1;
   std::uint32_t runs_held_max = wire::runs_per_lease_max;  ///< It wants no more at a time.
   double elapsed_s = 0.0;  ///< What it says that a run takes. It takes no time.

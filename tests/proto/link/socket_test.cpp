@@ -63,8 +63,7 @@ TEST(Router, ClosesTheConnectionOfWhoSendsTooMuch) {
     monitor.update(Clock::now());
     if (is_sent && !monitor.is_connected()) is_closed = true;
     if (!is_sent && monitor.is_connected()) {
-      is_sent =
-          dealer.send(zmq::message_t(mebibyte + 1), zmq::send_flags::dontwait).has_value();
+      is_sent = dealer.send(zmq::message_t(mebibyte + 1), zmq::send_flags::dontwait).has_value();
     }
   }
   EXPECT_TRUE(is_closed);
