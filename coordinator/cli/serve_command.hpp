@@ -19,7 +19,7 @@ struct ServeOptions {
   std::optional<std::filesystem::path> keys;    ///< Directory of `proofmass keygen`.
   bool is_plain_waived = false;
   ServiceEnd end = ServiceEnd::never;
-  double drain_time_s = 120.0;  ///< ≥ 0.
+  double drain_time_s = 120.0;          ///< ≥ 0.
   std::uint64_t memory_mib_max = 2048;  ///< ≥ 64; of the process.
   wire::LogFormat log_format = wire::LogFormat::text;
   std::string faults;       ///< As FaultPlan::parse() reads them.
