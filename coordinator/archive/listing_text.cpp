@@ -6,6 +6,7 @@
 
 #include "coordinator/archive/listing.hpp"
 #include "coordinator/report/text_cells.hpp"
+#include "proto/text/visible_text.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -33,7 +34,7 @@ std::string row(const std::array<std::string, columns.size()>& cells) {
   for (std::size_t i = 0; i < cells.size(); ++i) {
     // A space at least stays between a column and the next.
     const auto& [title, width, is_text] = columns[i];
-    const std::string cell = shortened(cells[i], width - 1);
+    const std::string cell = shortened(wire::visible_text(cells[i]), width - 1);
     text += is_text ? left_aligned(cell, width) : right_aligned(cell, width);
   }
   text.erase(text.find_last_not_of(' ') + 1);
@@ -60,13 +61,13 @@ std::string tag_lines(std::span<const std::string> tags) {
       text += line + "\n";
       line = indent;
     }
-    line += " " + tag;
+    line += fmt::format(" {}", wire::visible_text(tag));
   }
   return text + line + "\n";
 }
 
 std::string entry(const ListedCampaign& campaign) {
-  const std::string file = campaign.file.filename().string();
+  const std::string file = wire::visible_text(campaign.file.filename().string());
   if (!campaign.problem.empty()) return file + "\n  " + campaign.problem + "\n";
   constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10Z.
   std::string text =

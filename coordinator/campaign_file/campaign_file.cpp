@@ -9,6 +9,7 @@
 #include "coordinator/campaign_file/data_file.hpp"
 #include "coordinator/campaign_file/document.hpp"
 #include "coordinator/campaign_file/readers.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -126,8 +127,9 @@ void require_identity(const Campaign& defined, const StoredIdentity& stored) {
   const auto require_same = [](std::string_view field, const std::string& value,
                                const std::string& expected) {
     if (value == expected) return;
-    throw CampaignFileError(
-        fmt::format("campaign.{} = {} (must be {}, as in the definition)", field, value, expected));
+    throw CampaignFileError(fmt::format("campaign.{} = {} (must be {}, as in the definition)",
+                                        field, wire::visible_text(value),
+                                        wire::visible_text(expected)));
   };
   require_same("name", stored.name, defined.name);
   require_same("seed", stored.seed, fmt::to_string(defined.seed));

@@ -8,6 +8,7 @@
 
 #include "coordinator/cli/exit_code.hpp"
 #include "core/simulation/run.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -21,7 +22,9 @@ void require_same(const Store& store, const Campaign& wanted, const std::filesys
   }
   if (differences.empty()) return;
   std::string text = fmt::format("{} holds another campaign:", database.string());
-  for (const std::string& difference : differences) text += "\n  " + difference;
+  for (const std::string& difference : differences) {
+    text += fmt::format("\n  {}", wire::visible_text(difference));
+  }
   throw UsageError(fmt::format("{}\n{}", text, remedy));
 }
 

@@ -32,6 +32,9 @@ std::string left_text(const wire::CampaignStatus& status) {
 }
 
 std::string figures(const wire::CampaignStatus& status) {
+  if (!status.storage_failure.empty()) {
+    return fmt::format("{:3} %  nothing can be stored", percent(status));
+  }
   return fmt::format("{:3} %{}{}", percent(status), rate_text(status.rate_hz), left_text(status));
 }
 
@@ -79,7 +82,10 @@ void ProgressDisplay::update(const wire::CampaignStatus& status) {
   if (mode_ == DisplayMode::bar) return show_bar(status);
   if (mode_ == DisplayMode::quiet) return;
   const std::uint64_t tenths = percent(status) / 10;
-  if (status.num_runs == num_runs_shown_ && tenths <= tenths_shown_) return;
+  const bool has_failed = !status.storage_failure.empty();
+  const bool is_further = status.num_runs != num_runs_shown_ || tenths > tenths_shown_;
+  if (!is_further && has_failed == is_failure_shown_) return;
+  is_failure_shown_ = has_failed;
   num_runs_shown_ = status.num_runs;
   tenths_shown_ = tenths;
   wire::say_on(stream_, progress_line(status) + "\n");

@@ -12,11 +12,12 @@ namespace proofmass::coordinator {
 
 enum class DisplayMode : std::uint8_t {
   bar,    ///< One line, written again and again: for a terminal.
-  lines,  ///< A line every ten percent.
+  lines,  ///< A line every ten percent, and when storing begins to fail or works again.
   quiet,  ///< Notes only.
 };
 
-/// A line of at most 79 columns: runs done, percent, rate, time left.
+/// A line of at most 79 columns: runs done, percent, rate, time left; or that nothing can be
+/// stored.
 [[nodiscard]] std::string progress_bar(const wire::CampaignStatus& status);
 
 /// The same without a bar.
@@ -47,6 +48,7 @@ class ProgressDisplay {
   bool has_bar_ = false;
   std::string shown_;
   std::uint64_t tenths_shown_ = 0;
+  bool is_failure_shown_ = false;
   std::uint64_t num_runs_shown_ = 0;  ///< A stop rule asks for more and more.
 };
 

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
@@ -20,10 +22,12 @@
 #include "coordinator/net/service.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "coordinator/store/store_error.hpp"
 #include "core/campaign/run_ranges.hpp"
 #include "core/simulation/reference_digest.hpp"
 #include "core/simulation/run.hpp"
 #include "proto/command_line/standard_error.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -89,10 +93,33 @@ ServiceConfig service_config(const PrivateEndpoint& endpoint, std::uint64_t num_
 /// What nobody needs to see while all goes well goes into the database only.
 Log log_to(ProgressDisplay& display) {
   return [&display](const Event& event) {
-    if (event.severity != Severity::error) return;
+    // StorageNotes tells of the storage.
+    if (event.severity != Severity::error || event.kind == "storage_failed") return;
     display.note(fmt::format("proofmass: error: {} {}", event.kind, event.text));
   };
 }
+
+/// Tells when nothing can be stored, why, and when that is over.
+class StorageNotes {
+ public:
+  StorageNotes(ProgressDisplay& display, Duration retry_after)
+      : display_(display), retry_after_s_(std::chrono::duration<double>(retry_after).count()) {}
+
+  void update(const wire::CampaignStatus& status) {
+    if (status.storage_failure == shown_) return;
+    shown_ = status.storage_failure;
+    if (shown_.empty()) return display_.note("proofmass: all results are stored again");
+    display_.note(fmt::format(
+        "proofmass: error: {}\nproofmass: results are kept, and stored when that is possible; "
+        "tried again every {} s",
+        wire::visible_text(shown_), retry_after_s_));
+  }
+
+ private:
+  ProgressDisplay& display_;
+  double retry_after_s_;
+  std::string shown_;
+};
 
 void make_active(Store& store, const RunOptions& options) {
   const Entry control = CampaignControl{.phase = wire::CampaignPhase::active,
@@ -123,16 +150,32 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
       num_workers(options, num_runs - num_runs_in(campaign.store.finished_runs()));
   std::vector<ServedCampaign> campaigns;
   campaigns.push_back(std::move(campaign));
-  Service service(std::move(campaigns), service_config(endpoint, num_local, file), log_to(display));
+  const ServiceConfig config = service_config(endpoint, num_local, file);
+  Service service(std::move(campaigns), config, log_to(display));
   LocalWorkers workers(service, display);
+  StorageNotes storage(display, config.writer.retry_after);
+  const auto show = [&] {
+    const wire::CampaignStatus status = service.campaigns().front();
+    storage.update(status);
+    display.update(status);
+  };
   workers.start(num_local);
   service.run(stop, [&] {
     if (stop == StopRequest::none && !service.is_done()) workers.replace_dead();
-    display.update(service.campaigns().front());
+    show();
   });
-  display.update(service.campaigns().front());
+  show();
   const bool is_done = service.is_done();
   return {.store = std::move(service.close().front().store), .is_done = is_done};
+}
+
+/// What is written to a file that has lost its name is lost with it.
+void require_in_place(const Store& store, const std::filesystem::path& database) {
+  if (store.is_in_place()) return;
+  throw StoreError(fmt::format(
+      "campaign file = {} (was removed or replaced while the campaign ran; results that "
+      "are not in what is there now are lost, and the same command computes them again)",
+      database.string()));
 }
 
 int say_interrupted(const Store& store, const std::filesystem::path& database) {
@@ -142,6 +185,17 @@ int say_interrupted(const Store& store, const std::filesystem::path& database) {
                   "proofmass: the same command computes the others\n",
                   num_runs - num_missing(store), num_runs, database.string()));
   return exit_interrupted;
+}
+
+/// Statistics of a file that cannot be written stay as they are; what is stored is said.
+int end_interrupted(Store& store, const Scenario& scenario, const std::filesystem::path& database) {
+  try {
+    update_statistics(store, scenario);
+  } catch (const StoreError& error) {
+    wire::say(fmt::format("proofmass: error: {}\n", wire::visible_text(error.what())));
+  }
+  require_in_place(store, database);
+  return say_interrupted(store, database);
 }
 
 int say_given_up(std::span<const RunRange> given_up, std::uint64_t num_runs) {
@@ -169,8 +223,9 @@ int run_campaign(const RunOptions& options) {
   const std::filesystem::path database = database_of(options);
   Outcome outcome = compute(open_or_create(campaign, plan_of(options, campaign.num_runs), database),
                             campaign.num_runs, options);
+  if (!outcome.is_done) return end_interrupted(outcome.store, campaign.scenario, database);
   update_statistics(outcome.store, campaign.scenario);
-  if (!outcome.is_done) return say_interrupted(outcome.store, database);
+  require_in_place(outcome.store, database);
   print_lines(report_text(outcome.store, campaign.scenario));
   if (outcome.store.control().phase == wire::CampaignPhase::cancelled) {
     return say_cancelled(outcome.store, options.stop.failures_max.value_or(0));

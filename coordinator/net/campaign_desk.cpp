@@ -10,6 +10,7 @@
 #include <variant>
 
 #include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/simulation/run.hpp"
 #include "proto/link/faults.hpp"
@@ -347,7 +348,11 @@ std::vector<ServedCampaign> CampaignDesk::close() {
     Served& served = served_.at(id);
     if (served.summary.valid()) served.summary.wait();
     Store store = writer_.close(id);
-    store.end_coordinator(start_.epoch);
+    try {
+      store.end_coordinator(start_.epoch);
+    } catch (const StoreError&) {
+      // A file that cannot be written now looks as after a kill, and the campaigns are given back.
+    }
     const CampaignState& campaign = state_.campaigns.at(id);
     campaigns.push_back(
         {.file = served.file, .store = std::move(store), .definition = campaign.definition});

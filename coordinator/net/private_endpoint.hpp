@@ -5,8 +5,12 @@
 
 namespace proofmass::coordinator {
 
-/// An `ipc://` address in a new directory that only this user can enter; the directory goes with
-/// the object.
+/// An `ipc://` address in a new directory `proofmass-run-XXXXXX` that only this user can enter; the
+/// directory goes with the object. A process that is killed leaves its directory: the next object
+/// removes it, which knows it by a lock that nobody holds any more.
+///
+/// A socket in a directory of mode 0700 can be reached by this user alone. An abstract address
+/// would leave nothing behind, but any user of the machine could connect to it.
 class PrivateEndpoint {
  public:
   PrivateEndpoint();  ///< @throws Error if the directory cannot be made.
@@ -18,6 +22,12 @@ class PrivateEndpoint {
 
  private:
   std::filesystem::path directory_;
+  int lock_ = -1;  ///< Descriptor of the lock in the directory.
 };
+
+/// Removes what killed processes of this user left in a directory: directories
+/// `proofmass-run-XXXXXX` of mode 0700 that hold a lock which nobody holds, a socket, and nothing
+/// else. Leaves everything else alone, and ignores failures.
+void remove_stale_endpoints(const std::filesystem::path& parent);
 
 }  // namespace proofmass::coordinator

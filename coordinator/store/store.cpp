@@ -28,6 +28,7 @@
 #include "coordinator/store/detail/table_digest.hpp"
 #include "core/campaign/dispersion.hpp"
 #include "proto/link/kill_point.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 
@@ -194,7 +195,10 @@ std::string Store::definition() const {
 }
 
 std::string Store::model_version() const {
-  return parts_->database.text("SELECT model_version FROM campaign");
+  const std::string version = parts_->database.text("SELECT model_version FROM campaign");
+  // It is shown, and compared with ours, which has no control characters.
+  if (wire::visible_text(version) == version) return version;
+  parts_->database.refuse_as_damaged(fmt::format("model_version = {}", version));
 }
 
 std::string Store::build() const { return parts_->database.text("SELECT build FROM campaign"); }
@@ -469,6 +473,8 @@ void Store::read_one_state(const std::function<void()>& read) const {
   const detail::ReadTransaction transaction(parts_->database);
   read();
 }
+
+bool Store::is_in_place() const { return parts_->database.is_in_place(); }
 
 std::uint64_t Store::log_size() const { return parts_->database.log_size(); }
 

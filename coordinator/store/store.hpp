@@ -211,6 +211,10 @@ class Store {
   /// Lets `read` see one state of the file, whatever a coordinator writes meanwhile.
   void read_one_state(const std::function<void()>& read) const;
 
+  /// False if the file that is open no longer has its name: it was removed, renamed or replaced,
+  /// and what is written to it is lost when it is closed.
+  [[nodiscard]] bool is_in_place() const;
+
   /// Bytes of the write-ahead log, which only grows while somebody reads one state of the file.
   [[nodiscard]] std::uint64_t log_size() const;
 

@@ -11,6 +11,7 @@
 
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -94,7 +95,11 @@ void write_annotation(const Database& database, const Annotation& annotation) {
 std::vector<std::string> read_tags(const Database& database) {
   Statement select = database.prepare("SELECT tag FROM tag ORDER BY tag");
   std::vector<std::string> tags;
-  while (select.step()) tags.push_back(select.text(0));
+  while (select.step()) {
+    tags.push_back(select.text(0));
+    if (wire::visible_text(tags.back()) == tags.back()) continue;
+    select.refuse_as_damaged(fmt::format("tag = {}", tags.back()));
+  }
   return tags;
 }
 

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "coordinator/store/store_error.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -243,6 +244,13 @@ void Database::copy_to(Database& copy) const {
   if (code != SQLITE_OK) copy.fail(code);
 }
 
+bool Database::is_in_place() const {
+  int has_moved = 0;
+  const int code =
+      sqlite3_file_control(connection_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &has_moved);
+  return code == SQLITE_OK && has_moved == 0;
+}
+
 std::uint64_t Database::log_size() const {
   std::error_code error;
   const std::uintmax_t size =
@@ -263,7 +271,9 @@ void Database::leave_names_alone() {
 }
 
 void Database::refuse(std::string_view what) const {
-  throw StoreError(fmt::format("campaign file = {} ({})", path_.string(), what));
+  // It may quote the file.
+  throw StoreError(
+      fmt::format("campaign file = {} ({})", path_.string(), wire::visible_text(what)));
 }
 
 void Database::refuse_as_damaged(std::string_view what) const { refuse(damage(what)); }

@@ -117,6 +117,9 @@ class Database {
   /// Replaces the content of another database by that of this one, as it is now.
   void copy_to(Database& copy) const;
 
+  /// False if the file has been removed, renamed or replaced since it was opened.
+  [[nodiscard]] bool is_in_place() const;
+
   /// Bytes of the write-ahead log; 0 if there is none.
   [[nodiscard]] std::uint64_t log_size() const;
 

@@ -69,6 +69,29 @@ TEST(ProgressDisplay, BeginsAgainWhenThereAreMoreRuns) {
   EXPECT_EQ(text, "128/128 runs  100 %\n128/192 runs   66 %\n");
 }
 
+TEST(ProgressDisplay, ShowsThatNothingCanBeStored) {
+  wire::CampaignStatus failing = progress(42, 100, 0.5);
+  failing.storage_failure = "campaign file = a.db (the disk is full)";
+  EXPECT_EQ(progress_bar(failing),
+            "42/100 runs [############..................]  42 %  nothing can be stored");
+  const std::string text =
+      output_of<ProgressDisplay>(DisplayMode::lines, [&](ProgressDisplay& display) {
+        display.update(progress(42, 100, 0.0));
+        display.update(failing);
+        display.update(failing);
+        display.update(progress(42, 100, 0.0));
+      });
+  EXPECT_EQ(text,
+            "42/100 runs   42 %\n42/100 runs   42 %  nothing can be stored\n"
+            "42/100 runs   42 %\n");
+}
+
+TEST(ProgressDisplay, MakesNotesVisible) {
+  const std::string text = output_of<ProgressDisplay>(
+      DisplayMode::lines, [](ProgressDisplay& display) { display.note("one\x1b[2J\ntwo"); });
+  EXPECT_EQ(text, "one\\u001b[2J\ntwo\n");
+}
+
 TEST(ProgressDisplay, WritesTheBarOverItself) {
   const std::string text =
       output_of<ProgressDisplay>(DisplayMode::bar, [](ProgressDisplay& display) {

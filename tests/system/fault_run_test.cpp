@@ -1,0 +1,177 @@
+// `proofmass run` whose surroundings fail: its file is removed or replaced, its disk is full, it is
+// killed.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/mount.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "tests/skip_for_want.hpp"
+#include "tests/system/fault_fixture.hpp"
+#include "tests/system/network_namespace.hpp"
+
+namespace proofmass::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+using RunFault = CampaignProcess;
+
+/// Removes a file and what SQLite keeps beside it.
+void remove_database(const fs::path& file) {
+  for (const char* const ending : {"", "-wal", "-shm"}) fs::remove(file.string() + ending);
+}
+
+// Either all is there in the end, or the program says that it is not.
+TEST_F(RunFault, OfARemovedDatabaseIsNoSuccessWithoutResults) {
+  Process run = start("removed", {"--workers", "1"});
+  wait_for_runs("removed", 16);
+  remove_database(path("removed.db"));
+  const int exit_code = run.wait();
+  const std::string tables = read_file(path("removed.out"));
+  if (exit_code == 0) {
+    EXPECT_TRUE(stored_runs(path("removed.db")) == reference());
+    return;
+  }
+  EXPECT_EQ(exit_code, 1) << errors_of("removed");
+  EXPECT_EQ(tables, "");
+  EXPECT_TRUE(contains(errors_of("removed"), "campaign file = removed.db ("))
+      << errors_of("removed");
+}
+
+TEST_F(RunFault, OfADatabaseThatIsRemovedAtTheEndIsNoSuccess) {
+  ASSERT_EQ(start("removed", {"--workers", "1", "--runs", "16"}).wait(), 0);
+  Process run = start("removed", {"--workers", "1"});
+  wait_for_runs("removed", num_runs - 16);
+  remove_database(path("removed.db"));
+  const int exit_code = run.wait();
+  if (exit_code == 0) {
+    EXPECT_TRUE(stored_runs(path("removed.db")) == reference());
+    return;
+  }
+  EXPECT_EQ(exit_code, 1);
+  EXPECT_EQ(read_file(path("removed.out")), "");
+}
+
+TEST_F(RunFault, OfAnOlderCopyInPlaceOfTheDatabaseIsNoSuccessWithoutResults) {
+  ASSERT_EQ(start("copied", {"--workers", "1", "--runs", "16"}).wait(), 0);
+  fs::copy_file(path("copied.db"), path("copy"));
+  Process run = start("copied", {"--workers", "1"});
+  wait_for_runs("copied", 32);
+  fs::rename(path("copy"), path("copied.db"));
+  const int exit_code = run.wait();
+  if (exit_code == 0) {
+    EXPECT_TRUE(stored_runs(path("copied.db")) == reference());
+    return;
+  }
+  EXPECT_EQ(exit_code, 1) << errors_of("copied");
+  EXPECT_TRUE(contains(errors_of("copied"), "campaign file = copied.db (")) << errors_of("copied");
+}
+
+TEST_F(RunFault, OfARemovedDatabaseIsToldToWhoInterrupts) {
+  Process run = start("removed", {"--workers", "1"});
+  wait_for_runs("removed", 16);
+  remove_database(path("removed.db"));
+  run.signal(SIGINT);
+  const int exit_code = run.wait();
+  const std::size_t num_left = num_stored(path("removed.db"));
+  if (exit_code == 130) {
+    EXPECT_TRUE(contains(errors_of("removed"), "interrupted; " + std::to_string(num_left) +
+                                                   " of 320 runs are in removed.db"))
+        << errors_of("removed");
+    EXPECT_GE(num_left, 16U);
+    return;
+  }
+  EXPECT_EQ(exit_code, 1);
+  EXPECT_TRUE(contains(errors_of("removed"), "campaign file = removed.db ("))
+      << errors_of("removed");
+}
+
+/// The database is on a small file system of its own, on which something else takes what is left.
+class RunOnAFullDisk : public CampaignProcess {
+ protected:
+  void SetUp() override {
+    CampaignProcess::SetUp();
+    fs::create_directory(path("disk"));
+    if (!take_private_mounts() ||
+        mount("tmpfs", path("disk").c_str(), "tmpfs", 0, "size=2m") != 0) {
+      skip_for_want("no permission to mount a file system");
+    }
+  }
+  void TearDown() override { umount2(path("disk").c_str(), MNT_DETACH); }
+
+  [[nodiscard]] Process start_on_disk(const std::string& name) const {
+    return Process(directory / "", name, programs + "/proofmass",
+                   {"run", "short.toml", "--db", "disk/" + name + ".db", "--workers", "1"});
+  }
+  /// Fills the disk while the campaign is computed and waits until the program tells of it.
+  void fill_during(const std::string& name) const {
+    wait_for_runs("disk/" + name, 16);
+    std::ofstream ballast(path("disk/ballast"));
+    while (ballast << std::string(4096, 'x') << std::flush) {
+    }
+    wait_until("note", [&] { return contains(errors_of(name), "tried again every 5 s\n"); });
+    EXPECT_TRUE(contains(errors_of(name),
+                         "error: campaign file = disk/" + name + ".db (the disk is full; "))
+        << errors_of(name);
+    wait_until("progress",
+               [&] { return contains(errors_of(name), " %  nothing can be stored\n"); });
+  }
+  void free_disk() const { fs::remove(path("disk/ballast")); }
+};
+
+TEST_F(RunOnAFullDisk, TellsThatItWaitsAndThatItGoesOn) {
+  Process run = start_on_disk("full");
+  fill_during("full");
+  free_disk();
+  EXPECT_EQ(run.wait(), 0) << errors_of("full");
+  EXPECT_TRUE(contains(errors_of("full"), "all results are stored again\n")) << errors_of("full");
+  EXPECT_TRUE(stored_runs(path("disk/full.db")) == reference());
+}
+
+TEST_F(RunOnAFullDisk, TellsWhatIsStoredWhenItIsInterrupted) {
+  Process run = start_on_disk("stopped");
+  fill_during("stopped");
+  run.signal(SIGINT);
+  EXPECT_EQ(run.wait(), 130) << errors_of("stopped");
+  const std::size_t num_left = num_stored(path("disk/stopped.db"));
+  EXPECT_TRUE(contains(errors_of("stopped"), "interrupted; " + std::to_string(num_left) +
+                                                 " of 320 runs are in disk/stopped.db"))
+      << errors_of("stopped");
+  EXPECT_GE(num_left, 16U);
+  EXPECT_LT(num_left, num_runs);
+  free_disk();
+  EXPECT_EQ(start_on_disk("stopped").wait(), 0) << errors_of("stopped");
+  EXPECT_TRUE(stored_runs(path("disk/stopped.db")) == reference());
+}
+
+std::size_t num_socket_directories(const fs::path& directory) {
+  std::size_t count = 0;
+  for (const auto& entry : fs::directory_iterator(directory)) {
+    count += entry.path().filename().string().starts_with("proofmass-") ? 1U : 0U;
+  }
+  return count;
+}
+
+TEST_F(RunFault, OfAKillLeavesNoSocketDirectoryBehindTheNextRun) {
+  const Process living = start("living", {"--workers", "1"});
+  wait_for_runs("living", 1);
+  {
+    Process killed = start("killed", {"--workers", "1"});
+    wait_for_runs("killed", 1);
+    killed.signal(SIGKILL);
+    EXPECT_EQ(killed.wait(), -SIGKILL);
+  }
+  EXPECT_EQ(num_socket_directories(directory / ""), 2U);
+  living.signal(SIGSTOP);  // Its directory is in use, however long nothing happens there.
+  EXPECT_EQ(start("killed", {"--workers", "1"}).wait(), 0) << errors_of("killed");
+  EXPECT_EQ(num_socket_directories(directory / ""), 1U);
+  living.signal(SIGCONT);
+  wait_for_runs("living", num_runs);
+}
+
+}  // namespace
+}  // namespace proofmass::test
