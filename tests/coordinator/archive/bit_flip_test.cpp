@@ -27,18 +27,18 @@ class BitFlips : public test::StoreTest {
  protected:
   /// A campaign that has ended by a rule, with a run that was given up and one of each status.
   void SetUp() override {
-    std::vector<RunResult> results = test::results_of_each_status(40);
+    std::vector<RunResult> results = test::results_of_each_status(20);
     results.pop_back();
-    Store store = test::store_of(file(), test::campaign_of(40), results);
-    const std::vector<Entry> entries{LostRuns{.runs = {RunIndex{39}, 1},
+    Store store = test::store_of(file(), test::campaign_of(20), results);
+    const std::vector<Entry> entries{LostRuns{.runs = {RunIndex{19}, 1},
                                               .attempt = {1},
                                               .worker = test::session_1,
                                               .reason = wire::LossReason::crashed,
                                               .is_blamed = true},
-                                     GivenUpRun{.run = RunIndex{39}}};
+                                     GivenUpRun{.run = RunIndex{19}}};
     (void)store.write(entries);
     store.set_stop_plan(
-        {.stop_rule = "mean(k2c) within 90%", .num_runs_max = 40, .failures_max = {}});
+        {.stop_rule = "mean(k2c) within 90%", .num_runs_max = 20, .failures_max = {}});
     (void)summarise_file(file(), Scenario{},
                          [&](const std::function<void(Store&)>& action) { action(store); });
     const Entry finished = CampaignControl{.phase = wire::CampaignPhase::finished};
@@ -185,11 +185,11 @@ TEST_F(RowsOutOfOrder, OfResultsAreRefused) {
 }
 
 TEST_F(RowsOutOfOrder, OfDeliveriesAreRefused) {
-  test::swap_keys(file(), "delivery", 20, 30);
+  test::swap_keys(file(), "delivery", 5, 12);
   const Store store = Store::open_read_only(file());
   EXPECT_EQ(test::error_of([&] { (void)store.finished_runs(); }),
             "campaign file = " + file().string() +
-                " (is damaged: run 21 comes after run 30; restore it from a copy)");
+                " (is damaged: run 6 comes after run 12; restore it from a copy)");
 }
 
 TEST_F(RowsOutOfOrder, OfGivenUpRunsThatHaveResultsAreRefused) {

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "coordinator/report/text_cells.hpp"
+#include "coordinator/store/detail/schema.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -70,11 +71,16 @@ TEST_F(Listing, LeavesOtherFilesOutOfDirectories) {
 TEST_F(Listing, SaysWhatIsWrongWithACampaignFile) {
   make("a.db", 10);
   make("newer.db");
-  make("older.db");
+  {
+    detail::Database older(directory() / "older.db", detail::Access::create);
+    older.execute(std::string(detail::migrations().front()));
+    older.execute(
+        "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version)"
+        " VALUES (1, 'old', '42', 30, 'text', 'hardy2013-1')");
+  }
   const std::string whole = test::content_of(directory() / "a.db");
   test::write_file(directory() / "damaged.db", whole.substr(0, whole.size() / 2));
   test::change(directory() / "newer.db", "PRAGMA user_version = 99");
-  test::change(directory() / "older.db", "PRAGMA user_version = 1");
   const auto campaigns = list();
   ASSERT_EQ(campaigns.size(), 4U);
   EXPECT_EQ(campaigns[0].problem, "");
