@@ -11,6 +11,7 @@
 #include <vector>
 #include <zmq.hpp>
 
+#include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
 #include "core/simulation/run.hpp"
 #include "proto/link/socket.hpp"
@@ -105,6 +106,8 @@ class PlayingWorker {
       RunResult& result = batch.results.emplace_back().result;
       result.run = {run};
       result.status = status;
+      result.num_draws = status == RunStatus::no_draw ? num_draws_max : 1;
+      result.num_rounds = status == RunStatus::no_draw ? 0 : 1;
     }
     send(batch);
   }
