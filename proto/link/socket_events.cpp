@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <atomic>
+#include <cstdint>
 #include <cstring>
 #include <string>
 #include <zmq.hpp>
@@ -9,12 +11,21 @@
 #include "core/error.hpp"
 
 namespace proofmass::wire {
+namespace {
+
+/// A name that no other socket had: the library forgets that of a closed one some time later.
+std::string new_address() {
+  static std::atomic<std::uint64_t> count = 0;
+  return fmt::format("inproc://socket-events-{}", ++count);
+}
+
+}  // namespace
 
 class SocketEvents::Parts {
  public:
   Parts(zmq::context_t& context, void* socket, int kinds)
       : socket_(socket), events_(context, zmq::socket_type::pair) {
-    const std::string address = fmt::format("inproc://socket-events-{}", fmt::ptr(this));
+    const std::string address = new_address();
     if (zmq_socket_monitor(socket_, address.c_str(), kinds) != 0) {
       throw Error(fmt::format("zmq_socket_monitor: {}", zmq_strerror(zmq_errno())));
     }
