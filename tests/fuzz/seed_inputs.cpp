@@ -71,6 +71,7 @@ class Speaker {
     for (std::uint64_t run = first; run < first + count; ++run) {
       wire::ComputedRun computed;
       computed.result.run = {run};
+      computed.result.num_draws = 1;
       computed.compute_s = 0.5;
       computed.elapsed_s = 8.0;
       batch.results.push_back(computed);
