@@ -11,6 +11,7 @@
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
+namespace {
 
 void require_same(const Store& store, const Campaign& wanted, const std::filesystem::path& database,
                   std::string_view remedy) {
@@ -27,7 +28,11 @@ void require_same(const Store& store, const Campaign& wanted, const std::filesys
   throw UsageError(fmt::format("{}\n{}", text, remedy));
 }
 
-void extend_same(Store& store, const Campaign& wanted, const std::filesystem::path& database) {
+}  // namespace
+
+void extend_to(Store& store, const Campaign& wanted, const std::filesystem::path& database,
+               std::string_view remedy) {
+  require_same(store, wanted, database, remedy);
   const std::uint64_t num_runs = store.num_runs();
   if (wanted.num_runs < num_runs) {
     throw UsageError(
@@ -38,8 +43,7 @@ void extend_same(Store& store, const Campaign& wanted, const std::filesystem::pa
 }
 
 ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,
-                              const std::filesystem::path& database, std::string_view remedy,
-                              const Asker& asker) {
+                              const std::filesystem::path& database, std::string_view remedy) {
   if (!plan.stop_rule.empty() && !wanted.table_columns.empty()) {
     throw UsageError(fmt::format("until = {} (must not be with quantities whose law is a table)",
                                  plan.stop_rule));
@@ -52,13 +56,9 @@ ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,
   if (is_new) set_horizon(0);
   Store store = is_new ? Store::create(database, campaign, canonical_definition(campaign))
                        : Store::open(database);
-  if (is_new) {
-    if (!asker.name.empty()) store.set_owner(asker.name);
-  } else {
-    require_control(asker, wanted.name, store.owner());
+  if (!is_new) {
     set_horizon(store.num_runs());
-    require_same(store, campaign, database, remedy);
-    extend_same(store, campaign, database);
+    extend_to(store, campaign, database, remedy);
   }
   if (store.stop_plan() != plan) store.set_stop_plan(plan);
   // Shared with the dispatch and with messages under way.

@@ -70,21 +70,19 @@ void check_pages(const Database& database) {
 
 std::int64_t schema_version() { return static_cast<std::int64_t>(migrations().size()); }
 
-void check_kind(Database& database, const std::filesystem::path& path) {
+void check_campaign_file(Database& database, const std::filesystem::path& path) {
   const std::int64_t id = database.integer("PRAGMA application_id");
   if (id != application_id) {
     throw StoreError(fmt::format(
         "campaign file = {} (is not a Proofmass campaign: its application_id is {}, not {})",
         path.string(), id, application_id));
   }
-  // A coordinator that brings the file up to date changes version and schema together.
-  const ReadTransaction one_state(database);
-  const StepLimit limit(database, steps_of_schema_max);
-  check_schema(database, version_of(database, path));
-}
-
-void check_campaign_file(Database& database, const std::filesystem::path& path) {
-  check_kind(database, path);
+  {
+    // A coordinator that brings the file up to date changes version and schema together.
+    const ReadTransaction one_state(database);
+    const StepLimit limit(database, steps_of_schema_max);
+    check_schema(database, version_of(database, path));
+  }
   check_pages(database);
   const std::int64_t num_campaigns = database.integer("SELECT count(*) FROM campaign");
   if (num_campaigns != 1) database.refuse_as_damaged(fmt::format("campaigns = {}", num_campaigns));

@@ -19,15 +19,10 @@ inline constexpr std::int64_t application_id = 0x50724D73;
 /// The version that this program reads and writes.
 [[nodiscard]] std::int64_t schema_version();
 
-/// Checks that a database is a campaign file, not newer than this program, and that its tables,
-/// views and indexes are those of its version and that there is nothing else. Nothing that the file
-/// defines is evaluated before its definition has been compared.
-/// @param path  For the message.
-/// @throws StoreError otherwise.
-void check_kind(Database& database, const std::filesystem::path& path);
-
-/// As check_kind(), and that each page of its tables is what it should be. Takes some 0.1 s for a
-/// million runs.
+/// Checks that a database is a campaign file, not newer than this program, that its tables, views
+/// and indexes are those of its version and that there is nothing else, and that each page of its
+/// tables is what it should be. Nothing that the file defines is evaluated before its definition
+/// has been compared. Takes some 0.1 s for a million runs.
 /// @param path  For the message.
 /// @throws StoreError otherwise.
 void check_campaign_file(Database& database, const std::filesystem::path& path);
