@@ -159,6 +159,9 @@ void Reader::fail(int code, const std::string& sql) const {
     case SQLITE_READONLY:
     case SQLITE_SCHEMA:  // What a query without FROM gets for an unknown name.
       fail_query(sql);
+    case SQLITE_CORRUPT:
+      throw StoreError(fmt::format("campaign file = {} (is damaged: {}; restore it from a copy)",
+                                   file_.string(), text));
     default:
       throw StoreError(fmt::format("campaign file = {} ({})", file_.string(), text));
   }
@@ -261,7 +264,7 @@ QueryEnd run_query(const std::filesystem::path& file, const std::string& sql,
                    const QueryLimits& limits, RowWriter& writer) {
   const Clock::time_point end =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(limits.time_limit);
-  // It knows a campaign file, an undamaged one, and says what is wrong with others.
+  // It knows a campaign file and says what is wrong with others.
   (void)Store::open_read_only(file);
   Reader reader(file, limits, end);
   const Statement statement = reader.prepare(sql);

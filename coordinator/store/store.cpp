@@ -490,6 +490,8 @@ void Store::back_up(const std::filesystem::path& destination) const {
       destination, detail::IfThere::keep, [&](const std::filesystem::path& draft) {
         Database copy(draft, Access::create);
         parts_->database.copy_to(copy);
+        copy.execute("PRAGMA cell_size_check = ON");
+        (void)detail::check_all_pages(copy);  // Nobody shall rely on the copy of a damaged file.
         // What is copied may say that there is a log.
         copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
       });

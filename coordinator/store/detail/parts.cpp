@@ -73,6 +73,8 @@ Store::Parts::Parts(const std::filesystem::path& file, std::unique_ptr<detail::S
       database(file, Access::read_write) {
   detail::configure(database);
   detail::check_campaign_file(database, file);
+  // Before anything is changed: a file that cannot be served is left as it is.
+  const detail::RowCounts counts = detail::check_all_pages(database);
   detail::check_after_unclean_end(database);
   const bool has_log = detail::has_log(file);
   database.execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
@@ -81,7 +83,7 @@ Store::Parts::Parts(const std::filesystem::path& file, std::unique_ptr<detail::S
   Transaction transaction(database);
   detail::migrate(database);
   transaction.commit();
-  detail::check_results(database);
+  detail::check_results(database, counts);
   is_perhaps_marked_ = says_that_log_is_needed(database);
   is_log_lost = is_perhaps_marked_ && !has_log;
   place->remember_log();

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <map>
 #include <string>
 #include <vector>
@@ -58,34 +60,67 @@ std::int64_t version_of(const Database& database, const std::filesystem::path& p
   return version;
 }
 
-// Counting the rows of a table reads every page of its tree, and SQLite checks each that it reads.
-void check_pages(const Database& database) {
+// Tables of as many rows as the campaign has runs, workers or lines of its environment: their pages
+// are checked when they are read.
+constexpr std::array<std::string_view, 9> large_tables{
+    "attempt",     "audit",      "delivery", "dispersion_value", "environment_row", "overrun",
+    "run_failure", "run_result", "worker"};
+
+/// Names of the tables, those of SQLite's own among them.
+std::vector<std::string> table_names(const Database& database) {
   Statement select = database.prepare(
-      "SELECT 'SELECT count(*) FROM \"' || replace(name, '\"', '\"\"') || '\" NOT INDEXED'"
-      " FROM sqlite_schema WHERE type = 'table' AND rootpage > 0");
-  while (select.step()) database.prepare(select.text(0)).finish();
+      "SELECT name FROM sqlite_schema WHERE type = 'table' AND rootpage > 0 ORDER BY name");
+  std::vector<std::string> names;
+  while (select.step()) names.push_back(select.text(0));
+  return names;
+}
+
+// Counting the rows of a table reads every page of its tree, and SQLite checks each that it reads.
+std::uint64_t count_rows(const Database& database, const std::string& table) {
+  return database.count(fmt::format("SELECT count(*) FROM \"{}\" NOT INDEXED", table));
+}
+
+// SQLite holds the size of the file against its header with the first page that it reads.
+void check_small_tables(const Database& database) {
+  for (const std::string& table : table_names(database)) {
+    if (std::ranges::find(large_tables, table) == large_tables.end()) {
+      (void)count_rows(database, table);
+    } else {
+      database.prepare(fmt::format("SELECT 1 FROM \"{}\" NOT INDEXED LIMIT 1", table)).finish();
+    }
+  }
 }
 
 }  // namespace
 
 std::int64_t schema_version() { return static_cast<std::int64_t>(migrations().size()); }
 
-void check_campaign_file(Database& database, const std::filesystem::path& path) {
+void check_kind(Database& database, const std::filesystem::path& path) {
   const std::int64_t id = database.integer("PRAGMA application_id");
   if (id != application_id) {
     throw StoreError(fmt::format(
         "campaign file = {} (is not a Proofmass campaign: its application_id is {}, not {})",
         path.string(), id, application_id));
   }
-  {
-    // A coordinator that brings the file up to date changes version and schema together.
-    const ReadTransaction one_state(database);
-    const StepLimit limit(database, steps_of_schema_max);
-    check_schema(database, version_of(database, path));
-  }
-  check_pages(database);
+  // A coordinator that brings the file up to date changes version and schema together.
+  const ReadTransaction one_state(database);
+  const StepLimit limit(database, steps_of_schema_max);
+  check_schema(database, version_of(database, path));
+}
+
+void check_campaign_file(Database& database, const std::filesystem::path& path) {
+  check_kind(database, path);
+  check_small_tables(database);
   const std::int64_t num_campaigns = database.integer("SELECT count(*) FROM campaign");
   if (num_campaigns != 1) database.refuse_as_damaged(fmt::format("campaigns = {}", num_campaigns));
+}
+
+RowCounts check_all_pages(const Database& database) {
+  RowCounts counts;
+  for (const std::string& table : table_names(database)) {
+    counts[table] = count_rows(database, table);
+  }
+  return counts;
 }
 
 void check_after_unclean_end(const Database& database) {
@@ -95,17 +130,19 @@ void check_after_unclean_end(const Database& database) {
   database.refuse_as_damaged(finding);
 }
 
-void check_results(const Database& database) {
+void check_results(const Database& database, const RowCounts& counts) {
   const std::uint64_t num_runs = database.count("SELECT num_runs FROM campaign");
   const std::uint64_t end = database.count("SELECT ifnull(max(run_index) + 1, 0) FROM run_result");
   if (end > num_runs) {
     database.refuse_as_damaged(fmt::format("result of run {}, of {} there are", end - 1, num_runs));
   }
-  const std::uint64_t num_results = database.count("SELECT count(*) FROM run_result");
-  const std::uint64_t num_deliveries = database.count("SELECT count(*) FROM delivery");
-  if (num_results == num_deliveries) return;
+  const auto num_rows = [&](const std::string& table) {
+    const auto found = counts.find(table);
+    return found == counts.end() ? 0 : found->second;
+  };
+  if (num_rows("run_result") == num_rows("delivery")) return;
   database.refuse_as_damaged(
-      fmt::format("results = {}, deliveries = {}", num_results, num_deliveries));
+      fmt::format("results = {}, deliveries = {}", num_rows("run_result"), num_rows("delivery")));
 }
 
 void check_up_to_date(const Database& database, const std::filesystem::path& path) {

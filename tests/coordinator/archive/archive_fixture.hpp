@@ -75,9 +75,4 @@ inline std::string error_of(const std::function<void()>& action) {
   return {};
 }
 
-inline std::string content_of(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
 }  // namespace proofmass::test

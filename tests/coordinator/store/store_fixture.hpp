@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -50,6 +51,11 @@ class StoreTest : public ::testing::Test {
 
 inline void write_file(const std::filesystem::path& path, const std::string& content) {
   std::ofstream(path, std::ios::binary) << content;
+}
+
+inline std::string content_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 /// Harmonic environment, no tables.
@@ -102,6 +108,16 @@ inline std::vector<coordinator::Delivery> deliveries_of(std::uint64_t first, std
 inline void change(const std::filesystem::path& file, const std::string& sql) {
   coordinator::detail::Database database(file, coordinator::detail::Access::read_write);
   database.execute(sql);
+}
+
+/// First cell of a query of a file, without opening it as a Store.
+inline std::string text_in(const std::filesystem::path& file, const std::string& sql) {
+  return coordinator::detail::Database(file, coordinator::detail::Access::read_only).text(sql);
+}
+
+/// Kinds of its events, in order: `log_lost,resumed`.
+inline std::string event_kinds_in(const std::filesystem::path& file) {
+  return text_in(file, "SELECT group_concat(kind) FROM (SELECT kind FROM event ORDER BY event_id)");
 }
 
 inline std::vector<RunResult> results_in(const coordinator::Store& store) {

@@ -2,15 +2,12 @@
 
 #include <gmock/gmock.h>
 
-#include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/file_log.hpp"
 #include "tests/coordinator/store/writer_fixture.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using detail::Access;
-using detail::Database;
 using test::campaign_of;
 using test::deliveries_of;
 using test::delivery_of;
@@ -18,7 +15,6 @@ using test::results_in;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using ::testing::Not;
 
 class StorePlace : public test::WriterTest {
@@ -70,7 +66,7 @@ TEST_F(StorePlace, ARunIsStoredOnceThoughItsCommitWasInDoubt) {
   deliver(writer, 0, 10);
   std::filesystem::remove(file());
   deliver(writer, 10, 20);
-  EXPECT_EQ(Database(file(), Access::read_only).integer("SELECT count(*) FROM audit"), 0);
+  EXPECT_EQ(test::text_in(file(), "SELECT count(*) FROM audit"), "0");
 }
 
 TEST_F(StorePlace, AnOlderCopyInItsPlaceIsBroughtUpToDate) {
@@ -231,8 +227,7 @@ TEST_F(StorePlace, ClosingALostFileLeavesTheFileInItsPlaceAsItIs) {
     std::filesystem::rename(backup().string() + "-shm", file().string() + "-shm");
   }
   ASSERT_TRUE(detail::has_log(file()));
-  EXPECT_EQ(Database(file(), Access::read_only).text("SELECT group_concat(kind) FROM event"),
-            "other");
+  EXPECT_EQ(test::event_kinds_in(file()), "other");
 }
 
 // A second hard link endangers nothing that is stored: under either name the file is refused to a

@@ -18,7 +18,6 @@ using test::results_in;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using ::testing::Not;
 
 class StoreRest : public test::WriterTest {
@@ -98,7 +97,7 @@ TEST_F(StoreRest, ABackupOfACampaignThatGoesOnIsWhole) {
 TEST_F(StoreRest, AClosedFileNeedsNoLog) {
   { Store::create(file(), campaign_of(64), "").commit(deliveries_of(0, 64)); }
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
-  EXPECT_EQ(Database(file(), Access::read_only).integer("SELECT is_log_needed FROM campaign"), 0);
+  EXPECT_EQ(test::text_in(file(), "SELECT is_log_needed FROM campaign"), "0");
 }
 
 TEST_F(StoreRest, OfAFileThatSomebodyReadsIsRefusedWithTheReason) {
@@ -141,8 +140,7 @@ TEST_F(StoreRest, ACoordinatorGoesOnWithoutTheLogAndSaysSo) {
     resumed.commit(deliveries_of(0, 64));
   }
   EXPECT_EQ(results_in(Store::open_read_only(alone)).size(), 64u);
-  EXPECT_EQ(Database(alone, Access::read_only).text("SELECT group_concat(kind) FROM event"),
-            "log_lost");
+  EXPECT_EQ(test::event_kinds_in(alone), "log_lost");
   EXPECT_FALSE(Store::open(alone).has_lost_its_log());
 }
 
@@ -179,9 +177,9 @@ TEST_F(StoreRest, TheWriterBringsAFileToRestOnceAllIsWritten) {
   writer.record_event(id, {.kind = "later", .text = ""});
   writer.record_event({}, {.kind = "for those not at rest", .text = ""});
   writer.flush();
-  Database alone(copy(), Access::read_only);
-  EXPECT_EQ(alone.text("SELECT group_concat(kind) FROM event"), "later");
-  EXPECT_EQ(alone.integer("SELECT is_log_needed FROM campaign"), 0);
+  const std::filesystem::path alone = copy();
+  EXPECT_EQ(test::event_kinds_in(alone), "later");
+  EXPECT_EQ(test::text_in(alone, "SELECT is_log_needed FROM campaign"), "0");
   EXPECT_THAT(take_completions(), Not(Contains("log kept")));
 }
 
@@ -212,8 +210,7 @@ TEST_F(StoreRest, EndsForTheWriterWithTheNextResult) {
   writer.flush();
   const std::filesystem::path alone = copy();
   EXPECT_EQ(test::store_error_of([&] { Store::open_read_only(alone); }), lacks_its_log(alone));
-  EXPECT_EQ(Database(file(), Access::read_only).text("SELECT group_concat(kind) FROM event"),
-            "for those not at rest");
+  EXPECT_EQ(test::event_kinds_in(file()), "for those not at rest");
 }
 
 }  // namespace

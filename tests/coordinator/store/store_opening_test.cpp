@@ -1,0 +1,152 @@
+// What opening a file costs and finds, and what is found later where a page is read.
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "coordinator/store/detail/database.hpp"
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using detail::Access;
+using detail::Database;
+using test::campaign_of;
+using test::deliveries_of;
+using test::store_error_of;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+/// Bytes that this process has read so far, from files and caches alike.
+std::uint64_t num_bytes_read() {
+  std::ifstream stream("/proc/self/io");
+  std::string name;
+  std::uint64_t count = 0;
+  stream >> name >> count;
+  EXPECT_EQ(name, "rchar:");
+  return count;
+}
+
+class StoreOpening : public test::StoreTest {
+ protected:
+  void create(std::uint64_t num_runs) const {
+    std::filesystem::remove(file());
+    Store store = Store::create(file(), campaign_of(num_runs), "");
+    store.write(std::vector<Entry>{worker_1()});
+    store.commit(deliveries_of(0, num_runs));
+  }
+  static WorkerJoined worker_1() { return test::worker_1(); }
+
+  /// Bytes that are read to open the file.
+  template <typename Open>
+  [[nodiscard]] static std::uint64_t cost_of(const Open& open) {
+    const std::uint64_t before = num_bytes_read();
+    open();
+    return num_bytes_read() - before;
+  }
+
+  /// Overwrites a page of a table with zeros: its last one, or the root.
+  void damage(const std::string& table, bool is_root) const {
+    std::int64_t page = 0, page_size = 0;
+    {
+      const Database database(file(), Access::read_only);
+      page = database.integer("SELECT rootpage FROM sqlite_schema WHERE name = '" + table + "'");
+      page_size = database.integer("PRAGMA page_size");
+    }
+    std::fstream stream(file(), std::ios::binary | std::ios::in | std::ios::out);
+    const auto start_of = [&](std::int64_t number) { return (number - 1) * page_size; };
+    if (!is_root) {  // Bytes 8 to 11 of an inner page: its rightmost child.
+      stream.seekg(start_of(page));
+      ASSERT_EQ(stream.get(), 5) << table << " has one page";
+      stream.seekg(start_of(page) + 8);
+      page = 0;
+      for (int i = 0; i < 4; ++i) page = page << 8 | stream.get();
+    }
+    stream.seekp(start_of(page));
+    stream << std::string(static_cast<std::size_t>(page_size), '\0');
+  }
+
+  [[nodiscard]] std::string damaged() const {
+    return "campaign file = " + file().string() +
+           " (is damaged: database disk image is malformed; restore it from a copy)";
+  }
+};
+
+TEST_F(StoreOpening, ForReadingCostsTheSameForAnyNumberOfRuns) {
+  const auto read = [&] { Store::open_read_only(file()); };
+  const auto annotate = [&] { Store::annotate(file(), {}); };
+  create(1000);
+  read();  // What is read once in a process.
+  const std::uint64_t cost = cost_of(read), cost_of_annotation = cost_of(annotate);
+  create(20'000);
+  ASSERT_GT(std::filesystem::file_size(file()), 4'000'000u);
+  // Trees are a page or two deeper.
+  constexpr std::uint64_t tolerance = 32 * 1024;
+  EXPECT_LE(cost_of(read), cost + tolerance);
+  EXPECT_LE(cost_of(annotate), cost_of_annotation + tolerance);
+}
+
+TEST_F(StoreOpening, FindsADamagedPageOfATableThatDoesNotGrow) {
+  for (const std::string table : {"campaign", "parameter", "event", "summary", "tag"}) {
+    create(10);
+    damage(table, true);
+    EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()); }), damaged()) << table;
+    EXPECT_EQ(store_error_of([&] { Store::annotate(file(), {}); }), damaged()) << table;
+  }
+}
+
+TEST_F(StoreOpening, FindsADamagedRootOfAnyTable) {
+  for (const std::string table : {"run_result", "delivery", "attempt", "worker", "overrun"}) {
+    create(10);
+    damage(table, true);
+    EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()); }), damaged()) << table;
+  }
+}
+
+TEST_F(StoreOpening, LeavesAPageOfResultsToWhoeverReadsIt) {
+  create(2000);
+  damage("run_result", false);
+  const Store store = Store::open_read_only(file());
+  const std::vector<std::function<void()>> readings{
+      [&] { store.for_each_result([](const RunResult&) {}); },
+      [&] { (void)test::results_in(store); }, [&] { store.check_integrity(); },
+      [&] {
+        ResultReader reader = store.results({RunIndex{1990}, 10});
+        while (reader.next()) continue;
+      }};
+  for (const auto& read : readings) EXPECT_THAT(store_error_of(read), HasSubstr("is damaged: "));
+  EXPECT_EQ(store.finished_runs().size(), 1u);
+}
+
+TEST_F(StoreOpening, LeavesAPageOfDeliveriesToWhoeverReadsIt) {
+  create(2000);
+  damage("delivery", false);
+  const Store store = Store::open_read_only(file());
+  EXPECT_EQ(store_error_of([&] { (void)store.finished_runs(); }), damaged());
+  EXPECT_EQ(test::results_in(store).size(), 2000u);
+}
+
+// It reads every delivery anyway, and writes.
+TEST_F(StoreOpening, ForItsCoordinatorFindsAnyDamagedPageBeforeAnythingIsWritten) {
+  for (const std::string table : {"run_result", "delivery"}) {
+    create(2000);
+    damage(table, false);
+    const std::string before = test::content_of(file());
+    EXPECT_EQ(store_error_of([&] { Store::open(file()); }), damaged()) << table;
+    EXPECT_TRUE(test::content_of(file()) == before) << table;
+  }
+}
+
+TEST_F(StoreOpening, OfADamagedFileMakesNoBackup) {
+  create(2000);
+  damage("run_result", false);
+  const Store store = Store::open_read_only(file());
+  EXPECT_THAT(store_error_of([&] { store.back_up(directory() / "copy.db"); }),
+              HasSubstr("copy.db.unfinished (is damaged: "));
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
