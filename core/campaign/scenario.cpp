@@ -94,6 +94,28 @@ void check_loop(std::string_view loop, double bandwidth_hz, double integral_hz,
   }
 }
 
+// Within these bounds shape_noise() finds a filter of finite numbers. Beyond them the squares and
+// fourth powers that it is made of leave the range of a double, and every run would diverge.
+void check_sensor_noise(std::string_view axis, std::string_view unit, const SensorNoise& noise) {
+  const auto refuse = [axis](std::string_view key, std::string_view key_unit, double value,
+                             std::string_view rule) {
+    throw ConfigError(fmt::format("noise.{}.{}{}", axis, key, key_unit), fmt::format("{}", value),
+                      std::string(rule));
+  };
+  if (noise.white_asd < 1e-100 || noise.white_asd > 1e100) {
+    refuse("white_asd", unit, noise.white_asd, "must be in [1e-100, 1e+100]");
+  }
+  const double ratio = noise.rise_asd / noise.white_asd;
+  if (noise.rise_asd != 0.0 && (ratio < 1e-12 || ratio > 1e12)) {
+    refuse(
+        "rise_asd", unit, noise.rise_asd,
+        fmt::format("must be 0 or in [1e-12, 1e+12] times the white level, {}", noise.white_asd));
+  }
+  if (noise.rise_limit_hz != 0.0 && noise.rise_limit_hz < 1e-6) {
+    refuse("rise_limit_hz", "", noise.rise_limit_hz, "must be 0 or in [1e-06, 0.6]");
+  }
+}
+
 void check_transient(const Scenario& scenario) {
   for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
     const double duration_s = scenario.sessions[i].num_orbits * scenario.orbit.period_s;
@@ -124,6 +146,9 @@ void check_band(const Scenario& scenario) {
 void Scenario::validate() const {
   for_each_field(*this,
                  [](const FieldInfo& field, const auto& value) { check_value(field, value); });
+  check_sensor_noise("linear_x", "_m_s2", noise.linear_x);
+  check_sensor_noise("linear_yz", "_m_s2", noise.linear_yz);
+  check_sensor_noise("angular", "_rad_s2", noise.angular);
   check_loop("drag_free", drag_free.bandwidth_hz, drag_free.integral_hz,
              simulation.sample_period_s);
   check_loop("attitude", attitude.bandwidth_hz, attitude.integral_hz, simulation.sample_period_s);

@@ -33,7 +33,7 @@ TEST(ReadCampaign, TakesEveryKindOfValue) {
     runs = 7
     [noise]
     scale = 0
-    linear_x.white_asd_m_s2 = 1e-300
+    thrust_asd_m_s2 = 1e-300
     [environment.linear_x]
     mean_m_s2 = 0.1
     [estimation]
@@ -44,7 +44,7 @@ TEST(ReadCampaign, TakesEveryKindOfValue) {
   EXPECT_EQ(campaign.seed, 9223372036854775807u);
   EXPECT_EQ(campaign.num_runs, 7u);
   EXPECT_EQ(campaign.scenario.noise.scale, 0.0);
-  EXPECT_EQ(campaign.scenario.noise.linear_x.white_asd, 1e-300);
+  EXPECT_EQ(campaign.scenario.noise.thrust_asd_m_s2, 1e-300);
   EXPECT_EQ(campaign.scenario.environment.linear_x.mean, 0.1);
   EXPECT_EQ(campaign.scenario.estimation.correction, Correction::first_order);
   EXPECT_EQ(campaign.scenario.estimation.num_rounds_max, 3);

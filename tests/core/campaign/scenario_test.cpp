@@ -115,6 +115,28 @@ TEST(Scenario, WantsIntegralsSlowerThanTheirLoops) {
             "attitude.integral_hz = 0.003 (must be < attitude.bandwidth_hz, 0.002)");
 }
 
+TEST(Scenario, WantsANoiseThatAFilterOfFiniteNumbersCanYield) {
+  const auto with_x = [](const SensorNoise& noise) {
+    return refusal_after([&](Scenario& s) { s.noise.linear_x = noise; });
+  };
+  EXPECT_EQ(with_x({.white_asd = 1e-101}),
+            "noise.linear_x.white_asd_m_s2 = 1e-101 (must be in [1e-100, 1e+100])");
+  EXPECT_EQ(with_x({.white_asd = 1e101}),
+            "noise.linear_x.white_asd_m_s2 = 1e+101 (must be in [1e-100, 1e+100])");
+  EXPECT_EQ(with_x({.white_asd = 1e-12, .rise_asd = 2.0}),
+            "noise.linear_x.rise_asd_m_s2 = 2 (must be 0 or in [1e-12, 1e+12] times the white "
+            "level, 1e-12)");
+  EXPECT_EQ(with_x({.white_asd = 1e-12, .rise_asd = 1e-25}),
+            "noise.linear_x.rise_asd_m_s2 = 1e-25 (must be 0 or in [1e-12, 1e+12] times the white "
+            "level, 1e-12)");
+  EXPECT_EQ(with_x({.white_asd = 1e-12, .rise_asd = 1e-12, .rise_limit_hz = 9e-7}),
+            "noise.linear_x.rise_limit_hz = 9e-07 (must be 0 or in [1e-06, 0.6])");
+  EXPECT_EQ(refusal_after([](Scenario& s) { s.noise.linear_yz.white_asd = 1e101; }),
+            "noise.linear_yz.white_asd_m_s2 = 1e+101 (must be in [1e-100, 1e+100])");
+  EXPECT_EQ(refusal_after([](Scenario& s) { s.noise.angular.white_asd = 1e101; }),
+            "noise.angular.white_asd_rad_s2 = 1e+101 (must be in [1e-100, 1e+100])");
+}
+
 TEST(Scenario, WantsATransientThatLeavesHalfOfEachSession) {
   EXPECT_EQ(refusal_after([](Scenario& s) { s.estimation.transient_s = 29751.0; }),
             "estimation.transient_s = 29751 (must leave half of session[0], 59500 s)");

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstddef>
 #include <numbers>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -55,6 +57,35 @@ TEST(NominalPsd, IsTheSumOfWhitePinkAndRise) {
   EXPECT_NEAR(nominal_psd(design, 0.01) / expected, 1.0, 1e-14);
   const SensorNoise limited{1.0, 0.0, 2.0, 0.1, 0.2};  // 1 + 4·2⁴/(1 + 1) at 0.2 Hz
   EXPECT_NEAR(nominal_psd(limited, 0.2), 33.0, 1e-13);
+}
+
+bool is_finite(const NoiseShape& shape) {
+  const auto are_finite = [](const auto& values) {
+    return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+  };
+  return std::isfinite(shape.gain) && are_finite(shape.pole) && are_finite(shape.coefficient) &&
+         std::isfinite(std::norm(shape.pair_pole)) &&
+         std::isfinite(std::norm(shape.pair_coefficient)) && are_finite(shape.start_factor);
+}
+
+// Whatever noise a scenario admits, up to the corners of its ranges, has a filter.
+TEST(NoiseShape, IsFiniteForEveryNoiseThatAScenarioAdmits) {
+  std::mt19937_64 random(1);
+  const auto exponential = [&](double lowest, double highest) {  // The ends, too.
+    const double x = std::uniform_real_distribution<>(-0.1, 1.1)(random);
+    return lowest * std::pow(highest / lowest, std::clamp(x, 0.0, 1.0));
+  };
+  for (int i = 0; i < 10000; ++i) {
+    Scenario scenario;
+    SensorNoise& noise = scenario.noise.angular;
+    noise.white_asd = exponential(1.001e-100, 0.999e100);
+    noise.pink_corner_hz = i % 5 == 0 ? 0.0 : exponential(1e-300, 0.0999);
+    noise.rise_asd = i % 7 == 0 ? 0.0 : noise.white_asd * exponential(1.001e-12, 0.999e12);
+    noise.rise_corner_hz = exponential(1.001e-3, 0.999);
+    noise.rise_limit_hz = i % 3 == 0 ? 0.0 : exponential(1.001e-6, 0.599);
+    ASSERT_NO_THROW(scenario.validate());
+    EXPECT_TRUE(is_finite(shape_noise(noise, exponential(0.05, 1.0)))) << i;
+  }
 }
 
 // Half a decibel is promised; the ripple of the sum, 0.155 dB, is all that there is of it.
