@@ -62,39 +62,34 @@ CampaignFolder::CampaignFolder(std::filesystem::path directory) : directory_(std
 
 CampaignFolder::~CampaignFolder() { close(lock_); }
 
-std::vector<ServedCampaign> CampaignFolder::load(
-    const std::function<void(const std::string&)>& warn) const {
+std::vector<std::filesystem::path> CampaignFolder::list() const {
   std::vector<std::filesystem::path> files;
-  for (const auto& item : std::filesystem::directory_iterator(directory_)) {
-    if (item.path().extension() == ".db") files.push_back(item.path());
+  std::error_code error;
+  std::filesystem::directory_iterator item(directory_, error);
+  for (; !error && item != std::filesystem::directory_iterator(); item.increment(error)) {
+    if (item->path().extension() == ".db") files.push_back(item->path());
   }
+  if (error) refuse(directory_, error.message());
   std::sort(files.begin(), files.end());
-  std::vector<ServedCampaign> campaigns;
-  for (const std::filesystem::path& file : files) {
-    try {
-      ServedCampaign campaign = load_file(file);
-      const bool is_known =
-          std::any_of(campaigns.begin(), campaigns.end(), [&](const ServedCampaign& other) {
-            return other.store.id() == campaign.store.id() ||
-                   other.definition->name == campaign.definition->name;
-          });
-      if (is_known)
-        throw Error(fmt::format("{}: campaign {} is in another file as well", file.string(),
-                                campaign.definition->name));
-      campaigns.push_back(std::move(campaign));
-    } catch (const Error& error) {
-      warn(error.what());
-    }
-  }
-  return campaigns;
+  return files;
 }
 
-ServedCampaign CampaignFolder::open(const Campaign& wanted, const StopPlan& plan) {
-  return open_or_create(wanted, plan, file_of(wanted), remedy);
+ServedCampaign CampaignFolder::load(const std::filesystem::path& file) const {
+  return load_file(file);
 }
 
+ServedCampaign CampaignFolder::open(const Campaign& wanted, const StopPlan& plan,
+                                    const Asker& asker) {
+  return open_or_create(wanted, plan, file_of(wanted), remedy, asker);
+}
+
+void CampaignFolder::require_same(const std::filesystem::path& file, const Campaign& wanted) {
+  coordinator::require_same(Store::open_read_only(file), wanted, file, remedy);
+}
+
+// What the file holds was compared before.
 std::shared_ptr<const Campaign> CampaignFolder::extend(Store& store, const Campaign& wanted) {
-  extend_to(store, wanted, file_of(wanted), remedy);
+  extend_same(store, wanted, file_of(wanted));
   return std::make_shared<const Campaign>(wanted);
 }
 

@@ -12,7 +12,7 @@ namespace proofmass::coordinator {
 
 /// The directory in which a coordinator keeps its campaigns, one file NAME.db each. Nobody else's:
 /// a second coordinator on the directory is refused.
-class CampaignFolder final : public CampaignFiles {
+class CampaignFolder final : public CampaignFiles, public CampaignDirectory {
  public:
   /// Takes the directory, making it if it is not there, for this user only.
   /// @throws Error if it cannot be made or written, or if another coordinator has it.
@@ -21,12 +21,13 @@ class CampaignFolder final : public CampaignFiles {
   CampaignFolder(const CampaignFolder&) = delete;
   CampaignFolder& operator=(const CampaignFolder&) = delete;
 
-  /// The campaigns of all files NAME.db, by name.
-  /// @param warn  Told of files that cannot be served, and why: they are left alone.
-  [[nodiscard]] std::vector<ServedCampaign> load(
-      const std::function<void(const std::string&)>& warn) const;
+  /// All files NAME.db, by name.
+  [[nodiscard]] std::vector<std::filesystem::path> list() const override;
+  [[nodiscard]] ServedCampaign load(const std::filesystem::path& file) const override;
 
-  [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan& plan) override;
+  [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan& plan,
+                                    const Asker& asker) override;
+  void require_same(const std::filesystem::path& file, const Campaign& wanted) override;
   [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,
                                                        const Campaign& wanted) override;
   std::optional<std::uint64_t> summarise(

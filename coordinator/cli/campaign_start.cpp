@@ -11,7 +11,6 @@
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
-namespace {
 
 void require_same(const Store& store, const Campaign& wanted, const std::filesystem::path& database,
                   std::string_view remedy) {
@@ -28,11 +27,7 @@ void require_same(const Store& store, const Campaign& wanted, const std::filesys
   throw UsageError(fmt::format("{}\n{}", text, remedy));
 }
 
-}  // namespace
-
-void extend_to(Store& store, const Campaign& wanted, const std::filesystem::path& database,
-               std::string_view remedy) {
-  require_same(store, wanted, database, remedy);
+void extend_same(Store& store, const Campaign& wanted, const std::filesystem::path& database) {
   const std::uint64_t num_runs = store.num_runs();
   if (wanted.num_runs < num_runs) {
     throw UsageError(
@@ -43,7 +38,8 @@ void extend_to(Store& store, const Campaign& wanted, const std::filesystem::path
 }
 
 ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,
-                              const std::filesystem::path& database, std::string_view remedy) {
+                              const std::filesystem::path& database, std::string_view remedy,
+                              const Asker& asker) {
   if (!plan.stop_rule.empty() && !wanted.table_columns.empty()) {
     throw UsageError(fmt::format("until = {} (must not be with quantities whose law is a table)",
                                  plan.stop_rule));
@@ -56,9 +52,13 @@ ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,
   if (is_new) set_horizon(0);
   Store store = is_new ? Store::create(database, campaign, canonical_definition(campaign))
                        : Store::open(database);
-  if (!is_new) {
+  if (is_new) {
+    if (!asker.name.empty()) store.set_owner(asker.name);
+  } else {
+    require_control(asker, wanted.name, store.owner());
     set_horizon(store.num_runs());
-    extend_to(store, campaign, database, remedy);
+    require_same(store, campaign, database, remedy);
+    extend_same(store, campaign, database);
   }
   if (store.stop_plan() != plan) store.set_stop_plan(plan);
   // Shared with the dispatch and with messages under way.

@@ -6,6 +6,7 @@
 #include "coordinator/cli/command_line.hpp"
 #include "coordinator/cli/control_command.hpp"
 #include "coordinator/cli/override_options.hpp"
+#include "coordinator/cli/release_command.hpp"
 #include "coordinator/cli/status_command.hpp"
 #include "coordinator/cli/submit_command.hpp"
 #include "coordinator/cli/watch_command.hpp"
@@ -61,6 +62,14 @@ void add_control(CLI::App& app, Command& chosen, wire::ControlAction action,
       [options, &chosen] { chosen = [options] { return control_campaign(*options); }; });
 }
 
+void add_release(CLI::App& app, Command& chosen) {
+  const auto options = std::make_shared<ReleaseOptions>();
+  CLI::App& release = *app.add_subcommand("release", "Lend runs to a host in quarantine again");
+  release.add_option("HOST", options->host, "Host, as `proofmass workers` names it")->required();
+  add_client_options(release, options->client);
+  release.callback([options, &chosen] { chosen = [options] { return release_host(*options); }; });
+}
+
 }  // namespace
 
 void add_client_commands(CLI::App& app, Command& chosen) {
@@ -73,6 +82,7 @@ void add_client_commands(CLI::App& app, Command& chosen) {
   add_control(app, chosen, ControlAction::resume, "Go on with a paused or cancelled campaign");
   add_control(app, chosen, ControlAction::cancel, "Drop a campaign's open runs; results stay");
   add_question(app, chosen, "workers", "Show the workers of a coordinator", show_workers);
+  add_release(app, chosen);
 }
 
 }  // namespace proofmass::coordinator

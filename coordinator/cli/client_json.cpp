@@ -28,9 +28,11 @@ Json json_of(const wire::CampaignStatus& campaign) {
             {"num_mismatches", campaign.num_mismatches},
             {"rate_hz", campaign.rate_hz},
             {"remaining_s", nullptr},
-            {"storage_failure", nullptr}};
+            {"storage_failure", nullptr},
+            {"owner", nullptr}};
   if (campaign.remaining_s) json["remaining_s"] = *campaign.remaining_s;
   if (!campaign.storage_failure.empty()) json["storage_failure"] = campaign.storage_failure;
+  if (!campaign.owner.empty()) json["owner"] = campaign.owner;
   return json;
 }
 
@@ -53,6 +55,13 @@ std::string status_json(const wire::StatusReply& status, JsonLayout layout) {
             {"uptime_s", status.uptime_s},   {"num_workers", status.num_workers},
             {"num_slots", status.num_slots}, {"campaigns", Json::array()}};
   for (const auto& campaign : status.campaigns) json["campaigns"].push_back(json_of(campaign));
+  json["unserved_files"] = Json::array();
+  for (const wire::UnservedFile& file : status.unserved_files) {
+    json["unserved_files"].push_back({{"file", file.file}, {"reason", file.reason}});
+  }
+  json["num_unserved_files"] = status.num_unserved_files;
+  json["quarantined_hosts"] = status.quarantined_hosts;
+  json["num_quarantined_hosts"] = status.num_quarantined_hosts;
   return dumped(json, layout);
 }
 
@@ -66,6 +75,10 @@ std::string done_json(std::string_view action, std::string_view campaign,
                       const wire::DoneReply& done) {
   return dumped({{"action", action}, {"campaign", campaign}, {"text", done.text}},
                 JsonLayout::indented);
+}
+
+std::string released_json(std::string_view host, const wire::DoneReply& done) {
+  return dumped({{"action", "release"}, {"host", host}, {"text", done.text}}, JsonLayout::indented);
 }
 
 }  // namespace proofmass::coordinator

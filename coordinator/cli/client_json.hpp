@@ -21,5 +21,6 @@ enum class JsonLayout : std::uint8_t { one_line, indented };
 /// @param campaign  Its name.
 [[nodiscard]] std::string done_json(std::string_view action, std::string_view campaign,
                                     const wire::DoneReply& done);
+[[nodiscard]] std::string released_json(std::string_view host, const wire::DoneReply& done);
 
 }  // namespace proofmass::coordinator

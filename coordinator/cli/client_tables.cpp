@@ -157,11 +157,33 @@ std::string worker_row(const WorkerStatus& worker) {
                                  ago(worker.silent_s)});
 }
 
+std::string further(std::uint64_t count, std::size_t num_shown, std::string_view thing) {
+  if (count <= num_shown) return {};
+  return fmt::format("and {}\n", counted(count - num_shown, thing));
+}
+
+std::string quarantine_note(const std::string& host) {
+  return fmt::format(
+      "host {0} is in quarantine: too many workers crashed there; `proofmass release {0}`\n", host);
+}
+
+/// What concerns the coordinator, and no campaign that it serves.
+std::string service_notes(const wire::StatusReply& status) {
+  std::string text;
+  for (const wire::UnservedFile& file : status.unserved_files) {
+    text += fmt::format("not served, tried again: {}\n", file.reason);
+  }
+  text += further(status.num_unserved_files, status.unserved_files.size(), "more such file");
+  for (const std::string& host : status.quarantined_hosts) text += quarantine_note(host);
+  text += further(status.num_quarantined_hosts, status.quarantined_hosts.size(), "more such host");
+  return text;
+}
+
 }  // namespace
 
 std::string status_table(const wire::StatusReply& status) {
   std::string text = service_line(status);
-  if (status.campaigns.empty()) return text + "no campaigns\n";
+  if (status.campaigns.empty()) return text + "no campaigns\n" + service_notes(status);
   text += heading(status_columns);
   for (const CampaignStatus& campaign : status.campaigns) text += campaign_row(campaign);
   for (const CampaignStatus& campaign : status.campaigns) {
@@ -169,7 +191,8 @@ std::string status_table(const wire::StatusReply& status) {
       text += fmt::format("{}: {}\n", campaign.name, note);
     }
   }
-  return text;
+  text += further(status.num_campaigns, status.campaigns.size(), "more campaign");
+  return text + service_notes(status);
 }
 
 std::string workers_table(const wire::WorkersReply& workers) {
@@ -181,6 +204,7 @@ std::string workers_table(const wire::WorkersReply& workers) {
     text += fmt::format("{}: in quarantine, is lent nothing: too many crashes on {}\n",
                         worker.id.value, worker.host);
   }
+  text += further(workers.num_workers, workers.workers.size(), "more worker");
   return text;
 }
 

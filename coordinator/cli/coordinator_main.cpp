@@ -1,3 +1,4 @@
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -14,6 +15,8 @@ namespace wire = proofmass::wire;
 constexpr double drain_time_s_max = 366.0 * 86400.0;
 constexpr std::uint64_t memory_mib_min = 64;
 constexpr std::uint64_t memory_mib_max = std::uint64_t{1} << 24;
+constexpr std::size_t campaigns_per_key_max = 1'000'000;
+constexpr std::uint64_t bytes_per_key_max = std::uint64_t{1} << 50;
 
 void add_addresses(CLI::App& app, ServeOptions& options) {
   app.add_option("--bind", options.endpoint,
@@ -44,6 +47,14 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
          "MiB of memory; before it has more it closes\nall connections, and peers connect anew")
       ->check(wire::in_range(memory_mib_min, memory_mib_max))
       ->envname("PROOFMASS_MEMORY_MAX")
+      ->capture_default_str();
+  app.add_option("--campaigns-per-key", options.limits.campaigns_max,
+                 "Unfinished campaigns that a client's key may\nhave, at most")
+      ->check(wire::in_range(std::size_t{1}, campaigns_per_key_max))
+      ->capture_default_str();
+  app.add_option("--bytes-per-key", options.limits.size_max,
+                 "Bytes of the definitions of these campaigns,\nat most")
+      ->check(wire::in_range(std::uint64_t{1}, bytes_per_key_max))
       ->capture_default_str();
   static const std::map<std::string, wire::LogFormat> formats{{"json", wire::LogFormat::json},
                                                               {"text", wire::LogFormat::text}};

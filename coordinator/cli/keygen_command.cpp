@@ -28,15 +28,30 @@ std::string_view list_name(KeyRole role) {
   return role == KeyRole::worker ? wire::authorized_workers_name : wire::authorized_clients_name;
 }
 
-std::string list_head(KeyRole role) {
-  return fmt::format(
-      "# Public keys of the {0}s that may connect, one line `KEY NAME` each.\n"
-      "# Remove a line to revoke a key; a running coordinator notices within a second.\n",
-      to_text(role));
+wire::Domain domain_of(KeyRole role) {
+  return role == KeyRole::worker ? wire::Domain::workers : wire::Domain::clients;
 }
 
-std::string list_line(const wire::KeyPair& pair, std::string_view name) {
-  return fmt::format("{} {}\n", pair.public_key.text(), name);
+std::string list_head(KeyRole role) {
+  const bool is_client = role == KeyRole::client;
+  return fmt::format(
+      "# Public keys of the {0}s that may connect, one line `KEY NAME{1}` each.\n{2}"
+      "# Remove a line to revoke a key; a running coordinator notices within a second.\n",
+      to_text(role), is_client ? " [RIGHTS]" : "",
+      is_client ? "# RIGHTS: a comma list of observe, submit (and control what the same NAME\n"
+                  "# submitted), control (everybody's campaigns); observe,submit if left out.\n"
+                : "");
+}
+
+std::string list_line(const wire::KeyPair& pair, std::string_view name,
+                      std::string_view rights = "") {
+  return fmt::format("{} {}{}{}\n", pair.public_key.text(), name, rights.empty() ? "" : " ",
+                     rights);
+}
+
+/// Whoever sets a coordinator up may control all of its campaigns.
+std::string_view first_rights(KeyRole role) {
+  return role == KeyRole::client ? "observe,submit,control" : "";
 }
 
 void refuse_to_replace(const std::filesystem::path& file) {
@@ -62,8 +77,8 @@ void make_whole_set(const std::filesystem::path& directory) {
     const wire::KeyPair pair = wire::make_key_pair();
     wire::write_key_pair(directory, to_text(role), role, pair);
     wire::write_whole_file("allow-list", directory / list_name(role),
-                           list_head(role) + list_line(pair, to_text(role)), list_mode,
-                           wire::IfExists::refuse);
+                           list_head(role) + list_line(pair, to_text(role), first_rights(role)),
+                           list_mode, wire::IfExists::refuse);
   }
 }
 
@@ -83,8 +98,8 @@ void add_pair(const std::filesystem::path& directory, KeyRole role, const std::s
   }
   const std::filesystem::path list = directory / list_name(role);
   std::string text = read_list(list);
-  for (const auto& [key, owner] : parse_allow_list(text, list)) {
-    if (owner != name) continue;
+  for (const auto& [key, owner] : parse_allow_list(text, domain_of(role), list)) {
+    if (owner.name != name) continue;
     throw UsageError(
         fmt::format("--{} = {} (is in {} already)", to_text(role), name, list.string()));
   }

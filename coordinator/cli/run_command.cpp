@@ -58,7 +58,8 @@ StopPlan plan_of(const RunOptions& options, std::uint64_t num_runs) {
 /// The file of a campaign that asks for more runs until its stop rule is reached.
 class GrowingFile final : public CampaignFiles {
  public:
-  [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan&) override {
+  [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan&,
+                                    const Asker&) override {
     throw UsageError(fmt::format("submit = {} (nobody is there to submit)", wanted.name));
   }
   [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,

@@ -76,24 +76,11 @@ class Notices {
   TimePoint status_at_ = TimePoint::min();
 };
 
-/// Those of the directory, and those of campaign files that are not among them or have more runs.
-std::vector<ServedCampaign> campaigns_of(const ServeOptions& options, CampaignFolder& folder,
-                                         const Log& log) {
-  std::vector<ServedCampaign> campaigns = folder.load([&](const std::string& what) {
-    log({.severity = Severity::warning,
-         .kind = "campaign_not_served",
-         .text = fmt::format("reason=\"{}\"", what)});
-  });
+/// Those of campaign files, new ones or such that have more runs than before.
+std::vector<ServedCampaign> campaigns_of(const ServeOptions& options, CampaignFolder& folder) {
+  std::vector<ServedCampaign> campaigns;
   for (const std::filesystem::path& file : options.campaign_files) {
-    const Campaign wanted = read_campaign(file);
-    const auto known = std::find_if(
-        campaigns.begin(), campaigns.end(),
-        [&](const ServedCampaign& campaign) { return campaign.definition->name == wanted.name; });
-    if (known == campaigns.end()) {
-      campaigns.push_back(folder.open(wanted, {}));
-    } else {
-      known->definition = folder.extend(known->store, wanted);
-    }
+    campaigns.push_back(folder.open(read_campaign(file), {}, {}));
   }
   return campaigns;
 }
@@ -121,6 +108,8 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(options.drain_time_s));
   config.memory_size_max = options.memory_mib_max << 20;
   config.files = &folder;
+  config.directory = &folder;
+  config.limits = options.limits;
   config.version = PROOFMASS_VERSION;
   config.dispatch.reference_digest = reference_digest(best_instruction_set());
   if (!options.faults.empty()) config.faults = wire::FaultPlan::parse(options.faults);
@@ -134,20 +123,32 @@ void log_start(const Service& service, const Log& log) {
                            service.clients_endpoint(), service.campaigns().size())});
 }
 
-/// @return True if runs were given up.
+/// Brings the statistics of the campaigns that are still open up to date.
+/// @return False if they could not all be written.
 bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
-  bool has_given_up = false;
+  bool is_written = true;
   for (auto& [file, store, definition] : campaigns) {
-    update_statistics(store, definition->scenario);
-    has_given_up = has_given_up || !store.given_up_runs().empty();
-    if (const std::optional<std::string> reason = store.rest()) {
-      log({.severity = Severity::warning,
-           .kind = "write_ahead_log_kept",
-           .text = fmt::format("file={} reason=\"{}\"", file.string(), *reason)});
+    try {
+      update_statistics(store, definition->scenario);
+      if (const std::optional<std::string> reason = store.rest()) {
+        log({.severity = Severity::warning,
+             .kind = "write_ahead_log_kept",
+             .text = fmt::format("file={} reason=\"{}\"", file.string(), *reason)});
+      }
+    } catch (const std::exception& error) {
+      is_written = false;
+      log({.severity = Severity::error,
+           .kind = "statistics_failed",
+           .text = fmt::format("file={} reason=\"{}\"", file.string(), error.what())});
     }
   }
-  log({.kind = "coordinator_ended", .text = fmt::format("campaigns={}", campaigns.size())});
-  return has_given_up;
+  return is_written;
+}
+
+bool has_given_up_runs(const Service& service) {
+  const std::vector<wire::CampaignStatus> campaigns = service.campaigns();
+  return std::any_of(campaigns.begin(), campaigns.end(),
+                     [](const wire::CampaignStatus& one) { return one.num_given_up > 0; });
 }
 
 }  // namespace
@@ -160,13 +161,17 @@ int serve_campaigns(const ServeOptions& options) {
   if (config.faults && config.faults->kill) {
     wire::arm_kill_point(config.faults->kill->point, config.faults->kill->passage);
   }
-  Service service(campaigns_of(options, folder, log), config, log);
+  Service service(campaigns_of(options, folder), config, log);
   log_start(service, log);
   Notices notices;
   notices.ready();
   service.run(stop, [&] { notices.on_tick(service, stop); });
   const bool is_done = service.is_done();
-  const bool has_given_up = finish(service.close(), log);
+  const bool has_given_up = has_given_up_runs(service);
+  const std::size_t num_campaigns = service.campaigns().size();
+  const bool is_written = finish(service.close(), log);
+  log({.kind = "coordinator_ended", .text = fmt::format("campaigns={}", num_campaigns)});
+  if (!is_written || service.has_storage_failed()) return exit_cannot_be_done;
   const bool is_in_order =
       options.end == ServiceEnd::when_done ? is_done : stop != StopRequest::now;
   if (!is_in_order) return exit_interrupted;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "coordinator/net/service.hpp"
+#include "coordinator/net/submission_limits.hpp"
 #include "proto/link/log.hpp"
 
 namespace proofmass::coordinator {
@@ -21,6 +22,7 @@ struct ServeOptions {
   ServiceEnd end = ServiceEnd::never;
   double drain_time_s = 120.0;          ///< ≥ 0.
   std::uint64_t memory_mib_max = 2048;  ///< ≥ 64; of the process.
+  SubmissionLimits limits;              ///< Of each client's key.
   wire::LogFormat log_format = wire::LogFormat::text;
   std::string faults;       ///< As FaultPlan::parse() reads them.
   double time_scale = 1.0;  ///< > 0; of all that is waited for. Below 1 in tests of this program.

@@ -1,6 +1,7 @@
 #include "coordinator/cli/status_command.hpp"
 
 #include "coordinator/cli/client_json.hpp"
+#include "coordinator/cli/client_pages.hpp"
 #include "coordinator/cli/client_tables.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
@@ -9,7 +10,7 @@ namespace proofmass::coordinator {
 
 int show_status(const ClientOptions& options) {
   return with_connection(options, [&](const Ask& ask) {
-    const auto status = reply_of<wire::StatusReply>(ask, wire::StatusRequest{});
+    const wire::StatusReply status = whole_status(ask);
     print_lines(options.format == OutputFormat::json ? status_json(status, JsonLayout::indented)
                                                      : status_table(status));
     return exit_done;

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <thread>
 
+#include "coordinator/cli/client_pages.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/watch_display.hpp"
 
@@ -43,7 +44,7 @@ WatchMode mode_for(OutputFormat format) {
 int watch_until_over(const Ask& ask, const std::optional<std::string>& campaign,
                      WatchDisplay& display, const std::function<void()>& pause) {
   for (;;) {
-    auto status = reply_of<wire::StatusReply>(ask, wire::StatusRequest{});
+    wire::StatusReply status = whole_status(ask);
     if (campaign) keep_only(status, *campaign);
     display.update(status);
     if (std::ranges::all_of(status.campaigns, is_over)) {

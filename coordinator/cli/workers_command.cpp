@@ -1,6 +1,7 @@
 #include "coordinator/cli/workers_command.hpp"
 
 #include "coordinator/cli/client_json.hpp"
+#include "coordinator/cli/client_pages.hpp"
 #include "coordinator/cli/client_tables.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
@@ -9,7 +10,7 @@ namespace proofmass::coordinator {
 
 int show_workers(const ClientOptions& options) {
   return with_connection(options, [&](const Ask& ask) {
-    const auto workers = reply_of<wire::WorkersReply>(ask, wire::WorkersRequest{});
+    const wire::WorkersReply workers = all_workers(ask);
     print_lines(options.format == OutputFormat::json ? workers_json(workers)
                                                      : workers_table(workers));
     return exit_done;

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <cstdint>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -118,10 +120,20 @@ void settle_surplus(State& state, WorkerId id, CampaignId campaign_id, const Hel
   if (!open.empty()) worker.unleased[campaign_id].add(open);
 }
 
+/// Number of runs of a campaign that is loaded or known as ended.
+std::optional<std::uint64_t> num_runs_of(const State& state, CampaignId id) {
+  const auto campaign = state.campaigns.find(id);
+  if (campaign != state.campaigns.end()) return campaign->second.definition->num_runs;
+  const auto ended = state.ended.find(id);
+  return ended == state.ended.end() ? std::nullopt : std::optional(ended->second);
+}
+
 /// Takes out the runs that the campaign does not have: the worker keeps their results.
 void settle_foreign(State& state, WorkerId id, CampaignId campaign_id, HeldByAttempt& held,
                     Outbox& outbox) {
-  const RunRange known{{0}, state.campaigns.at(campaign_id).definition->num_runs};
+  const std::optional<std::uint64_t> num_runs = num_runs_of(state, campaign_id);
+  if (!num_runs) return;
+  const RunRange known{{0}, *num_runs};
   RunSet foreign = all_of(held);
   foreign.remove(known);
   if (foreign.empty()) return;
@@ -172,7 +184,7 @@ bool is_wanted(const State& state, CampaignId id) {
 /// Runs of one campaign that the worker holds.
 void settle_held(State& state, WorkerId id, CampaignId campaign, HeldByAttempt held, TimePoint now,
                  Outbox& outbox) {
-  if (state.campaigns.contains(campaign)) settle_foreign(state, id, campaign, held, outbox);
+  settle_foreign(state, id, campaign, held, outbox);
   if (held.empty()) return;
   if (is_wanted(state, campaign)) {
     settle_surplus(state, id, campaign, held, now, outbox);

@@ -37,14 +37,23 @@ std::string_view take_word(std::string_view& line) {
 
 /// Adds what one line says.
 /// @return Which rule it breaks; empty if none.
-std::string_view read_line(std::string_view line, AllowedKeys& keys) {
+std::string_view read_line(std::string_view line, wire::Domain domain, AllowedKeys& keys) {
   const std::string_view key = take_word(line);
   if (key.empty() || key.front() == '#') return {};
   const std::string_view name = take_word(line);
   if (!wire::PublicKey::parse(key)) return "must begin with a public key of 40 characters";
   if (!wire::is_name(name)) return "must have a name of [A-Za-z0-9._-] after the key";
-  if (!take_word(line).empty()) return "must be KEY NAME";
-  if (!keys.emplace(key, name).second) return "names a key a second time";
+  const std::string_view rights_text = take_word(line);
+  std::optional<Rights> rights;
+  if (domain == wire::Domain::clients) {
+    rights = rights_text.empty() ? Rights::usual() : Rights::parse(rights_text);
+    if (!rights) return "must have rights of observe,submit,control after the name";
+  } else if (!rights_text.empty()) {
+    return "must be KEY NAME";
+  }
+  if (!take_word(line).empty()) return "must be KEY NAME RIGHTS";
+  const AllowedKey owner{.name = std::string(name), .rights = rights.value_or(Rights())};
+  if (!keys.emplace(key, owner).second) return "names a key a second time";
   if (keys.size() > allowed_keys_max) return "is one key too many";
   return {};
 }
@@ -66,17 +75,18 @@ std::string read_file(const std::filesystem::path& file) {
   return text;
 }
 
-AllowedKeys read_allow_list(const std::filesystem::path& file) {
-  return parse_allow_list(read_file(file), file);
+AllowedKeys read_allow_list(const std::filesystem::path& file, wire::Domain domain) {
+  return parse_allow_list(read_file(file), domain, file);
 }
 
 }  // namespace
 
-AllowedKeys parse_allow_list(std::string_view text, const std::filesystem::path& file) {
+AllowedKeys parse_allow_list(std::string_view text, wire::Domain domain,
+                             const std::filesystem::path& file) {
   AllowedKeys keys;
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view rule = read_line(text.substr(0, end), keys);
+    const std::string_view rule = read_line(text.substr(0, end), domain, keys);
     if (!rule.empty()) {
       throw Error(fmt::format("{} line = {} ({})", file.string(), number, rule));
     }
@@ -85,9 +95,10 @@ AllowedKeys parse_allow_list(std::string_view text, const std::filesystem::path&
   return keys;
 }
 
-AllowList::AllowList(std::filesystem::path file) : file_(std::move(file)) {
+AllowList::AllowList(std::filesystem::path file, wire::Domain domain)
+    : file_(std::move(file)), domain_(domain) {
   const Stamp stamp = stamp_of(file_);
-  names_ = read_allow_list(file_);
+  keys_ = read_allow_list(file_, domain_);
   if (is_settled(stamp)) stamp_ = stamp;
 }
 
@@ -97,7 +108,7 @@ std::optional<std::string> AllowList::refresh() {
   if (stamp == stamp_) return std::nullopt;
   stamp_ = is_settled(stamp) ? std::optional(stamp) : std::nullopt;
   try {
-    names_ = read_allow_list(file_);
+    keys_ = read_allow_list(file_, domain_);
     reported_.clear();
     return std::nullopt;
   } catch (const Error& error) {
@@ -113,9 +124,9 @@ std::optional<std::string> AllowList::refresh_if_due(TimePoint now) {
   return refresh();
 }
 
-const std::string* AllowList::name_of(std::string_view public_key) const {
-  const auto found = names_.find(public_key);
-  return found == names_.end() ? nullptr : &found->second;
+const AllowedKey* AllowList::owner_of(std::string_view public_key) const {
+  const auto found = keys_.find(public_key);
+  return found == keys_.end() ? nullptr : &found->second;
 }
 
 AllowList::Stamp AllowList::stamp_of(const std::filesystem::path& file) {

@@ -9,20 +9,32 @@
 #include <string>
 #include <string_view>
 
+#include "coordinator/net/rights.hpp"
+#include "proto/link/security.hpp"
+
 namespace proofmass::coordinator {
 
 inline constexpr std::size_t allowed_keys_max = 65536;
 
-/// Names by public key.
-using AllowedKeys = std::map<std::string, std::string, std::less<>>;
+/// The owner of a key.
+struct AllowedKey {
+  std::string name;
+  Rights rights;  ///< Of a client; a worker has none.
 
-/// The keys in the text of an allow-list: one line `KEY NAME` each; empty lines and lines that
-/// begin with `#` say nothing.
+  bool operator==(const AllowedKey&) const = default;
+};
+
+/// Owners by public key.
+using AllowedKeys = std::map<std::string, AllowedKey, std::less<>>;
+
+/// The keys in the text of an allow-list: one line `KEY NAME` each, of clients also
+/// `KEY NAME RIGHTS`; empty lines and lines that begin with `#` say nothing.
 ///
-/// @param file  For messages.
+/// @param domain  Whose list it is.
+/// @param file    For messages.
 /// @throws Error reading `FILE line = NUMBER (rule)`. What the line says is not repeated, because
 ///         somebody may have put a secret there.
-[[nodiscard]] AllowedKeys parse_allow_list(std::string_view text,
+[[nodiscard]] AllowedKeys parse_allow_list(std::string_view text, wire::Domain domain,
                                            const std::filesystem::path& file);
 
 /// The keys that may enter by one door, from a file that may change at any time: a line that is
@@ -33,7 +45,7 @@ class AllowList {
 
   /// @throws Error if the file cannot be read, can be written by others than its owner, or says
   ///         something else than keys and names.
-  explicit AllowList(std::filesystem::path file);
+  AllowList(std::filesystem::path file, wire::Domain domain);
 
   /// Reads the file again if it changed. A file that is wrong or gone leaves the list as it was.
   /// @return What is wrong, once.
@@ -42,8 +54,8 @@ class AllowList {
   /// As refresh(), but at most once a second.
   [[nodiscard]] std::optional<std::string> refresh_if_due(TimePoint now);
 
-  /// Name of the key's owner; null if the key is not on the list.
-  [[nodiscard]] const std::string* name_of(std::string_view public_key) const;
+  /// The key's owner; null if the key is not on the list.
+  [[nodiscard]] const AllowedKey* owner_of(std::string_view public_key) const;
 
  private:
   /// What tells one state of the file from another.
@@ -59,10 +71,11 @@ class AllowList {
   [[nodiscard]] static bool is_settled(const Stamp& stamp);
 
   std::filesystem::path file_;
+  wire::Domain domain_;
   std::optional<Stamp> stamp_;  ///< None if the file must be read again in any case.
   std::string reported_;
   std::optional<TimePoint> looked_at_;
-  AllowedKeys names_;
+  AllowedKeys keys_;
 };
 
 }  // namespace proofmass::coordinator

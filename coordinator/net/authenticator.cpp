@@ -87,8 +87,8 @@ class Authenticator::Parts {
         std::function<void(Event)> log)
       : log_(std::move(log)),
         refusals_(log_),
-        workers_(directory / wire::authorized_workers_name),
-        clients_(directory / wire::authorized_clients_name),
+        workers_(directory / wire::authorized_workers_name, Domain::workers),
+        clients_(directory / wire::authorized_clients_name, Domain::clients),
         socket_(context, zmq::socket_type::rep) {
     try {
       socket_.bind(zap_address);
@@ -120,12 +120,18 @@ class Authenticator::Parts {
 
   [[nodiscard]] bool is_allowed(Domain domain, std::string_view public_key, TimePoint now) {
     report(list_of(domain).refresh_if_due(now));
-    return list_of(domain).name_of(public_key) != nullptr;
+    return list_of(domain).owner_of(public_key) != nullptr;
   }
 
   [[nodiscard]] std::string name_of(Domain domain, std::string_view public_key) {
-    const std::string* const name = list_of(domain).name_of(public_key);
-    return name == nullptr ? std::string() : *name;
+    const AllowedKey* const owner = list_of(domain).owner_of(public_key);
+    return owner == nullptr ? std::string() : owner->name;
+  }
+
+  [[nodiscard]] std::optional<Asker> client(std::string_view public_key, TimePoint now) {
+    if (!is_allowed(Domain::clients, public_key, now)) return std::nullopt;
+    const AllowedKey& owner = *clients_.owner_of(public_key);
+    return Asker{.name = owner.name, .rights = owner.rights};
   }
 
  private:
@@ -153,9 +159,9 @@ class Authenticator::Parts {
     if (!domain) return "no such domain";
     if (request.public_key.empty()) return "without a key";
     report(list_of(*domain).refresh());
-    if (list_of(*domain).name_of(request.public_key) != nullptr) return {};
+    if (list_of(*domain).owner_of(request.public_key) != nullptr) return {};
     const Domain other = *domain == Domain::workers ? Domain::clients : Domain::workers;
-    if (list_of(other).name_of(request.public_key) == nullptr) return "unknown key";
+    if (list_of(other).owner_of(request.public_key) == nullptr) return "unknown key";
     return other == Domain::workers ? "key of a worker" : "key of a client";
   }
 
@@ -203,6 +209,10 @@ bool Authenticator::is_allowed(Domain domain, std::string_view public_key, TimeP
 
 std::string Authenticator::name_of(Domain domain, std::string_view public_key) const {
   return parts_->name_of(domain, public_key);
+}
+
+std::optional<Asker> Authenticator::client(std::string_view public_key, TimePoint now) {
+  return parts_->client(public_key, now);
 }
 
 }  // namespace proofmass::coordinator

@@ -5,11 +5,13 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/net/handshake_watch.hpp"
+#include "coordinator/net/rights.hpp"
 #include "proto/link/security.hpp"
 
 namespace zmq {
@@ -56,6 +58,9 @@ class Authenticator {
 
   /// Name of the key's owner as in the list; empty if it is not on it.
   [[nodiscard]] std::string name_of(wire::Domain domain, std::string_view public_key) const;
+
+  /// Name and rights of a client's key, as is_allowed(); nothing if it is not on the list.
+  [[nodiscard]] std::optional<Asker> client(std::string_view public_key, TimePoint now);
 
  private:
   class Parts;

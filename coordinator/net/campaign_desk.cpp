@@ -5,46 +5,14 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
-#include <type_traits>
 #include <utility>
-#include <variant>
 
 #include "coordinator/dispatch/dispatch.hpp"
-#include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
-#include "core/simulation/run.hpp"
-#include "proto/link/faults.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-StopPlan plan_of(const wire::SubmitRequest& request) {
-  StopPlan plan{
-      .stop_rule = request.stop_rule, .num_runs_max = {}, .failures_max = request.failures_max};
-  if (!plan.stop_rule.empty()) plan.num_runs_max = request.campaign.num_runs;
-  return plan;
-}
-
-StoredCampaign stored_campaign_of(const ServedCampaign& campaign, GivenUpRuns given_up) {
-  const Store& store = campaign.store;
-  const CampaignControl control = store.control();
-  StoredCampaign stored{.definition = campaign.definition,
-                        .phase = control.phase,
-                        .priority = control.priority,
-                        .audit_fraction = control.audit_fraction,
-                        .finished = store.finished_runs(),
-                        .given_up = {},
-                        .compared = store.compared_runs(),
-                        .blamed = {}};
-  if (given_up == GivenUpRuns::retry) return stored;
-  stored.given_up = store.given_up_runs();
-  for (const BlamedRun& blamed : store.blamed_runs()) {
-    stored.blamed.push_back(
-        {.run = blamed.run, .num_crashes = blamed.num_crashes, .attempt = blamed.attempt});
-  }
-  return stored;
-}
 
 std::optional<double> remaining_s(const CampaignState& campaign, double rate_hz) {
   if (campaign.phase != Phase::active || rate_hz <= 0.0) return std::nullopt;
@@ -52,159 +20,168 @@ std::optional<double> remaining_s(const CampaignState& campaign, double rate_hz)
   return static_cast<double>(campaign.definition->num_runs - num_ended) / rate_hz;
 }
 
+bool is_over(Phase phase) { return phase == Phase::finished || phase == Phase::cancelled; }
+
 }  // namespace
 
-CampaignDesk::CampaignDesk(State& state, StoreWriter& writer, CampaignFiles* files,
-                           CoordinatorStart start, TimePoint now)
-    : state_(state), writer_(writer), files_(files), start_(std::move(start)), began_at_(now) {}
+CampaignDesk::CampaignDesk(Surroundings surroundings)
+    : surroundings_(std::move(surroundings)),
+      state_(surroundings_.state),
+      writer_(surroundings_.writer),
+      outbox_(surroundings_.outbox),
+      files_(surroundings_.files) {}
 
 CampaignDesk::~CampaignDesk() = default;
 
-void CampaignDesk::serve(ServedCampaign campaign, GivenUpRuns given_up, TimePoint now,
-                         Outbox& outbox) {
+void CampaignDesk::serve(PreparedCampaign prepared) {
+  ServedCampaign& campaign = prepared.campaign;
   const CampaignId id = campaign.store.id();
-  if (find(campaign.definition->name) || served_.contains(id)) {
-    throw Error(fmt::format("campaign = {} in {} (is served already, from another file)",
-                            campaign.definition->name, campaign.file.string()));
+  const std::string& name = campaign.definition->name;
+  const std::optional<Entry> entry = find(name);
+  const bool is_again = entry && entry->has_ended && entry->id == id;
+  if ((entry && !is_again) || served_.contains(id) || (ended_.contains(id) && !is_again)) {
+    throw Error(fmt::format("campaign = {} in {} (is served already, from another file)", name,
+                            campaign.file.string()));
   }
-  wire::kill_point(wire::KillPoint::after_open);
-  const StoredCampaign stored = stored_campaign_of(campaign, given_up);
-  campaign.store.begin_coordinator(start_);
+  const TimePoint now = surroundings_.now();
   served_.emplace(id, Served{.file = campaign.file,
-                             .name = campaign.definition->name,
+                             .name = name,
+                             .owner = prepared.owner,
                              .rate = RateMeter(now),
-                             .written = campaign.store.control(),
-                             .plan = campaign.store.stop_plan(),
-                             .is_decided = campaign.store.control().phase == Phase::finished,
-                             .num_failures_before = campaign.store.num_without_estimate(),
+                             .written = prepared.control,
+                             .plan = prepared.plan,
+                             .is_decided = prepared.control.phase == Phase::finished,
+                             .num_failures_before = prepared.num_failures,
                              .summary = {}});
-  writer_.open(id, std::move(campaign.store));
-  on_campaign(state_, id, stored, now, outbox);
-}
-
-wire::ClientReply CampaignDesk::answer(const wire::ClientRequest& request, TimePoint now,
-                                       Outbox& outbox) {
-  try {
-    return std::visit([&](const auto& content) { return carry_out(content, now, outbox); },
-                      request);
-  } catch (const Error& error) {
-    return wire::ErrorReply{.text = error.what()};
-  }
-}
-
-wire::ClientReply CampaignDesk::carry_out(const wire::SubmitRequest& request, TimePoint now,
-                                          Outbox& outbox) {
-  if (files_ == nullptr) {
-    return wire::ErrorReply{
-        fmt::format("submit = {} (this coordinator serves the campaigns that "
-                    "it began with)",
-                    request.campaign.name)};
-  }
-  auto id = find(request.campaign.name);
-  if (id) {
-    resubmit(*id, request, now, outbox);
+  if (is_again) {
+    ended_.erase(id);
   } else {
-    ServedCampaign campaign = files_->open(request.campaign, plan_of(request));
-    const Entry control = CampaignControl{.phase = Phase::active,
-                                          .priority = request.priority,
-                                          .audit_fraction = request.audit_fraction};
-    (void)campaign.store.write({&control, 1});
-    id = campaign.store.id();
-    serve(std::move(campaign), GivenUpRuns::keep, now, outbox);
+    order_.push_back(id);
   }
-  review(now, outbox);
-  return done_reply(*id);
+  writer_.open(id, std::move(campaign.store));
+  on_campaign(state_, id, prepared.stored, now, outbox_);
 }
 
-void CampaignDesk::resubmit(CampaignId id, const wire::SubmitRequest& request, TimePoint now,
-                            Outbox& outbox) {
+void CampaignDesk::list(EndedCampaign campaign) {
+  const CampaignId id = campaign.id;
+  if (find(campaign.status.name) || served_.contains(id) || ended_.contains(id)) {
+    throw Error(fmt::format("campaign = {} in {} (is served already, from another file)",
+                            campaign.status.name, campaign.file.string()));
+  }
+  on_ended(state_, id, campaign.status.num_runs);
+  ended_.emplace(id, std::move(campaign));
+  order_.push_back(id);
+}
+
+std::optional<CampaignDesk::Entry> CampaignDesk::find(std::string_view name) const {
+  for (const auto& [id, served] : served_) {
+    if (served.name == name) return Entry{.id = id, .file = served.file, .owner = served.owner};
+  }
+  for (const auto& [id, ended] : ended_) {
+    if (ended.status.name != name) continue;
+    return Entry{.id = id, .file = ended.file, .owner = ended.status.owner, .has_ended = true};
+  }
+  return std::nullopt;
+}
+
+KnownCampaigns CampaignDesk::known() const {
+  KnownCampaigns known;
+  for (const auto& [id, served] : served_) {
+    known.files.insert(served.file);
+    known.ids.insert(id);
+    known.names.insert(served.name);
+  }
+  for (const auto& [id, ended] : ended_) {
+    known.files.insert(ended.file);
+    known.ids.insert(id);
+    known.names.insert(ended.status.name);
+  }
+  return known;
+}
+
+CampaignDesk::Holdings CampaignDesk::holdings_of(std::string_view owner) const {
+  Holdings holdings;
+  for (const auto& [id, served] : served_) {
+    if (served.owner != owner || is_over(phase_of(id))) continue;
+    ++holdings.num_campaigns;
+    holdings.size += definition_size(*state_.campaigns.at(id).definition);
+  }
+  return holdings;
+}
+
+void CampaignDesk::take_hold(CampaignId id) {
   const CampaignState& campaign = state_.campaigns.at(id);
   if (!campaign.storage_failure.empty()) throw Error(campaign.storage_failure);
-  const StopPlan plan = plan_of(request);
-  Campaign wanted = request.campaign;
-  wanted.num_runs = horizon_of(plan, wanted.num_runs, campaign.definition->num_runs);
-  extend(id, wanted, now, outbox);
   Served& served = served_.at(id);
-  if (plan != served.plan) {
-    writer_.access(id, [&](Store& store) { store.set_stop_plan(plan); });
-    served.plan = plan;
+  if (served.is_held) {
+    throw Error(
+        fmt::format("campaign = {} (is being changed by another request; try again)", served.name));
+  }
+  served.is_held = true;
+}
+
+void CampaignDesk::change(CampaignId id, const Change& change) {
+  Served& served = served_.at(id);
+  served.is_held = false;
+  extend(id, change.definition);
+  if (change.plan != served.plan) {
+    served.plan = change.plan;
     served.is_decided = false;
   }
-  on_control(state_, id, request.priority, request.audit_fraction);
-  resume(id, now, outbox);
+  on_control(state_, id, change.priority, change.audit_fraction);
+  resume(id);
+  review();
 }
 
-void CampaignDesk::resume(CampaignId id, TimePoint now, Outbox& outbox) {
-  const Phase phase = state_.campaigns.at(id).phase;
-  if (phase == Phase::paused || phase == Phase::cancelled) on_resume(state_, id, now, outbox);
-}
-
-void CampaignDesk::extend(CampaignId id, const Campaign& wanted, TimePoint now, Outbox& outbox) {
-  std::shared_ptr<const Campaign> extended;
-  writer_.access(id, [&](Store& store) { extended = files_->extend(store, wanted); });
-  if (extended->num_runs == state_.campaigns.at(id).definition->num_runs) return;
+void CampaignDesk::extend(CampaignId id, std::shared_ptr<const Campaign> definition) {
+  if (definition->num_runs <= state_.campaigns.at(id).definition->num_runs) return;
   served_.at(id).is_decided = false;
-  on_extended(state_, id, std::move(extended), now, outbox);
+  on_extended(state_, id, std::move(definition), surroundings_.now(), outbox_);
 }
 
-wire::ClientReply CampaignDesk::carry_out(const wire::ControlRequest& request, TimePoint now,
-                                          Outbox& outbox) {
-  const auto id = find(request.campaign);
-  if (!id) return wire::ErrorReply{fmt::format("campaign = {} (is not served)", request.campaign)};
-  if (state_.campaigns.at(*id).phase == Phase::finished) {
-    return wire::ErrorReply{fmt::format("campaign = {} (is finished)", request.campaign)};
+void CampaignDesk::resume(CampaignId id) {
+  const Phase phase = state_.campaigns.at(id).phase;
+  if (phase != Phase::paused && phase != Phase::cancelled) return;
+  on_resume(state_, id, surroundings_.now(), outbox_);
+}
+
+wire::ClientReply CampaignDesk::control(CampaignId id, wire::ControlAction action) {
+  if (state_.campaigns.at(id).phase == Phase::finished) {
+    return wire::ErrorReply{fmt::format("campaign = {} (is finished)", served_.at(id).name)};
   }
-  switch (request.action) {
+  switch (action) {
     case wire::ControlAction::pause:
-      on_pause(state_, *id, outbox);
+      on_pause(state_, id, outbox_);
       break;
     case wire::ControlAction::resume:
-      resume(*id, now, outbox);
+      resume(id);
       break;
     case wire::ControlAction::cancel:
-      on_cancel(state_, *id, outbox);
+      on_cancel(state_, id, outbox_);
       break;
   }
-  review(now, outbox);
-  return done_reply(*id);
+  review();
+  return done_reply(id);
 }
 
-wire::ClientReply CampaignDesk::carry_out(const wire::StatusRequest&, TimePoint now, Outbox&) {
-  wire::StatusReply reply{.version = start_.version,
-                          .model_version = std::string(model_version),
-                          .uptime_s = std::chrono::duration<double>(now - began_at_).count(),
-                          .num_workers = state_.workers.size(),
-                          .campaigns = {}};
-  for (const auto& [id, worker] : state_.workers) reply.num_slots += worker.num_slots;
-  for (const CampaignId id : state_.order) {
-    if (reply.campaigns.size() == wire::campaigns_per_reply_max) break;
-    reply.campaigns.push_back(status_of(id, now));
+std::vector<wire::CampaignStatus> CampaignDesk::statuses(std::size_t first,
+                                                         std::size_t count_max) const {
+  std::vector<wire::CampaignStatus> statuses;
+  for (std::size_t i = first; i < order_.size() && statuses.size() < count_max; ++i) {
+    statuses.push_back(status_of(order_[i]));
   }
-  return reply;
+  return statuses;
 }
 
-wire::ClientReply CampaignDesk::carry_out(const wire::WorkersRequest&, TimePoint now, Outbox&) {
-  wire::WorkersReply reply;
-  for (const auto& [id, worker] : state_.workers) {
-    if (reply.workers.size() == wire::workers_per_reply_max) break;
-    reply.workers.push_back(
-        {.id = id,
-         .name = worker.name,
-         .host = worker.host.name,
-         .process_id = worker.process_id,
-         .num_slots = worker.num_slots,
-         .num_lent = worker.num_lent,
-         .num_results = worker.num_results,
-         .silent_s = std::chrono::duration<double>(now - worker.heard_at).count(),
-         .is_quarantined = state_.quarantined.contains(worker.host)});
-  }
-  return reply;
+wire::CampaignStatus CampaignDesk::status_of(CampaignId id) const {
+  const auto ended = ended_.find(id);
+  return ended == ended_.end() ? status_of_served(id) : ended->second.status;
 }
 
-wire::CampaignStatus CampaignDesk::status_of(CampaignId id, TimePoint now) const {
+wire::CampaignStatus CampaignDesk::status_of_served(CampaignId id) const {
   const CampaignState& campaign = state_.campaigns.at(id);
   const Served& served = served_.at(id);
-  const double rate_hz = served.rate.rate_hz(now);
+  const double rate_hz = served.rate.rate_hz(surroundings_.now());
   return {.name = served.name,
           .phase = phase_of(id),
           .priority = campaign.priority,
@@ -218,7 +195,8 @@ wire::CampaignStatus CampaignDesk::status_of(CampaignId id, TimePoint now) const
           .num_mismatches = campaign.num_mismatches,
           .rate_hz = rate_hz,
           .remaining_s = remaining_s(campaign, rate_hz),
-          .storage_failure = campaign.storage_failure};
+          .storage_failure = campaign.storage_failure,
+          .owner = served.owner};
 }
 
 Phase CampaignDesk::phase_of(CampaignId id) const {
@@ -229,7 +207,9 @@ Phase CampaignDesk::phase_of(CampaignId id) const {
   return phase;
 }
 
-void CampaignDesk::review(TimePoint now, Outbox& outbox) {
+void CampaignDesk::review() {
+  const TimePoint now = surroundings_.now();
+  std::vector<CampaignId> closable;
   for (auto& [id, served] : served_) {
     const CampaignState& campaign = state_.campaigns.at(id);
     const std::uint64_t num_committed = campaign.num_committed_here;
@@ -237,25 +217,28 @@ void CampaignDesk::review(TimePoint now, Outbox& outbox) {
       served.rate.add(num_committed - served.num_committed_seen, now);
       served.num_committed_seen = num_committed;
     }
-    review_failures(id, served, outbox);
-    review_summary(id, served, now, outbox);
+    review_failures(id, served);
+    review_summary(id, served);
     review_control(id, served);
+    review_rest(id, served);
+    if (can_be_closed(id, served, now)) closable.push_back(id);
   }
+  for (const CampaignId id : closable) begin_closing(id);
 }
 
-void CampaignDesk::review_failures(CampaignId id, const Served& served, Outbox& outbox) {
+void CampaignDesk::review_failures(CampaignId id, const Served& served) {
   if (!served.plan.failures_max) return;
   const CampaignState& campaign = state_.campaigns.at(id);
   if (campaign.phase != Phase::active && campaign.phase != Phase::paused) return;
   const std::uint64_t num_failures =
       served.num_failures_before + campaign.num_without_estimate + campaign.given_up.size();
   if (num_failures <= *served.plan.failures_max) return;
-  on_cancel(state_, id, outbox);
-  outbox.log({.severity = Severity::error,
-              .kind = "too_many_failures",
-              .text = fmt::format("without_estimate={} failures_max={}", num_failures,
-                                  *served.plan.failures_max),
-              .campaign = id});
+  on_cancel(state_, id, outbox_);
+  outbox_.log({.severity = Severity::error,
+               .kind = "too_many_failures",
+               .text = fmt::format("without_estimate={} failures_max={}", num_failures,
+                                   *served.plan.failures_max),
+               .campaign = id});
 }
 
 void CampaignDesk::review_control(CampaignId id, Served& served) {
@@ -272,49 +255,64 @@ void CampaignDesk::review_control(CampaignId id, Served& served) {
   served.written = control;
 }
 
-void CampaignDesk::review_summary(CampaignId id, Served& served, TimePoint now, Outbox& outbox) {
+void CampaignDesk::review_summary(CampaignId id, Served& served) {
   if (served.summary.valid()) {
     if (served.summary.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
-    take_summary(id, served, now, outbox);
+    take_summary(id, served);
   }
+  if (served.is_held) return;
   const bool is_finished = state_.campaigns.at(id).phase == Phase::finished;
   const bool is_undecided = is_finished && phase_of(id) != Phase::finished;
   const bool is_due = std::exchange(served.is_summary_due, false);
   if (is_due || is_undecided) begin_summary(id, served);
 }
 
-void CampaignDesk::take_summary(CampaignId id, Served& served, TimePoint now, Outbox& outbox) {
+void CampaignDesk::take_summary(CampaignId id, Served& served) {
   const auto [failure, num_runs] = served.summary.get();
   const Campaign& definition = *state_.campaigns.at(id).definition;
   // A rule that cannot be checked stops: nobody knows how much further it would go.
   served.is_decided = true;
   if (!failure.empty()) {
-    outbox.log({.severity = Severity::error,
-                .kind = "statistics_failed",
-                .text = fmt::format("reason=\"{}\"", failure),
-                .campaign = id});
+    outbox_.log({.severity = Severity::error,
+                 .kind = "statistics_failed",
+                 .text = fmt::format("reason=\"{}\"", failure),
+                 .campaign = id});
     return;
   }
-  outbox.log({.kind = "campaign_summarised",
-              .text = num_runs ? fmt::format("runs={} next={}", definition.num_runs, *num_runs)
-                               : fmt::format("runs={}", definition.num_runs),
-              .campaign = id});
-  if (num_runs && state_.campaigns.at(id).phase == Phase::finished) {
-    go_on_to(id, *num_runs, now, outbox);
+  outbox_.log({.kind = "campaign_summarised",
+               .text = num_runs ? fmt::format("runs={} next={}", definition.num_runs, *num_runs)
+                                : fmt::format("runs={}", definition.num_runs),
+               .campaign = id});
+  if (num_runs && !served.is_held && state_.campaigns.at(id).phase == Phase::finished) {
+    go_on_to(id, *num_runs);
   }
 }
 
-void CampaignDesk::go_on_to(CampaignId id, std::uint64_t num_runs, TimePoint now, Outbox& outbox) {
+void CampaignDesk::go_on_to(CampaignId id, std::uint64_t num_runs) {
+  Served& served = served_.at(id);
+  served.is_decided = false;
+  served.is_held = true;
   Campaign wanted = *state_.campaigns.at(id).definition;
   wanted.num_runs = num_runs;
-  try {
-    extend(id, wanted, now, outbox);
-  } catch (const Error& error) {
-    outbox.log({.severity = Severity::error,
-                .kind = "campaign_not_extended",
-                .text = fmt::format("runs={} reason=\"{}\"", num_runs, error.what()),
-                .campaign = id});
-  }
+  surroundings_.background.post_next(
+      [this, id, wanted = std::move(wanted)]() -> Background::Finish {
+        std::shared_ptr<const Campaign> extended;
+        std::string failure;
+        try {
+          writer_.access(id, [&](Store& store) { extended = files_->extend(store, wanted); });
+        } catch (const std::exception& error) {
+          failure = error.what();
+        }
+        return [this, id, extended, failure, num_runs = wanted.num_runs] {
+          served_.at(id).is_held = false;
+          if (extended != nullptr) return extend(id, extended);
+          served_.at(id).is_decided = true;
+          outbox_.log({.severity = Severity::error,
+                       .kind = "campaign_not_extended",
+                       .text = fmt::format("runs={} reason=\"{}\"", num_runs, failure),
+                       .campaign = id});
+        };
+      });
 }
 
 void CampaignDesk::begin_summary(CampaignId id, Served& served) {
@@ -334,6 +332,85 @@ void CampaignDesk::begin_summary(CampaignId id, Served& served) {
       });
 }
 
+bool CampaignDesk::can_be_closed(CampaignId id, const Served& served, TimePoint now) const {
+  constexpr std::chrono::seconds retry_after(1);
+  if (!surroundings_.closes_what_ended || served.is_held) return false;
+  if (served.closing_at && *served.closing_at != now && now - *served.closing_at < retry_after) {
+    return false;
+  }
+  const CampaignState& campaign = state_.campaigns.at(id);
+  const bool has_statistics = !served.is_summary_due && !served.summary.valid();
+  const bool is_quiet =
+      campaign.delivered.empty() && campaign.num_comparing == 0 && campaign.storage_failure.empty();
+  return served.written.phase == Phase::finished && phase_of(id) == Phase::finished &&
+         has_statistics && is_quiet && is_finished(campaign);
+}
+
+void CampaignDesk::review_rest(CampaignId id, Served& served) {
+  const CampaignState& campaign = state_.campaigns.at(id);
+  const bool is_quiet = campaign.lent.empty() && campaign.audits.empty() &&
+                        campaign.delivered.empty() && campaign.num_comparing == 0;
+  const bool is_at_rest = is_quiet && phase_of(id) != Phase::active && !served.is_summary_due &&
+                          !served.summary.valid() && !served.is_held;
+  if (is_at_rest && !served.is_at_rest) writer_.rest(id);
+  served.is_at_rest = is_at_rest;
+}
+
+// Nobody must be reading an old state of the file: then it is closed later.
+void CampaignDesk::begin_closing(CampaignId id) {
+  served_.at(id).is_held = true;
+  surroundings_.background.post_next([this, id]() -> Background::Finish {
+    bool is_folded = false;
+    try {
+      writer_.access(id, [&](Store& store) { is_folded = !store.rest(); });
+    } catch (const std::exception&) {
+      // The writer says why it cannot write.
+    }
+    return [this, id, is_folded] {
+      Served& served = served_.at(id);
+      served.is_held = false;
+      served.closing_at = surroundings_.now();
+      if (is_folded && can_be_closed(id, served, *served.closing_at)) close_ended(id);
+    };
+  });
+}
+
+// The dispatch forgets the campaign first: nothing is written any more when the file is closed.
+void CampaignDesk::close_ended(CampaignId id) {
+  EndedCampaign ended{.id = id, .file = served_.at(id).file, .status = status_of_served(id)};
+  ended.status.rate_hz = 0.0;
+  ended.status.remaining_s.reset();
+  outbox_.log({.kind = "campaign_closed",
+               .text = fmt::format("name={}", ended.status.name),
+               .campaign = id});
+  surroundings_.on_closing(id);
+  on_removed(state_, id, outbox_);
+  on_ended(state_, id, ended.status.num_runs);
+  served_.erase(id);
+  ended_.emplace(id, std::move(ended));
+  surroundings_.background.post_next(
+      [this, id, epoch = surroundings_.start.epoch]() -> Background::Finish {
+        try {
+          Store store = writer_.close(id);
+          std::vector<coordinator::Entry> entries;
+          for (const SessionId session : store.attached_sessions()) {
+            entries.emplace_back(WorkerEnded{.session = session, .reason = LossReason::drained});
+          }
+          if (!entries.empty()) (void)store.write(entries);
+          store.end_coordinator(epoch);
+        } catch (const std::exception& error) {
+          return [this, reason = std::string(error.what())] { say_not_closed(reason); };
+        }
+        return [] {};
+      });
+}
+
+void CampaignDesk::say_not_closed(std::string_view reason) {
+  outbox_.log({.severity = Severity::warning,
+               .kind = "campaign_not_closed",
+               .text = fmt::format("reason=\"{}\"", reason)});
+}
+
 bool CampaignDesk::is_all_done() const {
   return std::all_of(state_.campaigns.begin(), state_.campaigns.end(), [&](const auto& item) {
     const auto& [id, campaign] = item;
@@ -344,14 +421,15 @@ bool CampaignDesk::is_all_done() const {
 
 std::vector<ServedCampaign> CampaignDesk::close() {
   std::vector<ServedCampaign> campaigns;
-  for (const CampaignId id : state_.order) {
+  for (const CampaignId id : order_) {
+    if (!served_.contains(id)) continue;
     Served& served = served_.at(id);
     if (served.summary.valid()) served.summary.wait();
     Store store = writer_.close(id);
     try {
-      store.end_coordinator(start_.epoch);
-    } catch (const StoreError&) {
-      // A file that cannot be written now looks as after a kill, and the campaigns are given back.
+      store.end_coordinator(surroundings_.start.epoch);
+    } catch (const std::exception& error) {
+      say_not_closed(error.what());
     }
     const CampaignState& campaign = state_.campaigns.at(id);
     campaigns.push_back(
@@ -361,18 +439,10 @@ std::vector<ServedCampaign> CampaignDesk::close() {
   return campaigns;
 }
 
-std::optional<CampaignId> CampaignDesk::find(std::string_view name) const {
-  for (const auto& [id, served] : served_) {
-    if (served.name == name) return id;
-  }
-  return std::nullopt;
-}
-
 wire::DoneReply CampaignDesk::done_reply(CampaignId id) const {
-  const CampaignState& campaign = state_.campaigns.at(id);
-  return {.text = fmt::format("campaign {}: {}, {} runs, {} of them done",
-                              campaign.definition->name, wire::name_of(phase_of(id)),
-                              campaign.definition->num_runs, campaign.committed.size())};
+  const wire::CampaignStatus status = status_of(id);
+  return {.text = fmt::format("campaign {}: {}, {} runs, {} of them done", status.name,
+                              wire::name_of(status.phase), status.num_runs, status.num_done)};
 }
 
 }  // namespace proofmass::coordinator

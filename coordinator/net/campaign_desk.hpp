@@ -13,43 +13,106 @@
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
+#include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_files.hpp"
+#include "coordinator/net/prepared_campaign.hpp"
 #include "coordinator/net/rate_meter.hpp"
+#include "coordinator/net/rights.hpp"
 #include "coordinator/store/store_writer.hpp"
 #include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
-/// The campaigns of a coordinator: carries out what people ask for, and keeps in their files what
-/// must outlive the process. Status comes from memory alone.
+/// The campaigns of a coordinator: those that are served, and those that have ended and whose files
+/// are closed. Keeps in the files what must outlive the process. Status comes from memory alone;
+/// what may wait for a disk is done in the background.
 class CampaignDesk {
  public:
-  /// @param state, writer  Outlive the desk.
-  /// @param files          Null if nothing can be submitted and nobody wants statistics.
-  CampaignDesk(State& state, StoreWriter& writer, CampaignFiles* files, CoordinatorStart start,
-               TimePoint now);
+  /// What the desk works with; all of it outlives the desk.
+  struct Surroundings {
+    State& state;
+    StoreWriter& writer;
+    Background& background;
+    Outbox& outbox;
+    std::function<TimePoint()> now;
+    CampaignFiles* files;    ///< Null if nothing can be submitted and nobody wants statistics.
+    bool closes_what_ended;  ///< The file of a finished campaign can be opened again later.
+    std::function<void(CampaignId)> on_closing;  ///< The dispatch is about to forget it.
+    CoordinatorStart start;
+  };
+
+  /// A campaign by its name.
+  struct Entry {
+    CampaignId id;
+    std::filesystem::path file;
+    std::string owner;
+    bool has_ended = false;  ///< Its file is closed.
+  };
+
+  /// A served campaign as it is to be from now on.
+  struct Change {
+    std::shared_ptr<const Campaign> definition;
+    StopPlan plan;
+    int priority = 0;
+    double audit_fraction = 0.0;
+  };
+
+  explicit CampaignDesk(Surroundings surroundings);
   ~CampaignDesk();  ///< Waits for statistics that are being computed.
   CampaignDesk(const CampaignDesk&) = delete;
   CampaignDesk& operator=(const CampaignDesk&) = delete;
 
-  /// Begins to serve a campaign.
-  /// @throws Error if one of that name or number is served already, StoreError.
-  void serve(ServedCampaign campaign, GivenUpRuns given_up, TimePoint now, Outbox& outbox);
+  /// Begins to serve a campaign, one that has ended before perhaps.
+  /// @throws Error if one of that name or number is served already.
+  void serve(PreparedCampaign campaign);
+  /// Lists a campaign that is not served.
+  void list(EndedCampaign campaign);
 
-  /// Carries out a client's request; what cannot be done is an ErrorReply.
-  [[nodiscard]] wire::ClientReply answer(const wire::ClientRequest& request, TimePoint now,
-                                         Outbox& outbox);
+  [[nodiscard]] std::optional<Entry> find(std::string_view name) const;
+  [[nodiscard]] bool is_served(CampaignId id) const { return served_.contains(id); }
+  [[nodiscard]] KnownCampaigns known() const;
+  /// Unfinished campaigns of an owner, and the bytes of their definitions.
+  struct Holdings {
+    std::size_t num_campaigns = 0;
+    std::uint64_t size = 0;
+  };
+  [[nodiscard]] Holdings holdings_of(std::string_view owner) const;
+
+  /// Keeps a served campaign from being closed or changed by a stop rule, until change() or
+  /// let_go().
+  /// @throws Error if somebody else has it, or if nothing can be stored.
+  void take_hold(CampaignId id);
+  [[nodiscard]] bool is_held(CampaignId id) const { return served_.at(id).is_held; }
+  void let_go(CampaignId id) { served_.at(id).is_held = false; }
+  void change(CampaignId id, const Change& change);
+  // Of a served campaign.
+  [[nodiscard]] const StopPlan& plan_of(CampaignId id) const { return served_.at(id).plan; }
+  [[nodiscard]] const std::filesystem::path& file_of(CampaignId id) const {
+    return served_.at(id).file;
+  }
+  [[nodiscard]] std::uint64_t num_runs_of(CampaignId id) const {
+    return state_.campaigns.at(id).definition->num_runs;
+  }
+
+  /// Pauses, resumes or cancels a campaign that is served.
+  [[nodiscard]] wire::ClientReply control(CampaignId id, wire::ControlAction action);
+  [[nodiscard]] wire::DoneReply done_reply(CampaignId id) const;
 
   /// Takes notice of what the dispatch did: rates, phases, campaigns that are finished. To be
   /// called some times a second.
-  void review(TimePoint now, Outbox& outbox);
+  void review();
 
-  [[nodiscard]] wire::CampaignStatus status_of(CampaignId id, TimePoint now) const;
+  /// In the order in which they came, from the index on and at most so many.
+  [[nodiscard]] std::vector<wire::CampaignStatus> statuses(std::size_t first,
+                                                           std::size_t count_max) const;
+  [[nodiscard]] std::size_t num_campaigns() const { return order_.size(); }
+  [[nodiscard]] wire::CampaignStatus status_of(CampaignId id) const;
 
   /// True if every campaign is finished or cancelled.
   [[nodiscard]] bool is_all_done() const;
 
-  /// Ends the service of all campaigns and gives their files back, in the order in which they came.
+  /// Ends the service of all campaigns and gives the files that are open back, in the order in
+  /// which they came.
   [[nodiscard]] std::vector<ServedCampaign> close();
 
  private:
@@ -63,41 +126,46 @@ class CampaignDesk {
   struct Served {
     std::filesystem::path file;
     std::string name;
+    std::string owner;
     RateMeter rate;
     std::uint64_t num_committed_seen = 0;
     CampaignControl written;  ///< As the file has it.
     StopPlan plan;
-    bool is_decided = false;                ///< The stop rule was checked with the runs of now.
-    std::uint64_t num_failures_before = 0;  ///< Runs without an estimate, when it came.
+    bool is_decided = false;                   ///< The stop rule was checked with the runs of now.
+    std::uint64_t num_failures_before = 0;     ///< Runs without an estimate, when it came.
+    bool is_at_rest = false;                   ///< Nothing is expected: the log is folded in.
+    std::optional<TimePoint> closing_at = {};  ///< When closing was tried last, in vain.
+    bool is_held = false;                      ///< See take_hold().
     bool is_summary_due = false;
     std::uint64_t num_summarised = 0;  ///< Of the runs committed here.
     std::future<Summarised> summary;
   };
 
-  wire::ClientReply carry_out(const wire::SubmitRequest& request, TimePoint now, Outbox& outbox);
-  wire::ClientReply carry_out(const wire::ControlRequest& request, TimePoint now, Outbox& outbox);
-  wire::ClientReply carry_out(const wire::StatusRequest& request, TimePoint now, Outbox& outbox);
-  wire::ClientReply carry_out(const wire::WorkersRequest& request, TimePoint now, Outbox& outbox);
-  void resubmit(CampaignId id, const wire::SubmitRequest& request, TimePoint now, Outbox& outbox);
-  void extend(CampaignId id, const Campaign& wanted, TimePoint now, Outbox& outbox);
-  void resume(CampaignId id, TimePoint now, Outbox& outbox);
-  [[nodiscard]] std::optional<CampaignId> find(std::string_view name) const;
-  [[nodiscard]] wire::DoneReply done_reply(CampaignId id) const;
+  [[nodiscard]] wire::CampaignStatus status_of_served(CampaignId id) const;
   /// As shown and stored: a campaign whose stop rule is still to be checked is not finished.
   [[nodiscard]] Phase phase_of(CampaignId id) const;
-  void review_failures(CampaignId id, const Served& served, Outbox& outbox);
+  void extend(CampaignId id, std::shared_ptr<const Campaign> definition);
+  void resume(CampaignId id);
+  void review_failures(CampaignId id, const Served& served);
   void review_control(CampaignId id, Served& served);
-  void review_summary(CampaignId id, Served& served, TimePoint now, Outbox& outbox);
-  void take_summary(CampaignId id, Served& served, TimePoint now, Outbox& outbox);
-  void go_on_to(CampaignId id, std::uint64_t num_runs, TimePoint now, Outbox& outbox);
+  void review_summary(CampaignId id, Served& served);
+  void take_summary(CampaignId id, Served& served);
+  void go_on_to(CampaignId id, std::uint64_t num_runs);
   void begin_summary(CampaignId id, Served& served);
+  [[nodiscard]] bool can_be_closed(CampaignId id, const Served& served, TimePoint now) const;
+  void review_rest(CampaignId id, Served& served);
+  void begin_closing(CampaignId id);
+  void close_ended(CampaignId id);
+  void say_not_closed(std::string_view reason);
 
+  Surroundings surroundings_;
   State& state_;
   StoreWriter& writer_;
+  Outbox& outbox_;
   CampaignFiles* files_;
-  CoordinatorStart start_;
-  TimePoint began_at_;
   std::map<CampaignId, Served> served_;
+  std::map<CampaignId, EndedCampaign> ended_;
+  std::vector<CampaignId> order_;  ///< Of both.
 };
 
 }  // namespace proofmass::coordinator

@@ -5,7 +5,9 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <vector>
 
+#include "coordinator/net/rights.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/scenario.hpp"
@@ -39,9 +41,21 @@ class CampaignFiles {
   virtual ~CampaignFiles() = default;
 
   /// The file for a campaign that is not served: a new one, or one that was served before. With a
-  /// stop rule it has as many runs as the rule is to be checked with next.
-  /// @throws Error if there is another campaign in the file, naming what differs.
-  virtual ServedCampaign open(const Campaign& wanted, const StopPlan& plan) = 0;
+  /// stop rule it has as many runs as the rule is to be checked with next. Called in a background
+  /// thread.
+  ///
+  /// @param asker  Its name becomes the owner of a new file.
+  /// @throws Error if there is another campaign in the file, naming what differs, or one that the
+  ///         asker may not control.
+  virtual ServedCampaign open(const Campaign& wanted, const StopPlan& plan, const Asker& asker) = 0;
+
+  /// Compares a served file with the campaign that is wanted, whatever its number of runs. Called
+  /// in a background thread, before extend().
+  /// @throws Error if it is another campaign, naming what differs.
+  virtual void require_same(const std::filesystem::path& file, const Campaign& wanted) {
+    (void)file;
+    (void)wanted;
+  }
 
   /// Gives a served file as many runs as are wanted. Called in the writer's thread.
   ///
@@ -57,6 +71,20 @@ class CampaignFiles {
   virtual std::optional<std::uint64_t> summarise(
       const std::filesystem::path& file, const Scenario& scenario,
       const std::function<void(const std::function<void(Store&)>&)>& write) = 0;
+};
+
+/// A directory whose campaign files are all to be served. Called in a background thread.
+class CampaignDirectory {
+ public:
+  virtual ~CampaignDirectory() = default;
+
+  /// The campaign files that are there now, by name.
+  /// @throws Error if the directory cannot be read.
+  [[nodiscard]] virtual std::vector<std::filesystem::path> list() const = 0;
+
+  /// Opens one of them.
+  /// @throws Error, std::exception if it cannot be served.
+  [[nodiscard]] virtual ServedCampaign load(const std::filesystem::path& file) const = 0;
 };
 
 }  // namespace proofmass::coordinator

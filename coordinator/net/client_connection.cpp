@@ -43,22 +43,52 @@ class ClientConnection::Parts {
         monitor_(context_, dealer_, config.endpoint, security_, Clock::now()) {}
 
   wire::ClientReply ask(const wire::ClientRequest& request) {
-    const std::string bytes = wire::encode(wire::RequestPacket{++request_id_, request});
-    const auto deadline = Clock::now() + std::chrono::ceil<milliseconds>(config_.reply_wait);
-    bool is_sent = false;
+    request_ = wire::encode(wire::RequestPacket{++request_id_, request});
+    offset_ = 0;
+    is_sent_ = false;
+    hear();
     for (;;) {
       check_admission();
-      is_sent = monitor_.is_connected() && (is_sent || send(bytes));
-      if (auto reply = receive()) return *std::move(reply);
-      const auto left = std::chrono::ceil<milliseconds>(deadline - Clock::now());
+      is_sent_ = monitor_.is_connected() && (is_sent_ || send(next_message()));
+      while (auto reply = receive()) {
+        if (!is_interim(*reply)) return *std::move(reply);
+      }
+      const auto left = std::chrono::ceil<milliseconds>(deadline_ - Clock::now());
       if (left <= milliseconds(0)) fail_late();
-      wait(std::min(left, is_sent || !monitor_.is_connected() ? turn_max : send_pause));
+      wait(std::min(left, is_sent_ || !monitor_.is_connected() ? turn_max : send_pause));
     }
   }
 
  private:
   static constexpr milliseconds turn_max{500};
   static constexpr milliseconds send_pause{5};  ///< A connection is ready soon after it is there.
+
+  /// The coordinator is there: from now on counts the time that it has for an answer.
+  void hear() { deadline_ = Clock::now() + std::chrono::ceil<milliseconds>(config_.reply_wait); }
+
+  /// The whole request, or the part of it that the coordinator wants.
+  [[nodiscard]] std::string next_message() const {
+    if (request_.size() <= wire::request_part_size_max) return request_;
+    return wire::encode(wire::RequestPacket{
+        request_id_,
+        wire::RequestPart{.total_size = request_.size(),
+                          .offset = offset_,
+                          .slice = request_.substr(offset_, wire::request_part_size_max)}});
+  }
+
+  /// True if the reply to the request itself follows this one.
+  [[nodiscard]] bool is_interim(const wire::ClientReply& reply) {
+    if (const auto* const part = std::get_if<wire::PartReply>(&reply)) {
+      hear();
+      if (part->next_offset >= request_.size()) return true;
+      offset_ = part->next_offset;
+      is_sent_ = false;
+      return true;
+    }
+    if (!std::holds_alternative<wire::WaitReply>(reply)) return false;
+    hear();
+    return true;
+  }
 
   [[noreturn]] void fail(std::string_view reason) const {
     throw Error(fmt::format("connect = {} ({})", config_.endpoint, reason));
@@ -120,6 +150,10 @@ class ClientConnection::Parts {
   zmq::socket_t dealer_;
   wire::ConnectionMonitor monitor_;
   std::uint64_t request_id_ = 0;
+  std::string request_;       ///< The bytes of the last one.
+  std::uint64_t offset_ = 0;  ///< Of the part to be sent, if it travels in parts.
+  bool is_sent_ = false;      ///< On this connection: the request, or that part.
+  Clock::time_point deadline_;
 };
 
 ClientConnection::ClientConnection(const ClientConnectionConfig& config)

@@ -15,7 +15,8 @@ struct ClientConnectionConfig {
   std::string endpoint;                       ///< Where the coordinator serves clients.
   std::optional<std::filesystem::path> keys;  ///< With client.key and coordinator.pub.
   bool is_plain_waived = false;               ///< No keys beyond this machine: the user knows it.
-  std::chrono::duration<double> reply_wait = std::chrono::seconds(10);  ///< Per request; > 0.
+  std::chrono::duration<double> reply_wait =
+      std::chrono::seconds(10);  ///< For a sign of life; > 0.
 };
 
 /// A client's connection to a coordinator: one request at a time.
@@ -29,8 +30,9 @@ class ClientConnection {
   ClientConnection(const ClientConnection&) = delete;
   ClientConnection& operator=(const ClientConnection&) = delete;
 
-  /// Sends a request and waits for its reply. The request is sent again when the connection was
-  /// lost meanwhile, so the coordinator may carry it out twice; each leads to the same end as once.
+  /// Sends a request, a large one in parts, and waits for its reply, as long as the coordinator
+  /// says that it is at work. The request is sent again when the connection was lost meanwhile, so
+  /// the coordinator may carry it out twice; each leads to the same end as once.
   ///
   /// @return The reply, which may be that the request is refused.
   /// @throws Error reading `connect = endpoint (reason)` if nobody is there, the coordinator lets

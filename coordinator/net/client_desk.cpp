@@ -2,35 +2,165 @@
 
 #include <fmt/format.h>
 
+#include <exception>
+#include <functional>
+#include <utility>
 #include <variant>
 
 #include "core/error.hpp"
-#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-std::string refusal(std::uint64_t request, const std::string& text) {
-  return wire::encode(wire::ReplyPacket{.id = request, .reply = wire::ErrorReply{.text = text}});
+constexpr std::chrono::seconds told_every(1);
+
+wire::ErrorReply refusal(std::string text) { return {.text = std::move(text)}; }
+
+using Decoded = std::variant<wire::RequestPacket, wire::DecodeError>;
+
+/// Never throws: memory may be short for what a request would become.
+Decoded decode(std::string_view bytes) {
+  try {
+    return wire::decode_request(bytes);
+  } catch (const std::exception& error) {
+    return wire::DecodeError{.fault = wire::DecodeFault::invalid, .text = error.what()};
+  }
 }
 
 }  // namespace
 
-std::string answer_client(
-    std::span<const std::string_view> frames,
-    const std::function<wire::ClientReply(const wire::ClientRequest&)>& carry_out) {
-  if (frames.size() != 1) {
-    return refusal(0, fmt::format("request = {} frames (must be one)", frames.size()));
-  }
-  const auto decoded = wire::decode_request(frames.front());
-  if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
-    return refusal(0, error->text);
-  }
-  const auto& [id, request] = std::get<wire::RequestPacket>(decoded);
+ClientDesk::ClientDesk(Background& background, Surroundings surroundings)
+    : background_(background), surroundings_(std::move(surroundings)) {}
+
+void ClientDesk::receive(const Incoming& message) {
   try {
-    return wire::encode(wire::ReplyPacket{.id = id, .reply = carry_out(request)});
-  } catch (const InvalidArgument& error) {
-    return refusal(id, error.what());
+    take(message);
+  } catch (const std::exception& error) {
+    send({.routing_id = message.from.routing_id, .request = 0}, refusal(error.what()));
+  }
+}
+
+void ClientDesk::take(const Incoming& message) {
+  const Waiter unknown{.routing_id = message.from.routing_id, .request = 0};
+  if (!surroundings_.asker_of(message.from.key)) {
+    return send(unknown,
+                refusal(fmt::format("key = {} (is not authorized any more)", message.from.key)));
+  }
+  if (message.frames.size() != 1) {
+    return send(unknown,
+                refusal(fmt::format("request = {} frames (must be one)", message.frames.size())));
+  }
+  const std::string_view bytes = message.frames.front();
+  if (bytes.size() > wire::request_message_size_max) {
+    return send(unknown, refusal(fmt::format("request size = {} bytes (must be at most {} in one "
+                                             "message; larger ones travel in parts)",
+                                             bytes.size(), wire::request_message_size_max)));
+  }
+  Decoded decoded = decode(bytes);
+  if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
+    return send(unknown, refusal(error->text));
+  }
+  auto& [id, request] = std::get<wire::RequestPacket>(decoded);
+  if (const auto* const part = std::get_if<wire::RequestPart>(&request)) {
+    return take_part(message.from, id, *part);
+  }
+  const auto ticket = begin(message.from, id, bytes);
+  if (ticket) carry_out(*ticket, message.from.key, std::move(request));
+}
+
+void ClientDesk::take_part(const Address& from, std::uint64_t request,
+                           const wire::RequestPart& part) {
+  RequestParts::Outcome outcome = parts_.take(from.routing_id, request, part, surroundings_.now());
+  const Waiter waiter{.routing_id = from.routing_id, .request = request};
+  if (const auto* const next = std::get_if<wire::PartReply>(&outcome)) return send(waiter, *next);
+  if (const auto* const error = std::get_if<wire::ErrorReply>(&outcome)) {
+    return send(waiter, *error);
+  }
+  send(waiter, wire::PartReply{part.total_size});
+  take_whole(from, request, std::move(std::get<RequestParts::Whole>(outcome).bytes));
+}
+
+void ClientDesk::take_whole(const Address& from, std::uint64_t request, std::string bytes) {
+  const std::size_t size = bytes.size();
+  const auto begun = begin(from, request, bytes);
+  if (!begun) return parts_.release(size);
+  const std::uint64_t ticket = *begun;
+  const auto shared = std::make_shared<std::string>(std::move(bytes));
+  const bool is_posted =
+      background_.post([this, ticket, shared, size, key = from.key]() -> Background::Finish {
+        const auto decoded = std::make_shared<Decoded>(decode(*shared));
+        std::string().swap(*shared);
+        return [this, ticket, decoded, size, key] {
+          parts_.release(size);
+          if (const auto* const error = std::get_if<wire::DecodeError>(decoded.get())) {
+            return respond(ticket, refusal(error->text));
+          }
+          carry_out(ticket, key, std::move(std::get<wire::RequestPacket>(*decoded).request));
+        };
+      });
+  if (is_posted) return;
+  parts_.release(size);
+  respond(ticket, refusal(fmt::format("requests = {} (are under way, as many as may be; try again "
+                                      "later)",
+                                      Background::num_tasks_max)));
+}
+
+void ClientDesk::carry_out(std::uint64_t ticket, const std::string& key,
+                           wire::ClientRequest request) {
+  try {
+    const std::optional<Asker> asker = surroundings_.asker_of(key);
+    if (!asker) throw Error(fmt::format("key = {} (is not authorized any more)", key));
+    surroundings_.carry_out(
+        std::move(request), *asker,
+        [this, ticket](const wire::ClientReply& reply) { respond(ticket, reply); });
+  } catch (const std::exception& error) {
+    respond(ticket, refusal(error.what()));
+  }
+}
+
+std::optional<std::uint64_t> ClientDesk::begin(const Address& from, std::uint64_t request,
+                                               std::string_view bytes) {
+  const std::size_t hash = std::hash<std::string_view>()(bytes);
+  const Waiter waiter{.routing_id = from.routing_id, .request = request};
+  for (auto& [ticket, pending] : pending_) {
+    if (pending.hash != hash || pending.size != bytes.size() || pending.key != from.key) continue;
+    pending.waiters.push_back(waiter);
+    return std::nullopt;
+  }
+  const std::uint64_t ticket = next_ticket_++;
+  pending_.emplace(ticket, Pending{.key = from.key,
+                                   .size = bytes.size(),
+                                   .hash = hash,
+                                   .waiters = {waiter},
+                                   .told_at = surroundings_.now()});
+  return ticket;
+}
+
+void ClientDesk::respond(std::uint64_t ticket, const wire::ClientReply& reply) {
+  const auto found = pending_.find(ticket);
+  if (found == pending_.end()) return;
+  const std::vector<Waiter> waiters = std::move(found->second.waiters);
+  pending_.erase(found);
+  for (const Waiter& waiter : waiters) send(waiter, reply);
+}
+
+void ClientDesk::send(const Waiter& waiter, const wire::ClientReply& reply) {
+  std::string bytes;
+  try {
+    bytes = wire::encode(wire::ReplyPacket{.id = waiter.request, .reply = reply});
+  } catch (const Error& error) {
+    bytes = wire::encode(wire::ReplyPacket{.id = waiter.request, .reply = refusal(error.what())});
+  }
+  surroundings_.transmit(waiter.routing_id, bytes);
+}
+
+void ClientDesk::review() {
+  const TimePoint now = surroundings_.now();
+  parts_.drop_stale(now);
+  for (auto& [ticket, pending] : pending_) {
+    if (now - pending.told_at < told_every) continue;
+    pending.told_at = now;
+    for (const Waiter& waiter : pending.waiters) send(waiter, wire::WaitReply{});
   }
 }
 

@@ -1,29 +1,29 @@
 #include "coordinator/net/service.hpp"
 
 #include <fmt/format.h>
-#include <sys/random.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <array>
-#include <cerrno>
-#include <cstring>
-#include <map>
-#include <set>
+#include <exception>
+#include <functional>
+#include <string_view>
 #include <utility>
 #include <variant>
 
 #include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_desk.hpp"
 #include "coordinator/net/client_desk.hpp"
 #include "coordinator/net/descriptor_limit.hpp"
+#include "coordinator/net/directory_desk.hpp"
+#include "coordinator/net/prepared_campaign.hpp"
+#include "coordinator/net/request_desk.hpp"
+#include "coordinator/net/service_beginning.hpp"
 #include "coordinator/net/service_sockets.hpp"
+#include "coordinator/net/submission_desk.hpp"
 #include "coordinator/net/waking_time.hpp"
 #include "coordinator/net/worker_desk.hpp"
 #include "coordinator/net/worker_history.hpp"
 #include "core/error.hpp"
 #include "proto/link/kill_point.hpp"
-#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -36,25 +36,6 @@ constexpr std::chrono::seconds follow_up_max(3);
 constexpr int worker_messages_per_turn_max = 1000;
 // ... nor workers by clients that ask much.
 constexpr int client_messages_per_turn_max = 16;
-
-wire::Epoch random_epoch() {
-  wire::Epoch epoch;
-  while (epoch.value == 0) {
-    if (getrandom(&epoch.value, sizeof epoch.value, 0) < 0 && errno != EINTR) {
-      throw Error(fmt::format("getrandom: {}", std::strerror(errno)));
-    }
-  }
-  return epoch;
-}
-
-CoordinatorStart coordinator_start(wire::Epoch epoch, const std::string& version) {
-  std::array<char, 256> host{};
-  gethostname(host.data(), host.size() - 1);
-  return {.epoch = epoch,
-          .host = wire::name_from(host.data()),
-          .process_id = static_cast<std::uint64_t>(getpid()),
-          .version = version};
-}
 
 /// What is logged of a campaign file that lost its name and has it back.
 std::string_view kind_of(FileReturn file_return) {
@@ -69,24 +50,27 @@ std::string_view kind_of(FileReturn file_return) {
   return "campaign_file_restored";
 }
 
-std::set<SessionId> attached_sessions(const std::vector<ServedCampaign>& campaigns) {
-  std::set<SessionId> attached;
-  for (const ServedCampaign& campaign : campaigns) {
-    const std::vector<SessionId> sessions = campaign.store.attached_sessions();
-    attached.insert(sessions.begin(), sessions.end());
-  }
-  return attached;
-}
-
 }  // namespace
 
 class Service::Parts final : public Outbox {
  public:
-  Parts(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log)
-      : Parts(attached_sessions(campaigns), config, std::move(log)) {
-    for (ServedCampaign& campaign : campaigns) {
-      desk_.serve(std::move(campaign), config_.given_up, now(), *this);
-    }
+  Parts(Beginning beginning, const ServiceConfig& config, Log log)
+      : config_(config),
+        log_(std::move(log)),
+        start_(beginning.start),
+        sockets_(config, log_),
+        state_(initial_state(config.dispatch, beginning.attached, now())),
+        writer_([this] { sockets_.wake(); }, config.writer),
+        history_(state_, writer_, beginning.attached),
+        worker_desk_(state_, start_.epoch, surroundings_of_workers()),
+        desk_(surroundings_of_campaigns()),
+        directory_desk_(surroundings_of_directory()),
+        submission_desk_(surroundings_of_submissions()),
+        request_desk_(surroundings_of_requests()),
+        client_desk_(background_, surroundings_of_clients()),
+        background_([this] { sockets_.wake(); }) {
+    raise_descriptor_limit();
+    for (FileOutcome& outcome : beginning.campaigns) begin_with(std::move(outcome));
   }
 
   /// For all that is measured here and in the dispatch.
@@ -94,6 +78,10 @@ class Service::Parts final : public Outbox {
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const CampaignDesk& desk() const { return desk_; }
   [[nodiscard]] const ServiceSockets& sockets() const { return sockets_; }
+  [[nodiscard]] bool is_done() const {
+    return desk_.is_all_done() && directory_desk_.is_all_served();
+  }
+  [[nodiscard]] bool has_storage_failed() const { return has_storage_failed_; }
 
   void run(const std::atomic<StopRequest>& stop, const std::function<void()>& on_turn) {
     while (!is_over(stop)) {
@@ -152,24 +140,20 @@ class Service::Parts final : public Outbox {
 
   void log(Event event) override {
     log_(event);
+    if (event.campaign != CampaignId{} && !desk_.is_served(event.campaign)) return;
     writer_.record_event(event.campaign, {.kind = std::string(event.kind), .text = event.text});
   }
 
  private:
-  Parts(std::set<SessionId> attached, const ServiceConfig& config, Log log)
-      : config_(config),
-        log_(std::move(log)),
-        epoch_(random_epoch()),
-        sockets_(config, log_),
-        state_(initial_state(config.dispatch, attached, now())),
-        writer_([this] { sockets_.wake(); }, config.writer),
-        history_(state_, writer_, std::move(attached)),
-        worker_desk_(state_, epoch_, surroundings()),
-        desk_(state_, writer_, config.files, coordinator_start(epoch_, config.version), now()) {
-    raise_descriptor_limit();
+  /// Campaigns that are handed over are served or end the start; those of the directory may wait.
+  void begin_with(FileOutcome outcome) {
+    const auto* const prepared = std::get_if<PreparedCampaign>(&outcome);
+    const bool is_of_directory = config_.directory != nullptr || prepared == nullptr;
+    if (is_of_directory) return directory_desk_.take(std::move(outcome));
+    desk_.serve(std::get<PreparedCampaign>(std::move(outcome)));
   }
 
-  WorkerDesk::Surroundings surroundings() {
+  WorkerDesk::Surroundings surroundings_of_workers() {
     return {.transmit =
                 [this](const std::string& routing_id, const std::string& bytes) {
                   return sockets_.send_to_worker(routing_id, bytes, now());
@@ -180,6 +164,64 @@ class Service::Parts final : public Outbox {
                 },
             .on_leaving = [this](WorkerId worker,
                                  LossReason reason) { history_.note_reason(worker, reason); }};
+  }
+
+  CampaignDesk::Surroundings surroundings_of_campaigns() {
+    return {.state = state_,
+            .writer = writer_,
+            .background = background_,
+            .outbox = *this,
+            .now = [this] { return now(); },
+            .files = config_.files,
+            .closes_what_ended = config_.directory != nullptr,
+            .on_closing = [this](CampaignId id) { history_.note_closed(id); },
+            .start = start_};
+  }
+
+  DirectoryDesk::Surroundings surroundings_of_directory() {
+    return {.campaigns = desk_,
+            .background = background_,
+            .outbox = *this,
+            .directory = config_.directory,
+            .retry_after = config_.writer.retry_after,
+            .start = start_};
+  }
+
+  SubmissionDesk::Surroundings surroundings_of_submissions() {
+    return {.campaigns = desk_,
+            .writer = writer_,
+            .background = background_,
+            .files = config_.files,
+            .directory = config_.directory,
+            .limits = config_.limits,
+            .start = start_};
+  }
+
+  RequestDesk::Surroundings surroundings_of_requests() {
+    return {.state = state_,
+            .campaigns = desk_,
+            .submissions = submission_desk_,
+            .directory = directory_desk_,
+            .outbox = *this,
+            .now = [this] { return now(); },
+            .version = config_.version};
+  }
+
+  ClientDesk::Surroundings surroundings_of_clients() {
+    return {.transmit =
+                [this](const std::string& routing_id, const std::string& bytes) {
+                  (void)sockets_.send_to_client(routing_id, bytes, now());
+                  if (!desk_.is_all_done()) told_progress_at_ = now();
+                },
+            .asker_of = [this](const std::string& key) -> std::optional<Asker> {
+              Authenticator* const authenticator = sockets_.authenticator();
+              return authenticator == nullptr ? Asker{} : authenticator->client(key, now());
+            },
+            .carry_out =
+                [this](wire::ClientRequest request, const Asker& asker, Respond respond) {
+                  request_desk_.carry_out(std::move(request), asker, std::move(respond));
+                },
+            .now = [this] { return now(); }};
   }
 
   [[nodiscard]] bool is_allowed(wire::Domain domain, const std::string& key, TimePoint time) {
@@ -206,7 +248,8 @@ class Service::Parts final : public Outbox {
       on_drain(state_, *this);
     }
     if (drained_until_) return is_quiet(state_) || now() > *drained_until_;
-    return config_.end == ServiceEnd::when_done && desk_.is_all_done() && !is_followed();
+    return config_.end == ServiceEnd::when_done && is_done() && background_.is_idle() &&
+           !is_followed();
   }
 
   /// True if a client that was told of a campaign's progress may not know yet that it is over.
@@ -221,10 +264,14 @@ class Service::Parts final : public Outbox {
       std::visit([this](const auto& content) { complete(content); }, completion);
     }
     receive_from_clients();
+    finish_background();
     if (now() - ticked_at_ < tick_interval) return;
     ticked_at_ = now();
     on_tick(state_, ticked_at_, *this);
-    desk_.review(ticked_at_, *this);
+    desk_.review();
+    directory_desk_.review(ticked_at_);
+    submission_desk_.review();
+    client_desk_.review();
     history_.review();
     if (ticked_at_ - reviewed_at_ < review_interval) return;
     reviewed_at_ = ticked_at_;
@@ -243,28 +290,41 @@ class Service::Parts final : public Outbox {
 
   void receive_from_workers() {
     sockets_.receive_from_workers(
-        worker_messages_per_turn_max, now(),
-        [this](const Incoming& message) { worker_desk_.receive(message, now(), *this); });
+        worker_messages_per_turn_max, now(), [this](const Incoming& message) {
+          guarded("worker", [&] { worker_desk_.receive(message, now(), *this); });
+        });
   }
 
   void receive_from_clients() {
-    const auto handle = [this](const Incoming& message) {
-      const std::string reply = answer_client(
-          message.frames,
-          [&](const wire::ClientRequest& request) { return answer(request, message.from); });
-      (void)sockets_.send_to_client(message.from.routing_id, reply, now());
-    };
-    sockets_.receive_from_clients(client_messages_per_turn_max, now(), handle);
+    sockets_.receive_from_clients(client_messages_per_turn_max, now(),
+                                  [this](const Incoming& message) {
+                                    guarded("client", [&] { client_desk_.receive(message); });
+                                  });
   }
 
-  wire::ClientReply answer(const wire::ClientRequest& request, const Address& from) {
-    if (!is_allowed(wire::Domain::clients, from.key, now())) {
-      return wire::ErrorReply{.text =
-                                  fmt::format("key = {} (is not authorized any more)", from.key)};
+  void finish_background() {
+    for (const Background::Finish& finish : background_.take_finished()) {
+      guarded("background", finish);
     }
-    wire::ClientReply reply = desk_.answer(request, now(), *this);
-    if (!desk_.is_all_done()) told_progress_at_ = now();
-    return reply;
+  }
+
+  /// What a task came to may have a next step, such as the closing of a file.
+  void settle_background() {
+    while (!background_.is_idle()) {
+      background_.wait();
+      finish_background();
+    }
+  }
+
+  /// Nothing that one peer or file does may end the service of all.
+  void guarded(std::string_view who, const std::function<void()>& action) {
+    try {
+      action();
+    } catch (const std::exception& error) {
+      log({.severity = Severity::error,
+           .kind = "request_failed",
+           .text = fmt::format("of={} reason=\"{}\"", who, error.what())});
+    }
   }
 
   void complete(const Committed& committed) {
@@ -278,9 +338,11 @@ class Service::Parts final : public Outbox {
                 *this);
   }
   void complete(const StoreFailed& failed) {
+    if (!desk_.is_served(failed.campaign)) return;
     on_store_failed(state_, failed.campaign, failed.text, *this);
   }
   void complete(const StoreRecovered& recovered) {
+    if (!desk_.is_served(recovered.campaign)) return;
     on_store_recovered(state_, recovered.campaign, now(), *this);
   }
 
@@ -291,6 +353,7 @@ class Service::Parts final : public Outbox {
          .campaign = grown.campaign});
   }
   void complete(const FileReturned& returned) {
+    if (!desk_.is_served(returned.campaign)) return;
     log({.severity = Severity::warning,
          .kind = kind_of(returned.kind),
          .text = fmt::format("runs={}", state_.campaigns.at(returned.campaign).committed.size()),
@@ -317,34 +380,54 @@ class Service::Parts final : public Outbox {
 
   /// Results are acknowledged before their workers are told to end.
   void end() {
+    settle_background();
     writer_.flush();
     for (const Completion& completion : writer_.take_completions()) {
       std::visit([this](const auto& content) { complete(content); }, completion);
     }
+    for (const auto& [id, campaign] : state_.campaigns) note_unstored(id, campaign);
     on_stop(state_, *this);
-    desk_.review(now(), *this);
+    desk_.review();
+    settle_background();
     history_.end_all(LossReason::drained);
+  }
+
+  void note_unstored(CampaignId id, const CampaignState& campaign) {
+    if (campaign.storage_failure.empty() && campaign.delivered.empty()) return;
+    has_storage_failed_ = true;
+    log({.severity = Severity::error,
+         .kind = "results_not_stored",
+         .text = fmt::format("name={} runs={} reason=\"{}\"", campaign.definition->name,
+                             campaign.delivered.size(), campaign.storage_failure),
+         .campaign = id});
   }
 
   WakingTime time_{std::chrono::steady_clock::now()};
   ServiceConfig config_;
   Log log_;
-  wire::Epoch epoch_;
+  CoordinatorStart start_;
   ServiceSockets sockets_;
   State state_;
   StoreWriter writer_;
   WorkerHistory history_;
   WorkerDesk worker_desk_;
   CampaignDesk desk_;
+  DirectoryDesk directory_desk_;
+  SubmissionDesk submission_desk_;
+  RequestDesk request_desk_;
+  ClientDesk client_desk_;
   std::optional<TimePoint> drained_until_;
   std::optional<TimePoint> told_progress_at_;  ///< To any client.
   TimePoint ticked_at_;
   TimePoint reviewed_at_;
   std::uint64_t num_unsent_logged_ = 0;
+  bool has_storage_failed_ = false;
+  Background background_;  ///< Ends before all that its tasks use.
 };
 
 Service::Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log)
-    : parts_(std::make_unique<Parts>(std::move(campaigns), config, std::move(log))) {}
+    : parts_(std::make_unique<Parts>(beginning_of(std::move(campaigns), config), config,
+                                     std::move(log))) {}
 
 Service::~Service() = default;
 
@@ -357,14 +440,12 @@ void Service::run(const std::atomic<StopRequest>& stop, const std::function<void
 }
 
 std::vector<wire::CampaignStatus> Service::campaigns() const {
-  std::vector<wire::CampaignStatus> campaigns;
-  for (const CampaignId id : parts_->state().order) {
-    campaigns.push_back(parts_->desk().status_of(id, parts_->now()));
-  }
-  return campaigns;
+  return parts_->desk().statuses(0, parts_->desk().num_campaigns());
 }
 
-bool Service::is_done() const { return parts_->desk().is_all_done(); }
+bool Service::is_done() const { return parts_->is_done(); }
+
+bool Service::has_storage_failed() const { return parts_->has_storage_failed(); }
 
 std::optional<WorkerId> Service::worker_of(std::uint64_t process_id) const {
   for (const auto& [id, worker] : parts_->state().workers) {

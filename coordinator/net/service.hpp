@@ -14,6 +14,7 @@
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/campaign_files.hpp"
+#include "coordinator/net/submission_limits.hpp"
 #include "coordinator/store/store_writer.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/wire/client_messages.hpp"
@@ -30,7 +31,9 @@ enum class StopRequest : std::uint8_t {
 /// When a service ends that nobody asks to.
 enum class ServiceEnd : std::uint8_t {
   never,
-  when_done,  ///< Every campaign is finished or cancelled, and clients that follow can know it.
+  /// Every campaign is finished or cancelled, no file of the directory waits to be served, and
+  /// clients that follow can know it.
+  when_done,
 };
 
 /// Settings of a service.
@@ -48,7 +51,11 @@ struct ServiceConfig {
   /// that can connect is trusted.
   std::optional<std::size_t> memory_size_max;
   CampaignFiles* files = nullptr;  ///< Outlives the service; null if nothing can be submitted.
-  std::string version;             ///< Of the program, for people.
+  /// Whose campaigns are served beside those that are handed over; null if there is none. A
+  /// campaign that finishes is closed then, and opened again when somebody asks for more of it.
+  const CampaignDirectory* directory = nullptr;
+  SubmissionLimits limits;  ///< Of each client's key.
+  std::string version;      ///< Of the program, for people.
   DispatchConfig dispatch;
   WriterConfig writer;
   std::optional<wire::FaultPlan> faults;  ///< On the workers' messages; for tests of this program.
@@ -61,10 +68,11 @@ using Log = std::function<void(const Event&)>;
 /// and answers clients. One thread serves all sockets; another writes to the campaign files.
 class Service {
  public:
-  /// Binds the sockets and begins to serve the campaigns.
+  /// Binds the sockets and begins to serve the campaigns, and those of the directory. A file of the
+  /// directory that cannot be served is tried again later.
   ///
   /// @throws InvalidArgument if an endpoint is not acceptable; Error if it cannot be bound, keys
-  ///         cannot be read, or two campaigns have one name; StoreError.
+  ///         cannot be read, or two campaigns that are handed over have one name; StoreError.
   Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log);
   ~Service();
   Service(const Service&) = delete;
@@ -82,8 +90,11 @@ class Service {
 
   /// The campaigns, in the order in which they came.
   [[nodiscard]] std::vector<wire::CampaignStatus> campaigns() const;
-  /// True if every campaign is finished or cancelled.
+  /// True if every campaign is finished or cancelled, and no file waits to be served.
   [[nodiscard]] bool is_done() const;
+  /// True if results were delivered and could not be stored, or a campaign cannot store any. To be
+  /// asked after run().
+  [[nodiscard]] bool has_storage_failed() const;
 
   /// Number of the worker with this process on this machine; nothing if it is not registered.
   [[nodiscard]] std::optional<WorkerId> worker_of(std::uint64_t process_id) const;
@@ -94,7 +105,7 @@ class Service {
   /// The worker's process is known to have ended: its runs are lent again at once.
   void worker_ended(WorkerId worker, LossReason reason);
 
-  /// Ends the service of all campaigns and gives their files back. The last call.
+  /// Ends the service of all campaigns and gives the files that are open back. The last call.
   [[nodiscard]] std::vector<ServedCampaign> close();
 
  private:

@@ -28,6 +28,10 @@ void WorkerHistory::note_lent(CampaignId campaign, WorkerId id) {
                                           .num_slots = worker.num_slots});
 }
 
+void WorkerHistory::note_closed(CampaignId campaign) {
+  for (auto& [id, worker] : registered_) worker.campaigns.erase(campaign);
+}
+
 void WorkerHistory::note_reason(WorkerId worker, LossReason reason) {
   if (registered_.contains(worker)) reasons_[worker] = reason;
 }

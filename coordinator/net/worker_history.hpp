@@ -22,6 +22,8 @@ class WorkerHistory {
   /// To be called whenever runs are lent, and before anything of a worker that may be new to the
   /// campaign's file is written.
   void note_lent(CampaignId campaign, WorkerId worker);
+  /// A campaign's file is closed, and knows that all of its workers have ended.
+  void note_closed(CampaignId campaign);
   /// Why the worker is about to be removed, or was; `silent` if nobody says so.
   void note_reason(WorkerId worker, LossReason reason);
 

@@ -18,9 +18,14 @@ namespace proofmass::wire {
 inline constexpr std::size_t submit_size_max = std::size_t{64} << 20;
 inline constexpr std::size_t request_size_max = std::size_t{64} << 10;
 inline constexpr std::size_t reply_size_max = std::size_t{4} << 20;
+/// Of one message: a larger request travels as RequestParts with slices of at most the first.
+inline constexpr std::size_t request_part_size_max = std::size_t{256} << 10;
+inline constexpr std::size_t request_message_size_max = request_part_size_max + 1024;
 
-inline constexpr std::size_t campaigns_per_reply_max = 4096;
+inline constexpr std::size_t campaigns_per_reply_max = 512;
 inline constexpr std::size_t workers_per_reply_max = 4096;
+inline constexpr std::size_t unserved_files_per_reply_max = 64;
+inline constexpr std::size_t quarantined_hosts_per_reply_max = 256;
 inline constexpr std::size_t reply_text_size_max = 4096;  ///< Of any text in a reply, bytes.
 inline constexpr std::size_t stop_rule_size_max = 200;    ///< Bytes.
 inline constexpr int priority_max = 100;                  ///< And its negative.

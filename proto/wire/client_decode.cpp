@@ -22,7 +22,7 @@ using detail::require_count;
 using detail::require_in;
 
 /// A campaign with all the sessions, excitations and lines that it may have, has 34,000; a reply
-/// with 4096 campaigns 62,000.
+/// with 4096 workers 37,000.
 constexpr std::size_t fields_max = std::size_t{1} << 16;
 
 int checked_priority(int priority) {
@@ -71,6 +71,15 @@ ClientRequest read(const proto::ControlRequest& message) {
                         .campaign = checked_name(message.campaign(), "campaign")};
 }
 
+ClientRequest read(const proto::RequestPart& message) {
+  require_in(message.total_size(), 1, submit_size_max, "total_size");
+  require_in(message.slice().size(), 1, request_part_size_max, "slice size");
+  require_in(message.offset(), 0, message.total_size() - 1, "offset");
+  require_in(message.slice().size(), 1, message.total_size() - message.offset(), "slice size");
+  return RequestPart{
+      .total_size = message.total_size(), .offset = message.offset(), .slice = message.slice()};
+}
+
 bool may_be_in_text(char c) { return c == '\n' || (c >= ' ' && c <= '~'); }
 
 std::string checked_text(const std::string& text, std::string_view field) {
@@ -104,7 +113,21 @@ CampaignStatus read_campaign(const proto::CampaignStatus& message) {
           .num_mismatches = message.num_mismatches(),
           .rate_hz = checked_magnitude(message.rate_hz(), "rate_hz"),
           .remaining_s = remaining_time(message),
-          .storage_failure = checked_text(message.storage_failure(), "storage_failure")};
+          .storage_failure = checked_text(message.storage_failure(), "storage_failure"),
+          .owner = message.owner().empty() ? "" : checked_name(message.owner(), "owner")};
+}
+
+void read_what_is_amiss(const proto::StatusReply& message, StatusReply& status) {
+  require_count(message.unserved_files_size(), 0, unserved_files_per_reply_max, "unserved_files");
+  require_count(message.quarantined_hosts_size(), 0, quarantined_hosts_per_reply_max,
+                "quarantined_hosts");
+  for (const auto& file : message.unserved_files()) {
+    status.unserved_files.push_back({.file = checked_text(file.file(), "file"),
+                                     .reason = checked_text(file.reason(), "reason")});
+  }
+  for (const std::string& host : message.quarantined_hosts()) {
+    status.quarantined_hosts.push_back(checked_name(host, "quarantined_hosts"));
+  }
 }
 
 ClientReply read(const proto::StatusReply& message) {
@@ -114,10 +137,14 @@ ClientReply read(const proto::StatusReply& message) {
                      .uptime_s = checked_magnitude(message.uptime_s(), "uptime_s"),
                      .num_workers = message.num_workers(),
                      .num_slots = message.num_slots(),
-                     .campaigns = {}};
+                     .campaigns = {},
+                     .num_campaigns = message.num_campaigns(),
+                     .num_unserved_files = message.num_unserved_files(),
+                     .num_quarantined_hosts = message.num_quarantined_hosts()};
   for (const auto& campaign : message.campaigns()) {
     status.campaigns.push_back(read_campaign(campaign));
   }
+  read_what_is_amiss(message, status);
   return status;
 }
 
@@ -135,7 +162,7 @@ WorkerStatus read_worker(const proto::WorkerStatus& message) {
 
 ClientReply read(const proto::WorkersReply& message) {
   require_count(message.workers_size(), 0, workers_per_reply_max, "workers");
-  WorkersReply reply;
+  WorkersReply reply{.workers = {}, .num_workers = message.num_workers()};
   for (const auto& worker : message.workers()) reply.workers.push_back(read_worker(worker));
   return reply;
 }
@@ -145,11 +172,15 @@ ClientRequest read_content(const proto::RequestEnvelope& envelope) {
     case proto::RequestEnvelope::kSubmit:
       return read(envelope.submit());
     case proto::RequestEnvelope::kStatus:
-      return StatusRequest{};
+      return StatusRequest{envelope.status().first_campaign()};
     case proto::RequestEnvelope::kWorkers:
-      return WorkersRequest{};
+      return WorkersRequest{envelope.workers().after_worker_id()};
     case proto::RequestEnvelope::kControl:
       return read(envelope.control());
+    case proto::RequestEnvelope::kPart:
+      return read(envelope.part());
+    case proto::RequestEnvelope::kReleaseHost:
+      return ReleaseHostRequest{checked_name(envelope.release_host().host(), "host")};
     case proto::RequestEnvelope::REQUEST_NOT_SET:
       break;
   }
@@ -166,6 +197,10 @@ ClientReply read_content(const proto::ReplyEnvelope& envelope) {
       return DoneReply{checked_text(envelope.done().text(), "text")};
     case proto::ReplyEnvelope::kError:
       return ErrorReply{checked_text(envelope.error().text(), "text")};
+    case proto::ReplyEnvelope::kPart:
+      return PartReply{envelope.part().next_offset()};
+    case proto::ReplyEnvelope::kWait:
+      return WaitReply{};
     case proto::ReplyEnvelope::REPLY_NOT_SET:
       break;
   }
@@ -200,6 +235,11 @@ std::optional<DecodeError> parse(std::string_view bytes, std::string_view what,
   return std::nullopt;
 }
 
+std::size_t size_max_of(const proto::RequestEnvelope& envelope) {
+  if (envelope.has_submit()) return submit_size_max;
+  return envelope.has_part() ? request_message_size_max : request_size_max;
+}
+
 DecodeError empty(std::string_view what) {
   return fault(DecodeFault::empty, fmt::format("{} = none (must be of a known kind)", what));
 }
@@ -210,9 +250,8 @@ std::variant<RequestPacket, DecodeError> decode_request(std::string_view bytes) 
   proto::RequestEnvelope envelope;
   if (const auto error = parse(bytes, "request", submit_size_max, envelope)) return *error;
   if (envelope.request_case() == proto::RequestEnvelope::REQUEST_NOT_SET) return empty("request");
-  if (!envelope.has_submit() && bytes.size() > request_size_max) {
-    return too_large("request", bytes.size(), request_size_max);
-  }
+  const std::size_t size_max = size_max_of(envelope);
+  if (bytes.size() > size_max) return too_large("request", bytes.size(), size_max);
   try {
     return RequestPacket{.id = detail::checked_id(envelope.request_id(), "request_id"),
                          .request = read_content(envelope)};

@@ -22,8 +22,24 @@ void write(const SubmitRequest& submit, proto::RequestEnvelope& envelope) {
   if (submit.failures_max) message.set_failures_max(*submit.failures_max);
 }
 
-void write(const StatusRequest&, proto::RequestEnvelope& envelope) { envelope.mutable_status(); }
-void write(const WorkersRequest&, proto::RequestEnvelope& envelope) { envelope.mutable_workers(); }
+void write(const StatusRequest& status, proto::RequestEnvelope& envelope) {
+  envelope.mutable_status()->set_first_campaign(status.first_campaign);
+}
+
+void write(const WorkersRequest& workers, proto::RequestEnvelope& envelope) {
+  envelope.mutable_workers()->set_after_worker_id(workers.after_worker_id);
+}
+
+void write(const ReleaseHostRequest& release, proto::RequestEnvelope& envelope) {
+  envelope.mutable_release_host()->set_host(release.host);
+}
+
+void write(const RequestPart& part, proto::RequestEnvelope& envelope) {
+  proto::RequestPart& message = *envelope.mutable_part();
+  message.set_total_size(part.total_size);
+  message.set_offset(part.offset);
+  message.set_slice(part.slice);
+}
 
 void write(const ControlRequest& control, proto::RequestEnvelope& envelope) {
   proto::ControlRequest& message = *envelope.mutable_control();
@@ -54,6 +70,7 @@ void write_campaign(const CampaignStatus& campaign, proto::CampaignStatus& messa
   message.set_rate_hz(campaign.rate_hz);
   if (campaign.remaining_s) message.set_remaining_s(*campaign.remaining_s);
   message.set_storage_failure(sendable(campaign.storage_failure));
+  message.set_owner(campaign.owner);
 }
 
 void write(const StatusReply& status, proto::ReplyEnvelope& envelope) {
@@ -66,6 +83,15 @@ void write(const StatusReply& status, proto::ReplyEnvelope& envelope) {
   for (const CampaignStatus& campaign : status.campaigns) {
     write_campaign(campaign, *message.add_campaigns());
   }
+  message.set_num_campaigns(status.num_campaigns);
+  for (const UnservedFile& file : status.unserved_files) {
+    proto::UnservedFile& unserved = *message.add_unserved_files();
+    unserved.set_file(sendable(file.file));
+    unserved.set_reason(sendable(file.reason));
+  }
+  message.set_num_unserved_files(status.num_unserved_files);
+  for (const std::string& host : status.quarantined_hosts) message.add_quarantined_hosts(host);
+  message.set_num_quarantined_hosts(status.num_quarantined_hosts);
 }
 
 void write_worker(const WorkerStatus& worker, proto::WorkerStatus& message) {
@@ -83,6 +109,7 @@ void write_worker(const WorkerStatus& worker, proto::WorkerStatus& message) {
 void write(const WorkersReply& reply, proto::ReplyEnvelope& envelope) {
   proto::WorkersReply& message = *envelope.mutable_workers();
   for (const WorkerStatus& worker : reply.workers) write_worker(worker, *message.add_workers());
+  message.set_num_workers(reply.num_workers);
 }
 
 void write(const DoneReply& done, proto::ReplyEnvelope& envelope) {
@@ -91,6 +118,18 @@ void write(const DoneReply& done, proto::ReplyEnvelope& envelope) {
 
 void write(const ErrorReply& error, proto::ReplyEnvelope& envelope) {
   envelope.mutable_error()->set_text(sendable(error.text));
+}
+
+void write(const PartReply& part, proto::ReplyEnvelope& envelope) {
+  envelope.mutable_part()->set_next_offset(part.next_offset);
+}
+
+void write(const WaitReply&, proto::ReplyEnvelope& envelope) { envelope.mutable_wait(); }
+
+std::size_t size_max_of(const ClientRequest& request) {
+  if (std::holds_alternative<SubmitRequest>(request)) return submit_size_max;
+  if (std::holds_alternative<RequestPart>(request)) return request_message_size_max;
+  return request_size_max;
 }
 
 template <typename Envelope>
@@ -110,8 +149,7 @@ std::string encode(const RequestPacket& packet) {
   envelope.set_protocol_version(protocol_version);
   envelope.set_request_id(packet.id);
   std::visit([&](const auto& content) { write(content, envelope); }, packet.request);
-  const bool is_submit = std::holds_alternative<SubmitRequest>(packet.request);
-  return bytes_of(envelope, "request", is_submit ? submit_size_max : request_size_max);
+  return bytes_of(envelope, "request", size_max_of(packet.request));
 }
 
 std::string encode(const ReplyPacket& packet) {

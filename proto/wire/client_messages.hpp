@@ -25,8 +25,13 @@ struct SubmitRequest {
   std::optional<std::uint64_t> failures_max = {};
 };
 
-struct StatusRequest {};
-struct WorkersRequest {};
+struct StatusRequest {
+  std::uint64_t first_campaign = 0;  ///< Index in the list of all; those before are left out.
+};
+
+struct WorkersRequest {
+  std::uint64_t after_worker_id = 0;  ///< Workers up to this number are left out.
+};
 
 enum class ControlAction : std::uint8_t { pause = 1, resume = 2, cancel = 3 };
 
@@ -35,7 +40,20 @@ struct ControlRequest {
   std::string campaign;  ///< Name; is_name() holds.
 };
 
-using ClientRequest = std::variant<SubmitRequest, StatusRequest, WorkersRequest, ControlRequest>;
+/// Runs are lent to workers of this host again, though too many of them crashed.
+struct ReleaseHostRequest {
+  std::string host;  ///< is_name() holds.
+};
+
+/// A slice of the bytes of a request that is too large for one message.
+struct RequestPart {
+  std::uint64_t total_size = 0;  ///< Of the whole request, bytes; 1 to submit_size_max.
+  std::uint64_t offset = 0;      ///< Of the first byte.
+  std::string slice;             ///< 1 byte to request_part_size_max; ends at most at total_size.
+};
+
+using ClientRequest = std::variant<SubmitRequest, StatusRequest, WorkersRequest, ControlRequest,
+                                   ReleaseHostRequest, RequestPart>;
 
 /// Whether a campaign's runs are lent. The values are sent: never renumber.
 enum class CampaignPhase : std::uint8_t {
@@ -61,6 +79,13 @@ struct CampaignStatus {
   double rate_hz = 0.0;               ///< Runs stored per second, recently.
   std::optional<double> remaining_s;  ///< At that rate.
   std::string storage_failure;        ///< Why nothing can be stored; empty if all is well.
+  std::string owner = {};             ///< Name of the key that submitted it; empty if not known.
+};
+
+/// A file that should be served and cannot be for now. It is tried again every few seconds.
+struct UnservedFile {
+  std::string file;
+  std::string reason;
 };
 
 struct StatusReply {
@@ -69,7 +94,13 @@ struct StatusReply {
   double uptime_s = 0.0;
   std::uint64_t num_workers = 0;
   std::uint64_t num_slots = 0;
-  std::vector<CampaignStatus> campaigns;  ///< In the order in which they were submitted.
+  /// In the order in which they were submitted, from StatusRequest::first_campaign on.
+  std::vector<CampaignStatus> campaigns;
+  std::uint64_t num_campaigns = 0;  ///< Of all, in this reply or not.
+  std::vector<UnservedFile> unserved_files = {};
+  std::uint64_t num_unserved_files = 0;  ///< Of all, in this reply or not.
+  std::vector<std::string> quarantined_hosts = {};
+  std::uint64_t num_quarantined_hosts = 0;  ///< Of all, in this reply or not.
 };
 
 /// A registered worker.
@@ -86,7 +117,8 @@ struct WorkerStatus {
 };
 
 struct WorkersReply {
-  std::vector<WorkerStatus> workers;
+  std::vector<WorkerStatus> workers;  ///< Ascending, after WorkersRequest::after_worker_id.
+  std::uint64_t num_workers = 0;      ///< Of all, in this reply or not.
 };
 
 /// The request was carried out.
@@ -99,6 +131,15 @@ struct ErrorReply {
   std::string text;  ///< `field = value (rule)`.
 };
 
-using ClientReply = std::variant<StatusReply, WorkersReply, DoneReply, ErrorReply>;
+/// The coordinator wants the bytes of the request from here on; 0: all of them.
+struct PartReply {
+  std::uint64_t next_offset = 0;
+};
+
+/// The request is being carried out, and its reply will follow.
+struct WaitReply {};
+
+using ClientReply =
+    std::variant<StatusReply, WorkersReply, DoneReply, ErrorReply, PartReply, WaitReply>;
 
 }  // namespace proofmass::wire

@@ -213,7 +213,8 @@ std::vector<Contradiction> read_contradictions(const Database& database) {
 void insert_start(const Database& database, const CoordinatorStart& start) {
   database
       .prepare(
-          "INSERT INTO coordinator_start (epoch, host, process_id, version) VALUES (?, ?, ?, ?)")
+          "INSERT INTO coordinator_start (epoch, host, process_id, version) VALUES (?, ?, ?, ?) "
+          "ON CONFLICT (epoch) DO UPDATE SET ended_utc = NULL")
       .run(hexadecimal(start.epoch.value), start.host, start.process_id, start.version);
 }
 

@@ -25,8 +25,23 @@ int open_flags(Access access) {
       return SQLITE_OPEN_READWRITE;
     case Access::read_only:
       return SQLITE_OPEN_READONLY;
+    case Access::immutable:
+      return SQLITE_OPEN_READONLY | SQLITE_OPEN_URI;
   }
   return SQLITE_OPEN_READONLY;
+}
+
+// An absolute path is never mistaken for `:memory:` or a URI.
+std::string name_of(const std::filesystem::path& path, Access access) {
+  if (access == Access::memory) return ":memory:";
+  std::string name = std::filesystem::absolute(path).string();
+  if (access != Access::immutable) return name;
+  std::string uri = "file://";
+  for (const char c : name) {
+    const bool is_special = c == '%' || c == '?' || c == '#';
+    uri += is_special ? fmt::format("%{:02X}", static_cast<int>(c)) : std::string(1, c);
+  }
+  return uri + "?immutable=1";
 }
 
 std::string damage(std::string_view what) {
@@ -176,9 +191,7 @@ void Statement::refuse_as_damaged(std::string_view what) const {
 void Database::Close::operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }
 
 Database::Database(const std::filesystem::path& path, Access access) : path_(path) {
-  // An absolute path is never mistaken for `:memory:` or a URI.
-  const std::string name =
-      access == Access::memory ? ":memory:" : std::filesystem::absolute(path).string();
+  const std::string name = name_of(path, access);
   sqlite3* connection = nullptr;
   const int code = sqlite3_open_v2(name.c_str(), &connection, open_flags(access), nullptr);
   connection_.reset(connection);
@@ -186,7 +199,8 @@ Database::Database(const std::filesystem::path& path, Access access) : path_(pat
   sqlite3_extended_result_codes(connection, 1);
   sqlite3_busy_timeout(connection, busy_timeout_ms);
   sqlite3_limit(connection, SQLITE_LIMIT_SQL_LENGTH, sql_size_max);
-  if (access != Access::read_only && sqlite3_db_readonly(connection, "main") != 0) {
+  const bool is_reader = access == Access::read_only || access == Access::immutable;
+  if (!is_reader && sqlite3_db_readonly(connection, "main") != 0) {
     throw StoreError(fmt::format("campaign file = {} (is not writable)", path_.string()));
   }
 }

@@ -12,8 +12,9 @@ struct sqlite3_stmt;
 
 namespace proofmass::coordinator::detail {
 
-/// How a database file is opened; `memory` opens none, and the path is for messages.
-enum class Access { create, read_write, read_only, memory };
+/// How a database file is opened; `memory` opens none, and the path is for messages. `immutable`
+/// reads the file alone, as it is, without locks and without its log.
+enum class Access { create, read_write, read_only, immutable, memory };
 
 /// How long a connection waits for the locks of others.
 inline constexpr int busy_timeout_ms = 5000;

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "coordinator/cli/exit_code.hpp"
+#include "coordinator/net/prepared_campaign.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 
 namespace proofmass::coordinator {
@@ -24,12 +25,17 @@ Campaign campaign_of(const std::string& name, std::uint64_t num_runs = 10) {
 
 class CampaignFolderTest : public testing::Test {
  protected:
-  /// Names of the campaigns that are loaded.
+  /// Names of the campaigns that can be loaded.
   std::vector<std::string> loaded(const CampaignFolder& folder) {
     std::vector<std::string> names;
-    const auto warn = [this](const std::string& what) { warnings.push_back(what); };
-    for (const ServedCampaign& campaign : folder.load(warn)) {
-      names.push_back(campaign.definition->name);
+    KnownCampaigns known;
+    const CoordinatorStart start{.epoch = {7}, .host = "h", .version = "0"};
+    for (const FileOutcome& outcome : look_at_all(folder, known, start)) {
+      if (const auto* const prepared = std::get_if<PreparedCampaign>(&outcome)) {
+        names.push_back(prepared->campaign.definition->name);
+      } else {
+        warnings.push_back(std::get<FileFailure>(outcome).reason);
+      }
     }
     return names;
   }
@@ -72,15 +78,15 @@ TEST_F(CampaignFolderTest, SaysWhyItCannotBeMade) {
 
 TEST_F(CampaignFolderTest, KeepsEachCampaignInAFileOfItsName) {
   CampaignFolder folder(directory / "served");
-  EXPECT_EQ(folder.open(campaign_of("b"), {}).file, directory / "served/b.db");
-  (void)folder.open(campaign_of("a"), {});
+  EXPECT_EQ(folder.open(campaign_of("b"), {}, {}).file, directory / "served/b.db");
+  (void)folder.open(campaign_of("a"), {}, {});
   EXPECT_THAT(loaded(folder), ElementsAre("a", "b"));
   EXPECT_THAT(warnings, IsEmpty());
 }
 
 TEST_F(CampaignFolderTest, LeavesAloneWhatItCannotServe) {
   CampaignFolder folder(directory / "served");
-  (void)folder.open(campaign_of("a"), {});
+  (void)folder.open(campaign_of("a"), {}, {});
   std::ofstream(directory / "served/b.db") << "something else";
   std::ofstream(directory / "served/notes.txt") << "something else";
   EXPECT_THAT(loaded(folder), ElementsAre("a"));
@@ -90,7 +96,7 @@ TEST_F(CampaignFolderTest, LeavesAloneWhatItCannotServe) {
 
 TEST_F(CampaignFolderTest, ServesOneOfTwoCopies) {
   CampaignFolder folder(directory / "served");
-  (void)folder.open(campaign_of("a"), {});
+  (void)folder.open(campaign_of("a"), {}, {});
   std::filesystem::copy_file(directory / "served/a.db", directory / "served/b.db");
   EXPECT_THAT(loaded(folder), ElementsAre("a"));
   EXPECT_THAT(warnings, ElementsAre((directory / "served/b.db").string() +
@@ -99,20 +105,36 @@ TEST_F(CampaignFolderTest, ServesOneOfTwoCopies) {
 
 TEST_F(CampaignFolderTest, OpensACampaignAgainAndExtendsIt) {
   CampaignFolder folder(directory / "served");
-  (void)folder.open(campaign_of("a", 10), {});
-  ServedCampaign campaign = folder.open(campaign_of("a", 11), {});
+  (void)folder.open(campaign_of("a", 10), {}, {});
+  ServedCampaign campaign = folder.open(campaign_of("a", 11), {}, {});
   EXPECT_EQ(campaign.store.num_runs(), 11U);
   EXPECT_EQ(folder.extend(campaign.store, campaign_of("a", 12))->num_runs, 12U);
   EXPECT_EQ(campaign.store.num_runs(), 12U);
 }
 
+TEST_F(CampaignFolderTest, WritesTheOwnerIntoANewFileAndAsksItOfOneThatIsThere) {
+  CampaignFolder folder(directory / "served");
+  const Asker anna{.name = "anna", .rights = Rights::usual()};
+  const Asker ben{.name = "ben", .rights = Rights::usual()};
+  EXPECT_EQ(folder.open(campaign_of("a"), {}, anna).store.owner(), "anna");
+  try {
+    (void)folder.open(campaign_of("a", 11), {}, ben);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "campaign = a (belongs to anna; the key ben must have the right `control`)");
+  }
+  const Asker boss{.name = "boss", .rights = Rights::all()};
+  EXPECT_EQ(folder.open(campaign_of("a", 11), {}, boss).store.owner(), "anna");
+}
+
 TEST_F(CampaignFolderTest, SaysHowTheCampaignInAFileDiffers) {
   CampaignFolder folder(directory / "served");
-  (void)folder.open(campaign_of("a"), {});
+  (void)folder.open(campaign_of("a"), {}, {});
   Campaign other = campaign_of("a");
   other.seed = 2;
   try {
-    (void)folder.open(other, {});
+    (void)folder.open(other, {}, {});
     FAIL();
   } catch (const UsageError& error) {
     EXPECT_EQ(error.what(), (directory / "served/a.db").string() +
@@ -124,7 +146,7 @@ TEST_F(CampaignFolderTest, SaysHowTheCampaignInAFileDiffers) {
 
 TEST_F(CampaignFolderTest, BringsStatisticsUpToDateBesideTheWriter) {
   CampaignFolder folder(directory / "served");
-  ServedCampaign campaign = folder.open(campaign_of("a", 1), {});
+  ServedCampaign campaign = folder.open(campaign_of("a", 1), {}, {});
   Delivery delivery{.result = {}, .worker = {1}, .attempt = {1}};
   const std::vector<Entry> entries{
       WorkerJoined{.session = {1}, .name = "w", .host = "h", .process_id = 1}, delivery};

@@ -30,7 +30,13 @@ wire::StatusReply some_status() {
                               .num_mismatches = 7,
                               .rate_hz = 0.5,
                               .remaining_s = 2.5,
-                              .storage_failure = "disk full"});
+                              .storage_failure = "disk full",
+                              .owner = "anna"});
+  status.num_campaigns = 1;
+  status.unserved_files = {{.file = "d/a.db", .reason = "is locked"}};
+  status.num_unserved_files = 2;
+  status.quarantined_hosts = {"n7"};
+  status.num_quarantined_hosts = 1;
   return status;
 }
 
@@ -54,7 +60,12 @@ TEST(StatusJson, HoldsEverythingUnderStableKeys) {
                          {"num_mismatches", 7},
                          {"rate_hz", 0.5},
                          {"remaining_s", 2.5},
-                         {"storage_failure", "disk full"}}}}};
+                         {"storage_failure", "disk full"},
+                         {"owner", "anna"}}}},
+                      {"unserved_files", {{{"file", "d/a.db"}, {"reason", "is locked"}}}},
+                      {"num_unserved_files", 2},
+                      {"quarantined_hosts", {"n7"}},
+                      {"num_quarantined_hosts", 1}};
   EXPECT_EQ(Json::parse(status_json(some_status(), JsonLayout::indented)), expected);
   EXPECT_EQ(Json::parse(status_json(some_status(), JsonLayout::one_line)), expected);
 }

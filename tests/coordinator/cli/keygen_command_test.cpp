@@ -50,13 +50,16 @@ TEST_F(Keygen, MakesAllThatACoordinatorItsWorkersAndClientsNeed) {
   EXPECT_EQ(worker.identity->coordinator, server.keys->public_key);
   EXPECT_EQ(client.identity->coordinator, server.keys->public_key);
 
-  const AllowList workers(directory_ / "authorized_workers");
-  const AllowList clients(directory_ / "authorized_clients");
-  ASSERT_NE(workers.name_of(worker.identity->keys.public_key.text()), nullptr);
-  EXPECT_EQ(*workers.name_of(worker.identity->keys.public_key.text()), "worker");
-  EXPECT_EQ(workers.name_of(client.identity->keys.public_key.text()), nullptr);
-  ASSERT_NE(clients.name_of(client.identity->keys.public_key.text()), nullptr);
-  EXPECT_EQ(clients.name_of(worker.identity->keys.public_key.text()), nullptr);
+  const AllowList workers(directory_ / "authorized_workers", wire::Domain::workers);
+  const AllowList clients(directory_ / "authorized_clients", wire::Domain::clients);
+  ASSERT_NE(workers.owner_of(worker.identity->keys.public_key.text()), nullptr);
+  EXPECT_EQ(workers.owner_of(worker.identity->keys.public_key.text())->name, "worker");
+  EXPECT_EQ(workers.owner_of(client.identity->keys.public_key.text()), nullptr);
+  ASSERT_NE(clients.owner_of(client.identity->keys.public_key.text()), nullptr);
+  EXPECT_EQ(clients.owner_of(worker.identity->keys.public_key.text()), nullptr);
+  // Whoever sets it up may control everything.
+  const AllowedKey& first = *clients.owner_of(client.identity->keys.public_key.text());
+  EXPECT_EQ(first.rights, Rights::all());
 }
 
 TEST_F(Keygen, KeepsSecretsToTheirOwner) {
@@ -112,11 +115,11 @@ TEST_F(Keygen, AddsAPairAndItsLine) {
             std::string::npos)
       << output;
   const auto pair = wire::read_key_pair(directory_ / "cluster-2.key", KeyRole::worker);
-  const AllowList workers(directory_ / "authorized_workers");
-  ASSERT_NE(workers.name_of(pair.public_key.text()), nullptr);
-  EXPECT_EQ(*workers.name_of(pair.public_key.text()), "cluster-2");
+  const AllowList workers(directory_ / "authorized_workers", wire::Domain::workers);
+  ASSERT_NE(workers.owner_of(pair.public_key.text()), nullptr);
+  EXPECT_EQ(workers.owner_of(pair.public_key.text())->name, "cluster-2");
   const auto first = wire::read_public_key(directory_ / "worker.pub", KeyRole::worker);
-  EXPECT_NE(workers.name_of(first.text()), nullptr);
+  EXPECT_NE(workers.owner_of(first.text()), nullptr);
 }
 
 TEST_F(Keygen, AddsToAListThatAPersonHasEdited) {

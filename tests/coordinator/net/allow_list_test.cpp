@@ -22,7 +22,11 @@ using test::write_text;
 std::string new_key() { return wire::make_key_pair().public_key.text(); }
 
 std::string parsing(const std::string& text) {
-  return refusal_of([&] { (void)parse_allow_list(text, "keys"); });
+  return refusal_of([&] { (void)parse_allow_list(text, wire::Domain::workers, "keys"); });
+}
+
+std::string parsing_clients(const std::string& text) {
+  return refusal_of([&] { (void)parse_allow_list(text, wire::Domain::clients, "keys"); });
 }
 
 TEST(AllowListText, HasAKeyAndANameInEachLine) {
@@ -30,10 +34,10 @@ TEST(AllowListText, HasAKeyAndANameInEachLine) {
   const std::string two = new_key();
   const AllowedKeys keys = parse_allow_list("# workers\n\n" + one + " worker-1\n  " + two +
                                                 "\tcluster.7 \r\n   \n#" + new_key() + " revoked\n",
-                                            "keys");
-  EXPECT_EQ(keys, (AllowedKeys{{one, "worker-1"}, {two, "cluster.7"}}));
-  EXPECT_EQ(parse_allow_list(one + " last", "keys").size(), 1u);
-  EXPECT_TRUE(parse_allow_list("", "keys").empty());
+                                            wire::Domain::workers, "keys");
+  EXPECT_EQ(keys, (AllowedKeys{{one, {"worker-1", {}}}, {two, {"cluster.7", {}}}}));
+  EXPECT_EQ(parse_allow_list(one + " last", wire::Domain::workers, "keys").size(), 1u);
+  EXPECT_TRUE(parse_allow_list("", wire::Domain::workers, "keys").empty());
 }
 
 TEST(AllowListText, SaysWhichLineIsWrongAndNotWhatItSays) {
@@ -51,6 +55,22 @@ TEST(AllowListText, SaysWhichLineIsWrongAndNotWhatItSays) {
   EXPECT_EQ(parsing(fine + key + " b\n"), "keys line = 2 (names a key a second time)");
 }
 
+TEST(AllowListText, NamesTheRightsOfClients) {
+  const std::string one = new_key();
+  const std::string two = new_key();
+  const AllowedKeys keys = parse_allow_list(one + " anna\n" + two + " ben observe,control \n",
+                                            wire::Domain::clients, "keys");
+  EXPECT_EQ(keys.at(one).rights, Rights::usual());
+  EXPECT_EQ(keys.at(two).rights, Rights::parse("control,observe"));
+  for (const std::string rights : {"all", "observe,", ",submit", "observe submit", "Submit"}) {
+    EXPECT_NE(parsing_clients(one + " anna " + rights + "\n"), "") << rights;
+  }
+  EXPECT_EQ(parsing_clients(one + " anna everything\n"),
+            "keys line = 1 (must have rights of observe,submit,control after the name)");
+  EXPECT_EQ(parsing_clients(one + " anna submit extra\n"),
+            "keys line = 1 (must be KEY NAME RIGHTS)");
+}
+
 TEST(AllowListText, HasALimit) {
   std::string text;
   // Any 32 bytes are a public key; digits make distinct ones without 65537 key generations.
@@ -59,7 +79,7 @@ TEST(AllowListText, HasALimit) {
     return std::string(40 - number.size(), '0') + number + " a\n";
   };
   for (std::size_t i = 0; i < allowed_keys_max; ++i) text += line(i);
-  EXPECT_EQ(parse_allow_list(text, "keys").size(), allowed_keys_max);
+  EXPECT_EQ(parse_allow_list(text, wire::Domain::workers, "keys").size(), allowed_keys_max);
   EXPECT_EQ(parsing(text + line(allowed_keys_max)), "keys line = 65537 (is one key too many)");
 }
 
@@ -77,52 +97,52 @@ class AllowListFile : public ::testing::Test {
 
 TEST_F(AllowListFile, NamesTheOwnersOfKeys) {
   write(one_ + " worker-1\n");
-  const AllowList list(file_);
-  ASSERT_NE(list.name_of(one_), nullptr);
-  EXPECT_EQ(*list.name_of(one_), "worker-1");
-  EXPECT_EQ(list.name_of(two_), nullptr);
-  EXPECT_EQ(list.name_of(""), nullptr);
+  const AllowList list(file_, wire::Domain::workers);
+  ASSERT_NE(list.owner_of(one_), nullptr);
+  EXPECT_EQ(list.owner_of(one_)->name, "worker-1");
+  EXPECT_EQ(list.owner_of(two_), nullptr);
+  EXPECT_EQ(list.owner_of(""), nullptr);
 }
 
 TEST_F(AllowListFile, ChangesAreSeen) {
   write(one_ + " a\n");
-  AllowList list(file_);
+  AllowList list(file_, wire::Domain::workers);
   write(two_ + " a\n");
   EXPECT_FALSE(list.refresh());
-  EXPECT_EQ(list.name_of(one_), nullptr);
-  EXPECT_NE(list.name_of(two_), nullptr);
+  EXPECT_EQ(list.owner_of(one_), nullptr);
+  EXPECT_NE(list.owner_of(two_), nullptr);
 }
 
 // An editor that writes in place, twice within one tick of the file system's clock.
 TEST_F(AllowListFile, ChangesOfTheSameSizeInPlaceAreSeen) {
   for (int i = 0; i < 50; ++i) {
     write_text(file_, one_ + " a\n", 0644);
-    AllowList list(file_);
+    AllowList list(file_, wire::Domain::workers);
     write_text(file_, two_ + " a\n", 0644);
     EXPECT_FALSE(list.refresh());
-    EXPECT_EQ(list.name_of(one_), nullptr);
+    EXPECT_EQ(list.owner_of(one_), nullptr);
   }
 }
 
 TEST_F(AllowListFile, ThatIsWrongOrGoneLeavesTheListStanding) {
   write(one_ + " a\n");
-  AllowList list(file_);
+  AllowList list(file_, wire::Domain::workers);
 
   write("nonsense\n");
   EXPECT_EQ(list.refresh().value_or(""),
             file_.string() + " line = 1 (must begin with a public key of 40 characters)");
   EXPECT_FALSE(list.refresh());  // Once.
-  EXPECT_NE(list.name_of(one_), nullptr);
+  EXPECT_NE(list.owner_of(one_), nullptr);
 
   std::filesystem::remove(file_);
   EXPECT_EQ(list.refresh().value_or(""),
             "allow-list = " + file_.string() + " (No such file or directory)");
   EXPECT_FALSE(list.refresh());
-  EXPECT_NE(list.name_of(one_), nullptr);
+  EXPECT_NE(list.owner_of(one_), nullptr);
 
   write(two_ + " a\n");
   EXPECT_FALSE(list.refresh());
-  EXPECT_EQ(list.name_of(one_), nullptr);
+  EXPECT_EQ(list.owner_of(one_), nullptr);
 
   write("nonsense\n");
   EXPECT_TRUE(list.refresh());  // Again, as it was right in between.
@@ -130,19 +150,19 @@ TEST_F(AllowListFile, ThatIsWrongOrGoneLeavesTheListStanding) {
 
 TEST_F(AllowListFile, IsLookedAtOnceASecond) {
   write(one_ + " a\n");
-  AllowList list(file_);
+  AllowList list(file_, wire::Domain::workers);
   AllowList::TimePoint now{};
   EXPECT_FALSE(list.refresh_if_due(now));
   write("");
   EXPECT_FALSE(list.refresh_if_due(now + milliseconds(999)));
-  EXPECT_NE(list.name_of(one_), nullptr);
+  EXPECT_NE(list.owner_of(one_), nullptr);
   EXPECT_FALSE(list.refresh_if_due(now + milliseconds(1000)));
-  EXPECT_EQ(list.name_of(one_), nullptr);
+  EXPECT_EQ(list.owner_of(one_), nullptr);
 }
 
 TEST_F(AllowListFile, ThatCannotBeTrustedIsRefused) {
   const auto opening = [&](const std::filesystem::path& file) {
-    return refusal_of([&] { const AllowList list(file); });
+    return refusal_of([&] { const AllowList list(file, wire::Domain::workers); });
   };
   EXPECT_EQ(opening(file_), "allow-list = " + file_.string() + " (No such file or directory)");
   EXPECT_EQ(opening(directory_.path()),

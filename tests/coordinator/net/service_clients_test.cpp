@@ -3,58 +3,17 @@
 #include <gmock/gmock.h>
 
 #include "proto/wire/client_codec.hpp"
+#include "tests/coordinator/net/playing_client.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
+using test::PlayingClient;
 using test::PlayingWorker;
 using ::testing::ElementsAre;
 using ::testing::StartsWith;
 using wire::ControlAction;
-
-/// A client's socket; every receive has a deadline.
-class PlayingClient {
- public:
-  explicit PlayingClient(const std::string& endpoint)
-      : socket_(wire::make_dealer(context_, wire::ClientSecurity{})) {
-    socket_.set(zmq::sockopt::linger, 0);
-    socket_.set(zmq::sockopt::immediate, false);
-    socket_.set(zmq::sockopt::rcvtimeo, 20'000);
-    socket_.connect(endpoint);
-  }
-
-  wire::ReplyPacket ask_bytes(const std::vector<std::string>& frames) {
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      const bool is_last = i + 1 == frames.size();
-      (void)socket_.send(zmq::buffer(frames[i]),
-                         is_last ? zmq::send_flags::none : zmq::send_flags::sndmore);
-    }
-    zmq::message_t frame;
-    if (!socket_.recv(frame)) throw Error("no reply before the deadline");
-    return std::get<wire::ReplyPacket>(wire::decode_reply(frame.to_string_view()));
-  }
-
-  wire::ClientReply ask(const wire::ClientRequest& request) {
-    const wire::ReplyPacket packet =
-        ask_bytes({wire::encode(wire::RequestPacket{.id = ++id_, .request = request})});
-    EXPECT_EQ(packet.id, id_);
-    return packet.reply;
-  }
-
-  std::string done(const wire::ClientRequest& request) {
-    return std::get<wire::DoneReply>(ask(request)).text;
-  }
-  std::string error(const wire::ClientRequest& request) {
-    return std::get<wire::ErrorReply>(ask(request)).text;
-  }
-  wire::StatusReply status() { return std::get<wire::StatusReply>(ask(wire::StatusRequest{})); }
-
- private:
-  zmq::context_t context_;
-  zmq::socket_t socket_;
-  std::uint64_t id_ = 0;
-};
 
 class ServiceClients : public test::ServiceTest {
  protected:
@@ -238,6 +197,118 @@ TEST_F(ServiceClients, SeeTheWorkers) {
   EXPECT_EQ(reply.workers[0].num_slots, 1U);
   EXPECT_EQ(reply.workers[0].num_lent, lease.runs.count);
   EXPECT_FALSE(reply.workers[0].is_quarantined);
+}
+
+/// A submission of so many runs with a table, as bytes.
+std::string large_submission(std::uint64_t id, const std::string& name, std::size_t num_runs) {
+  Campaign campaign = test::campaign_of(name, num_runs);
+  campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
+  campaign.table_columns = {std::vector<double>(num_runs, 1e-3)};
+  return wire::encode(wire::RequestPacket{id, wire::SubmitRequest{.campaign = campaign}});
+}
+
+wire::RequestPart part_of(const std::string& bytes, std::size_t offset) {
+  return {.total_size = bytes.size(),
+          .offset = offset,
+          .slice = bytes.substr(offset, wire::request_part_size_max)};
+}
+
+// One client's parts come out of order, another's in between.
+TEST_F(ServiceClients, SubmitLargeCampaignsInParts) {
+  start_with({});
+  PlayingClient other(service->clients_endpoint());
+  const std::string mine = large_submission(7, "mine", 100'000);
+  const std::string others = large_submission(7, "others", 100'001);
+  ASSERT_GT(mine.size(), 3 * wire::request_part_size_max);
+  const auto next_offset = [](PlayingClient& from) {
+    const wire::ReplyPacket packet = from.receive();
+    EXPECT_EQ(packet.id, 7U);
+    return std::get<wire::PartReply>(packet.reply).next_offset;
+  };
+  client->send(7, part_of(mine, wire::request_part_size_max));
+  EXPECT_EQ(next_offset(*client), 0U);
+  for (std::size_t offset = 0; offset < mine.size();) {
+    client->send(7, part_of(mine, offset));
+    other.send(7, part_of(others, offset));
+    EXPECT_EQ(next_offset(other), std::min(others.size(), offset + wire::request_part_size_max));
+    offset = next_offset(*client);
+  }
+  for (PlayingClient* const asker : {&*client, &other}) {
+    const wire::ReplyPacket packet = asker->receive_final();
+    EXPECT_EQ(packet.id, 7U);
+    EXPECT_TRUE(std::holds_alternative<wire::DoneReply>(packet.reply));
+  }
+  EXPECT_EQ(client->status().campaigns.size(), 2U);
+}
+
+TEST_F(ServiceClients, GetOneCampaignForASubmissionThatTheyRepeat) {
+  start_with({});
+  PlayingClient other(service->clients_endpoint());
+  const std::string bytes = large_submission(7, "mine", 100'000);
+  for (PlayingClient* const asker : {&*client, &other}) {
+    for (std::size_t offset = 0; offset < bytes.size(); offset += wire::request_part_size_max) {
+      asker->send(7, part_of(bytes, offset));
+      (void)asker->receive_final();
+    }
+  }
+  for (PlayingClient* const asker : {&*client, &other}) {
+    EXPECT_EQ(std::get<wire::DoneReply>(asker->receive_final().reply).text,
+              "campaign mine: active, 100000 runs, 0 of them done");
+  }
+}
+
+TEST_F(ServiceClients, AreToldThatALargeRequestMustTravelInParts) {
+  start_with({});
+  const std::string bytes = large_submission(7, "mine", 100'000);
+  EXPECT_EQ(std::get<wire::ErrorReply>(client->ask_bytes({bytes}).reply).text,
+            "request size = " + std::to_string(bytes.size()) +
+                " bytes (must be at most 263168 in one message; larger ones travel in parts)");
+}
+
+TEST_F(ServiceClients, GetAnErrorForPartsThatAreNoRequest) {
+  start_with({});
+  client->send(7, wire::RequestPart{.total_size = 3, .offset = 0, .slice = "abc"});
+  EXPECT_EQ(std::get<wire::PartReply>(client->receive().reply).next_offset, 3U);
+  const wire::ReplyPacket refused = client->receive_final();
+  EXPECT_EQ(refused.id, 7U);
+  EXPECT_EQ(std::get<wire::ErrorReply>(refused.reply).text,
+            "request = 3 bytes (must be an envelope of at most 65536 fields)");
+}
+
+// What a caller's code throws, other than our own errors, ends the request and not the service.
+TEST_F(ServiceClients, OutliveAFileSystemThatThrows) {
+  files.before_open = [] { throw std::filesystem::filesystem_error("rename", std::error_code()); };
+  start_with({});
+  EXPECT_THAT(client->error(wire::SubmitRequest{.campaign = test::campaign_of("a", 2)}),
+              StartsWith("filesystem error: rename"));
+  files.before_open = [] { throw std::bad_alloc(); };
+  EXPECT_EQ(client->error(wire::SubmitRequest{.campaign = test::campaign_of("a", 2)}),
+            "std::bad_alloc");
+  files.before_open = [] {};
+  EXPECT_THAT(client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 2)}),
+              StartsWith("campaign a: active"));
+}
+
+TEST_F(ServiceClients, SeeAllCampaignsInPages) {
+  std::vector<Campaign> campaigns;
+  for (std::size_t i = 0; i < 3; ++i) {
+    campaigns.push_back(test::campaign_of("c" + std::to_string(i), 1));
+  }
+  start_with(campaigns);
+  const auto page =
+      std::get<wire::StatusReply>(client->ask(wire::StatusRequest{.first_campaign = 1}));
+  EXPECT_EQ(page.num_campaigns, 3U);
+  ASSERT_EQ(page.campaigns.size(), 2U);
+  EXPECT_EQ(page.campaigns[0].name, "c1");
+  EXPECT_TRUE(std::get<wire::StatusReply>(
+                  client->ask(wire::StatusRequest{.first_campaign = ~std::uint64_t{0}}))
+                  .campaigns.empty());
+}
+
+TEST_F(ServiceClients, AreToldThatAHostIsInNoQuarantine) {
+  start_with({});
+  EXPECT_EQ(client->error(wire::ReleaseHostRequest{.host = "n7"}),
+            "host = n7 (is not in quarantine)");
 }
 
 TEST_F(ServiceClients, GetAnErrorForWhatIsNoRequest) {

@@ -35,8 +35,9 @@ class PlainFiles final : public coordinator::CampaignFiles {
  public:
   explicit PlainFiles(const TemporaryDirectory& directory) : directory_(directory) {}
 
-  coordinator::ServedCampaign open(const Campaign& wanted,
-                                   const coordinator::StopPlan& plan) override {
+  coordinator::ServedCampaign open(const Campaign& wanted, const coordinator::StopPlan& plan,
+                                   const coordinator::Asker&) override {
+    before_open();
     const auto file = directory_ / (wanted.name + ".db");
     coordinator::Store store = std::filesystem::exists(file)
                                    ? coordinator::Store::open(file)
@@ -63,6 +64,9 @@ class PlainFiles final : public coordinator::CampaignFiles {
     return next_runs(num_runs);
   }
 
+  /// May throw.
+  std::function<void()> before_open = [] {};
+
   /// What a stop rule asks for, after so many runs.
   std::function<std::optional<std::uint64_t>(std::uint64_t)> next_runs =
       [](std::uint64_t) -> std::optional<std::uint64_t> { return std::nullopt; };
@@ -84,7 +88,7 @@ class ServiceTest : public testing::Test {
 
   void start(const std::vector<Campaign>& campaigns) {
     std::vector<coordinator::ServedCampaign> served;
-    for (const Campaign& campaign : campaigns) served.push_back(files.open(campaign, plan));
+    for (const Campaign& campaign : campaigns) served.push_back(files.open(campaign, plan, {}));
     stop = coordinator::StopRequest::none;
     service = std::make_unique<coordinator::Service>(
         std::move(served), config, [this](const coordinator::Event& event) { note(event); });

@@ -120,7 +120,7 @@ TEST_F(ServiceStop, CancelsACampaignWithMoreFailuresThanItMayHave) {
 TEST_F(ServiceStop, CountsRunsThatAreGivenUpAsFailures) {
   plan = {.stop_rule = "", .num_runs_max = {}, .failures_max = 1};
   {
-    Store store = files.open(test::campaign_of("a", 5), plan).store;
+    Store store = files.open(test::campaign_of("a", 5), plan, {}).store;
     const Entry given_up = GivenUpRun{.run = {4}};
     store.write({&given_up, 1});
   }

@@ -167,7 +167,7 @@ TEST_F(ServiceWorkers, HaveSoMuchTimeAndNoMoreWhenDrained) {
 
 TEST_F(ServiceWorkers, AreLentRunsThatWereGivenUpIfThatIsAskedFor) {
   {
-    ServedCampaign campaign = files.open(test::campaign_of("a", 1), {});
+    ServedCampaign campaign = files.open(test::campaign_of("a", 1), {}, {});
     const Entry given_up = GivenUpRun{.run = {0}};
     (void)campaign.store.write({&given_up, 1});
   }
@@ -181,7 +181,7 @@ TEST_F(ServiceWorkers, AreLentRunsThatWereGivenUpIfThatIsAskedFor) {
 
 TEST_F(ServiceWorkers, AreNotLentRunsThatWereGivenUp) {
   {
-    ServedCampaign campaign = files.open(test::campaign_of("a", 1), {});
+    ServedCampaign campaign = files.open(test::campaign_of("a", 1), {}, {});
     const Entry given_up = GivenUpRun{.run = {0}};
     (void)campaign.store.write({&given_up, 1});
   }
@@ -252,8 +252,8 @@ TEST_F(ServiceStart, SaysThatAnAddressIsTaken) {
 
 TEST_F(ServiceStart, RefusesTwoCampaignsOfOneName) {
   std::vector<ServedCampaign> campaigns;
-  campaigns.push_back(files.open(test::campaign_of("a", 1), {}));
-  campaigns.push_back(files.open(test::campaign_of("b", 1), {}));
+  campaigns.push_back(files.open(test::campaign_of("a", 1), {}, {}));
+  campaigns.push_back(files.open(test::campaign_of("b", 1), {}, {}));
   campaigns.back().definition = campaigns.front().definition;
   try {
     (void)Service(std::move(campaigns), config, [](const Event&) {});

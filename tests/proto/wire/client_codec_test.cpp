@@ -110,6 +110,55 @@ StatusReply reply_with(const std::vector<CampaignStatus>& campaigns) {
   return reply;
 }
 
+TEST(QuestionRequests, SayWhereToBegin) {
+  EXPECT_EQ(round_trip_request(StatusRequest{.first_campaign = 512}).first_campaign, 512U);
+  EXPECT_EQ(round_trip_request(WorkersRequest{.after_worker_id = 9}).after_worker_id, 9U);
+}
+
+TEST(ReleaseHostRequest, KeepsTheHost) {
+  EXPECT_EQ(round_trip_request(ReleaseHostRequest{.host = "n7"}).host, "n7");
+}
+
+TEST(RequestPart, KeepsItsBytes) {
+  const std::string slice("\0\xff x", 4);
+  const auto part =
+      round_trip_request(RequestPart{.total_size = 1000, .offset = 996, .slice = slice});
+  EXPECT_EQ(part.total_size, 1000U);
+  EXPECT_EQ(part.offset, 996U);
+  EXPECT_EQ(part.slice, slice);
+}
+
+TEST(RequestPart, OfTheLargestSizeFitsIntoAMessage) {
+  const RequestPart part{.total_size = submit_size_max,
+                         .offset = submit_size_max - request_part_size_max,
+                         .slice = std::string(request_part_size_max, 'x')};
+  const std::string bytes = encode(RequestPacket{~std::uint64_t{0}, part});
+  EXPECT_LE(bytes.size(), request_message_size_max);
+  EXPECT_TRUE(std::holds_alternative<RequestPacket>(decode_request(bytes)));
+}
+
+TEST(InterimReplies, AreTold) {
+  EXPECT_EQ(round_trip_reply(PartReply{.next_offset = 77}).next_offset, 77U);
+  (void)round_trip_reply(WaitReply{});
+}
+
+TEST(StatusReply, SaysWhatIsAmissAndHowMuchThereIs) {
+  StatusReply sent{.version = "v", .model_version = "m", .campaigns = {}};
+  sent.num_campaigns = 1000;
+  sent.unserved_files = {{.file = "a.db", .reason = "is locked"}};
+  sent.num_unserved_files = 70;
+  sent.quarantined_hosts = {"n7"};
+  sent.num_quarantined_hosts = 300;
+  const StatusReply status = round_trip_reply(sent);
+  EXPECT_EQ(status.num_campaigns, 1000U);
+  ASSERT_EQ(status.unserved_files.size(), 1U);
+  EXPECT_EQ(status.unserved_files[0].file, "a.db");
+  EXPECT_EQ(status.unserved_files[0].reason, "is locked");
+  EXPECT_EQ(status.num_unserved_files, 70U);
+  EXPECT_EQ(status.quarantined_hosts, std::vector<std::string>{"n7"});
+  EXPECT_EQ(status.num_quarantined_hosts, 300U);
+}
+
 TEST(StatusReply, KeepsEverything) {
   const auto status =
       round_trip_reply(StatusReply{.version = "0.1.0",

@@ -106,6 +106,55 @@ TEST(MalformedRequest, MayBeLargeForACampaignOnly) {
   EXPECT_EQ(error.text, "request size = 65548 bytes (must be at most 65536)");
 }
 
+std::string refusal_of_part(const std::function<void(proto::RequestPart&)>& change) {
+  return refusal(RequestPart{.total_size = 10, .offset = 4, .slice = "abc"},
+                 [&](auto& envelope) { change(*envelope.mutable_part()); });
+}
+
+TEST(MalformedPart, MustLieWithinItsRequest) {
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_total_size(0); }),
+            "total_size = 0 (must be in [1, 67108864])");
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_total_size(submit_size_max + 1); }),
+            "total_size = 67108865 (must be in [1, 67108864])");
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_offset(10); }),
+            "offset = 10 (must be in [0, 9])");
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_offset(~std::uint64_t{0}); }),
+            "offset = 18446744073709551615 (must be in [0, 9])");
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.set_offset(8); }),
+            "slice size = 3 (must be in [1, 2])");
+  EXPECT_EQ(refusal_of_part([](auto& part) { part.clear_slice(); }),
+            "slice size = 0 (must be in [1, 262144])");
+}
+
+TEST(MalformedPart, MustNotBeLargerThanAMessage) {
+  proto::RequestEnvelope envelope = status_request();
+  envelope.mutable_part()->set_slice(std::string(request_message_size_max, 'x'));
+  const DecodeError error = refusal_of_request(envelope.SerializeAsString());
+  EXPECT_EQ(error.fault, DecodeFault::too_large);
+}
+
+TEST(MalformedRelease, MustNameAHost) {
+  EXPECT_EQ(refusal(ReleaseHostRequest{.host = "n7"},
+                    [](auto& envelope) { envelope.mutable_release_host()->set_host("a b"); }),
+            "host = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+}
+
+TEST(MalformedStatus, MustNameFilesAndHostsInPrintableCharacters) {
+  EXPECT_EQ(refusal_of_status([](auto& status) {
+              auto& file = *status.add_unserved_files();
+              file.set_file("a\x1b");
+            }),
+            "file = 2 bytes (must be printable ASCII and line ends)");
+  EXPECT_EQ(refusal_of_status([](auto& status) { status.add_quarantined_hosts("a b"); }),
+            "quarantined_hosts = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal_of_status([](auto& status) {
+              for (std::size_t i = 0; i <= unserved_files_per_reply_max; ++i) {
+                status.add_unserved_files();
+              }
+            }),
+            "unserved_files = 65 entries (must be in [0, 64])");
+}
+
 TEST(MalformedRequest, ThatIsNoneIsUnparsable) {
   const DecodeError error = refusal_of_request("GET / HTTP/1.1");
   EXPECT_EQ(error.fault, DecodeFault::unparsable);
@@ -234,9 +283,9 @@ TEST(MalformedStatusReply, HasVersionsAndATime) {
 
 TEST(MalformedStatusReply, NamesABoundedNumberOfCampaigns) {
   EXPECT_EQ(refusal_of_status([](auto& status) {
-              for (int i = 0; i < 4096; ++i) status.add_campaigns();
+              for (int i = 0; i < 512; ++i) status.add_campaigns();
             }),
-            "campaigns = 4097 entries (must be in [0, 4096])");
+            "campaigns = 513 entries (must be in [0, 512])");
 }
 
 TEST(MalformedCampaignStatus, HasANameAPhaseAndAPriority) {

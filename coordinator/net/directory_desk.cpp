@@ -1,0 +1,116 @@
+#include "coordinator/net/directory_desk.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <exception>
+#include <memory>
+#include <set>
+#include <utility>
+#include <variant>
+
+namespace proofmass::coordinator {
+namespace {
+
+std::filesystem::path file_of(const FileOutcome& outcome) {
+  if (const auto* const prepared = std::get_if<PreparedCampaign>(&outcome)) {
+    return prepared->campaign.file;
+  }
+  if (const auto* const ended = std::get_if<EndedCampaign>(&outcome)) return ended->file;
+  return std::get<FileFailure>(outcome).file;
+}
+
+std::vector<FileOutcome> look(const CampaignDirectory& directory, KnownCampaigns known,
+                              const CoordinatorStart& start) {
+  try {
+    return look_at_all(directory, known, start);
+  } catch (const std::exception& error) {
+    std::vector<FileOutcome> outcomes;
+    outcomes.emplace_back(FileFailure{.file = {}, .reason = error.what()});
+    return outcomes;
+  }
+}
+
+}  // namespace
+
+DirectoryDesk::DirectoryDesk(Surroundings surroundings) : surroundings_(std::move(surroundings)) {}
+
+void DirectoryDesk::take(FileOutcome outcome) {
+  const std::filesystem::path file = file_of(outcome);
+  try {
+    if (auto* const failure = std::get_if<FileFailure>(&outcome)) return note(std::move(*failure));
+    if (auto* const ended = std::get_if<EndedCampaign>(&outcome)) {
+      surroundings_.campaigns.list(std::move(*ended));
+    } else {
+      surroundings_.campaigns.serve(std::get<PreparedCampaign>(std::move(outcome)));
+    }
+  } catch (const std::exception& error) {
+    return note({.file = file, .reason = error.what()});
+  }
+  if (unserved_.erase(file) == 0) return;
+  surroundings_.outbox.log(
+      {.kind = "campaign_file_served", .text = fmt::format("file={}", file.string())});
+}
+
+void DirectoryDesk::note(FileFailure failure) {
+  FileFailure& known = unserved_[failure.file];
+  const bool is_news = known.reason != failure.reason;
+  known = std::move(failure);
+  if (!is_news) return;
+  surroundings_.outbox.log({.severity = Severity::error,
+                            .kind = "campaign_not_served",
+                            .text = fmt::format("reason=\"{}\"", known.reason)});
+}
+
+void DirectoryDesk::review(TimePoint now) {
+  const auto& [campaigns, background, outbox, directory, retry_after, start] = surroundings_;
+  if (directory == nullptr || is_looking_ || now - looked_at_ < retry_after) return;
+  is_looking_ = true;
+  background.post_next([this, &directory = *directory, start = start, now,
+                        known = campaigns.known()]() -> Background::Finish {
+    const auto outcomes = std::make_shared<std::vector<FileOutcome>>(look(directory, known, start));
+    return [this, outcomes, now] { finish(std::move(*outcomes), now); };
+  });
+}
+
+void DirectoryDesk::finish(std::vector<FileOutcome> outcomes, TimePoint now) {
+  is_looking_ = false;
+  looked_at_ = now;
+  std::set<std::filesystem::path> seen;
+  const std::set<std::filesystem::path> served = surroundings_.campaigns.known().files;
+  for (FileOutcome& outcome : outcomes) {
+    const std::filesystem::path file = file_of(outcome);
+    seen.insert(file);
+    // It may have been submitted meanwhile.
+    if (!served.contains(file)) take(std::move(outcome));
+  }
+  if (seen.contains(std::filesystem::path())) return;  // The directory could not be read.
+  std::vector<std::filesystem::path> gone;
+  for (const auto& [file, failure] : unserved_) {
+    if (!seen.contains(file)) gone.push_back(file);
+  }
+  for (const std::filesystem::path& file : gone) forget(file);
+}
+
+void DirectoryDesk::forget(const std::filesystem::path& file) {
+  unserved_.erase(file);
+  const bool is_served = surroundings_.campaigns.known().files.contains(file);
+  surroundings_.outbox.log({.kind = is_served ? "campaign_file_served" : "campaign_file_gone",
+                            .text = fmt::format("file={}", file.string())});
+}
+
+bool DirectoryDesk::is_all_served() const {
+  return std::all_of(unserved_.begin(), unserved_.end(),
+                     [](const auto& item) { return item.second.is_copy; });
+}
+
+std::vector<wire::UnservedFile> DirectoryDesk::unserved(std::size_t count_max) const {
+  std::vector<wire::UnservedFile> files;
+  for (const auto& [file, failure] : unserved_) {
+    if (files.size() == count_max) break;
+    files.push_back({.file = file.string(), .reason = failure.reason});
+  }
+  return files;
+}
+
+}  // namespace proofmass::coordinator

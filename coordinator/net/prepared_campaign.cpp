@@ -1,0 +1,149 @@
+#include "coordinator/net/prepared_campaign.hpp"
+
+#include <fmt/format.h>
+
+#include <exception>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "coordinator/store/campaign_peek.hpp"
+#include "proto/link/kill_point.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+StoredCampaign stored_campaign_of(const ServedCampaign& campaign, GivenUpRuns given_up) {
+  const Store& store = campaign.store;
+  const CampaignControl control = store.control();
+  StoredCampaign stored{.definition = campaign.definition,
+                        .phase = control.phase,
+                        .priority = control.priority,
+                        .audit_fraction = control.audit_fraction,
+                        .finished = store.finished_runs(),
+                        .given_up = {},
+                        .compared = store.compared_runs(),
+                        .blamed = {}};
+  if (given_up == GivenUpRuns::retry) return stored;
+  stored.given_up = store.given_up_runs();
+  for (const BlamedRun& blamed : store.blamed_runs()) {
+    stored.blamed.push_back(
+        {.run = blamed.run, .num_crashes = blamed.num_crashes, .attempt = blamed.attempt});
+  }
+  return stored;
+}
+
+FileFailure copy_of(const std::filesystem::path& file, const std::string& name) {
+  return {.file = file,
+          .reason = fmt::format("{}: campaign {} is in another file as well", file.string(), name),
+          .is_copy = true};
+}
+
+EndedCampaign ended_campaign(const std::filesystem::path& file, const CampaignPeek& peek) {
+  return {.id = peek.id,
+          .file = file,
+          .status = {.name = peek.name,
+                     .phase = peek.phase,
+                     .priority = peek.priority,
+                     .num_runs = peek.num_runs,
+                     .num_done = peek.num_finished,
+                     .num_given_up = peek.num_given_up,
+                     .remaining_s = {},
+                     .storage_failure = {},
+                     .owner = peek.owner}};
+}
+
+/// How many of the files that are looked at hold a campaign, by its name.
+using NumFiles = std::map<std::string, int>;
+
+NumFiles count_files(const std::vector<std::filesystem::path>& files) {
+  NumFiles num_files;
+  for (const std::filesystem::path& file : files) {
+    try {
+      ++num_files[peek_campaign(file).name];
+    } catch (const std::exception&) {
+      // Why is said when the file is looked at.
+    }
+  }
+  return num_files;
+}
+
+FileOutcome opened(const CampaignDirectory& directory, const std::filesystem::path& file,
+                   const KnownCampaigns& known, const NumFiles& num_files,
+                   const CoordinatorStart& start) {
+  // By its bytes, and without its log: it may be a file that is served under another name.
+  const CampaignPeek peek = peek_campaign(file);
+  const bool is_known = known.ids.contains(peek.id) || known.names.contains(peek.name);
+  const auto found = num_files.find(peek.name);
+  const bool has_rival = is_known || found == num_files.end() || found->second > 1;
+  // Of several files a damaged one must not stand for the campaign.
+  if (has_rival) (void)peek_campaign(file, PeekDepth::pages);
+  if (is_known) return copy_of(file, peek.name);
+  if (peek.is_at_rest) return ended_campaign(file, peek);
+  ServedCampaign campaign = directory.load(file);
+  if (known.ids.contains(campaign.store.id()) || known.names.contains(campaign.definition->name)) {
+    return copy_of(file, campaign.definition->name);
+  }
+  return prepare(std::move(campaign), GivenUpRuns::keep, start);
+}
+
+}  // namespace
+
+void KnownCampaigns::add(const FileOutcome& outcome) {
+  if (const auto* const prepared = std::get_if<PreparedCampaign>(&outcome)) {
+    files.insert(prepared->campaign.file);
+    ids.insert(prepared->campaign.store.id());
+    names.insert(prepared->campaign.definition->name);
+  } else if (const auto* const ended = std::get_if<EndedCampaign>(&outcome)) {
+    files.insert(ended->file);
+    ids.insert(ended->id);
+    names.insert(ended->status.name);
+  }
+}
+
+PreparedCampaign prepare(ServedCampaign campaign, GivenUpRuns given_up,
+                         const CoordinatorStart& start) {
+  wire::kill_point(wire::KillPoint::after_open);
+  Store& store = campaign.store;
+  StoredCampaign stored = stored_campaign_of(campaign, given_up);
+  const CampaignControl control = store.control();
+  const StopPlan plan = store.stop_plan();
+  const std::uint64_t num_failures = store.num_without_estimate();
+  std::vector<SessionId> sessions = store.attached_sessions();
+  std::string owner = store.owner();
+  store.begin_coordinator(start);
+  return {.campaign = std::move(campaign),
+          .stored = std::move(stored),
+          .control = control,
+          .plan = plan,
+          .owner = std::move(owner),
+          .num_failures = num_failures,
+          .sessions = std::move(sessions)};
+}
+
+std::vector<FileOutcome> look_at_all(const CampaignDirectory& directory, KnownCampaigns& known,
+                                     const CoordinatorStart& start) {
+  std::vector<std::filesystem::path> files = directory.list();
+  std::erase_if(files, [&](const auto& file) { return known.files.contains(file); });
+  const NumFiles num_files = count_files(files);
+  std::vector<FileOutcome> outcomes;
+  for (const std::filesystem::path& file : files) {
+    try {
+      outcomes.push_back(opened(directory, file, known, num_files, start));
+    } catch (const std::exception& error) {
+      outcomes.emplace_back(FileFailure{.file = file, .reason = error.what()});
+    }
+    known.add(outcomes.back());
+  }
+  return outcomes;
+}
+
+std::uint64_t definition_size(const Campaign& campaign) {
+  constexpr std::uint64_t numbers_per_row = 7;
+  std::uint64_t num_values = numbers_per_row * campaign.environment_table.size();
+  for (const std::vector<double>& column : campaign.table_columns) num_values += column.size();
+  constexpr std::uint64_t text_size = 4096;  // What a definition takes without tables, about.
+  return text_size + sizeof(double) * num_values;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <set>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "coordinator/dispatch/state.hpp"
+#include "coordinator/net/campaign_files.hpp"
+#include "coordinator/store/records.hpp"
+#include "proto/wire/client_messages.hpp"
+
+namespace proofmass::coordinator {
+
+// What a service must know of a campaign file before it serves it. Reading that takes as long as
+// the disk does, so it is done before the service begins or in a background thread.
+
+/// A campaign that can be served at once.
+struct PreparedCampaign {
+  ServedCampaign campaign;
+  StoredCampaign stored;  ///< For the dispatch.
+  CampaignControl control;
+  StopPlan plan;
+  std::string owner;                ///< Name of the key that submitted it; empty if not known.
+  std::uint64_t num_failures = 0;   ///< Finished runs without an estimate.
+  std::vector<SessionId> sessions;  ///< Workers that may come back.
+};
+
+/// A finished or cancelled campaign whose file is closed and complete.
+struct EndedCampaign {
+  CampaignId id;
+  std::filesystem::path file;
+  wire::CampaignStatus status;
+};
+
+/// A file that cannot be served for now.
+struct FileFailure {
+  std::filesystem::path file;
+  std::string reason;
+  bool is_copy = false;  ///< Of a campaign that is served from another file.
+};
+
+using FileOutcome = std::variant<PreparedCampaign, EndedCampaign, FileFailure>;
+
+/// What a service has already.
+struct KnownCampaigns {
+  std::set<std::filesystem::path> files;
+  std::set<CampaignId> ids;
+  std::set<std::string> names;
+
+  void add(const FileOutcome& outcome);
+};
+
+/// Reads what the service must know, and writes down that a coordinator begins.
+/// @throws StoreError, Error.
+[[nodiscard]] PreparedCampaign prepare(ServedCampaign campaign, GivenUpRuns given_up,
+                                       const CoordinatorStart& start);
+
+/// Looks at the files of a directory that are not known, in order, and adds their campaigns to
+/// those that are. Opens a file only if something is left to do with it: a campaign that has ended
+/// costs no lock, no descriptor and no write.
+/// @throws Error if the directory cannot be read.
+[[nodiscard]] std::vector<FileOutcome> look_at_all(const CampaignDirectory& directory,
+                                                   KnownCampaigns& known,
+                                                   const CoordinatorStart& start);
+
+/// Bytes that the tables of a campaign take.
+[[nodiscard]] std::uint64_t definition_size(const Campaign& campaign);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,130 @@
+#include "coordinator/net/request_desk.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "coordinator/dispatch/dispatch.hpp"
+#include "core/error.hpp"
+#include "core/simulation/run.hpp"
+#include "proto/wire/client_codec.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+/// Workers with several keys may run there.
+std::set<std::string> quarantined_hosts(const State& state) {
+  std::set<std::string> names;
+  for (const HostId& host : state.quarantined) names.insert(host.name);
+  return names;
+}
+
+}  // namespace
+
+RequestDesk::RequestDesk(Surroundings surroundings)
+    : surroundings_(std::move(surroundings)), began_at_(surroundings_.now()) {}
+
+void RequestDesk::carry_out(wire::ClientRequest request, const Asker& asker, Respond respond) {
+  std::visit([&](auto& content) { take(std::move(content), asker, respond); }, request);
+}
+
+void RequestDesk::take(wire::SubmitRequest request, const Asker& asker, Respond respond) {
+  surroundings_.submissions.submit(std::make_shared<const wire::SubmitRequest>(std::move(request)),
+                                   asker, std::move(respond));
+}
+
+void RequestDesk::take(const wire::ControlRequest& request, const Asker& asker,
+                       const Respond& respond) {
+  CampaignDesk& campaigns = surroundings_.campaigns;
+  const auto campaign = campaigns.find(request.campaign);
+  if (!campaign) {
+    require_right(asker, Right::submit);
+    throw Error(fmt::format("campaign = {} (is not served)", request.campaign));
+  }
+  require_control(asker, request.campaign, campaign->owner);
+  if (campaign->has_ended) return control_ended(*campaign, request.action, respond);
+  respond(campaigns.control(campaign->id, request.action));
+}
+
+void RequestDesk::control_ended(const CampaignDesk::Entry& campaign, wire::ControlAction action,
+                                const Respond& respond) {
+  const wire::CampaignStatus status = surroundings_.campaigns.status_of(campaign.id);
+  if (status.phase == Phase::finished) {
+    throw Error(fmt::format("campaign = {} (is finished)", status.name));
+  }
+  if (action == wire::ControlAction::resume) {
+    return surroundings_.submissions.reopen(campaign, respond);
+  }
+  respond(surroundings_.campaigns.done_reply(campaign.id));
+}
+
+void RequestDesk::take(const wire::StatusRequest& request, const Asker& asker,
+                       const Respond& respond) {
+  require_right(asker, Right::observe);
+  const State& state = surroundings_.state;
+  const CampaignDesk& campaigns = surroundings_.campaigns;
+  const DirectoryDesk& directory = surroundings_.directory;
+  const Duration uptime = surroundings_.now() - began_at_;
+  wire::StatusReply reply{
+      .version = surroundings_.version,
+      .model_version = std::string(model_version),
+      .uptime_s = std::chrono::duration<double>(uptime).count(),
+      .num_workers = state.workers.size(),
+      .num_slots = state.num_slots,
+      .campaigns = campaigns.statuses(request.first_campaign, wire::campaigns_per_reply_max),
+      .num_campaigns = campaigns.num_campaigns(),
+      .unserved_files = directory.unserved(wire::unserved_files_per_reply_max),
+      .num_unserved_files = directory.num_unserved()};
+  const std::set<std::string> hosts = quarantined_hosts(state);
+  reply.num_quarantined_hosts = hosts.size();
+  for (const std::string& host : hosts) {
+    if (reply.quarantined_hosts.size() == wire::quarantined_hosts_per_reply_max) break;
+    reply.quarantined_hosts.push_back(host);
+  }
+  respond(std::move(reply));
+}
+
+void RequestDesk::take(const wire::WorkersRequest& request, const Asker& asker,
+                       const Respond& respond) {
+  require_right(asker, Right::observe);
+  const State& state = surroundings_.state;
+  const TimePoint now = surroundings_.now();
+  wire::WorkersReply reply{.workers = {}, .num_workers = state.workers.size()};
+  for (auto item = state.workers.upper_bound(WorkerId{request.after_worker_id});
+       item != state.workers.end() && reply.workers.size() < wire::workers_per_reply_max; ++item) {
+    const auto& [id, worker] = *item;
+    reply.workers.push_back(
+        {.id = id,
+         .name = worker.name,
+         .host = worker.host.name,
+         .process_id = worker.process_id,
+         .num_slots = worker.num_slots,
+         .num_lent = worker.num_lent,
+         .num_results = worker.num_results,
+         .silent_s = std::chrono::duration<double>(now - worker.heard_at).count(),
+         .is_quarantined = state.quarantined.contains(worker.host)});
+  }
+  respond(std::move(reply));
+}
+
+void RequestDesk::take(const wire::ReleaseHostRequest& request, const Asker& asker,
+                       const Respond& respond) {
+  require_right(asker, Right::control);
+  if (!on_release_host(surroundings_.state, request.host, surroundings_.now(),
+                       surroundings_.outbox)) {
+    throw Error(fmt::format("host = {} (is not in quarantine)", request.host));
+  }
+  respond(
+      wire::DoneReply{fmt::format("host {}: runs are lent to its workers again", request.host)});
+}
+
+void RequestDesk::take(const wire::RequestPart&, const Asker&, const Respond&) {
+  throw Error("request = a part (must be a request when its parts are together)");
+}
+
+}  // namespace proofmass::coordinator

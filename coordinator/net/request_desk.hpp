@@ -1,0 +1,51 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "coordinator/dispatch/outbox.hpp"
+#include "coordinator/dispatch/state.hpp"
+#include "coordinator/net/campaign_desk.hpp"
+#include "coordinator/net/client_desk.hpp"
+#include "coordinator/net/directory_desk.hpp"
+#include "coordinator/net/rights.hpp"
+#include "coordinator/net/submission_desk.hpp"
+#include "proto/wire/client_messages.hpp"
+
+namespace proofmass::coordinator {
+
+/// Carries out what clients ask for, if they may ask for it.
+class RequestDesk {
+ public:
+  /// What the desk works with; all of it outlives the desk.
+  struct Surroundings {
+    State& state;
+    CampaignDesk& campaigns;
+    SubmissionDesk& submissions;
+    DirectoryDesk& directory;
+    Outbox& outbox;
+    std::function<TimePoint()> now;
+    std::string version;  ///< Of the program.
+  };
+
+  explicit RequestDesk(Surroundings surroundings);
+
+  /// Responds at once, or later if a file must be opened or made.
+  /// @throws Error, std::exception with the reason if it is not carried out.
+  void carry_out(wire::ClientRequest request, const Asker& asker, Respond respond);
+
+ private:
+  void take(wire::SubmitRequest request, const Asker& asker, Respond respond);
+  void take(const wire::ControlRequest& request, const Asker& asker, const Respond& respond);
+  void take(const wire::StatusRequest& request, const Asker& asker, const Respond& respond);
+  void take(const wire::WorkersRequest& request, const Asker& asker, const Respond& respond);
+  void take(const wire::ReleaseHostRequest& request, const Asker& asker, const Respond& respond);
+  void take(const wire::RequestPart& part, const Asker& asker, const Respond& respond);
+  void control_ended(const CampaignDesk::Entry& campaign, wire::ControlAction action,
+                     const Respond& respond);
+
+  Surroundings surroundings_;
+  TimePoint began_at_;
+};
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "coordinator/net/background.hpp"
+#include "coordinator/net/campaign_desk.hpp"
+#include "coordinator/net/campaign_files.hpp"
+#include "coordinator/net/client_desk.hpp"
+#include "coordinator/net/rights.hpp"
+#include "coordinator/net/submission_limits.hpp"
+#include "coordinator/store/store_writer.hpp"
+#include "proto/wire/client_messages.hpp"
+
+namespace proofmass::coordinator {
+
+/// Takes campaigns that clients submit: makes, opens and extends their files in the background, so
+/// that the service goes on meanwhile.
+class SubmissionDesk {
+ public:
+  /// What the desk works with; all of it outlives the desk.
+  struct Surroundings {
+    CampaignDesk& campaigns;
+    StoreWriter& writer;
+    Background& background;
+    CampaignFiles* files;                ///< Null if nothing can be submitted.
+    const CampaignDirectory* directory;  ///< Null if files that were closed stay closed.
+    SubmissionLimits limits;
+    CoordinatorStart start;
+  };
+
+  explicit SubmissionDesk(Surroundings surroundings);
+
+  /// Takes a new campaign, or more runs of one that is there. Waits while the campaign is being
+  /// changed, opened or closed.
+  /// @throws Error if the asker may not, has submitted too much, or if too much is under way.
+  void submit(const std::shared_ptr<const wire::SubmitRequest>& request, const Asker& asker,
+              Respond respond);
+
+  /// Opens the file of a campaign that has ended and goes on with it.
+  /// @throws Error if too much is under way.
+  void reopen(const CampaignDesk::Entry& campaign, Respond respond);
+
+  /// Takes what had to wait. To be called some times a second.
+  void review();
+
+ private:
+  /// What is being opened or made in the background.
+  struct UnderWay {
+    std::string owner;
+    std::uint64_t size = 0;
+  };
+
+  /// A submission that waits.
+  struct Deferred {
+    std::shared_ptr<const wire::SubmitRequest> request;
+    Asker asker;
+    Respond respond;
+  };
+
+  [[nodiscard]] bool is_busy(const std::string& name) const;
+  void check_limits(const std::string& owner, std::uint64_t size, bool is_new) const;
+  void open_file(const std::shared_ptr<const wire::SubmitRequest>& request, const Asker& asker,
+                 const std::string& owner, Respond respond);
+  void change_served(CampaignId id, const std::shared_ptr<const wire::SubmitRequest>& request,
+                     Respond respond);
+  /// Opens or makes a file with `open` in the background, and serves it.
+  /// @param control  Nothing if it is to be what the file has, but active.
+  void serve_opened(const std::string& name, UnderWay under_way,
+                    std::function<ServedCampaign()> open, std::optional<CampaignControl> control,
+                    Respond respond);
+
+  Surroundings surroundings_;
+  CampaignDesk& campaigns_;
+  std::map<std::string, UnderWay> under_way_;  ///< By the campaign's name.
+  std::vector<Deferred> deferred_;
+};
+
+}  // namespace proofmass::coordinator

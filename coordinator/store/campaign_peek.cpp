@@ -1,0 +1,78 @@
+#include "coordinator/store/campaign_peek.hpp"
+
+#include <fmt/format.h>
+
+#include <system_error>
+
+#include "coordinator/store/detail/control_rows.hpp"
+#include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/schema.hpp"
+#include "coordinator/store/store_error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using detail::Database;
+
+constexpr std::int64_t version_with_phases = 4;
+constexpr std::int64_t version_with_summaries = 5;
+constexpr std::int64_t version_with_owners = 6;
+
+/// Whether there is a log or a rollback journal; an empty one says nothing.
+bool has_journal(const std::filesystem::path& path) {
+  for (const char* const ending : {"-wal", "-journal"}) {
+    std::error_code error;
+    const std::filesystem::path journal = std::filesystem::path(path).concat(ending);
+    const std::uintmax_t size = std::filesystem::file_size(journal, error);
+    if (!error && size > 0) return true;
+  }
+  return false;
+}
+
+/// Whether the campaign has ended, and its statistics are those of all of its results.
+bool is_complete(const Database& database, CampaignPeek& peek) {
+  peek.num_given_up = database.count("SELECT count(*) FROM run_failure");
+  peek.num_finished = database.count("SELECT coalesce(max(num_finished), 0) FROM summary");
+  if (peek.phase == wire::CampaignPhase::finished) {
+    return peek.num_finished + peek.num_given_up == peek.num_runs;
+  }
+  return peek.phase == wire::CampaignPhase::cancelled &&
+         database.count("SELECT count(*) FROM delivery") == peek.num_finished;
+}
+
+}  // namespace
+
+CampaignPeek peek_campaign(const std::filesystem::path& path, PeekDepth depth) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) {
+    throw StoreError(fmt::format("campaign file = {} (is no file)", path.string()));
+  }
+  Database database(path, detail::Access::immutable);
+  database.execute("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
+  if (depth == PeekDepth::pages) {
+    detail::check_campaign_file(database, path);
+    (void)detail::check_all_pages(database);
+  } else {
+    detail::check_kind(database, path);
+  }
+  const std::int64_t version = database.integer("PRAGMA user_version");
+  CampaignPeek peek{.id = {},
+                    .name = database.text("SELECT name FROM campaign"),
+                    .num_runs = database.count("SELECT num_runs FROM campaign"),
+                    .owner = {}};
+  if (version < version_with_phases) return peek;
+  peek.id = {database.count("SELECT campaign_uid FROM campaign")};
+  const CampaignControl control = detail::read_control(database);
+  peek.phase = control.phase;
+  peek.priority = control.priority;
+  bool is_log_needed = false;
+  if (version >= version_with_owners) {
+    peek.owner = database.text("SELECT owner FROM campaign");
+    is_log_needed = database.integer("SELECT is_log_needed FROM campaign") != 0;
+  }
+  if (version < version_with_summaries) return peek;
+  peek.is_at_rest = is_complete(database, peek) && !is_log_needed && !has_journal(path);
+  return peek;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,239 @@
+// A service and the files of its directory: those that cannot be served, and those that need not.
+
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <mutex>
+
+#include "tests/coordinator/net/playing_client.hpp"
+#include "tests/coordinator/net/service_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+namespace fs = std::filesystem;
+using test::PlayingWorker;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+std::string bytes_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+/// The *.db of a directory, and no look at the definitions in them.
+class PlainDirectory final : public CampaignDirectory {
+ public:
+  explicit PlainDirectory(const test::TemporaryDirectory& directory) : directory_(directory / "") {}
+
+  [[nodiscard]] std::vector<fs::path> list() const override {
+    std::vector<fs::path> files;
+    for (const auto& item : fs::directory_iterator(directory_)) {
+      if (item.path().extension() == ".db") files.push_back(item.path());
+    }
+    return files;
+  }
+
+  [[nodiscard]] ServedCampaign load(const fs::path& file) const override {
+    {
+      const std::lock_guard lock(mutex_);
+      ++num_loads_;
+      before_load_(file);
+    }
+    Store store = Store::open(file);
+    auto campaign = std::make_shared<Campaign>(test::campaign_of(store.name(), store.num_runs()));
+    return {.file = file, .store = std::move(store), .definition = std::move(campaign)};
+  }
+
+  /// May throw.
+  void set_before_load(std::function<void(const fs::path&)> before_load) {
+    const std::lock_guard lock(mutex_);
+    before_load_ = std::move(before_load);
+  }
+  [[nodiscard]] int num_loads() const {
+    const std::lock_guard lock(mutex_);
+    return num_loads_;
+  }
+
+ private:
+  fs::path directory_;
+  mutable std::mutex mutex_;
+  mutable int num_loads_ = 0;
+  std::function<void(const fs::path&)> before_load_ = [](const fs::path&) {};
+};
+
+class ServiceWithADirectory : public test::ServiceTest {
+ protected:
+  ServiceWithADirectory() {
+    config.clients_endpoint = "tcp://127.0.0.1:*";
+    config.directory = &folder;
+    config.writer.retry_after = std::chrono::milliseconds(10);
+  }
+
+  void make_file(const std::string& name, std::uint64_t num_runs = 1) {
+    (void)files.open(test::campaign_of(name, num_runs), {}, {});
+  }
+  /// A campaign of which every run was given up.
+  void make_finished_file(const std::string& name) {
+    ServedCampaign campaign = files.open(test::campaign_of(name, 2), {}, {});
+    const std::vector<coordinator::Entry> entries{
+        GivenUpRun{RunIndex{0}}, GivenUpRun{RunIndex{1}},
+        CampaignControl{.phase = wire::CampaignPhase::finished, .priority = 3}};
+    (void)campaign.store.write(entries);
+  }
+
+  void start_service() {
+    start({});
+    client.emplace(service->clients_endpoint());
+  }
+
+  std::vector<std::string> served() {
+    std::vector<std::string> names;
+    for (const auto& campaign : client->status().campaigns) names.push_back(campaign.name);
+    return names;
+  }
+
+  PlainDirectory folder{directory};
+  std::optional<test::PlayingClient> client;
+};
+
+TEST_F(ServiceWithADirectory, ServesAFileOnceItCanBeOpened) {
+  make_file("a");
+  folder.set_before_load([](const fs::path&) { throw Error("file = a.db (is locked)"); });
+  start_service();
+  wait_for_event("campaign_not_served");
+  const wire::StatusReply status = client->status();
+  EXPECT_THAT(status.campaigns, IsEmpty());
+  ASSERT_EQ(status.unserved_files.size(), 1U);
+  EXPECT_EQ(status.num_unserved_files, 1U);
+  EXPECT_EQ(status.unserved_files[0].file, (directory / "a.db").string());
+  EXPECT_EQ(status.unserved_files[0].reason, "file = a.db (is locked)");
+  while (folder.num_loads() < 4) std::this_thread::yield();
+  folder.set_before_load([](const fs::path&) {});
+  EXPECT_EQ(wait_for_event("campaign_file_served"),
+            "campaign_file_served file=" + (directory / "a.db").string());
+  EXPECT_THAT(served(), ElementsAre("a"));
+  EXPECT_THAT(client->status().unserved_files, IsEmpty());
+  EXPECT_EQ(num_events("campaign_not_served"), 1);
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)worker.receive<wire::ResultAck>();
+}
+
+TEST_F(ServiceWithADirectory, ServesTheOthersWhateverAFileThrows) {
+  make_file("a");
+  make_file("b");
+  make_file("c");
+  folder.set_before_load([](const fs::path& file) {
+    if (file.stem() == "a") throw fs::filesystem_error("rename", std::error_code());
+    if (file.stem() == "b") throw std::bad_alloc();
+  });
+  start_service();
+  EXPECT_THAT(served(), ElementsAre("c"));
+  EXPECT_EQ(client->status().num_unserved_files, 2U);
+}
+
+TEST_F(ServiceWithADirectory, DoesNotOpenWhatHasEnded) {
+  make_finished_file("a");
+  make_file("b");
+  const std::string before = bytes_of(directory / "a.db");
+  start_service();
+  EXPECT_THAT(served(), testing::UnorderedElementsAre("a", "b"));
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)worker.receive<wire::ResultAck>();
+  EXPECT_EQ(folder.num_loads(), 1);
+  for (const wire::CampaignStatus& campaign : client->status().campaigns) {
+    if (campaign.name != "a") continue;
+    EXPECT_EQ(campaign.phase, wire::CampaignPhase::finished);
+    EXPECT_EQ(campaign.priority, 3);
+    EXPECT_EQ(campaign.num_runs, 2U);
+    EXPECT_EQ(campaign.num_done, 0U);
+    EXPECT_EQ(campaign.num_given_up, 2U);
+  }
+  EXPECT_TRUE(bytes_of(directory / "a.db") == before);
+  EXPECT_NO_THROW((void)Store::open(directory / "a.db"));  // Nobody has its lock. This writes.
+  const std::string opened = bytes_of(directory / "a.db");
+  end(StopRequest::now);
+  EXPECT_TRUE(bytes_of(directory / "a.db") == opened);
+}
+
+TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
+  make_file("a");
+  start_service();
+  {
+    PlayingWorker worker(endpoint.address());
+    worker.deliver(worker.borrow());
+    (void)worker.receive<wire::ResultAck>();
+    wait_for_event("campaign_closed name=a");
+  }
+  EXPECT_EQ(client->status().campaigns.at(0).phase, wire::CampaignPhase::finished);
+  EXPECT_EQ(client->status().campaigns.at(0).num_done, 1U);
+  EXPECT_EQ(client->error(wire::ControlRequest{wire::ControlAction::pause, "a"}),
+            "campaign = a (is finished)");
+  EXPECT_EQ(client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 3)}),
+            "campaign a: active, 3 runs, 1 of them done");
+  PlayingWorker worker(endpoint.address(), 1002);
+  EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{1});
+  EXPECT_THAT(served(), ElementsAre("a"));
+}
+
+TEST_F(ServiceWithADirectory, GoesOnWithACancelledCampaignThatItDidNotOpen) {
+  {
+    ServedCampaign campaign = files.open(test::campaign_of("a", 2), {}, {});
+    const coordinator::Entry entry =
+        CampaignControl{.phase = wire::CampaignPhase::cancelled, .priority = 4};
+    (void)campaign.store.write({&entry, 1});
+  }
+  start_service();
+  EXPECT_EQ(folder.num_loads(), 0);
+  EXPECT_EQ(client->done(wire::ControlRequest{wire::ControlAction::cancel, "a"}),
+            "campaign a: cancelled, 2 runs, 0 of them done");
+  EXPECT_EQ(client->done(wire::ControlRequest{wire::ControlAction::resume, "a"}),
+            "campaign a: active, 2 runs, 0 of them done");
+  EXPECT_EQ(client->status().campaigns.at(0).priority, 4);
+  PlayingWorker worker(endpoint.address());
+  EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{0});
+}
+
+TEST_F(ServiceWithADirectory, ServesAFileThatIsPutThere) {
+  start_service();
+  EXPECT_THAT(served(), IsEmpty());
+  make_file("elsewhere");
+  while (served().empty()) std::this_thread::yield();
+  EXPECT_THAT(served(), ElementsAre("elsewhere"));
+}
+
+TEST_F(ServiceWithADirectory, IsNotDoneWhileAFileWaits) {
+  make_file("a");
+  make_finished_file("b");
+  folder.set_before_load([](const fs::path&) { throw Error("file = a.db (is locked)"); });
+  config.end = ServiceEnd::when_done;
+  start_service();
+  wait_for_event("campaign_not_served");
+  while (folder.num_loads() < 3) std::this_thread::yield();
+  in_service([this] { EXPECT_FALSE(service->is_done()); });
+  folder.set_before_load([](const fs::path&) {});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)worker.receive<wire::ResultAck>();
+  wait_for_end();
+}
+
+// By its name alone it is another file; it would be opened twice.
+TEST_F(ServiceWithADirectory, DoesNotServeACopy) {
+  make_file("a");
+  fs::copy_file(directory / "a.db", directory / "b.db");
+  start_service();
+  EXPECT_EQ(folder.num_loads(), 1);
+  const wire::StatusReply status = client->status();
+  ASSERT_EQ(status.unserved_files.size(), 1U);
+  EXPECT_THAT(status.unserved_files[0].reason,
+              testing::EndsWith("campaign a is in another file as well"));
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,246 @@
+// A coordinator and the files of its directory, with real processes: files that cannot be opened
+// when it starts, and files with which nothing remains to be done.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sqlite3.h>
+#include <sys/mount.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "coordinator/store/store.hpp"
+#include "tests/skip_for_want.hpp"
+#include "tests/system/fault_fixture.hpp"
+#include "tests/system/network_namespace.hpp"
+
+namespace proofmass::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+void execute(const fs::path& database, const std::string& sql) {
+  sqlite3* connection = nullptr;
+  ASSERT_EQ(sqlite3_open(database.c_str(), &connection), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(connection, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
+      << sqlite3_errmsg(connection);
+  sqlite3_close(connection);
+}
+
+class ServedDirectory : public FaultTest {
+ protected:
+  void SetUp() override {
+    FaultTest::SetUp();
+    write_null_campaign(500);
+  }
+
+  /// Makes the file of `null` without a result.
+  void make_open_file() const {
+    Process coordinator = this->coordinator("maker", {"null.toml"});
+    wait_for_log("maker", "coordinator_started");
+    coordinator.signal(SIGTERM);
+    EXPECT_EQ(coordinator.wait(), 0) << errors_of("maker");
+  }
+  /// Makes the file of `null` with all results.
+  void make_finished_file() const {
+    Process coordinator = this->coordinator("maker", {"null.toml", "--exit-when-done"});
+    const Process worker = null_worker("maker-worker", {"--run-time", "0"});
+    EXPECT_EQ(coordinator.wait(), 0) << errors_of("maker");
+  }
+
+  [[nodiscard]] nlohmann::json unserved() const {
+    return nlohmann::json::parse(told({"status", "--json"})).at("unserved_files");
+  }
+
+  void expect_finished_here() const {
+    wait_for_log("coordinator", "campaign_finished");
+    EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+  }
+};
+
+TEST_F(ServedDirectory, HasAFileThatIsLockedForAMoment) {
+  make_open_file();
+  std::optional<coordinator::Store> holder = coordinator::Store::open(file_of("null"));
+  const Process coordinator = this->coordinator("coordinator", {"--time-scale", "0.05"});
+  wait_for_log("coordinator", "campaign_not_served");
+  const Process worker = null_worker("worker", {"--run-time", "0"});
+  ASSERT_EQ(unserved().size(), 1U);
+  EXPECT_EQ(unserved()[0].at("file"), "served/null.db");
+  EXPECT_TRUE(contains(unserved()[0].at("reason"), "null.db"));
+  holder.reset();
+  wait_for_log("coordinator", "campaign_file_served file=served/null.db");
+  expect_finished_here();
+  EXPECT_TRUE(unserved().empty());
+  EXPECT_EQ(num_log_lines("coordinator", "campaign_not_served"), 1U);
+}
+
+TEST_F(ServedDirectory, GetsACopyBackForAFileThatIsDamaged) {
+  make_open_file();
+  fs::copy_file(file_of("null"), path("copy.db"));
+  fs::resize_file(file_of("null"), 5000);
+  const Process coordinator = this->coordinator("coordinator", {"--time-scale", "0.05"});
+  wait_for_log("coordinator", "campaign_not_served reason=\"campaign file = served/null.db (is ");
+  fs::rename(path("copy.db"), file_of("null"));
+  const Process worker = null_worker("worker", {"--run-time", "0"});
+  expect_finished_here();
+}
+
+// The end waits for what cannot be served yet.
+TEST_F(ServedDirectory, IsNotDoneBeforeAllOfItIsServed) {
+  make_open_file();
+  std::optional<coordinator::Store> holder = coordinator::Store::open(file_of("null"));
+  Process coordinator =
+      this->coordinator("coordinator", {"--time-scale", "0.05", "--exit-when-done"});
+  wait_for_log("coordinator", "campaign_not_served");
+  const Process worker = null_worker("worker", {"--run-time", "0"});
+  wait_for_log("coordinator", "worker_registered");
+  EXPECT_FALSE(coordinator.has_ended());
+  holder.reset();
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
+// A session that is no number: reading who was registered throws.
+TEST_F(ServedDirectory, HasAFileWithABadRow) {
+  make_open_file();
+  fs::copy_file(file_of("null"), file_of("bad"));
+  execute(file_of("bad"),
+          "UPDATE campaign SET name = 'bad', campaign_uid = campaign_uid + 1;"
+          "INSERT INTO worker (session, name, host) VALUES ('zzzzzzzzzzzzzzzz', 'w', 'h')");
+  const Process coordinator = this->coordinator("coordinator", {});
+  const Process worker = null_worker("worker", {"--run-time", "0"});
+  expect_finished_here();
+  ASSERT_EQ(unserved().size(), 1U);
+  EXPECT_EQ(unserved()[0].at("file"), "served/bad.db");
+}
+
+/// The directory is a small file system of its own.
+class SmallDirectory : public ServedDirectory {
+ protected:
+  void SetUp() override {
+    FaultTest::SetUp();
+    fs::create_directory(path("served"));
+    if (!take_private_mounts() ||
+        ::mount("tmpfs", path("served").c_str(), "tmpfs", 0, "size=700k") != 0) {
+      skip_for_want("no permission to mount a file system");
+    }
+  }
+  void TearDown() override { umount2(path("served").c_str(), MNT_DETACH); }
+
+  void enlarge() const {
+    ASSERT_EQ(::mount(nullptr, path("served").c_str(), nullptr, MS_REMOUNT, "size=16m"), 0);
+  }
+  /// Takes all space that is left.
+  void fill() const {
+    std::ofstream ballast(path("served/ballast"), std::ios::binary);
+    while (ballast.put('x')) ballast.flush();
+  }
+};
+
+TEST_F(SmallDirectory, IsFullWhenTheCoordinatorStarts) {
+  write_null_campaign(500);
+  make_open_file();
+  fill();
+  const Process coordinator = this->coordinator("coordinator", {"--time-scale", "0.05"});
+  wait_for_log("coordinator", "campaign_not_served");
+  EXPECT_EQ(unserved().size(), 1U);
+  const Process worker = null_worker("worker", {"--run-time", "0"});
+  fs::remove(path("served/ballast"));
+  enlarge();
+  expect_finished_here();
+}
+
+// Who starts it next must know that results may be missing.
+TEST_F(SmallDirectory, IsFullWhenTheCoordinatorEnds) {
+  Process coordinator =
+      this->coordinator("coordinator", {"null.toml", "--time-scale", "0.1", "--drain-time", "1"});
+  const Process worker = null_worker("worker");
+  wait_for_log("coordinator", "storage_failed");
+  coordinator.signal(SIGTERM);
+  EXPECT_EQ(coordinator.wait(), 1) << errors_of("coordinator");
+  EXPECT_EQ(num_log_lines("coordinator", "results_not_stored name=null"), 1U)
+      << errors_of("coordinator");
+}
+
+/// A directory of many campaigns that have finished.
+class FinishedCampaigns : public ServedDirectory {
+ protected:
+  static constexpr int num_files = 300;
+
+  void SetUp() override {
+    FaultTest::SetUp();
+    write_null_campaign(16);
+    make_finished_file();
+    fs::create_directory(path("many"));
+    for (int i = 0; i < num_files; ++i) {
+      const std::string name = std::string("c").append(std::to_string(i));
+      const fs::path file = path("many") / (name + ".db");
+      fs::copy_file(file_of("null"), file);
+      execute(file, "UPDATE campaign SET name = '" + name +
+                        "', campaign_uid = " + std::to_string(1000 + i));
+    }
+    served = "many";
+  }
+
+  [[nodiscard]] std::map<std::string, fs::file_time_type> times() const {
+    std::map<std::string, fs::file_time_type> times;
+    for (const auto& item : fs::directory_iterator(path("many"))) {
+      if (item.path().extension() != ".db") continue;
+      times[item.path().filename()] = fs::last_write_time(item.path());
+    }
+    return times;
+  }
+};
+
+// Twelve seconds to start and nineteen to end, when each of them was opened.
+TEST_F(FinishedCampaigns, CostNothing) {
+  using Clock = std::chrono::steady_clock;
+  const auto before = times();
+  const auto started_at = Clock::now();
+  Process coordinator = this->coordinator("coordinator", {});
+  wait_for_log("coordinator", "coordinator_started");
+  const std::chrono::duration<double> start = Clock::now() - started_at;
+  const Process worker = null_worker("worker");
+  wait_for_log("coordinator", "worker_registered");
+  const nlohmann::json status = nlohmann::json::parse(told({"status", "--json"}));
+  EXPECT_EQ(status.at("campaigns").size(), std::size_t{num_files});
+  EXPECT_EQ(status.at("campaigns")[7].at("phase"), "finished");
+  EXPECT_EQ(status.at("campaigns")[7].at("num_done"), 16);
+  std::size_t num_open = 0;
+  for (const auto& item :
+       fs::directory_iterator("/proc/" + std::to_string(coordinator.id()) + "/fd")) {
+    std::error_code ignored;
+    num_open += fs::read_symlink(item.path(), ignored).extension() == ".db" ? 1U : 0U;
+  }
+  EXPECT_EQ(num_open, 0U);
+  const auto ended_at = Clock::now();
+  coordinator.signal(SIGTERM);
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+  const std::chrono::duration<double> end = Clock::now() - ended_at;
+  EXPECT_EQ(times(), before);
+  RecordProperty("start_s", std::to_string(start.count()));
+  RecordProperty("end_s", std::to_string(end.count()));
+  EXPECT_LT(start.count(), 2.0);
+  EXPECT_LT(end.count(), 2.0);
+}
+
+TEST_F(ServedDirectory, HasACampaignThatIsClosedWhenItFinishesAndOpenedForMore) {
+  const Process coordinator = this->coordinator("coordinator", {"null.toml"});
+  const Process worker = null_worker("worker", {"--run-time", "0"});
+  wait_for_log("coordinator", "campaign_closed name=null");
+  wait_until("closed file", [&] { return !fs::exists(file_of("null").concat("-wal")); });
+  EXPECT_EQ(status_of("null").at("phase"), "finished");
+  // A copy of the file alone has all of it.
+  fs::copy_file(file_of("null"), path("copy.db"));
+  EXPECT_EQ(num_stored(path("copy.db")), 500U);
+  extend_null_campaign(700);
+  wait_until("second finish", [&] { return num_log_lines("coordinator", "campaign_closed") == 2; });
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
+}  // namespace
+}  // namespace proofmass::test
