@@ -72,6 +72,7 @@ class ServiceWithADirectory : public test::ServiceTest {
     config.directory = &folder;
     config.writer.retry_after = std::chrono::milliseconds(10);
   }
+  ~ServiceWithADirectory() override { end(StopRequest::now); }  // It reads the directory until then.
 
   void make_file(const std::string& name, std::uint64_t num_runs = 1) {
     (void)files.open(test::campaign_of(name, num_runs), {}, {});
@@ -169,6 +170,8 @@ TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
     worker.deliver(worker.borrow());
     (void)worker.receive<wire::ResultAck>();
     wait_for_event("campaign_closed name=a");
+    worker.send(wire::Bye{});
+    wait_for_event("worker_left");
   }
   EXPECT_EQ(client->status().campaigns.at(0).phase, wire::CampaignPhase::finished);
   EXPECT_EQ(client->status().campaigns.at(0).num_done, 1U);
