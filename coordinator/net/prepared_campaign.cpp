@@ -4,10 +4,12 @@
 
 #include <exception>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/store_error.hpp"
 #include "proto/link/kill_point.hpp"
 
 namespace proofmass::coordinator {
@@ -68,18 +70,29 @@ NumFiles count_files(const std::vector<std::filesystem::path>& files) {
   return num_files;
 }
 
+/// By its bytes and without its log: it may be a file that is served under another name. Nothing
+/// if that does not tell, as a coordinator that was killed while it folded its log in leaves it.
+std::optional<CampaignPeek> peek_without_log(const std::filesystem::path& file) {
+  try {
+    return peek_campaign(file);
+  } catch (const StoreError&) {
+    if (!has_journal(file)) throw;
+    return std::nullopt;
+  }
+}
+
 FileOutcome opened(const CampaignDirectory& directory, const std::filesystem::path& file,
                    const KnownCampaigns& known, const NumFiles& num_files,
                    const CoordinatorStart& start) {
-  // By its bytes, and without its log: it may be a file that is served under another name.
-  const CampaignPeek peek = peek_campaign(file);
-  const bool is_known = known.ids.contains(peek.id) || known.names.contains(peek.name);
-  const auto found = num_files.find(peek.name);
-  const bool has_rival = is_known || found == num_files.end() || found->second > 1;
-  // Of several files a damaged one must not stand for the campaign.
-  if (has_rival) (void)peek_campaign(file, PeekDepth::pages);
-  if (is_known) return copy_of(file, peek.name);
-  if (peek.is_at_rest) return ended_campaign(file, peek);
+  if (const std::optional<CampaignPeek> peek = peek_without_log(file)) {
+    const bool is_known = known.ids.contains(peek->id) || known.names.contains(peek->name);
+    const auto found = num_files.find(peek->name);
+    const bool has_rival = is_known || found == num_files.end() || found->second > 1;
+    // Of several files a damaged one must not stand for the campaign.
+    if (has_rival && !has_journal(file)) (void)peek_campaign(file, PeekDepth::pages);
+    if (is_known) return copy_of(file, peek->name);
+    if (peek->is_at_rest) return ended_campaign(file, *peek);
+  }
   ServedCampaign campaign = directory.load(file);
   if (known.ids.contains(campaign.store.id()) || known.names.contains(campaign.definition->name)) {
     return copy_of(file, campaign.definition->name);

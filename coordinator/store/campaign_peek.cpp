@@ -18,17 +18,6 @@ constexpr std::int64_t version_with_phases = 4;
 constexpr std::int64_t version_with_summaries = 5;
 constexpr std::int64_t version_with_owners = 6;
 
-/// Whether there is a log or a rollback journal; an empty one says nothing.
-bool has_journal(const std::filesystem::path& path) {
-  for (const char* const ending : {"-wal", "-journal"}) {
-    std::error_code error;
-    const std::filesystem::path journal = std::filesystem::path(path).concat(ending);
-    const std::uintmax_t size = std::filesystem::file_size(journal, error);
-    if (!error && size > 0) return true;
-  }
-  return false;
-}
-
 /// Whether the campaign has ended, and its statistics are those of all of its results.
 bool is_complete(const Database& database, CampaignPeek& peek) {
   peek.num_given_up = database.count("SELECT count(*) FROM run_failure");
@@ -41,6 +30,16 @@ bool is_complete(const Database& database, CampaignPeek& peek) {
 }
 
 }  // namespace
+
+bool has_journal(const std::filesystem::path& path) {
+  for (const char* const ending : {"-wal", "-journal"}) {
+    std::error_code error;
+    const std::filesystem::path log = std::filesystem::path(path).concat(ending);
+    const std::uintmax_t size = std::filesystem::file_size(log, error);
+    if (!error && size > 0) return true;
+  }
+  return false;
+}
 
 CampaignPeek peek_campaign(const std::filesystem::path& path, PeekDepth depth) {
   std::error_code ignored;

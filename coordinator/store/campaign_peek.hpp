@@ -30,11 +30,15 @@ enum class PeekDepth : std::uint8_t {
   pages,  ///< Every page of its tables as well, which tells most damage.
 };
 
+/// Whether a file has a write-ahead log or a rollback journal that is not empty: it may lack pages
+/// that stand there.
+[[nodiscard]] bool has_journal(const std::filesystem::path& path);
+
 /// Reads a few rows of a campaign file without opening it for anybody else to notice: no lock, no
 /// log, no write, whether a coordinator has it or not. What stands in the log of a file that is
 /// being written is not seen.
 /// @throws StoreError if it is missing, no campaign file, newer than this program or damaged where
-///         it is looked at.
+///         it is looked at; also if it lacks pages that stand in its log.
 [[nodiscard]] CampaignPeek peek_campaign(const std::filesystem::path& path,
                                          PeekDepth depth = PeekDepth::rows);
 

@@ -24,6 +24,10 @@ std::string bytes_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
+void write_bytes(const fs::path& file, const std::string& bytes) {
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
 /// The *.db of a directory, and no look at the definitions in them.
 class PlainDirectory final : public CampaignDirectory {
  public:
@@ -72,7 +76,9 @@ class ServiceWithADirectory : public test::ServiceTest {
     config.directory = &folder;
     config.writer.retry_after = std::chrono::milliseconds(10);
   }
-  ~ServiceWithADirectory() override { end(StopRequest::now); }  // It reads the directory until then.
+  ~ServiceWithADirectory() override {
+    end(StopRequest::now);
+  }  // It reads the directory until then.
 
   void make_file(const std::string& name, std::uint64_t num_runs = 1) {
     (void)files.open(test::campaign_of(name, num_runs), {}, {});
@@ -122,6 +128,29 @@ TEST_F(ServiceWithADirectory, ServesAFileOnceItCanBeOpened) {
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
   (void)worker.receive<wire::ResultAck>();
+}
+
+// A coordinator that is killed while it folds the log in, on a full disk perhaps, leaves a file
+// that names more pages than it has. The log has the others.
+TEST_F(ServiceWithADirectory, ServesAFileWhoseLogWasFoldedInHalfway) {
+  const fs::path file = directory / "a.db";
+  std::string before;
+  std::string log;
+  {
+    ServedCampaign campaign = files.open(test::campaign_of("a", 1), {}, {});
+    ASSERT_EQ(campaign.store.rest(), std::nullopt);
+    before = bytes_of(file);
+    for (int i = 0; i < 100; ++i) campaign.store.record_event("test", std::string(1000, 'x'));
+    log = bytes_of(directory / "a.db-wal");
+  }
+  const std::string after = bytes_of(file);
+  ASSERT_GT(after.size(), before.size());
+  constexpr std::size_t first_page_size = 4096;
+  write_bytes(file, after.substr(0, first_page_size) + before.substr(first_page_size));
+  write_bytes(directory / "a.db-wal", log);
+  start_service();
+  EXPECT_THAT(client->status().unserved_files, IsEmpty());
+  EXPECT_THAT(served(), ElementsAre("a"));
 }
 
 TEST_F(ServiceWithADirectory, ServesTheOthersWhateverAFileThrows) {
