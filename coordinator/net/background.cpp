@@ -16,20 +16,20 @@ Background::~Background() {
   thread_.join();
 }
 
-bool Background::post(Task task) {
+bool Background::post(Work work) {
   {
     const std::lock_guard lock(mutex_);
-    if (tasks_.size() >= num_tasks_max) return false;
-    tasks_.push_back(std::move(task));
+    if (pending_.size() >= num_pending_max) return false;
+    pending_.push_back(std::move(work));
   }
   changed_.notify_all();
   return true;
 }
 
-void Background::post_next(Task task) {
+void Background::post_next(Work work) {
   {
     const std::lock_guard lock(mutex_);
-    tasks_.push_back(std::move(task));
+    pending_.push_back(std::move(work));
   }
   changed_.notify_all();
 }
@@ -41,25 +41,25 @@ std::vector<Background::Finish> Background::take_finished() {
 
 bool Background::is_idle() {
   const std::lock_guard lock(mutex_);
-  return tasks_.empty() && finished_.empty();
+  return pending_.empty() && finished_.empty();
 }
 
 void Background::wait() {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return tasks_.empty(); });
+  changed_.wait(lock, [this] { return pending_.empty(); });
 }
 
 void Background::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    changed_.wait(lock, [this] { return is_ending_ || !tasks_.empty(); });
+    changed_.wait(lock, [this] { return is_ending_ || !pending_.empty(); });
     if (is_ending_) return;
-    Task task = std::move(tasks_.front());
+    Work work = std::move(pending_.front());
     lock.unlock();
-    Finish finish = task();
-    task = nullptr;  // What it holds may be large, and is freed here.
+    Finish finish = work();
+    work = nullptr;  // What it holds may be large, and is freed here.
     lock.lock();
-    tasks_.pop_front();
+    pending_.pop_front();
     finished_.push_back(std::move(finish));
     lock.unlock();
     changed_.notify_all();

@@ -14,31 +14,31 @@ namespace proofmass::coordinator {
 /// thing at a time, in the order in which they were handed over.
 class Background {
  public:
-  /// What is to be done in the service's thread with what a task came to. May throw.
+  /// What is to be done in the service's thread when some work is done. May throw.
   using Finish = std::function<void()>;
   /// Done in the background thread. Must not throw.
-  using Task = std::function<Finish()>;
+  using Work = std::function<Finish()>;
 
-  static constexpr std::size_t num_tasks_max = 16;  ///< That wait or are under way.
+  static constexpr std::size_t num_pending_max = 16;  ///< That wait or are under way.
 
-  /// @param wake  Called in the background thread when a task is done. Must not throw.
+  /// @param wake  Called in the background thread when some work is done. Must not throw.
   explicit Background(std::function<void()> wake);
-  ~Background();  ///< Waits for the task that is under way; those that wait are dropped.
+  ~Background();  ///< Waits for what is under way; what has not begun is dropped.
   Background(const Background&) = delete;
   Background& operator=(const Background&) = delete;
 
-  /// False if there are too many tasks.
-  [[nodiscard]] bool post(Task task);
-  /// Hands over a task however many there are: for the next step of one that was accepted.
-  void post_next(Task task);
+  /// False if too much work is pending.
+  [[nodiscard]] bool post(Work work);
+  /// Hands over work however much is pending: for the next step of what was accepted.
+  void post_next(Work work);
 
-  /// Of the tasks that are done, in order.
+  /// Of the work that is done, in order.
   [[nodiscard]] std::vector<Finish> take_finished();
 
-  /// True if no task waits, is under way, or is done and has not been taken.
+  /// True if no work waits, is under way, or is done and has not been taken.
   [[nodiscard]] bool is_idle();
 
-  /// Waits until all tasks are done.
+  /// Waits until all work is done.
   void wait();
 
  private:
@@ -47,7 +47,7 @@ class Background {
   const std::function<void()> wake_;
   std::mutex mutex_;  ///< Guards all that follows.
   std::condition_variable changed_;
-  std::deque<Task> tasks_;  ///< The first of them is under way.
+  std::deque<Work> pending_;  ///< The first of them is under way.
   std::vector<Finish> finished_;
   bool is_ending_ = false;
   std::thread thread_;  ///< Begins when all else is there.

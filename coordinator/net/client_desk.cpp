@@ -102,7 +102,7 @@ void ClientDesk::take_whole(const Address& from, std::uint64_t request, std::str
   parts_.release(size);
   respond(ticket, refusal(fmt::format("requests = {} (are under way, as many as may be; try again "
                                       "later)",
-                                      Background::num_tasks_max)));
+                                      Background::num_pending_max)));
 }
 
 void ClientDesk::carry_out(std::uint64_t ticket, const std::string& key,

@@ -308,7 +308,7 @@ class Service::Parts final : public Outbox {
     }
   }
 
-  /// What a task came to may have a next step, such as the closing of a file.
+  /// Work that is done may have a next step, such as the closing of a file.
   void settle_background() {
     while (!background_.is_idle()) {
       background_.wait();
@@ -422,7 +422,7 @@ class Service::Parts final : public Outbox {
   TimePoint reviewed_at_;
   std::uint64_t num_unsent_logged_ = 0;
   bool has_storage_failed_ = false;
-  Background background_;  ///< Ends before all that its tasks use.
+  Background background_;  ///< Ends before all that its work uses.
 };
 
 Service::Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log)

@@ -28,7 +28,7 @@ CampaignControl control_of(const wire::SubmitRequest& request) {
 
 [[noreturn]] void refuse_as_too_many() {
   throw Error(fmt::format("requests = {} (are under way, as many as may be; try again later)",
-                          Background::num_tasks_max));
+                          Background::num_pending_max));
 }
 
 }  // namespace
@@ -49,7 +49,7 @@ void SubmissionDesk::submit(const Submission& request, const Asker& asker, Respo
     require_right(asker, Right::submit);
   }
   if (is_busy(name)) {
-    if (deferred_.size() == Background::num_tasks_max) refuse_as_too_many();
+    if (deferred_.size() == Background::num_pending_max) refuse_as_too_many();
     deferred_.push_back({.request = request, .asker = asker, .respond = std::move(respond)});
     return;
   }

@@ -51,11 +51,6 @@ void limit(zmq::socket_t& socket, std::size_t message_size, int linger) {
   socket.set(zmq::sockopt::tcp_maxrt, tcp_unconfirmed_max);
 }
 
-/// Campaigns come in by the clients' door, and go out to workers.
-std::size_t received_size_max(Domain domain) {
-  return domain == Domain::clients ? definition_size_max : router_message_size_max;
-}
-
 /// Without an authenticator nobody gets in, instead of everybody. The library takes this option
 /// although its header declares it for drafts only.
 void enforce_domain(zmq::socket_t& socket) {
@@ -71,7 +66,7 @@ void enforce_domain(zmq::socket_t& socket) {
 zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
                           const std::string& endpoint, const ServerSecurity& security) {
   zmq::socket_t socket(context, zmq::socket_type::router);
-  limit(socket, received_size_max(security.domain), linger_of_router);
+  limit(socket, router_message_size_max, linger_of_router);
   socket.set(zmq::sockopt::router_mandatory, true);
   if (security.keys) {
     socket.set(zmq::sockopt::curve_server, true);

@@ -222,12 +222,12 @@ TEST_F(BoundedMemory, LetsPeersWithoutAKeyFillNoMoreThanAMebibyteEach) {
   start_coordinator({"--keys", "keys"});
   find_endpoints();
   const std::size_t before = peak_mib();
-  const auto fill = [&](std::size_t size) {
+  const auto fill = [](const std::string& endpoint, std::size_t size) {
     // All but the last byte, after which the frame would be looked at.
     const std::string body(size - 1, 'x');
     std::vector<std::unique_ptr<RawPeer>> peers;
     for (int i = 0; i < 30; ++i) {
-      peers.push_back(std::make_unique<RawPeer>(workers_endpoint));
+      peers.push_back(std::make_unique<RawPeer>(endpoint));
       peers.back()->greet(RawPeer::Mechanism::curve);
       peers.back()->send(RawPeer::head_of_large(RawPeer::command, size));
     }
@@ -239,9 +239,10 @@ TEST_F(BoundedMemory, LetsPeersWithoutAKeyFillNoMoreThanAMebibyteEach) {
     }
     return peers;
   };
-  (void)fill(std::size_t{64} << 20);
+  (void)fill(workers_endpoint, std::size_t{64} << 20);
+  (void)fill(clients_endpoint, std::size_t{64} << 20);
   EXPECT_LT(peak_mib(), before + 10);
-  const auto peers = fill(wire::router_message_size_max);
+  const auto peers = fill(workers_endpoint, wire::router_message_size_max);
   wait_until("arrival", [&] { return peak_mib() > before + 25; });
   // They are cut off when they have taken too long.
   wait_for_log("coordinator", "reason=\"handshake takes too long\"");

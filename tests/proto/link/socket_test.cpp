@@ -18,13 +18,13 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::int64_t mebibyte = 1 << 20;
 
-TEST(Router, LimitsWhatEachDoorTakes) {
+TEST(Router, LimitsTheSizeOfAMessage) {
   zmq::context_t context;
   const auto router = [&](Domain domain) {
     return make_router(context, "bind", "tcp://127.0.0.1:*", {.domain = domain, .keys = {}});
   };
   EXPECT_EQ(router(Domain::workers).get(zmq::sockopt::maxmsgsize), mebibyte);
-  EXPECT_EQ(router(Domain::clients).get(zmq::sockopt::maxmsgsize), 64 * mebibyte);
+  EXPECT_EQ(router(Domain::clients).get(zmq::sockopt::maxmsgsize), mebibyte);
   EXPECT_EQ(make_dealer(context, {}).get(zmq::sockopt::maxmsgsize), 4 * mebibyte);
 }
 
