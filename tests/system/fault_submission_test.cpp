@@ -35,7 +35,8 @@ class LargeSubmission : public FaultTest {
   }
 };
 
-// Meanwhile clients are answered, workers too, and what they deliver is stored.
+// Meanwhile clients are answered, workers too, and what they deliver is stored. When the service's
+// thread read the submission, neither happened until it was done.
 TEST_F(LargeSubmission, HoldsUpNobody) {
   using Clock = std::chrono::steady_clock;
   constexpr std::size_t num_rows = 3'200'000;  // 51 MB.
@@ -48,27 +49,32 @@ TEST_F(LargeSubmission, HoldsUpNobody) {
                                         .keys = {},
                                         .is_plain_waived = false,
                                         .reply_wait = std::chrono::seconds(60)});
+  const Clock::time_point began_at = Clock::now();
   Process submit = start_behind({}, "submit", "proofmass",
                                 {"submit", "large.toml", "--connect", clients_endpoint});
-  std::chrono::duration<double> longest{};
-  std::chrono::duration<double> longest_without_results{};
+  Clock::duration longest_answer{};
+  Clock::duration longest_without_results{};
   Clock::time_point result_at = Clock::now();
   std::uint64_t num_done_before = 0;
   while (!submit.has_ended()) {
     const Clock::time_point asked_at = Clock::now();
     const auto status = std::get<wire::StatusReply>(client.ask(wire::StatusRequest{}));
     const Clock::time_point now = Clock::now();
-    longest = std::max(longest, std::chrono::duration<double>(now - asked_at));
+    longest_answer = std::max(longest_answer, now - asked_at);
     if (status.campaigns.at(0).num_done > num_done_before) result_at = now;
     num_done_before = status.campaigns.at(0).num_done;
-    longest_without_results =
-        std::max(longest_without_results, std::chrono::duration<double>(now - result_at));
+    longest_without_results = std::max(longest_without_results, now - result_at);
   }
+  const Clock::duration whole = Clock::now() - began_at;
   EXPECT_EQ(submit.wait(), 0) << errors_of("submit");
-  RecordProperty("longest_answer_s", std::to_string(longest.count()));
-  RecordProperty("longest_without_results_s", std::to_string(longest_without_results.count()));
-  EXPECT_LT(longest.count(), 1.0);
-  EXPECT_LT(longest_without_results.count(), 2.0);
+  const auto seconds = [](Clock::duration duration) {
+    return std::to_string(std::chrono::duration<double>(duration).count());
+  };
+  RecordProperty("longest_answer_s", seconds(longest_answer));
+  RecordProperty("longest_without_results_s", seconds(longest_without_results));
+  RecordProperty("whole_s", seconds(whole));
+  EXPECT_LT(longest_answer, whole / 4) << seconds(whole);
+  EXPECT_LT(longest_without_results, whole / 4) << seconds(whole);
   EXPECT_EQ(num_log_lines("coordinator", "worker_lost"), 0U);
   EXPECT_EQ(status_of("large").at("num_runs"), num_rows);
 }
