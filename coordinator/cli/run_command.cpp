@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -188,10 +189,21 @@ int say_interrupted(const Store& store, const std::filesystem::path& database) {
   return exit_interrupted;
 }
 
+/// The file alone holds everything, or it is said that its log does too.
+void bring_to_rest(Store& store, const std::filesystem::path& database) {
+  const std::optional<std::string> reason = store.rest();
+  if (!reason) return;
+  wire::say(
+      fmt::format("proofmass: warning: campaign file = {0} ({1}; copy {2}-wal with it, or make "
+                  "copies with `proofmass backup`)\n",
+                  database.string(), *reason, database.filename().string()));
+}
+
 /// Statistics of a file that cannot be written stay as they are; what is stored is said.
 int end_interrupted(Store& store, const Scenario& scenario, const std::filesystem::path& database) {
   try {
     update_statistics(store, scenario);
+    bring_to_rest(store, database);
   } catch (const StoreError& error) {
     wire::say(fmt::format("proofmass: error: {}\n", wire::visible_text(error.what())));
   }
@@ -227,6 +239,7 @@ int run_campaign(const RunOptions& options) {
   if (!outcome.is_done) return end_interrupted(outcome.store, campaign.scenario, database);
   update_statistics(outcome.store, campaign.scenario);
   require_in_place(outcome.store, database);
+  bring_to_rest(outcome.store, database);
   print_lines(report_text(outcome.store, campaign.scenario));
   if (outcome.store.control().phase == wire::CampaignPhase::cancelled) {
     return say_cancelled(outcome.store, options.stop.failures_max.value_or(0));

@@ -13,6 +13,7 @@
 #include "coordinator/query/display_text.hpp"
 #include "coordinator/query/functions.hpp"
 #include "coordinator/query/read_rule.hpp"
+#include "coordinator/store/detail/private_copy.hpp"
 #include "coordinator/store/store.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -59,7 +60,9 @@ std::string place_text(std::string_view sql, std::size_t position) {
 /// A read-only connection on which nothing but reading is possible, for some time.
 class Reader {
  public:
-  Reader(std::filesystem::path file, const QueryLimits& limits, Clock::time_point end);
+  /// @param is_older  The file is of an older version: a private copy is read.
+  Reader(std::filesystem::path file, bool is_older, const QueryLimits& limits,
+         Clock::time_point end);
 
   /// @throws QueryError unless the text is one statement that reads.
   [[nodiscard]] Statement prepare(const std::string& sql);
@@ -68,6 +71,7 @@ class Reader {
   [[nodiscard]] bool is_interrupted() const { return is_interrupted_; }
 
  private:
+  void open_file();
   void restrict_connection();
   void set_limits();
   static int on_progress(void* reader);
@@ -85,19 +89,29 @@ class Reader {
   std::unique_ptr<sqlite3, Close> connection_;
 };
 
-Reader::Reader(std::filesystem::path file, const QueryLimits& limits, Clock::time_point end)
+Reader::Reader(std::filesystem::path file, bool is_older, const QueryLimits& limits,
+               Clock::time_point end)
     : file_(std::move(file)), limits_(limits), end_(end) {
+  if (is_older) {
+    connection_.reset(detail::open_private_copy(file_));
+  } else {
+    open_file();
+  }
+  sqlite3* const connection = connection_.get();
+  sqlite3_extended_result_codes(connection, 1);
+  sqlite3_busy_timeout(connection, busy_timeout_ms);
+  check(register_functions(connection));
+  set_limits();
+  restrict_connection();
+}
+
+void Reader::open_file() {
   // An absolute path is never mistaken for `:memory:` or a URI.
   const std::string name = std::filesystem::absolute(file_).string();
   sqlite3* connection = nullptr;
   const int code = sqlite3_open_v2(name.c_str(), &connection, SQLITE_OPEN_READONLY, nullptr);
   connection_.reset(connection);
   check(code);
-  sqlite3_extended_result_codes(connection, 1);
-  sqlite3_busy_timeout(connection, busy_timeout_ms);
-  check(register_functions(connection));
-  set_limits();
-  restrict_connection();
 }
 
 // A file from elsewhere is data: nothing in its schema may call a function with side effects, and
@@ -265,8 +279,8 @@ QueryEnd run_query(const std::filesystem::path& file, const std::string& sql,
   const Clock::time_point end =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(limits.time_limit);
   // It knows a campaign file and says what is wrong with others.
-  (void)Store::open_read_only(file);
-  Reader reader(file, limits, end);
+  const bool is_older = Store::open_read_only(file).is_of_older_version();
+  Reader reader(file, is_older, limits, end);
   const Statement statement = reader.prepare(sql);
   const std::vector<std::string> names = column_names(statement.get());
   writer.begin(names);

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <charconv>
 #include <exception>
 #include <functional>
@@ -24,7 +23,6 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_lock.hpp"
-#include "coordinator/store/detail/table_differences.hpp"
 #include "coordinator/store/detail/table_digest.hpp"
 #include "core/campaign/dispersion.hpp"
 #include "proto/link/kill_point.hpp"
@@ -33,9 +31,7 @@
 namespace proofmass::coordinator {
 
 using detail::Access;
-using detail::ComparedTable;
 using detail::Database;
-using detail::Statement;
 using detail::Transaction;
 
 namespace {
@@ -92,15 +88,6 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
   detail::replace_budgets(database,
                           {.before = before, .after_worst = nullptr, .after_mean = nullptr});
   transaction.commit();
-}
-
-void replace_all(Database& database, const CampaignStatistics& statistics, const Budget& before,
-                 const Budget& after_worst, const Budget& after_mean) {
-  const bool has_estimates = statistics.num_estimated > 0;
-  detail::replace_statistics(database, statistics);
-  detail::replace_budgets(database, {.before = before,
-                                     .after_worst = has_estimates ? &after_worst : nullptr,
-                                     .after_mean = has_estimates ? &after_mean : nullptr});
 }
 
 }  // namespace
@@ -340,6 +327,8 @@ CommitSummary Store::write(std::span<const Entry> entries) {
   return summary;
 }
 
+bool Store::is_of_older_version() const { return parts_->is_older; }
+
 bool Store::has_lost_its_log() const { return parts_->is_log_lost; }
 
 std::optional<std::string> Store::rest() {
@@ -386,82 +375,8 @@ ResultReader Store::results() const { return ResultReader(parts_->database); }
 
 ResultReader Store::results(RunRange runs) const { return ResultReader(parts_->database, runs); }
 
-void Store::write_statistics(const CampaignStatistics& statistics, const Budget& before,
-                             const Budget& after_worst, const Budget& after_mean,
-                             std::string_view digest) {
-  parts_->change([&](Database& database) {
-    replace_all(database, statistics, before, after_worst, after_mean);
-    detail::replace_summary(database, statistics, digest);
-  });
-}
-
-std::optional<Summary> Store::summary() const { return detail::read_summary(parts_->database); }
-
-std::vector<std::string> Store::parameter_differences(const ParameterArray& objectives) const {
-  constexpr std::array tables{ComparedTable{.name = "parameter", .row_name = "name"}};
-  return detail::table_differences(
-      parts_->database,
-      [&](Database& expected) { detail::insert_parameters(expected, objectives); }, tables);
-}
-
-std::vector<std::string> Store::statistic_differences(const CampaignStatistics& statistics,
-                                                      const Budget& before,
-                                                      const Budget& after_worst,
-                                                      const Budget& after_mean) const {
-  constexpr std::array tables{ComparedTable{.name = "statistic", .row_name = "parameter"},
-                              ComparedTable{.name = "budget_entry", .row_name = "name"}};
-  return detail::table_differences(
-      parts_->database,
-      [&](Database& expected) {
-        replace_all(expected, statistics, before, after_worst, after_mean);
-      },
-      tables);
-}
-
-std::vector<std::string> Store::budget_differences(const Budget& before) const {
-  constexpr std::array tables{ComparedTable{
-      .name = "budget_entry",
-      .row_name = "name",
-      .columns = "position, label, before, paper_before, paper_after_worst, paper_after_mean"}};
-  return detail::table_differences(
-      parts_->database,
-      [&](Database& expected) {
-        detail::replace_budgets(expected,
-                                {.before = before, .after_worst = nullptr, .after_mean = nullptr});
-      },
-      tables);
-}
-
-std::vector<std::string> Store::stop_check_differences(
-    std::span<const StopCheckRow> expected) const {
-  constexpr std::array tables{
-      ComparedTable{.name = "stop_check",
-                    .row_name = "statistic || ' after ' || num_runs || ' runs'",
-                    .columns = "estimate, lower, upper, relative_half_width, is_reached"}};
-  return detail::table_differences(
-      parts_->database,
-      [&](Database& database) {
-        for (const StopCheckRow& row : expected) {
-          detail::replace_stop_check(database, row.num_runs, row.statistic, row.check);
-        }
-      },
-      tables, detail::FurtherRows::ignore);
-}
-
-bool Store::has_statistics() const {
-  return parts_->database.integer(
-             "SELECT EXISTS (SELECT 1 FROM statistic WHERE percentile_50 IS NOT NULL)") != 0;
-}
-
 void Store::refuse_as_damaged(std::string_view what) const {
   parts_->database.refuse_as_damaged(what);
-}
-
-bool Store::has_older_statistics() const {
-  return parts_->database.integer(
-             "SELECT EXISTS (SELECT 1 FROM statistic)"
-             " AND NOT EXISTS (SELECT 1 FROM statistic WHERE percentile_50 IS NOT NULL)"
-             " AND NOT EXISTS (SELECT 1 FROM summary)") != 0;
 }
 
 void Store::record_event(std::string_view kind, std::string_view text) {

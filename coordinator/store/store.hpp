@@ -46,9 +46,11 @@ class Store {
   ///         A file without the log that it needs is opened as it is; see has_lost_its_log().
   static Store open(const std::filesystem::path& path);
 
-  /// Opens a campaign file for reading, also while a coordinator writes to it.
-  /// @throws StoreError as open() does, but for lock, file system and hard links; if the file is
-  ///         older than this program; if the file lacks the log that it needs.
+  /// Opens a campaign file for reading, also while a coordinator writes to it. Of a file that is
+  /// older than this program a private copy is read, as the file was when it was opened and brought
+  /// up to date; the file stays as it is.
+  /// @throws StoreError as open() does, but for lock, file system and hard links; if the file lacks
+  ///         the log that it needs; if there is no room for the copy of an older file.
   static Store open_read_only(const std::filesystem::path& path);
 
   /// Adds tags and notes or removes tags, all or none of them, also while a coordinator serves the
@@ -146,8 +148,10 @@ class Store {
   /// To be called when nothing more is expected: folds the write-ahead log into the file, which is
   /// whole without it until the next change. Waits for nobody.
   /// A file that has lost its name gets it back before.
-  /// @return Why the log is still needed: somebody reads an old state of the file. Or nothing.
-  /// @throws StoreError as return_to_place() does.
+  /// @return Why the log is still needed: somebody reads an old state of the file, or writes to it.
+  ///         Or nothing.
+  /// @throws StoreError as return_to_place() does; if the disk does not take it. What was stored
+  ///         is in the file and its log then.
   std::optional<std::string> rest();
 
   /// Gives a file back its name that somebody removed, renamed or replaced while it was open: an
@@ -159,6 +163,9 @@ class Store {
   /// @return What was done, if anything.
   /// @throws StoreError with the reason if it cannot be done now; to be tried again.
   std::optional<FileReturn> return_to_place();
+
+  /// Whether the file is older than this program, and a copy is read.
+  [[nodiscard]] bool is_of_older_version() const;
 
   /// Whether open() found that the file needs a log and that there was none: runs whose results
   /// were in it are missing, and are computed again. The event `log_lost` says so.

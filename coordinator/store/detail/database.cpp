@@ -8,6 +8,7 @@
 #include <limits>
 #include <system_error>
 
+#include "coordinator/store/detail/file_log.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -16,19 +17,20 @@ namespace {
 
 constexpr int sql_size_max = 1'000'000;  // Of a statement, a definition in the schema among them.
 
+// One thread at a time uses a connection, so that SQLite need not lock it for each column.
 int open_flags(Access access) {
   switch (access) {
     case Access::create:
     case Access::memory:
-      return SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+      return SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
     case Access::read_write:
-      return SQLITE_OPEN_READWRITE;
+      return SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
     case Access::read_only:
-      return SQLITE_OPEN_READONLY;
+      break;
     case Access::immutable:
-      return SQLITE_OPEN_READONLY | SQLITE_OPEN_URI;
+      return SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX;
   }
-  return SQLITE_OPEN_READONLY;
+  return SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX;
 }
 
 // An absolute path is never mistaken for `:memory:` or a URI.
@@ -44,22 +46,45 @@ std::string name_of(const std::filesystem::path& path, Access access) {
   return uri + "?immutable=1";
 }
 
-std::string damage(std::string_view what) {
+// SQLite applies a log to whatever file has the name, also to one that was put there since.
+std::string damage(const std::filesystem::path& file, std::string_view what) {
+  if (has_log(file) && is_sound_without_log(file)) {
+    return fmt::format(
+        "is damaged: {}; without its log {} it is in order: if the file was restored from a copy, "
+        "the log is that of the file before it, and removing the log suffices",
+        what, log_path(file).filename().string());
+  }
   return fmt::format("is damaged: {}; restore it from a copy", what);
 }
 
-std::string explanation(int code, sqlite3* connection) {
+// What a reader meets that must be written before anything can be read.
+std::string explanation_of_readonly(int code, sqlite3* connection) {
+  switch (code) {
+    case SQLITE_READONLY_ROLLBACK:
+      return "was being changed by a program that was killed; whoever writes to it next takes that "
+             "back: resume the campaign, or add a tag";
+    case SQLITE_READONLY_RECOVERY:
+    case SQLITE_READONLY_CANTINIT:
+      return "has a log that only a user who may write to its directory can read";
+    default:
+      return sqlite3_errmsg(connection);
+  }
+}
+
+std::string explanation(int code, sqlite3* connection, const std::filesystem::path& file) {
   switch (code & 0xff) {
     case SQLITE_NOTADB:
       return "is not an SQLite database";
     case SQLITE_CORRUPT:
-      return damage(sqlite3_errmsg(connection));
+      return damage(file, sqlite3_errmsg(connection));
     case SQLITE_FULL:
       return "the disk is full; what was committed before is safe, free space and try again";
     case SQLITE_BUSY:
       return fmt::format("is locked by another program for more than {} s", busy_timeout_ms / 1000);
     case SQLITE_INTERRUPT:
       return "has more in its schema than a campaign has";
+    case SQLITE_READONLY:
+      return explanation_of_readonly(code, connection);
     case SQLITE_IOERR:
       return fmt::format("{}; what was committed before is safe", sqlite3_errmsg(connection));
     case SQLITE_CANTOPEN:
@@ -216,6 +241,12 @@ void Database::execute(const std::string& sql) {
   if (code != SQLITE_OK) fail(code);
 }
 
+bool Database::execute_unless_busy(const std::string& sql) {
+  const int code = sqlite3_exec(connection_.get(), sql.c_str(), nullptr, nullptr, nullptr);
+  if (code != SQLITE_OK && (code & 0xff) != SQLITE_BUSY) fail(code);
+  return code == SQLITE_OK;
+}
+
 Statement Database::prepare(std::string_view sql) const {
   sqlite3_stmt* statement = nullptr;
   const int code = sqlite3_prepare_v2(connection_.get(), sql.data(), static_cast<int>(sql.size()),
@@ -258,6 +289,28 @@ void Database::copy_to(Database& copy) const {
   if (code != SQLITE_OK) copy.fail(code);
 }
 
+void Database::go_on_with_private_copy() {
+  sqlite3* connection = nullptr;
+  int code = sqlite3_open_v2("", &connection, open_flags(Access::create), nullptr);
+  std::unique_ptr<sqlite3, Close> copy(connection);
+  if (code == SQLITE_OK) {
+    sqlite3_extended_result_codes(connection, 1);
+    sqlite3_backup* const backup =
+        sqlite3_backup_init(connection, "main", connection_.get(), "main");
+    if (backup == nullptr) fail(sqlite3_errcode(connection));
+    const int step_code = sqlite3_backup_step(backup, -1);
+    code = sqlite3_backup_finish(backup);
+    if (step_code == SQLITE_BUSY || step_code == SQLITE_LOCKED) code = step_code;
+  }
+  if (code != SQLITE_OK) refuse_copy(code);
+  connection_ = std::move(copy);
+  is_private_copy_ = true;
+  // It is thrown away if anything fails.
+  const int off =
+      sqlite3_exec(connection_.get(), "PRAGMA journal_mode = OFF", nullptr, nullptr, nullptr);
+  if (off != SQLITE_OK) fail(off);
+}
+
 bool Database::is_in_place() const {
   int has_moved = 0;
   const int code =
@@ -272,6 +325,8 @@ std::uint64_t Database::log_size() const {
   return error ? 0 : size;
 }
 
+void Database::wait_as_usual() { sqlite3_busy_timeout(connection_.get(), busy_timeout_ms); }
+
 // The row of the pragma: whether somebody was in the way, frames of the log, frames in the file.
 bool Database::fold_log(Fold fold) {
   Statement row = prepare(fold == Fold::all_and_empty_it ? "PRAGMA wal_checkpoint(TRUNCATE)"
@@ -280,7 +335,7 @@ bool Database::fold_log(Fold fold) {
   return row.integer(0) == 0 && row.integer(1) == row.integer(2);
 }
 
-void Database::leave_names_alone() {
+void Database::leave_files_alone() {
   sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
 }
 
@@ -290,9 +345,23 @@ void Database::refuse(std::string_view what) const {
       fmt::format("campaign file = {} ({})", path_.string(), wire::visible_text(what)));
 }
 
-void Database::refuse_as_damaged(std::string_view what) const { refuse(damage(what)); }
+void Database::refuse_as_damaged(std::string_view what) const { refuse(damage(path_, what)); }
 
-void Database::fail(int code) const { refuse(explanation(code, connection_.get())); }
+void Database::refuse_copy(int code) const {
+  refuse(
+      fmt::format("is older than this program, which reads a copy of it; the copy cannot be made "
+                  "in the temporary directory, which TMPDIR names: {}",
+                  sqlite3_errstr(code & 0xff)));
+}
+
+void Database::fail(int code) const {
+  const int kind = code & 0xff;
+  if (is_private_copy_ &&
+      (kind == SQLITE_FULL || kind == SQLITE_IOERR || kind == SQLITE_CANTOPEN)) {
+    refuse_copy(code);
+  }
+  refuse(explanation(code, connection_.get(), path_));
+}
 
 Transaction::Transaction(Database& database) : database_(database) {
   database_.execute("BEGIN IMMEDIATE");

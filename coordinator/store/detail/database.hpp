@@ -101,6 +101,8 @@ class Database {
 
   /// Runs statements that yield nothing of interest.
   void execute(const std::string& sql);
+  /// The same; false if another connection is in the way.
+  [[nodiscard]] bool execute_unless_busy(const std::string& sql);
   [[nodiscard]] Statement prepare(std::string_view sql) const;
 
   /// First column of the first row of a query.
@@ -118,24 +120,36 @@ class Database {
   /// Replaces the content of another database by that of this one, as it is now.
   void copy_to(Database& copy) const;
 
+  /// Goes on with a copy of its own that may be changed: SQLite keeps it in memory while it is
+  /// small, and else in a nameless file of the temporary directory, which ends with the process,
+  /// however that ends. Messages still name the file. @pre No statement is under way.
+  /// @throws StoreError if the copy cannot be made, for want of space for instance.
+  void go_on_with_private_copy();
+
+  /// The connection; the caller closes it, and the Database is of no use any more.
+  [[nodiscard]] sqlite3* release() { return connection_.release(); }
+
   /// False if the file has been removed, renamed or replaced since it was opened.
   [[nodiscard]] bool is_in_place() const;
 
   /// Bytes of the write-ahead log; 0 if there is none.
   [[nodiscard]] std::uint64_t log_size() const;
 
+  void wait_as_usual();  ///< Up to 5 s for locks of others.
+
   /// Copies the write-ahead log into the file. True if all of it is there now and, if so asked, the
   /// log is empty; false if somebody reads an older state, or writes.
   [[nodiscard]] bool fold_log(Fold fold);
 
-  /// To be called if the file has lost its name: what has it now is not touched when the connection
-  /// is closed.
-  void leave_names_alone();
+  /// The file is not touched any more when the connection is closed, and its log stays: for a file
+  /// that has lost its name, and for one that says that it needs its log.
+  void leave_files_alone();
 
   /// @throws StoreError `campaign file = path (what)`.
   [[noreturn]] void refuse(std::string_view what) const;
 
-  /// @throws StoreError `campaign file = path (is damaged: what; restore it from a copy)`.
+  /// @throws StoreError `campaign file = path (is damaged: what; restore it from a copy)`, or with
+  ///         the remedy for a log that is not that of the file.
   [[noreturn]] void refuse_as_damaged(std::string_view what) const;
 
   /// @throws StoreError `campaign file = path (what went wrong, with a remedy)`.
@@ -147,8 +161,11 @@ class Database {
     void operator()(sqlite3* connection) const;
   };
 
+  [[noreturn]] void refuse_copy(int code) const;
+
   std::filesystem::path path_;
   std::unique_ptr<sqlite3, Close> connection_;
+  bool is_private_copy_ = false;
 };
 
 /// Changes that are stored together by commit(), or not at all.

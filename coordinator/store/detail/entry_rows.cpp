@@ -54,12 +54,18 @@ CommitSummary EntryRows::write(std::span<const Entry> entries) {
     std::visit([this](const auto& kind) { write_entry(kind); }, entry);
   }
   workers_.write_counts(now_unix_s_);
+  if (workers_.take_overflow()) {
+    write_entry(EventEntry{
+        .kind = "worker_table_full",
+        .text = fmt::format("rows={} (further workers share one row)", num_workers_max)});
+  }
   return std::exchange(summary_, {});
 }
 
 void EntryRows::write_entry(const Delivery& delivery) {
   if (!results_.insert(delivery.result)) {
     ++summary_.num_duplicate;
+    require_delivery(delivery.result.run);
     compare(delivery);
     return;
   }
@@ -74,14 +80,46 @@ void EntryRows::write_entry(const Delivery& delivery) {
 
 void EntryRows::write_entry(const SecondDelivery& second) { compare(second.delivery); }
 
+// A run without a delivery would be lent again each time that the campaign is resumed.
+void EntryRows::require_delivery(RunIndex run) const {
+  Statement select = database_.prepare("SELECT 1 FROM delivery WHERE run_index = ?");
+  select.bind_all(run.value);
+  if (select.step()) return;
+  database_.refuse_as_damaged(fmt::format("delivery lacks run {}, which has a result", run.value));
+}
+
 void EntryRows::compare(const Delivery& delivery) {
   const RunIndex run = delivery.result.run;
   const RunResult stored = results_.read(run);
   const bool is_equal = are_equal(delivery.result, stored);
-  insert_audit_.run(run.value, workers_.key_of(delivery.worker), std::int64_t{is_equal},
-                    hexadecimal(digest(stored)), hexadecimal(digest(delivery.result)), now_unix_s_);
+  const std::int64_t worker = workers_.key_of(delivery.worker);
+  if (has_room_for_audit(run, worker, is_equal)) {
+    insert_audit_.run(run.value, worker, std::int64_t{is_equal}, hexadecimal(digest(stored)),
+                      hexadecimal(digest(delivery.result)), now_unix_s_);
+  }
   summary_.comparisons.push_back({.run = run, .worker = delivery.worker, .is_equal = is_equal});
   if (!is_equal) report_contradiction(delivery);
+}
+
+bool EntryRows::has_room_for_audit(RunIndex run, std::int64_t worker, bool is_equal) {
+  Statement select = database_.prepare("SELECT 1 FROM audit WHERE run_index = ? AND worker = ?");
+  select.bind_all(run.value, worker);
+  if (select.step()) return true;  // The row is there.
+  if (!num_audits_) num_audits_ = database_.count("SELECT count(*) FROM audit");
+  const std::uint64_t num_equal_max =
+      database_.count("SELECT num_runs FROM campaign") + num_further_audits_max;
+  const std::uint64_t num_max = is_equal ? num_equal_max : num_equal_max + num_further_audits_max;
+  if (*num_audits_ < num_max) {
+    ++*num_audits_;
+    return true;
+  }
+  if (!std::exchange(is_audit_full_, true)) {
+    write_entry(
+        EventEntry{.kind = "audit_history_full",
+                   .text = fmt::format("rows={} (further second results are compared and not kept)",
+                                       *num_audits_)});
+  }
+  return false;
 }
 
 void EntryRows::report_contradiction(const Delivery& delivery) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,6 +15,10 @@ namespace proofmass::coordinator::detail {
 
 /// Rows of `attempt` that are kept.
 inline constexpr std::int64_t num_attempts_max = 1'000'000;
+
+/// Rows of `audit` that are kept beyond one for each run of the campaign. Further ones are kept
+/// only if they differ, and then as many again.
+inline constexpr std::uint64_t num_further_audits_max = 1'000'000;
 
 /// Writes each kind of entry where it belongs. Holds prepared statements and the keys of workers:
 /// to be thrown away with a transaction that is rolled back.
@@ -35,6 +40,10 @@ class EntryRows {
   void write_entry(const CampaignControl& control);
 
   void compare(const Delivery& delivery);
+  /// A worker that has a delivery of the run in the file, or had: not a run that lacks one.
+  void require_delivery(RunIndex run) const;
+  /// Whether a comparison may get a row; says so once if not.
+  [[nodiscard]] bool has_room_for_audit(RunIndex run, std::int64_t worker, bool is_equal);
   void report_contradiction(const Delivery& delivery);
 
   const Database& database_;
@@ -49,6 +58,8 @@ class EntryRows {
   Statement insert_event_;
   Statement trim_events_;
   std::int64_t now_unix_s_ = 0;
+  std::optional<std::uint64_t> num_audits_;  ///< Rows; counted when the first is written.
+  bool is_audit_full_ = false;               ///< As was said.
   CommitSummary summary_;
 };
 

@@ -1,9 +1,15 @@
 #include "coordinator/store/detail/file_log.hpp"
 
+#include <fmt/format.h>
+#include <sqlite3.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
+#include <memory>
+#include <string>
+#include <string_view>
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -13,6 +19,17 @@ namespace {
 constexpr std::uint32_t log_magic = 0x377f0682;
 constexpr std::size_t log_header_size = 32;
 constexpr std::size_t frame_header_size = 24;
+
+// SQLite takes only an address of a file for one that nobody changes, and then reads no log.
+std::string address_of(const std::filesystem::path& file) {
+  std::string address = "file://";
+  for (const char character : std::filesystem::absolute(file).string()) {
+    const bool has_meaning = character == '%' || character == '?' || character == '#';
+    address += has_meaning ? fmt::format("%{:02X}", static_cast<int>(character))
+                           : std::string(1, character);
+  }
+  return address + "?immutable=1";
+}
 
 }  // namespace
 
@@ -28,6 +45,22 @@ bool has_log(const std::filesystem::path& file) {
   std::uint32_t magic = 0;
   for (std::size_t i = 0; i < sizeof magic; ++i) magic = magic << 8 | bytes[i];
   return (magic & ~std::uint32_t{1}) == log_magic;
+}
+
+bool is_sound_without_log(const std::filesystem::path& file) {
+  sqlite3* opened = nullptr;
+  const int code = sqlite3_open_v2(address_of(file).c_str(), &opened,
+                                   SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
+  const std::unique_ptr<sqlite3, int (*)(sqlite3*)> connection(opened, &sqlite3_close_v2);
+  if (code != SQLITE_OK) return false;
+  bool is_sound = false;
+  const auto take = [](void* result, int, char** texts, char**) {
+    *static_cast<bool*>(result) = texts[0] != nullptr && std::string_view(texts[0]) == "ok";
+    return 0;
+  };
+  const int end = sqlite3_exec(opened, "PRAGMA trusted_schema = OFF; PRAGMA quick_check(1)", take,
+                               &is_sound, nullptr);
+  return end == SQLITE_OK && is_sound;
 }
 
 }  // namespace proofmass::coordinator::detail

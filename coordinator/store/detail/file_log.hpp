@@ -11,4 +11,8 @@ namespace proofmass::coordinator::detail {
 /// header and begins as such a log does.
 [[nodiscard]] bool has_log(const std::filesystem::path& file);
 
+/// Whether SQLite finds nothing wrong with the pages and rows of the file alone. Takes some 1 s for
+/// a million runs.
+[[nodiscard]] bool is_sound_without_log(const std::filesystem::path& file);
+
 }  // namespace proofmass::coordinator::detail

@@ -25,6 +25,28 @@ bool says_that_log_is_needed(const Database& database) {
 
 constexpr std::string_view reader_in_the_way =
     "somebody reads an old state of the file, and its log is still needed";
+constexpr std::string_view writer_in_the_way =
+    "another program is writing to the file, and its log is still needed";
+
+// Entering and leaving the mode of write-ahead logs writes one page, of which one sector changes,
+// so that nothing can be torn. A journal beside the file would be in the way of every reader if the
+// disk failed then, and so there is none.
+constexpr const char* without_log = "PRAGMA journal_mode = MEMORY";
+constexpr const char* with_log = "PRAGMA journal_mode = WAL";
+
+/// While it lives, whatever needs a lock that another connection has fails at once.
+class ShortWait {
+ public:
+  explicit ShortWait(Database& database) : database_(database) {
+    database_.execute("PRAGMA busy_timeout = 0");
+  }
+  ~ShortWait() { database_.wait_as_usual(); }
+  ShortWait(const ShortWait&) = delete;
+  ShortWait& operator=(const ShortWait&) = delete;
+
+ private:
+  Database& database_;
+};
 
 }  // namespace
 
@@ -51,7 +73,9 @@ void check_that_log_is_there(const Database& database, const std::filesystem::pa
 // in it, and whenever it says that it needs one, the log is there.
 std::optional<std::string> bring_to_rest(Database& database) {
   if (!database.fold_log(Fold::what_no_reader_needs)) return std::string(reader_in_the_way);
-  database.execute("UPDATE campaign SET is_log_needed = 0 WHERE is_log_needed");
+  if (!database.execute_unless_busy("UPDATE campaign SET is_log_needed = 0 WHERE is_log_needed")) {
+    return std::string(writer_in_the_way);
+  }
   if (!database.fold_log(Fold::all_and_empty_it)) return std::string(reader_in_the_way);
   return std::nullopt;
 }
@@ -62,7 +86,11 @@ Store::Parts::Parts(const std::filesystem::path& file)
     : path(file), database(file, Access::read_only) {
   detail::configure(database);
   detail::check_campaign_file(database, file);
-  detail::check_up_to_date(database, file);
+  if (detail::is_older(database)) {
+    detail::migrate_privately(database);
+    is_older = true;
+    return;
+  }
   detail::check_that_log_is_there(database, file);
 }
 
@@ -77,7 +105,9 @@ Store::Parts::Parts(const std::filesystem::path& file, std::unique_ptr<detail::S
   const detail::RowCounts counts = detail::check_all_pages(database);
   detail::check_after_unclean_end(database);
   const bool has_log = detail::has_log(file);
-  database.execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+  if (database.text("PRAGMA journal_mode") != "wal") database.execute(without_log);
+  database.execute(with_log);
+  database.execute("PRAGMA synchronous = FULL");
   // A log that had to grow gives the disk its space back when it begins anew.
   database.execute(fmt::format("PRAGMA journal_size_limit = {}", usual_log_size));
   Transaction transaction(database);
@@ -97,14 +127,19 @@ Store::Parts::~Parts() {
   try {
     rows.reset();
     if (place->look() != detail::Placement::in_place) {
-      database.leave_names_alone();
+      database.leave_files_alone();
       return;
     }
-    if (rest()) return;
-    database.execute("PRAGMA busy_timeout = 0; PRAGMA journal_mode = DELETE");
+    if (!rest()) {
+      database.execute("PRAGMA busy_timeout = 0");
+      database.execute(without_log);
+      return;
+    }
   } catch (const StoreError&) {
     // The next coordinator finds the log and goes on from there.
   }
+  // The file says that it needs its log, of which SQLite may think that all is in the file.
+  if (is_perhaps_marked_) database.leave_files_alone();
 }
 
 void Store::Parts::change(const std::function<void(Database&)>& action) {
@@ -131,7 +166,8 @@ void Store::Parts::check_place() const {
 void Store::Parts::renew_log() {
   rows.reset();
   if (const std::optional<std::string> reason = rest()) database.refuse(*reason);
-  database.execute("PRAGMA journal_mode = DELETE; PRAGMA journal_mode = WAL");
+  database.execute(without_log);
+  database.execute(with_log);
   (void)says_that_log_is_needed(database);  // Reading opens the new log.
   place->remember_log();
 }
@@ -155,14 +191,9 @@ void Store::Parts::mark_log_as_needed() {
 std::optional<std::string> Store::Parts::rest() {
   if (!is_perhaps_marked_ && database.log_size() == 0) return std::nullopt;
   is_marked_ = false;
-  database.execute("PRAGMA busy_timeout = 0");
-  std::optional<std::string> reason;
-  try {
-    reason = detail::bring_to_rest(database);
-  } catch (const StoreError& error) {
-    reason = error.what();
-  }
-  database.execute(fmt::format("PRAGMA busy_timeout = {}", detail::busy_timeout_ms));
+  is_perhaps_marked_ = true;
+  const ShortWait nobody_is_waited_for(database);
+  const std::optional<std::string> reason = detail::bring_to_rest(database);
   is_perhaps_marked_ = reason.has_value();
   return reason;
 }

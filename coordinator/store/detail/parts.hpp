@@ -48,7 +48,7 @@ struct Store::Parts {
   void renew_log();
 
   /// Folds the log into the file, which is whole without it afterwards. Does not wait for readers:
-  /// returns why it could not.
+  /// returns why it could not. @throws StoreError if the disk does not take it.
   [[nodiscard]] std::optional<std::string> rest();
 
   std::filesystem::path path;
@@ -56,6 +56,7 @@ struct Store::Parts {
   std::unique_ptr<detail::FilePlace> place;  ///< The same. Closed after the database.
   detail::Database database;
   std::optional<detail::EntryRows> rows;  ///< Prepared when they are first needed.
+  bool is_older = false;     ///< The file has an older version, and `database` is a copy of it.
   bool is_log_lost = false;  ///< The file needed a log when it was opened; none was there.
 
  private:

@@ -154,6 +154,10 @@ void check_up_to_date(const Database& database, const std::filesystem::path& pat
                   path.string(), version, schema_version()));
 }
 
+bool is_older(const Database& database) {
+  return database.integer("PRAGMA user_version") < schema_version();
+}
+
 void check_schema(const Database& database, std::int64_t version) {
   SchemaObjects expected = known_schemas().at(static_cast<std::size_t>(version));
   for (const auto& [name, sql] : schema_objects(database)) {
@@ -173,6 +177,15 @@ void migrate(Database& database) {
     PROOFMASS_EXPECT(database.integer("PRAGMA user_version") == version + 1);
     wire::kill_point(wire::KillPoint::while_migrating);
   }
+}
+
+void migrate_privately(Database& database) {
+  database.go_on_with_private_copy();
+  database.distrust_content();
+  Transaction transaction(database);
+  migrate(database);
+  transaction.commit();
+  database.execute("PRAGMA query_only = ON");  // What would be written is lost.
 }
 
 }  // namespace proofmass::coordinator::detail

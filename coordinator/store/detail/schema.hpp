@@ -57,8 +57,15 @@ void check_schema(const Database& database, std::int64_t version);
 /// @throws StoreError otherwise.
 void check_up_to_date(const Database& database, const std::filesystem::path& path);
 
+/// Whether a campaign file has an older version than this program writes.
+[[nodiscard]] bool is_older(const Database& database);
+
 /// Brings the schema up to date, step by step. @pre Inside a transaction.
 void migrate(Database& database);
+
+/// Goes on with a private copy of an older file that is up to date; the file stays as it is.
+/// @throws StoreError if there is no room for the copy, or the file is damaged.
+void migrate_privately(Database& database);
 
 /// A run without a delivery would be lent again and come back as a second result, and a result of a
 /// run that there is not would stand for one that is missing.

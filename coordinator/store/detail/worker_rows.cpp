@@ -62,6 +62,10 @@ WorkerRows::WorkerRows(const Database& database)
       select_key_(database.prepare("SELECT worker_key FROM worker WHERE session = ?")) {}
 
 void WorkerRows::write(const WorkerJoined& joined) {
+  if (is_full() && !stored_key(joined.session)) {
+    (void)key_of_further();
+    return;
+  }
   database_
       .prepare(
           "INSERT INTO worker (session, name, host, process_id, num_slots) VALUES (?, ?, ?, ?, ?) "
@@ -80,19 +84,45 @@ void WorkerRows::write(const WorkerEnded& ended) {
       .run(stored_name(ended.reason), hexadecimal(ended.session.value));
 }
 
+std::optional<std::int64_t> WorkerRows::stored_key(wire::SessionId session) {
+  select_key_.bind_all(hexadecimal(session.value));
+  if (!select_key_.step()) return std::nullopt;
+  const std::int64_t key = select_key_.integer(0);
+  select_key_.finish();
+  return key;
+}
+
+bool WorkerRows::is_full() const {
+  return database_.integer("SELECT ifnull(max(worker_key), 0) FROM worker") >= num_workers_max;
+}
+
+std::int64_t WorkerRows::key_of_further() {
+  const std::string_view select =
+      "SELECT ifnull((SELECT worker_key FROM worker WHERE worker_key > ? AND session IS NULL"
+      " AND name = 'further workers' LIMIT 1), 0)";
+  Statement row = database_.prepare(select);
+  row.bind_all(num_workers_max - 1);
+  if (row.step() && row.integer(0) != 0) return row.integer(0);
+  row.finish();
+  has_overflowed_ = true;
+  database_.prepare("INSERT INTO worker (session, name, host) VALUES (NULL, ?, '')")
+      .run(std::string_view("further workers"));
+  return database_.last_row();
+}
+
 std::int64_t WorkerRows::key_of(wire::SessionId session) {
   const auto found = keys_.find(session);
   if (found != keys_.end()) return found->second;
-  const std::string digits = hexadecimal(session.value);
-  database_
-      .prepare("INSERT INTO worker (session, name, host) VALUES (?, '', '') ON CONFLICT DO NOTHING")
-      .run(digits);
-  select_key_.bind_all(digits);
-  if (!select_key_.step()) database_.refuse_as_damaged("worker lacks session " + digits);
-  const std::int64_t key = select_key_.integer(0);
-  select_key_.finish();
-  keys_.emplace(session, key);
-  return key;
+  std::optional<std::int64_t> key = stored_key(session);
+  if (!key && is_full()) key = key_of_further();
+  if (!key) {
+    database_.prepare("INSERT INTO worker (session, name, host) VALUES (?, '', '')")
+        .run(hexadecimal(session.value));
+    key = database_.last_row();
+  }
+  if (keys_.size() >= static_cast<std::size_t>(num_workers_max)) keys_.clear();
+  keys_.emplace(session, *key);
+  return *key;
 }
 
 std::string WorkerRows::name_of(wire::SessionId session) {

@@ -58,6 +58,38 @@ TEST_F(StoreDamage, ASecondResultOfARunThatIsNotThereIsRefused) {
               HasSubstr("is damaged: run_result lacks run 3"));
 }
 
+// Somebody deletes rows while a coordinator has the file.
+TEST_F(StoreDamage, AResultThatIsDeletedMeanwhileIsMissedWhenItIsNeeded) {
+  Store store = Store::create(file(), campaign_of(10), "");
+  store.commit(deliveries_of(0, 4));
+  test::change(file(), "DELETE FROM run_result WHERE run_index = 3");
+  const Entry second = SecondDelivery{delivery_of(3)};
+  EXPECT_THAT(store_error_of([&] {
+                store.write({&second, 1});
+              }),
+              HasSubstr("is damaged: run_result lacks run 3"));
+  EXPECT_THAT(store_error_of([&] { store.check_integrity(); }), HasSubstr("is damaged: "));
+  EXPECT_EQ(store.commit(deliveries_of(5, 7)).num_new, 2u);
+}
+
+TEST_F(StoreDamage, ADeliveryThatIsDeletedMeanwhileIsMissedWhenItsRunComesAgain) {
+  Store store = Store::create(file(), campaign_of(10), "");
+  store.commit(deliveries_of(0, 4));
+  test::change(file(), "DELETE FROM delivery WHERE run_index = 3");
+  EXPECT_THAT(store_error_of([&] { store.commit(deliveries_of(3, 4)); }),
+              HasSubstr("is damaged: delivery lacks run 3, which has a result"));
+  EXPECT_EQ(store.commit(deliveries_of(5, 7)).num_new, 2u);
+}
+
+TEST_F(StoreDamage, AWorkerThatIsDeletedMeanwhileIsRefusedAndMadeAnew) {
+  Store store = Store::create(file(), campaign_of(10), "");
+  store.commit(deliveries_of(0, 4));
+  test::change(file(), "DELETE FROM worker");
+  const Entry wrong = SecondDelivery{test::wrong_delivery_of(3)};
+  EXPECT_NE(store_error_of([&] { store.write({&wrong, 1}); }), "");
+  EXPECT_EQ(store.write({&wrong, 1}).num_contradicting, 1u);
+}
+
 TEST_F(StoreDamage, AFileWithoutItsCampaignIsRefusedByEveryFunction) {
   Store store = Store::create(file(), campaign_of(10), "");
   test::change(file(), "DELETE FROM campaign");

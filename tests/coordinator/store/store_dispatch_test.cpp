@@ -22,6 +22,7 @@ using test::worker_1;
 using test::wrong_delivery_of;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
+using ::testing::SizeIs;
 
 class StoreDispatch : public test::StoreTest {
  protected:
@@ -220,6 +221,53 @@ TEST_F(StoreDispatch, KeepsTheNewestMillionLossesAndSaysSo) {
   EXPECT_EQ(text("SELECT group_concat(attempt_id) FROM attempt"), "1000000,1000001,1000002");
   EXPECT_EQ(text("SELECT group_concat(kind || ' ' || text) FROM event"),
             "attempt_history_full rows=1000000 (older ones are dropped)");
+}
+
+// Sums still follow from the deliveries: the check of the whole file holds.
+TEST_F(StoreDispatch, CountsFurtherWorkersThanAHundredThousandInOneRow) {
+  Store store = create();
+  write(store, {delivery_of(0)});
+  Database(file(), Access::read_write)
+      .execute(
+          "INSERT INTO worker (worker_key, session, name, host) VALUES (100000,"
+          " 'ffffffffffffffff', 'last', 'here')");
+  const auto of_worker = [](std::uint64_t session, std::uint64_t run) {
+    Delivery delivery = delivery_of(run);
+    delivery.worker = wire::SessionId{session};
+    return delivery;
+  };
+  WorkerJoined late = worker_1();
+  late.session = wire::SessionId{2};
+  write(store, {late, of_worker(2, 1), of_worker(3, 2), delivery_of(3), worker_1()});
+  write(store, {of_worker(4, 4), SecondDelivery{of_worker(5, 4)},
+                WorkerEnded{.session = wire::SessionId{2}, .reason = wire::LossReason::silent}});
+  EXPECT_EQ(text("SELECT group_concat(name || ' ' || num_results || ' ' || compute_s, ';')"
+                 " FROM worker"),
+            "worker-1 2 1.0;last 0 0.0;further workers 3 1.5");
+  EXPECT_EQ(text("SELECT group_concat(kind || ' ' || text) FROM event"),
+            "worker_table_full rows=100000 (further workers share one row)");
+  EXPECT_THAT(store.attached_sessions(), SizeIs(2));
+  store.check_integrity();
+}
+
+TEST_F(StoreDispatch, KeepsSoManyComparisonsAndSaysSo) {
+  constexpr std::int64_t num_rows = 10 + 1'000'000;
+  {
+    Store store = create(10);
+    write(store, {delivery_of(0), delivery_of(1), SecondDelivery{delivery_of(0)}});
+  }
+  Database(file(), Access::read_write)
+      .execute("WITH RECURSIVE n(i) AS (SELECT 2 UNION ALL SELECT i + 1 FROM n WHERE i < " +
+               std::to_string(num_rows) +
+               ") INSERT INTO audit SELECT 0, i, 1, stored_digest, second_digest, 0 FROM n, audit");
+  Store store = Store::open(file());
+  write(store, {delivery_of(2), SecondDelivery{delivery_of(1)}, SecondDelivery{delivery_of(2)},
+                SecondDelivery{delivery_of(0)}});
+  EXPECT_EQ(integer("SELECT count(*) FROM audit"), num_rows);
+  EXPECT_EQ(text("SELECT group_concat(kind || ' ' || text) FROM event"),
+            "audit_history_full rows=1000010 (further second results are compared and not kept)");
+  EXPECT_EQ(write(store, {SecondDelivery{wrong_delivery_of(1)}}).num_contradicting, 1u);
+  EXPECT_EQ(integer("SELECT count(*) FROM audit"), num_rows + 1) << "what differs is kept";
 }
 
 TEST_F(StoreDispatch, NamesEveryReason) {

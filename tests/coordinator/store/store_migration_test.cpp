@@ -1,6 +1,9 @@
 // Files that older programs made.
 
 #include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <cstdlib>
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/schema.hpp"
@@ -129,6 +132,81 @@ TEST_F(StoreMigration, FromVersion5HasNoOwnerAndNoDigestOfTables) {
   EXPECT_EQ(store.owner(), "");
   EXPECT_EQ(store.table_digest(), "");
   EXPECT_EQ(Database(file(), Access::read_only).integer("SELECT is_log_needed FROM campaign"), 0);
+}
+
+// It is a copy that is brought up to date.
+TEST_F(StoreMigration, OfAFileThatIsReadLeavesItAsItIs) {
+  make_file_of_version_3();
+  const std::string before = test::content_of(file());
+  {
+    Store store = Store::open_read_only(file());
+    EXPECT_TRUE(store.is_of_older_version());
+    EXPECT_EQ(store.name(), "old");
+    EXPECT_EQ(store.num_runs(), 5u);
+    EXPECT_EQ(test::results_in(store).size(), 3u);
+    EXPECT_THAT(store.finished_runs(),
+                ElementsAre(RunRange{RunIndex{0}, 2}, RunRange{RunIndex{4}, 1}));
+    EXPECT_EQ(store.control(), CampaignControl{});
+    store.check_integrity();
+    EXPECT_EQ(test::store_error_of([&] { store.record_event("note", ""); }),
+              "campaign file = " + file().string() + " (attempt to write a readonly database)");
+    EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+  }
+  EXPECT_TRUE(test::content_of(file()) == before);
+}
+
+TEST_F(StoreMigration, OfAFileThatIsReadIsPossibleFromEachVersion) {
+  for (std::size_t version = 1; version < detail::migrations().size(); ++version) {
+    std::filesystem::remove(file());
+    {
+      Database old(file(), Access::create);
+      for (std::size_t i = 0; i < version; ++i) old.execute(std::string(detail::migrations()[i]));
+      old.execute(
+          "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version)"
+          " VALUES (1, 'old', '42', 5, 'text', 'hardy2013-1')");
+    }
+    const Store store = Store::open_read_only(file());
+    EXPECT_TRUE(store.is_of_older_version()) << version;
+    EXPECT_EQ(store.num_runs(), 5u) << version;
+  }
+}
+
+/// While it lives, temporary files are made in another directory.
+class TemporaryFilesIn {
+ public:
+  explicit TemporaryFilesIn(const std::filesystem::path& directory) {
+    std::filesystem::create_directory(directory);
+    ::setenv("TMPDIR", directory.c_str(), 1);
+  }
+  ~TemporaryFilesIn() { ::unsetenv("TMPDIR"); }
+  TemporaryFilesIn(const TemporaryFilesIn&) = delete;
+  TemporaryFilesIn& operator=(const TemporaryFilesIn&) = delete;
+};
+
+// The file has no name, so that no end of the process leaves it behind.
+TEST_F(StoreMigration, OfAFileThatIsReadLeavesNoTemporaryFile) {
+  make_file_of_version_3();
+  Database(file(), Access::read_write)
+      .execute("UPDATE campaign SET definition = printf('%.*c', 8000000, 'x')");
+  const std::filesystem::path folder = directory() / "temporary";
+  const TemporaryFilesIn temporary(folder);
+  test::run_and_kill([&] {
+    const Store store = Store::open_read_only(file());
+    if (store.definition().size() != 8'000'000) ::_exit(1);
+    if (!std::filesystem::is_empty(folder)) ::_exit(1);
+  });
+  EXPECT_TRUE(std::filesystem::is_empty(folder));
+}
+
+TEST_F(StoreMigration, OfAFileThatIsReadNeedsRoomForACopy) {
+  make_file_of_version_3();
+  Database(file(), Access::read_write)
+      .execute("UPDATE campaign SET definition = printf('%.*c', 8000000, 'x')");
+  const test::FileSizeLimit limit(100'000);
+  EXPECT_EQ(test::store_error_of([&] { Store::open_read_only(file()); }),
+            "campaign file = " + file().string() +
+                " (is older than this program, which reads a copy of it; the copy cannot be made "
+                "in the temporary directory, which TMPDIR names: disk I/O error)");
 }
 
 // A time that is none: nothing of the step may remain.

@@ -148,5 +148,42 @@ TEST_F(StoreOpening, OfADamagedFileMakesNoBackup) {
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
 }
 
+// The log is that of a coordinator that was killed, and then an older copy took the file's place.
+TEST_F(StoreOpening, TellsThatALogBesideARestoredFileIsNotItsOwn) {
+  const std::filesystem::path backup = directory() / "backup.db";
+  Store::create(file(), campaign_of(4000), "").commit(deliveries_of(0, 1000));
+  Store::open_read_only(file()).back_up(backup);
+  Store::open(file()).commit(deliveries_of(1000, 2000));
+  test::run_and_kill([&] {
+    auto* const killed = new Store(Store::open(file()));  // Never closed.
+    killed->commit(deliveries_of(2000, 3000));
+  });
+  std::filesystem::copy_file(backup, file(), std::filesystem::copy_options::overwrite_existing);
+  const auto read = [&] {
+    const Store store = Store::open_read_only(file());
+    store.for_each_result([](const RunResult&) {});
+    (void)store.finished_runs();
+  };
+  const std::string remedy =
+      "; without its log campaign.db-wal it is in order: if the file was restored from a copy, the "
+      "log is that of the file before it, and removing the log suffices)";
+  EXPECT_THAT(store_error_of(read), HasSubstr(remedy));
+  EXPECT_THAT(store_error_of([&] { Store::open(file()); }), HasSubstr(remedy));
+  std::filesystem::remove(file().string() + "-wal");
+  std::filesystem::remove(file().string() + "-shm");
+  EXPECT_EQ(store_error_of(read), "");
+  EXPECT_EQ(test::results_in(Store::open(file())).size(), 1000u);
+}
+
+TEST_F(StoreOpening, OfAFileThatIsDamagedWithoutItsLogNamesNoSuchRemedy) {
+  create(2000);
+  damage("run_result", false);
+  test::change(file(), "PRAGMA journal_mode = WAL");
+  const Database keeps_the_log(file(), Access::read_only);
+  test::change(file(), "UPDATE campaign SET priority = 1");
+  const Store store = Store::open_read_only(file());
+  EXPECT_EQ(store_error_of([&] { store.for_each_result([](const RunResult&) {}); }), damaged());
+}
+
 }  // namespace
 }  // namespace proofmass::coordinator

@@ -79,14 +79,14 @@ TEST_F(StoreRefusal, OfANewerFile) {
   EXPECT_EQ(error_of_open_read_only(), expected);
 }
 
-TEST_F(StoreRefusal, ToReadAnOlderFile) {
+TEST_F(StoreRefusal, ToAnnotateAnOlderFile) {
   {
     Database old(file(), Access::create);
     for (std::size_t i = 0; i < 2; ++i) old.execute(std::string(detail::migrations()[i]));
     old.execute("INSERT INTO campaign VALUES (1, 'old', '42', 5, 'text', 'proofmass 0', '')");
   }
   EXPECT_EQ(
-      error_of_open_read_only(),
+      store_error_of([&] { Store::annotate(file(), {AddTag{"tag"}}); }),
       message("is older than this program: its user_version is 2, not 6; resuming the campaign "
               "brings it up to date"));
 }

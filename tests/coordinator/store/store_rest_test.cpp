@@ -111,6 +111,23 @@ TEST_F(StoreRest, OfAFileThatSomebodyReadsIsRefusedWithTheReason) {
   EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 64u);
 }
 
+// SQLite would remove a log of which all is in the file; the mark in the file says that it is
+// needed.
+TEST_F(StoreRest, AFileWhoseMarkCannotBeClearedKeepsItsLog) {
+  {
+    std::optional<Store> store = Store::create(file(), campaign_of(64), "");
+    store->commit(deliveries_of(0, 64));
+    test::change(file(), "PRAGMA wal_checkpoint(PASSIVE)");
+    const test::FileSizeLimit full(0);
+    EXPECT_THAT(test::store_error_of([&] { (void)store->rest(); }), HasSubstr("disk I/O error"));
+    store.reset();
+  }
+  EXPECT_EQ(results_in(Store::open_read_only(file())).size(), 64u);
+  { (void)Store::open(file()); }
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+  EXPECT_EQ(results_in(Store::open_read_only(file())).size(), 64u);
+}
+
 TEST_F(StoreRest, AFileClosedWhileSomebodyReadsIsFoldedInByWhoeverOpensItNext) {
   {
     Store store = Store::create(file(), campaign_of(64), "");

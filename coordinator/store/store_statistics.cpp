@@ -1,0 +1,105 @@
+// What a Store keeps of its results, and how that is held against what it should be.
+
+#include <array>
+
+#include "coordinator/store/detail/campaign_rows.hpp"
+#include "coordinator/store/detail/control_rows.hpp"
+#include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/parts.hpp"
+#include "coordinator/store/detail/statistic_rows.hpp"
+#include "coordinator/store/detail/table_differences.hpp"
+#include "coordinator/store/store.hpp"
+
+namespace proofmass::coordinator {
+
+using detail::ComparedTable;
+using detail::Database;
+
+namespace {
+
+void replace_all(Database& database, const CampaignStatistics& statistics, const Budget& before,
+                 const Budget& after_worst, const Budget& after_mean) {
+  const bool has_estimates = statistics.num_estimated > 0;
+  detail::replace_statistics(database, statistics);
+  detail::replace_budgets(database, {.before = before,
+                                     .after_worst = has_estimates ? &after_worst : nullptr,
+                                     .after_mean = has_estimates ? &after_mean : nullptr});
+}
+
+}  // namespace
+
+void Store::write_statistics(const CampaignStatistics& statistics, const Budget& before,
+                             const Budget& after_worst, const Budget& after_mean,
+                             std::string_view digest) {
+  parts_->change([&](Database& database) {
+    replace_all(database, statistics, before, after_worst, after_mean);
+    detail::replace_summary(database, statistics, digest);
+  });
+}
+
+std::optional<Summary> Store::summary() const { return detail::read_summary(parts_->database); }
+
+std::vector<std::string> Store::parameter_differences(const ParameterArray& objectives) const {
+  constexpr std::array tables{ComparedTable{.name = "parameter", .row_name = "name"}};
+  return detail::table_differences(
+      parts_->database,
+      [&](Database& expected) { detail::insert_parameters(expected, objectives); }, tables);
+}
+
+std::vector<std::string> Store::statistic_differences(const CampaignStatistics& statistics,
+                                                      const Budget& before,
+                                                      const Budget& after_worst,
+                                                      const Budget& after_mean) const {
+  constexpr std::array tables{ComparedTable{.name = "statistic", .row_name = "parameter"},
+                              ComparedTable{.name = "budget_entry", .row_name = "name"}};
+  return detail::table_differences(
+      parts_->database,
+      [&](Database& expected) {
+        replace_all(expected, statistics, before, after_worst, after_mean);
+      },
+      tables);
+}
+
+std::vector<std::string> Store::budget_differences(const Budget& before) const {
+  constexpr std::array tables{ComparedTable{
+      .name = "budget_entry",
+      .row_name = "name",
+      .columns = "position, label, before, paper_before, paper_after_worst, paper_after_mean"}};
+  return detail::table_differences(
+      parts_->database,
+      [&](Database& expected) {
+        detail::replace_budgets(expected,
+                                {.before = before, .after_worst = nullptr, .after_mean = nullptr});
+      },
+      tables);
+}
+
+std::vector<std::string> Store::stop_check_differences(
+    std::span<const StopCheckRow> expected) const {
+  constexpr std::array tables{
+      ComparedTable{.name = "stop_check",
+                    .row_name = "statistic || ' after ' || num_runs || ' runs'",
+                    .columns = "estimate, lower, upper, relative_half_width, is_reached"}};
+  return detail::table_differences(
+      parts_->database,
+      [&](Database& database) {
+        for (const StopCheckRow& row : expected) {
+          detail::replace_stop_check(database, row.num_runs, row.statistic, row.check);
+        }
+      },
+      tables, detail::FurtherRows::ignore);
+}
+
+bool Store::has_statistics() const {
+  return parts_->database.integer(
+             "SELECT EXISTS (SELECT 1 FROM statistic WHERE percentile_50 IS NOT NULL)") != 0;
+}
+
+bool Store::has_older_statistics() const {
+  return parts_->database.integer(
+             "SELECT EXISTS (SELECT 1 FROM statistic)"
+             " AND NOT EXISTS (SELECT 1 FROM statistic WHERE percentile_50 IS NOT NULL)"
+             " AND NOT EXISTS (SELECT 1 FROM summary)") != 0;
+}
+
+}  // namespace proofmass::coordinator
