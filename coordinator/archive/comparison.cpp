@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <utility>
 
-#include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/report/digest.hpp"
+#include "coordinator/report/digest_check.hpp"
 #include "core/campaign/run_ranges.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/value_passes.hpp"
@@ -43,35 +45,57 @@ bool have_same_draw(const RunResult& first, const RunResult& second) {
 }
 
 /// Finds out whether runs can be paired, and counts those without an estimate.
-void survey(const ComparedCampaign& first, const ComparedCampaign& second,
-            CampaignComparison& comparison) {
-  comparison.missing_in_first = {.num_given_up = first.num_given_up};
-  comparison.missing_in_second = {.num_given_up = second.num_given_up};
-  std::string& why = comparison.why_unpaired;
-  if (first.campaign.seed != second.campaign.seed) why = "the seeds differ";
-  bool has_common_run = false;
-  walk_both(first, second, [&](const RunResult* a, const RunResult* b) {
-    if (a != nullptr) comparison.missing_in_first.add(*a);
-    if (b != nullptr) comparison.missing_in_second.add(*b);
-    if (a == nullptr || b == nullptr) return;
-    has_common_run = true;
-    if (why.empty() && !have_same_draw(*a, *b)) {
-      why = fmt::format("the draws of run {} differ", a->run.value);
+class Survey {
+ public:
+  Survey(const ComparedCampaign& first, const ComparedCampaign& second,
+         CampaignComparison& comparison)
+      : comparison_(comparison) {
+    comparison.missing_in_first = {.num_given_up = first.num_given_up};
+    comparison.missing_in_second = {.num_given_up = second.num_given_up};
+    if (first.campaign.seed != second.campaign.seed) comparison.why_unpaired = "the seeds differ";
+  }
+
+  /// @return Whether runs may be paired, as far as is known.
+  bool add(const RunResult* a, const RunResult* b) {
+    std::string& why = comparison_.why_unpaired;
+    if (a != nullptr) comparison_.missing_in_first.add(*a);
+    if (b != nullptr) comparison_.missing_in_second.add(*b);
+    if (a != nullptr && b != nullptr) {
+      has_common_run_ = true;
+      if (why.empty() && !have_same_draw(*a, *b)) {
+        why = fmt::format("the draws of run {} differ", a->run.value);
+      }
     }
-  });
-  if (why.empty() && !has_common_run) why = "no run is finished in both";
+    return why.empty();
+  }
+
+  void end() {
+    if (comparison_.is_paired() && !has_common_run_) {
+      comparison_.why_unpaired = "no run is finished in both";
+    }
+  }
+
+ private:
+  CampaignComparison& comparison_;
+  bool has_common_run_ = false;
+};
+
+/// Calls visit(first, second) for runs that are compared: a pair, or, if runs are not paired, one
+/// of either campaign.
+template <typename Visit>
+void visit_compared(const RunResult* a, const RunResult* b, bool is_paired, const Visit& visit) {
+  const RunResult* const of_first = a != nullptr && a->has_estimate() ? a : nullptr;
+  const RunResult* const of_second = b != nullptr && b->has_estimate() ? b : nullptr;
+  if (is_paired && (of_first == nullptr || of_second == nullptr)) return;
+  visit(of_first, of_second);
 }
 
-/// Calls visit(first, second) for the runs that are compared: pairs, or, if runs are not paired,
-/// one of either campaign at a time.
+/// The same of all runs.
 template <typename Visit>
 void walk_compared(const ComparedCampaign& first, const ComparedCampaign& second, bool is_paired,
                    const Visit& visit) {
   walk_both(first, second, [&](const RunResult* a, const RunResult* b) {
-    const RunResult* const of_first = a != nullptr && a->has_estimate() ? a : nullptr;
-    const RunResult* const of_second = b != nullptr && b->has_estimate() ? b : nullptr;
-    if (is_paired && (of_first == nullptr || of_second == nullptr)) return;
-    visit(of_first, of_second);
+    visit_compared(a, b, is_paired, visit);
   });
 }
 
@@ -100,22 +124,38 @@ bool end_pass(Magnitudes& magnitudes) {
 struct BothMagnitudes {
   Magnitudes first = make_magnitudes();
   Magnitudes second = make_magnitudes();
+
+  void add(const RunResult* a, const RunResult* b) {
+    add_to(first, a);
+    add_to(second, b);
+  }
+  /// @return True if another pass is needed.
+  [[nodiscard]] bool end() {
+    const bool first_needs = end_pass(first);
+    const bool second_needs = end_pass(second);
+    return first_needs || second_needs;
+  }
 };
 
-BothMagnitudes read_magnitudes(const ComparedCampaign& first, const ComparedCampaign& second,
-                               bool is_paired) {
-  BothMagnitudes both;
-  bool is_another_needed = true;
-  while (is_another_needed) {
-    walk_compared(first, second, is_paired, [&](const RunResult* a, const RunResult* b) {
-      add_to(both.first, a);
-      add_to(both.second, b);
+/// Each pass reads both files, which takes most of the time, so that the first one has all that can
+/// be known at once: it takes runs for paired until they prove not to be.
+/// @return Whether the magnitudes need another pass.
+bool read_first_pass(const ComparedCampaign& first, const ComparedCampaign& second,
+                     CampaignComparison& comparison, BothMagnitudes& magnitudes) {
+  Survey survey(first, second, comparison);
+  const bool was_paired = comparison.is_paired();
+  walk_both(first, second, [&](const RunResult* a, const RunResult* b) {
+    if (survey.add(a, b) != was_paired) return;
+    visit_compared(a, b, was_paired, [&](const RunResult* of_first, const RunResult* of_second) {
+      magnitudes.add(of_first, of_second);
     });
-    const bool first_needs = end_pass(both.first);
-    const bool second_needs = end_pass(both.second);
-    is_another_needed = first_needs || second_needs;
-  }
-  return both;
+  });
+  survey.end();
+  if (comparison.is_paired() == was_paired) return magnitudes.end();
+  magnitudes = {};
+  walk_compared(first, second, false,
+                [&](const RunResult* a, const RunResult* b) { magnitudes.add(a, b); });
+  return magnitudes.end();
 }
 
 ComparedAccuracy accuracy_of(const ValuePasses& magnitudes) {
@@ -124,27 +164,50 @@ ComparedAccuracy accuracy_of(const ValuePasses& magnitudes) {
           .standard_deviation = magnitudes.moments().standard_deviation};
 }
 
-void compare_pairs(const ComparedCampaign& first, const ComparedCampaign& second,
-                   CampaignComparison& comparison) {
-  const std::size_t size = comparison.num_first * sizeof(double);
-  const std::size_t num_at_a_time = std::clamp(kept_size / size, std::size_t{1}, num_parameters);
-  for (std::size_t begin = 0; begin < num_parameters; begin += num_at_a_time) {
-    const std::size_t end = std::min(begin + num_at_a_time, num_parameters);
-    std::vector<std::vector<double>> differences(end - begin);
-    for (std::vector<double>& column : differences) column.reserve(comparison.num_first);
-    walk_compared(first, second, true, [&](const RunResult* a, const RunResult* b) {
-      for (std::size_t i = begin; i < end; ++i) {
-        differences[i - begin].push_back(magnitude(*b, i) - magnitude(*a, i));
-      }
-    });
-    for (std::size_t i = begin; i < end; ++i) {
+/// The differences of some parameters of all pairs.
+class Differences {
+ public:
+  Differences(std::size_t begin, std::size_t end, std::size_t num_pairs)
+      : begin_(begin), columns_(end - begin) {
+    for (std::vector<double>& column : columns_) column.reserve(num_pairs);
+  }
+
+  void add(const RunResult& first, const RunResult& second) {
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      columns_[i].push_back(magnitude(second, begin_ + i) - magnitude(first, begin_ + i));
+    }
+  }
+
+  void compare(CampaignComparison& comparison) {
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
       const PairedComparison paired =
-          compare_differences(std::move(differences[i - begin]), default_confidence);
-      ParameterComparison& parameter = comparison.parameters[i];
+          compare_differences(std::move(columns_[i]), default_confidence);
+      ParameterComparison& parameter = comparison.parameters[begin_ + i];
       parameter.mean_change = paired.mean_difference;
       parameter.interval = paired.interval;
       parameter.p_value = paired.rank_p_value;
     }
+  }
+
+ private:
+  std::size_t begin_;
+  std::vector<std::vector<double>> columns_;
+};
+
+/// @param need_pass  The magnitudes need a pass, which is one of those made here.
+void compare_pairs(const ComparedCampaign& first, const ComparedCampaign& second,
+                   BothMagnitudes& magnitudes, bool need_pass, CampaignComparison& comparison) {
+  const std::size_t size = comparison.num_first * sizeof(double);
+  const std::size_t num_at_a_time = std::clamp(kept_size / size, std::size_t{1}, num_parameters);
+  for (std::size_t begin = 0; begin < num_parameters; begin += num_at_a_time) {
+    const std::size_t end = std::min(begin + num_at_a_time, num_parameters);
+    Differences differences(begin, end, comparison.num_first);
+    walk_compared(first, second, true, [&](const RunResult* a, const RunResult* b) {
+      if (need_pass) magnitudes.add(a, b);
+      differences.add(*a, *b);
+    });
+    if (need_pass) need_pass = magnitudes.end();
+    differences.compare(comparison);
   }
 }
 
@@ -165,14 +228,18 @@ void compare_few(const ComparedCampaign& first, const ComparedCampaign& second, 
   keep(compare_unpaired(of_first, of_second, default_confidence), parameter);
 }
 
-void compare_parameters(const ComparedCampaign& first, const ComparedCampaign& second,
-                        const BothMagnitudes& magnitudes, CampaignComparison& comparison) {
+void compare_unpaired_runs(const ComparedCampaign& first, const ComparedCampaign& second,
+                           BothMagnitudes& magnitudes, bool need_pass,
+                           CampaignComparison& comparison) {
+  while (need_pass) {
+    walk_compared(first, second, false,
+                  [&](const RunResult* a, const RunResult* b) { magnitudes.add(a, b); });
+    need_pass = magnitudes.end();
+  }
+  const bool are_few = std::min(comparison.num_first, comparison.num_second) < num_welch_min;
   for (std::size_t i = 0; i < num_parameters; ++i) {
     ParameterComparison& parameter = comparison.parameters[i];
-    parameter.first = accuracy_of(magnitudes.first[i]);
-    parameter.second = accuracy_of(magnitudes.second[i]);
-    if (comparison.is_paired()) continue;
-    if (std::min(comparison.num_first, comparison.num_second) < num_welch_min) {
+    if (are_few) {
       compare_few(first, second, i, parameter);
     } else {
       keep(compare_means(magnitudes.first[i].moments(), magnitudes.second[i].moments(),
@@ -180,7 +247,6 @@ void compare_parameters(const ComparedCampaign& first, const ComparedCampaign& s
            parameter);
     }
   }
-  if (comparison.is_paired()) compare_pairs(first, second, comparison);
 }
 
 void adjust_p_values(std::array<ParameterComparison, num_parameters>& parameters) {
@@ -201,6 +267,36 @@ std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
   return differences;
 }
 
+/// Results that are held against the stored digest once all of them were read.
+class CheckedReader {
+ public:
+  CheckedReader(const Store& store, const IsStopped& is_stopped)
+      : store_(store), is_stopped_(is_stopped), reader_(store.results()) {}
+
+  [[nodiscard]] std::optional<RunResult> next() {
+    if (is_stopped_()) throw Interrupted();
+    if (has_ended_) return std::nullopt;
+    const std::optional<RunResult> result = reader_.next();
+    if (result) {
+      require_in_range(*result);
+      digest_.add(*result);
+      ++num_results_;
+    } else {
+      has_ended_ = true;
+      (void)check_digest(store_, num_results_, digest_.finish());
+    }
+    return result;
+  }
+
+ private:
+  const Store& store_;
+  IsStopped is_stopped_;
+  ResultReader reader_;
+  Digest digest_;
+  std::uint64_t num_results_ = 0;
+  bool has_ended_ = false;
+};
+
 std::string why_too_few(const CampaignComparison& comparison) {
   const std::size_t num_needed = comparison.is_paired() ? 1 : 2;
   if (std::min(comparison.num_first, comparison.num_second) >= num_needed) return "";
@@ -211,14 +307,18 @@ std::string why_too_few(const CampaignComparison& comparison) {
 }  // namespace
 
 ComparedCampaign read_compared(const Store& store, const IsStopped& is_stopped) {
+  if (is_stopped()) throw Interrupted();
   ComparedCampaign compared{.campaign = stored_campaign(store),
                             .model_version = store.model_version(),
                             .build = store.build(),
                             .num_given_up = num_runs_in(store.given_up_runs()),
                             .open_results = {}};
-  (void)walk_results(store, is_stopped, [](const RunResult& result) { require_in_range(result); });
-  compared.open_results = [&store, is_stopped]() -> ResultStream {
+  compared.open_results = [&store, is_stopped, is_first = true]() mutable -> ResultStream {
     // A stream is copied, and its reader cannot be: all copies go on with the same one.
+    if (std::exchange(is_first, false)) {
+      const auto reader = std::make_shared<CheckedReader>(store, is_stopped);
+      return [reader] { return reader->next(); };
+    }
     const auto reader = std::make_shared<ResultReader>(store.results());
     return [reader, is_stopped]() -> std::optional<RunResult> {
       if (is_stopped()) throw Interrupted();
@@ -232,13 +332,18 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                      const ComparedCampaign& second) {
   CampaignComparison comparison;
   comparison.differences = all_differences(first, second);
-  survey(first, second, comparison);
-  const BothMagnitudes magnitudes = read_magnitudes(first, second, comparison.is_paired());
+  BothMagnitudes magnitudes;
+  const bool need_pass = read_first_pass(first, second, comparison, magnitudes);
   comparison.num_first = magnitudes.first.front().count();
   comparison.num_second = magnitudes.second.front().count();
   comparison.why_not_compared = why_too_few(comparison);
   if (!comparison.why_not_compared.empty()) return comparison;
-  compare_parameters(first, second, magnitudes, comparison);
+  const auto compare = comparison.is_paired() ? compare_pairs : compare_unpaired_runs;
+  compare(first, second, magnitudes, need_pass, comparison);
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    comparison.parameters[i].first = accuracy_of(magnitudes.first[i]);
+    comparison.parameters[i].second = accuracy_of(magnitudes.second[i]);
+  }
   adjust_p_values(comparison.parameters);
   return comparison;
 }

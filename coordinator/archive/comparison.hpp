@@ -33,11 +33,13 @@ struct ComparedCampaign {
   std::function<ResultStream()> open_results;
 };
 
-/// Holds the results against the stored digest and names the campaign of the file. The Store
-/// outlives what is returned, and one state of the file is read meanwhile
-/// (Store::read_one_state()).
-/// @throws StoreError or CampaignFileError if the file cannot be read or holds other results than
-///         were stored, see check_digest(); Interrupted; so do the streams.
+/// Names the campaign of the file. The first stream of results that is opened holds them against
+/// the stored digest at its end, so that no further pass is needed for that; compare_campaigns()
+/// reads it to its end before anything else. The Store outlives what is returned, and one state of
+/// the file is read meanwhile (Store::read_one_state()).
+/// @throws StoreError or CampaignFileError if the file cannot be read; Interrupted. So do the
+///         streams, and StoreError if the file holds other results than were stored, see
+///         check_digest().
 [[nodiscard]] ComparedCampaign read_compared(const Store& store, const IsStopped& is_stopped);
 
 /// |estimate − truth| of one parameter over the runs of one side that are compared, SI.

@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "coordinator/store/store.hpp"
 #include "tests/skip_for_want.hpp"
 #include "tests/system/fault_fixture.hpp"
 #include "tests/system/network_namespace.hpp"
@@ -124,6 +125,63 @@ TEST_F(CampaignFiles, ThatAreDamagedAreNotReplaced) {
                "proofmass-coordinator: error: campaign file = served/null.db (is damaged: "))
       << errors_of("second");
   EXPECT_EQ(fs::file_size(file_of("null")), 5000U);
+}
+
+/// The database of a live coordinator is taken from under it, by hand or by a restoring program.
+class CampaignFileThatLosesItsName : public FaultTest {
+ protected:
+  void SetUp() override {
+    FaultTest::SetUp();
+    write_null_campaign(2000);
+  }
+
+  /// The campaign ends as if nothing had happened: the same digest, one row a run.
+  void expect_undisturbed_end(Process& coordinator) const {
+    EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+    EXPECT_EQ(num_done("null"), num_null_runs);
+    EXPECT_EQ(stored_text(file_of("null"), "SELECT count(*) FROM delivery"),
+              std::to_string(num_null_runs));
+    EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+    proofmass::coordinator::Store::open_read_only(file_of("null")).check_integrity();
+  }
+};
+
+TEST_F(CampaignFileThatLosesItsName, ByBeingRemovedEndsWithEveryResult) {
+  Process coordinator = this->coordinator("coordinator", {"null.toml", "--exit-when-done"});
+  const Process one = null_worker("one"), other = null_worker("other");
+  wait_for_done("null", 200);
+  fs::remove(file_of("null"));
+  wait_for_log("coordinator", "campaign_file_restored");
+  expect_undisturbed_end(coordinator);
+}
+
+TEST_F(CampaignFileThatLosesItsName, ToAnOlderCopyEndsWithEveryResult) {
+  Process coordinator = this->coordinator("coordinator", {"null.toml", "--exit-when-done"});
+  const Process one = null_worker("one"), other = null_worker("other");
+  wait_for_done("null", 200);
+  Process backup(directory / "", "backup", programs + "/proofmass",
+                 {"backup", file_of("null").string(), path("backup.db").string()});
+  ASSERT_EQ(backup.wait(), 0) << errors_of("backup");
+  wait_for_done("null", 400);
+  fs::rename(path("backup.db"), file_of("null"));
+  wait_for_log("coordinator", "campaign_file_replaced");
+  expect_undisturbed_end(coordinator);
+}
+
+// A copy of the file alone has every run, or is refused as it lacks its log.
+TEST_F(CampaignFileThatLosesItsName, IsNoneThatIsCopiedAloneFromALiveCoordinator) {
+  const Process coordinator = this->coordinator("coordinator", {"null.toml"});
+  const Process worker = null_worker("worker", {"--run-time", "0"});
+  wait_for_log("coordinator", "campaign_summarised");
+  fs::copy_file(file_of("null"), path("alone.db"));
+  Process report(directory / "", "report", programs + "/proofmass", {"report", "alone.db"});
+  if (report.wait() == 0) {
+    EXPECT_TRUE(contains(read_file(path("report.out")), "2000 finished of 2000"))
+        << read_file(path("report.out"));
+  } else {
+    EXPECT_TRUE(contains(errors_of("report"), "alone.db (lacks its log alone.db-wal"))
+        << errors_of("report");
+  }
 }
 
 /// `served` is a directory of another machine, as far as the kernel knows.

@@ -206,7 +206,40 @@ TEST(Comparison, NamesOtherModelsAndBuilds) {
   EXPECT_EQ(differences[2].field, "build");
 }
 
+// Reading takes most of the time of a comparison.
+TEST(Comparison, ReadsEachCampaignTwice) {
+  for (const bool is_paired : {true, false}) {
+    const Side first = side(100);
+    Side second = side(100);
+    if (!is_paired) ++second.campaign.seed;
+    ComparedCampaign counted = compared(second);
+    int num_readings = 0;
+    counted.open_results = [open = counted.open_results, &num_readings] {
+      ++num_readings;
+      return open();
+    };
+    EXPECT_EQ(compare_campaigns(compared(first), counted).is_paired(), is_paired);
+    EXPECT_EQ(num_readings, is_paired ? 2 : 1);
+  }
+}
+
 using ComparedFile = test::StoreTest;
+
+// Results that were changed are refused before anything is made of them.
+TEST_F(ComparedFile, IsHeldAgainstItsDigestWhenItIsReadFirst) {
+  const Campaign campaign = test::campaign_of(5);
+  {
+    Store store = test::store_of(file(), campaign, test::results_of_each_status(5));
+    update_statistics(store, campaign.scenario);
+  }
+  test::change(file(), "UPDATE run_result SET num_rounds = num_rounds + 1 WHERE run_index = 0");
+  const Store store = Store::open_read_only(file());
+  const auto compare = [&] {
+    (void)compare_campaigns(read_compared(store, test::never_stopped),
+                            read_compared(store, test::never_stopped));
+  };
+  EXPECT_THAT(test::error_of(compare), HasSubstr("the digest of its 5 results is "));
+}
 
 TEST_F(ComparedFile, IsReadWithAllThatCounts) {
   const auto results = test::results_of_each_status(5);
