@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/campaign_file/nearest_name.hpp"
@@ -60,16 +61,18 @@ int print_sensitivity(const SensitivityOptions& options) {
   std::vector<Parameter> parameters;
   if (options.parameter) parameters.push_back(parameter_named(*options.parameter));
   const Store store = Store::open_read_only(options.database);
-  const DrawnRuns drawn = read_drawn_runs(store, stored_campaign(store), sensitivity_runs_max);
+  std::optional<RunIndex> explained;
+  if (options.run) explained = RunIndex{*options.run};
+  const DrawnRuns drawn =
+      read_drawn_runs(store, stored_campaign(store), sensitivity_runs_max, explained);
   if (drawn.runs.size() < sensitivity_values_min) {
     throw Error(fmt::format("runs with an estimate = {} (sensitivities need {} at least)",
                             drawn.runs.size(), sensitivity_values_min));
   }
-  if (options.run) {
-    const RunIndex run{*options.run};
+  if (explained) {
     const Parameter parameter =
-        parameters.empty() ? worst_parameter_of(drawn, run) : parameters.front();
-    print_lines(explanation_text(drawn, parameter, run, options.num_rows));
+        parameters.empty() ? worst_parameter_of(drawn, *explained) : parameters.front();
+    print_lines(explanation_text(drawn, parameter, *explained, options.num_rows));
     return exit_done;
   }
   if (parameters.empty()) {

@@ -30,18 +30,22 @@ void append(const RunResult& result, const DrawnValues& values, DrawnRuns& drawn
 
 }  // namespace
 
-DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign,
-                          std::uint64_t num_runs_max) {
+DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uint64_t num_runs_max,
+                          std::optional<RunIndex> also) {
   DrawnRuns drawn;
   drawn.names = column_names();
   drawn.columns.resize(drawn.names.size());
   drawn.missing.num_given_up = num_runs_in(store.given_up_runs());
   (void)walk_checked(store, [&](const RunResult& result) {
-    if (drawn.runs.size() == num_runs_max) return;
+    const bool is_first = drawn.num_first < num_runs_max;
     if (!result.has_estimate()) {
-      drawn.missing.add(result);
+      if (is_first) drawn.missing.add(result);
       return;
     }
+    ++drawn.num_with_estimate;
+    drawn.last_with_estimate = result.run;
+    if (!is_first && result.run != also) return;
+    if (is_first) ++drawn.num_first;
     require_in_range(result);
     const DrawnValues values = draw_values(campaign.dispersions, campaign.seed, result.run,
                                            result.num_draws - 1, campaign.table_values(result.run));

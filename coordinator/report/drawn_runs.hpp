@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,8 +16,11 @@ namespace proofmass::coordinator {
 /// What was drawn for runs that have an estimate, and how far their estimates are off. Draws are
 /// made again from the definition; no file holds them.
 struct DrawnRuns {
-  std::vector<RunIndex> runs;  ///< Ascending; n of them.
-  MissingEstimates missing;    ///< Runs among these that are left out; all that are given up.
+  std::uint64_t num_with_estimate = 0;         ///< In the whole campaign file.
+  std::optional<RunIndex> last_with_estimate;  ///< Empty if there is none.
+  std::uint64_t num_first = 0;                 ///< Runs that are here as the first ones.
+  std::vector<RunIndex> runs;                  ///< Ascending; n of them.
+  MissingEstimates missing;  ///< Runs among these that are left out; all that are given up.
   /// Drawn quantities as in drawn_names(), then the true parameters that follow from them, as in
   /// `truth_k2d_s2_m`. Units are in the names.
   std::vector<std::string> names;
@@ -27,8 +31,10 @@ struct DrawnRuns {
 
 /// The first runs of a campaign file that have an estimate, `num_runs_max` of them at most.
 /// @param campaign  The definition in the file.
+/// @param also      A run that is kept in any case if it has an estimate.
 /// @throws StoreError as walk_checked() does.
 [[nodiscard]] DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign,
-                                        std::uint64_t num_runs_max);
+                                        std::uint64_t num_runs_max,
+                                        std::optional<RunIndex> also = std::nullopt);
 
 }  // namespace proofmass::coordinator

@@ -10,15 +10,22 @@
 #include "coordinator/report/text_cells.hpp"
 #include "core/error.hpp"
 #include "core/statistics/sensitivity.hpp"
+#include "core/statistics/term_search.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-constexpr std::size_t name_width = 40;
-constexpr std::size_t share_width = 16;
-constexpr std::size_t rank_width = 24;
-constexpr std::size_t value_width = 14;
-constexpr std::size_t percentile_width = 12;
+constexpr std::size_t name_width = 39;
+constexpr std::size_t share_width = 21;
+constexpr std::size_t rank_width = 9;
+constexpr std::size_t p_width = 11;
+constexpr std::size_t value_width = 9;
+constexpr std::size_t percentile_width = 11;
+constexpr std::size_t terms_width = 44;
+constexpr std::size_t slope_width = 12;
+constexpr std::size_t term_share_width = 13;
+constexpr std::size_t num_terms_max = 3;
+constexpr double p_value_min = 1e-9;  // Below it the approximations of the tests do not hold.
 
 std::vector<double> magnitudes_of(const std::vector<double>& errors) {
   std::vector<double> magnitudes(errors.size());
@@ -26,48 +33,93 @@ std::vector<double> magnitudes_of(const std::vector<double>& errors) {
   return magnitudes;
 }
 
-/// Of error and |error|, largest first-order index first.
+std::vector<Column> inputs_of(const DrawnRuns& drawn) {
+  return {drawn.columns.begin(), drawn.columns.end()};
+}
+
+/// Of error and |error|, the most significant first.
 std::vector<std::vector<Sensitivity>> sensitivities_of(const DrawnRuns& drawn,
                                                        Parameter parameter) {
   const std::vector<double>& errors = drawn.errors[index(parameter)];
   const std::vector<double> magnitudes = magnitudes_of(errors);
-  const std::vector<Column> inputs(drawn.columns.begin(), drawn.columns.end());
+  const std::vector<Column> inputs = inputs_of(drawn);
   const std::vector<Column> outputs{errors, magnitudes};
   return sensitivities(inputs, outputs, default_confidence);
 }
 
 std::string share_of(const FirstOrderIndex& index) {
-  return fmt::format("{:.1f} ± {:.1f} %", 100.0 * index.index, 100.0 * index.standard_error);
+  return fmt::format("{:.1f} ({:.1f}, {:.1f})", 100.0 * index.index, 100.0 * index.interval.lower,
+                     100.0 * index.interval.upper);
+}
+
+std::string p_value_cell(double p_value) {
+  return p_value < p_value_min ? fmt::format("<{:.0e}", p_value_min) : measured_figure(p_value);
 }
 
 std::string sensitivity_rows(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
                              std::string_view output) {
   std::string text = left_aligned(fmt::format("drives {}", output), name_width) +
-                     right_aligned("of variance", share_width) +
-                     right_aligned("rank correlation (95 %)", rank_width) + "\n" +
-                     horizontal_rule(name_width + share_width + rank_width) + "\n";
+                     right_aligned("% of variance (95 %)", share_width) +
+                     right_aligned("rank", rank_width) + right_aligned("p", p_width) + "\n" +
+                     horizontal_rule(name_width + share_width + rank_width + p_width) + "\n";
   for (const Sensitivity& row : rows) {
-    const auto& [coefficient, interval] = row.rank;
     text += left_aligned(drawn.names[row.input], name_width) +
             right_aligned(share_of(row.first_order), share_width) +
-            right_aligned(fmt::format("{:+.2f} ({:+.2f}, {:+.2f})", coefficient, interval.lower,
-                                      interval.upper),
-                          rank_width) +
-            "\n";
+            right_aligned(fmt::format("{:+.2f}", row.rank.coefficient), rank_width) +
+            right_aligned(p_value_cell(row.adjusted_p_value), p_width) + "\n";
   }
   return text;
 }
 
-std::string noise_line(const std::vector<Sensitivity>& rows) {
+std::string key_of(const std::vector<Sensitivity>& rows) {
   if (rows.empty()) return "";
   return fmt::format(
-      "±: standard error; without influence above {:.1f} % with 1 of 20, by chance\n",
-      100.0 * rows.front().first_order.noise_level);
+      "% of variance: with its 95 % interval; rank: rank correlation; p: that chance\n"
+      "alone makes one of {} quantities look so influential (Kruskal-Wallis, Holm)\n",
+      rows.size());
+}
+
+std::string name_of(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
+  const std::string& first = drawn.names[term.first];
+  if (!term.second) return first;
+  return term.second == term.first ? fmt::format("({})²", first)
+                                   : fmt::format("{} × {}", first, drawn.names[*term.second]);
+}
+
+std::string term_row(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
+  const std::string name = name_of(drawn, term);
+  const bool fits = text_width(name) < terms_width;
+  return (fits ? left_aligned(name, terms_width) : name + "\n" + left_aligned("", terms_width)) +
+         right_aligned(fmt::format("{:.3g}", term.slope), slope_width) +
+         right_aligned(fmt::format("{:.1f} %", 100.0 * term.share), term_share_width) +
+         right_aligned(p_value_cell(term.p_value), p_width) + "\n";
+}
+
+/// The sum of quantities and products of two that explains the error.
+std::string term_table(const DrawnRuns& drawn, Parameter parameter) {
+  const std::vector<ExplanatoryTerm> terms = explanatory_terms(
+      inputs_of(drawn), drawn.errors[index(parameter)], num_terms_max, default_confidence);
+  if (terms.empty()) return "No quantity and no product of two explains the error.\n";
+  std::string text =
+      left_aligned("error as a sum of", terms_width) + right_aligned("slope", slope_width) +
+      right_aligned("of variance", term_share_width) + right_aligned("p", p_width) + "\n" +
+      horizontal_rule(terms_width + slope_width + term_share_width + p_width) + "\n";
+  for (const ExplanatoryTerm& term : terms) text += term_row(drawn, term);
+  return text +
+         "slope: in SI units; of variance: R², beyond that of the terms above; p: that\n"
+         "chance alone makes one of all quantities and products of two look so\n";
 }
 
 std::string left_out(const DrawnRuns& drawn) {
   const std::string reasons = reasons_text(drawn.missing);
   return reasons.empty() ? "" : fmt::format("Left out, without an estimate: {}\n", reasons);
+}
+
+std::string limit_line(const DrawnRuns& drawn) {
+  if (drawn.runs.size() == drawn.num_with_estimate) return "";
+  return fmt::format("Computed from {} of {} runs with an estimate: the first {}{}\n",
+                     drawn.runs.size(), drawn.num_with_estimate, drawn.num_first,
+                     drawn.runs.size() > drawn.num_first ? " and this one" : "");
 }
 
 std::span<const Sensitivity> first_of(const std::vector<Sensitivity>& rows, std::size_t num_rows) {
@@ -77,9 +129,10 @@ std::span<const Sensitivity> first_of(const std::vector<Sensitivity>& rows, std:
 std::size_t position_of(const DrawnRuns& drawn, RunIndex run) {
   const auto found = std::ranges::lower_bound(drawn.runs, run);
   if (found == drawn.runs.end() || *found != run) {
-    const std::string last = drawn.runs.empty() ? "none" : fmt::to_string(drawn.runs.back().value);
+    const std::string last =
+        drawn.last_with_estimate ? fmt::to_string(drawn.last_with_estimate->value) : "none";
     throw InvalidArgument(fmt::format("run = {} (must have an estimate, as {} runs up to {} have)",
-                                      run.value, drawn.runs.size(), last));
+                                      run.value, drawn.num_with_estimate, last));
   }
   return static_cast<std::size_t>(found - drawn.runs.begin());
 }
@@ -100,15 +153,15 @@ std::string explanation_rows(const DrawnRuns& drawn, std::span<const Sensitivity
                              std::size_t position, std::string_view output) {
   std::string text =
       left_aligned(fmt::format("drives {}", output), name_width) +
-      right_aligned("of variance", share_width) + right_aligned("its value", value_width - 2) +
+      right_aligned("% of variance (95 %)", share_width) + right_aligned("value", value_width) +
       right_aligned("percentile", percentile_width) + "\n" +
-      horizontal_rule(name_width + share_width + value_width + percentile_width - 2) + "\n";
+      horizontal_rule(name_width + share_width + value_width + percentile_width) + "\n";
   for (const Sensitivity& row : rows) {
     const std::vector<double>& values = drawn.columns[row.input];
     const double value = values[position];
     text += left_aligned(drawn.names[row.input], name_width) +
             right_aligned(share_of(row.first_order), share_width) +
-            right_aligned(fmt::format("{:.3g}", value), value_width - 2) +
+            right_aligned(fmt::format("{:.3g}", value), value_width) +
             right_aligned(fmt::format("{:.1f}", percentile_of(values, value)), percentile_width) +
             "\n";
   }
@@ -119,10 +172,11 @@ std::string explanation_rows(const DrawnRuns& drawn, std::span<const Sensitivity
 
 std::string sensitivity_text(const DrawnRuns& drawn, Parameter parameter, std::size_t num_rows) {
   const auto both = sensitivities_of(drawn, parameter);
-  return fmt::format(
-      "{}: {} runs\n{}\n{}\n{}{}", parameter_infos()[index(parameter)].label, drawn.runs.size(),
-      left_out(drawn), sensitivity_rows(drawn, first_of(both[1], num_rows), "|error|"),
-      sensitivity_rows(drawn, first_of(both[0], num_rows), "error"), noise_line(both[1]));
+  return fmt::format("{}: {} runs\n{}{}\n{}\n{}{}\n{}", parameter_infos()[index(parameter)].label,
+                     drawn.runs.size(), limit_line(drawn), left_out(drawn),
+                     sensitivity_rows(drawn, first_of(both[1], num_rows), "|error|"),
+                     sensitivity_rows(drawn, first_of(both[0], num_rows), "error"), key_of(both[1]),
+                     term_table(drawn, parameter));
 }
 
 std::string explanation_text(const DrawnRuns& drawn, Parameter parameter, RunIndex run,
@@ -131,12 +185,11 @@ std::string explanation_text(const DrawnRuns& drawn, Parameter parameter, RunInd
   const ParameterInfo& info = parameter_infos()[index(parameter)];
   const std::vector<double>& errors = drawn.errors[index(parameter)];
   const auto both = sensitivities_of(drawn, parameter);
-  return fmt::format("Run {}: error of {} {:.3g} {}, rank {} of {}\n{}\n{}\n{}{}", run.value,
+  return fmt::format("Run {}: error of {} {:.3g} {}, rank {} of {}\n{}{}\n{}\n{}", run.value,
                      info.label, errors[position] / info.display_scale, info.display_unit,
-                     rank_of(errors, position), errors.size(), left_out(drawn),
+                     rank_of(errors, position), errors.size(), limit_line(drawn), left_out(drawn),
                      explanation_rows(drawn, first_of(both[1], num_rows), position, "|error|"),
-                     explanation_rows(drawn, first_of(both[0], num_rows), position, "error"),
-                     noise_line(both[1]));
+                     explanation_rows(drawn, first_of(both[0], num_rows), position, "error"));
 }
 
 Parameter worst_parameter_of(const DrawnRuns& drawn, RunIndex run) {

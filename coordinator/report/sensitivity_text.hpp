@@ -10,11 +10,12 @@
 namespace proofmass::coordinator {
 
 /// Runs that sensitivities are computed from at most: a million would take minutes and say no more.
+/// The texts say so where a campaign has more.
 inline constexpr std::uint64_t sensitivity_runs_max = 100'000;
 
-/// Which drawn quantities drive a parameter's error, and which its magnitude: the `num_rows` with
-/// the largest first-order index of each, with rank correlations and their 95 % intervals. Lines
-/// have at most 80 characters.
+/// Which drawn quantities drive a parameter's error, and which its magnitude: the first `num_rows`
+/// of sensitivities() of each, and the error as a sum of explanatory_terms(). Lines have at most 80
+/// characters.
 /// @throws InvalidArgument below 16 runs.
 [[nodiscard]] std::string sensitivity_text(const DrawnRuns& drawn, Parameter parameter,
                                            std::size_t num_rows);

@@ -4,7 +4,10 @@
 #include <cmath>
 #include <functional>
 
+#include "core/math/elementary.hpp"
+#include "core/statistics/comparison.hpp"
 #include "core/statistics/detail/check.hpp"
+#include "core/statistics/detail/special.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/order.hpp"
 #include "core/statistics/sum.hpp"
@@ -12,8 +15,12 @@
 namespace proofmass {
 namespace {
 
-constexpr double noise_probability = 0.05;
+/// Neighbours on either side whose mean stands for the conditional mean of an output.
+constexpr std::size_t num_neighbours = 2;
+/// Degrees of freedom that the variance of an index lacks; README.md has the coverage.
+constexpr double num_lost_degrees = 6.0;
 
+/// Bins of the test. Few are powerful for smooth dependences and miss oscillations inside a bin.
 std::size_t num_bins_for(std::size_t num_values) {
   const auto root = static_cast<std::size_t>(std::sqrt(static_cast<double>(num_values)));
   return std::clamp(root / 2, std::size_t{4}, std::size_t{64});
@@ -31,88 +38,151 @@ void centre(std::span<double> values) {
   }
 }
 
-/// Values minus the mean of their bin.
-std::vector<double> residuals_in_bins(std::span<const double> values, std::size_t num_bins) {
-  std::vector<double> residuals(values.begin(), values.end());
-  for (std::size_t bin = 0; bin < num_bins; ++bin) {
-    const std::size_t first = bin * values.size() / num_bins;
-    const std::size_t end = (bin + 1) * values.size() / num_bins;
-    centre(std::span(residuals).subspan(first, end - first));
-  }
-  return residuals;
-}
-
 double sum_of_squares(std::span<const double> values) {
   CompensatedSum sum;
   for (const double value : values) sum.add(value * value);
   return sum.value();
 }
 
-// The influence of one run on 1 − w/v, w and v being the mean squares within bins and of all, is
-// ((1 − index)(y − ȳ)² − residual²)/v: the bins' means have none, to first order. To its variance
-// comes that of the index of an unrelated input, 2(bins − 1)/n², which the first order lacks.
-double standard_error_of(double index, double variance, std::span<const double> residuals,
-                         std::span<const double> differences, std::size_t num_bins) {
-  const auto n = static_cast<double>(residuals.size());
-  CompensatedSum squares;
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    const double influence =
-        ((1.0 - index) * differences[i] * differences[i] - residuals[i] * residuals[i]) / variance;
-    squares.add(influence * influence);
-  }
-  const double unrelated =
-      2.0 * (static_cast<double>(num_bins) - 1.0) * (1.0 - index) * (1.0 - index) / (n * n);
-  return std::sqrt(squares.value() / (n * n) + unrelated);
+// Half the squared differences of neighbours, added up. The first and the last one count half as
+// much again, as the values at the ends have one neighbour only.
+double sum_of_differences(std::span<const double> values) {
+  const auto half_square = [&](std::size_t i) {
+    const double difference = values[i + 1] - values[i];
+    return 0.5 * difference * difference;
+  };
+  CompensatedSum sum;
+  for (std::size_t i = 0; i + 1 < values.size(); ++i) sum.add(half_square(i));
+  sum.add(0.5 * half_square(0));
+  sum.add(0.5 * half_square(values.size() - 2));
+  return sum.value();
 }
 
-double noise_level_of(double n, double bins) {
-  const double ratio = fisher_quantile(1.0 - noise_probability, bins - 1.0, n - bins);
-  return 1.0 - (n - 1.0) / (n - bins + (bins - 1.0) * ratio);
+/// A value minus the mean of its neighbours, two on either side where there are as many.
+double local_residual(std::span<const double> values, std::size_t i) {
+  const std::size_t first = i - std::min(i, num_neighbours);
+  const std::size_t last = std::min(i + num_neighbours, values.size() - 1);
+  double sum = 0.0;
+  for (std::size_t j = first; j <= last; ++j) {
+    if (j != i) sum += values[j];
+  }
+  return values[i] - sum / static_cast<double>(last - first);
+}
+
+// The influence of one run on 1 − w/v, w being the variance that the input leaves and v that of
+// all, is ψ = ((1 − index)(y − ȳ)² − (y − m(x))²)/v. Products of neighbours, whose sum is not an
+// influence of single runs, add w²/v². The mean of four neighbours in place of m(x) has the
+// variance w/4, which makes Σψ² larger by (2 ε m̂)² = 4·w²/4 a run: just these w²/v².
+double standard_error_of(double index, double variance, std::span<const double> differences) {
+  const auto n = static_cast<double>(differences.size());
+  std::vector<double> influences(differences.size());
+  for (std::size_t i = 0; i < differences.size(); ++i) {
+    const double residual = local_residual(differences, i);
+    influences[i] =
+        ((1.0 - index) * differences[i] * differences[i] - residual * residual) / variance;
+  }
+  centre(influences);
+  return std::sqrt(sum_of_squares(influences) / (n * (n - num_lost_degrees)));
+}
+
+// Student's interval of the logarithm of 1 − index, which keeps it below 1.
+Interval interval_of(double index, double standard_error, double num_values, double confidence) {
+  const double rest = 1.0 - index;
+  if (rest <= 0.0) return {index, index, confidence};
+  const double quantile = student_quantile(0.5 + 0.5 * confidence, num_values - num_lost_degrees);
+  const double factor = exponential(std::min(quantile * standard_error / rest, 700.0));
+  return {1.0 - rest * factor, 1.0 - rest / factor, confidence};
+}
+
+/// Ranks of a column, and what their mean square lacks for equal values, as a factor.
+struct Ranks {
+  std::vector<double> values;
+  double square_sum = 0.0;  ///< Σ(rank − mean)².
+};
+
+Ranks ranks_of(Column column) {
+  Ranks ranks{.values = average_ranks(column)};
+  const double mean = 0.5 * (static_cast<double>(column.size()) + 1.0);
+  CompensatedSum sum;
+  for (const double rank : ranks.values) sum.add((rank - mean) * (rank - mean));
+  ranks.square_sum = sum.value();
+  return ranks;
+}
+
+// H = (n − 1) Σ(squared mean rank deviation of a bin · its size)/Σ(rank − mean)², by the chi-square
+// law; bins of equal counts along the input.
+double dependence_p_value(std::span<const std::size_t> order, const Ranks& output) {
+  const std::size_t num_bins = num_bins_for(order.size());
+  const auto n = static_cast<double>(order.size());
+  const double mean = 0.5 * (n + 1.0);
+  CompensatedSum between;
+  for (std::size_t bin = 0; bin < num_bins; ++bin) {
+    const std::size_t first = bin * order.size() / num_bins;
+    const std::size_t end = (bin + 1) * order.size() / num_bins;
+    double sum = 0.0;  // Of halves: exact.
+    for (std::size_t i = first; i < end; ++i) sum += output.values[order[i]] - mean;
+    between.add(sum * sum / static_cast<double>(end - first));
+  }
+  const double statistic = (n - 1.0) * between.value() / output.square_sum;
+  return detail::regularised_gamma(0.5 * (static_cast<double>(num_bins) - 1.0), 0.5 * statistic)
+      .upper;
 }
 
 /// @pre Both columns vary and have sensitivity_values_min values.
-FirstOrderIndex index_of(std::span<const std::size_t> order, Column output, double noise_level) {
+FirstOrderIndex index_of(std::span<const std::size_t> order, Column output, const Ranks& ranks,
+                         double confidence) {
   const auto n = static_cast<double>(order.size());
-  const std::size_t num_bins = num_bins_for(order.size());
   std::vector<double> differences(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) differences[i] = output[order[i]];
   centre(differences);
-  const std::vector<double> residuals = residuals_in_bins(differences, num_bins);
-  const double within = sum_of_squares(residuals) / (n - static_cast<double>(num_bins));
   const double variance = sum_of_squares(differences) / (n - 1.0);
-  const double index = 1.0 - within / variance;
+  const double index = 1.0 - sum_of_differences(differences) / n / variance;
+  const double standard_error = standard_error_of(index, variance, differences);
   return {.index = index,
-          .standard_error = standard_error_of(index, variance, residuals, differences, num_bins),
-          .noise_level = noise_level,
-          .num_bins = num_bins};
-}
-
-double noise_level_for(std::size_t num_values) {
-  return noise_level_of(static_cast<double>(num_values),
-                        static_cast<double>(num_bins_for(num_values)));
+          .standard_error = standard_error,
+          .interval = interval_of(index, standard_error, n, confidence),
+          .p_value = dependence_p_value(order, ranks)};
 }
 
 /// Ranks of each output; none for one that does not vary.
-std::vector<std::vector<double>> ranks_of(std::span<const Column> outputs) {
-  std::vector<std::vector<double>> ranks(outputs.size());
+std::vector<Ranks> ranks_of_all(std::span<const Column> outputs) {
+  std::vector<Ranks> ranks(outputs.size());
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     detail::check_same_size("output", outputs[i], outputs.front());
     detail::check_values("output", outputs[i], sensitivity_values_min);
-    if (varies(outputs[i])) ranks[i] = average_ranks(outputs[i]);
+    if (varies(outputs[i])) ranks[i] = ranks_of(outputs[i]);
   }
   return ranks;
+}
+
+void adjust(std::vector<Sensitivity>& of_output) {
+  std::vector<double> p_values;
+  for (const Sensitivity& one : of_output) p_values.push_back(one.first_order.p_value);
+  const std::vector<double> adjusted = holm_adjusted(p_values);
+  for (std::size_t i = 0; i < of_output.size(); ++i) of_output[i].adjusted_p_value = adjusted[i];
+}
+
+void rank(std::vector<Sensitivity>& of_output, double significance) {
+  const auto by_p_value = [](const Sensitivity& one) { return one.first_order.p_value; };
+  const auto by_index = [](const Sensitivity& one) { return one.first_order.index; };
+  const auto others = std::ranges::stable_partition(
+      of_output, [&](const Sensitivity& one) { return one.adjusted_p_value < significance; });
+  std::ranges::stable_sort(of_output.begin(), others.begin(), std::greater<>(), by_index);
+  std::ranges::stable_sort(others, {}, by_p_value);
 }
 
 }  // namespace
 
 std::optional<FirstOrderIndex> first_order_index(std::span<const double> input,
-                                                 std::span<const double> output) {
+                                                 std::span<const double> output,
+                                                 double confidence) {
+  detail::check_fraction("confidence", confidence);
   detail::check_same_size("output", output, input);
   detail::check_values("input", input, 0);
   detail::check_values("output", output, 0);
   if (input.size() < sensitivity_values_min) return std::nullopt;
   if (!varies(input) || !varies(output)) return std::nullopt;
-  return index_of(ascending_order(input), output, noise_level_for(input.size()));
+  return index_of(ascending_order(input), output, ranks_of(output), confidence);
 }
 
 std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inputs,
@@ -120,8 +190,7 @@ std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inpu
                                                     double confidence) {
   std::vector<std::vector<Sensitivity>> all(outputs.size());
   if (inputs.empty() || outputs.empty()) return all;
-  const std::vector<std::vector<double>> output_ranks = ranks_of(outputs);
-  const double noise_level = noise_level_for(outputs.front().size());
+  const std::vector<Ranks> output_ranks = ranks_of_all(outputs);
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     detail::check_same_size("input", inputs[i], outputs.front());
     detail::check_values("input", inputs[i], sensitivity_values_min);
@@ -129,16 +198,19 @@ std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inpu
     const std::vector<std::size_t> order = ascending_order(inputs[i]);
     const std::vector<double> ranks = average_ranks(inputs[i]);
     for (std::size_t j = 0; j < outputs.size(); ++j) {
-      if (output_ranks[j].empty()) continue;
+      if (output_ranks[j].values.empty()) continue;
       const auto linear = linear_correlation(inputs[i], outputs[j], confidence);
-      const auto rank = correlation_of_ranks(ranks, output_ranks[j], confidence);
-      if (!linear || !rank) continue;
-      all[j].push_back({i, *linear, *rank, index_of(order, outputs[j], noise_level)});
+      const auto of_ranks = correlation_of_ranks(ranks, output_ranks[j].values, confidence);
+      if (!linear || !of_ranks) continue;
+      all[j].push_back({.input = i,
+                        .linear = *linear,
+                        .rank = *of_ranks,
+                        .first_order = index_of(order, outputs[j], output_ranks[j], confidence)});
     }
   }
   for (std::vector<Sensitivity>& of_output : all) {
-    std::ranges::stable_sort(of_output, std::greater<>(),
-                             [](const Sensitivity& one) { return one.first_order.index; });
+    adjust(of_output);
+    rank(of_output, 1.0 - confidence);
   }
   return all;
 }

@@ -230,23 +230,27 @@ def rank_correlation(x, y, confidence):
     return with_interval(r, (1 + float(r) ** 2 / 2) / (len(columns[x]) - 3), confidence)
 
 
-def first_order_index(x, y):
+def first_order_index(x, y, confidence):
     order = np.argsort(columns[x], kind="stable")
+    ranked = columns[y][order]
     mean = exact_moments(columns[y])[0]
-    y = [mpmath.mpf(float(v)) - mean for v in columns[y][order]]
+    y = [mpmath.mpf(float(v)) - mean for v in ranked]
     n = len(y)
+    squares = [(b - a) ** 2 / 2 for a, b in zip(y, y[1:])]
+    variance = sum(v * v for v in y) / (n - 1)
+    rest = (sum(squares) + (squares[0] + squares[-1]) / 2) / n / variance
+    influences = []
+    for i, v in enumerate(y):
+        near = y[max(i - 2, 0):i] + y[i + 1:i + 3]
+        influences.append((rest * v * v - (v - sum(near) / len(near)) ** 2) / variance)
+    mean = sum(influences) / n
+    error = mpmath.sqrt(sum((i - mean) ** 2 for i in influences) / (n * (n - 6)))
+    half = student_quantile(0.5 + 0.5 * float(confidence), n - 6) * error / rest
     bins = min(max(math.isqrt(n) // 2, 4), 64)
     edges = [b * n // bins for b in range(bins + 1)]
-    residuals = [v - sum(y[a:b]) / (b - a) for a, b in zip(edges, edges[1:]) for v in y[a:b]]
-    within = sum(r * r for r in residuals) / (n - bins)
-    variance = sum(v * v for v in y) / (n - 1)
-    index = 1 - within / variance
-    influence = sum((((1 - index) * v * v - r * r) / variance) ** 2 for v, r in zip(y, residuals))
-    error = mpmath.sqrt(influence / n**2 + 2 * (bins - 1) * (1 - index) ** 2 / mpmath.mpf(n) ** 2)
-    f = fisher_quantile(0.95, bins - 1, n - bins)
-    between = (bins - 1) * f / (n - bins)  # Of the sum of squares within.
-    noise = 1 - (n - 1) / ((n - bins) * (1 + between))
-    return index, error, noise, bins
+    test = scipy.stats.kruskal(*[ranked[a:b] for a, b in zip(edges, edges[1:])])
+    return (1 - rest, error, 1 - rest * mpmath.exp(half), 1 - rest * mpmath.exp(-half),
+            test.pvalue)
 
 
 def compare_paired(a, b, confidence):

@@ -117,14 +117,14 @@ void ask_about_dependence(Questions& questions, const std::string& x, const std:
   const std::string names = fmt::format(" {} {}", x, y);
   const auto linear = linear_correlation(first, second, confidence);
   const auto rank = rank_correlation(first, second, confidence);
-  const auto index = first_order_index(first, second);
+  const auto index = first_order_index(first, second, confidence);
   questions.ask("linear_correlation" + names + " 0.9",
                 {linear->coefficient, linear->interval.lower, linear->interval.upper});
   questions.ask("rank_correlation" + names + " 0.9",
                 {rank->coefficient, rank->interval.lower, rank->interval.upper});
-  questions.ask("first_order_index" + names,
-                {index->index, index->standard_error, index->noise_level,
-                 static_cast<double>(index->num_bins)});
+  questions.ask("first_order_index" + names + " 0.9",
+                {index->index, index->standard_error, index->interval.lower, index->interval.upper,
+                 index->p_value});
 }
 
 void ask_about_pair(Questions& questions, const std::string& a, const std::string& b) {

@@ -41,9 +41,9 @@ TEST(FirstOrderIndex, OfALinearFunctionIsItsShareOfTheVariance) {
   const Columns u = uniform_columns(3, 10'000, 41);
   const auto y =
       evaluated(u, [&](std::size_t i) { return 3.0 * u[0][i] - 2.0 * u[1][i] + u[2][i]; });
-  expect_index(first_order_index(u[0], y), 9.0 / 14.0);
-  expect_index(first_order_index(u[1], y), 4.0 / 14.0);
-  expect_index(first_order_index(u[2], y), 1.0 / 14.0);
+  expect_index(first_order_index(u[0], y, 0.95), 9.0 / 14.0);
+  expect_index(first_order_index(u[1], y, 0.95), 4.0 / 14.0);
+  expect_index(first_order_index(u[2], y, 0.95), 1.0 / 14.0);
 }
 
 // Ishigami's function with a = 7, b = 0.1 on (−π, π)³: V₁ = ½(1 + bπ⁴/5)², V₂ = a²/8, V₃ = 0 though
@@ -61,43 +61,51 @@ TEST(FirstOrderIndex, OfIshigamisFunctionIsTheKnownOne) {
   const double first = 0.5 * std::pow(1.0 + 0.1 * fourth / 5.0, 2);
   const double second = 49.0 / 8.0;
   const double all = 0.5 + second + 0.1 * fourth / 5.0 + 0.01 * fourth * fourth / 18.0;
-  expect_index(first_order_index(u[0], y), first / all);
-  expect_index(first_order_index(u[1], y), second / all);
-  expect_index(first_order_index(u[2], y), 0.0);
+  expect_index(first_order_index(u[0], y, 0.95), first / all);
+  expect_index(first_order_index(u[1], y, 0.95), second / all);
+  expect_index(first_order_index(u[2], y, 0.95), 0.0);
 }
 
-// x on (−1, 1) in 5 bins of width 0.4. Of y = |x|, Var(y) = 1/12, the outer four miss 0.4²/12 each
-// and the middle one, where |x| runs over 0.2, 0.2²/12; of x, Var(x) = 4/12, all miss 0.4²/12. Of
-// x², Var(x²) = 4/45, a bin about c misses (2c)² 0.4²/12 and a little: 5/25 on average. The degrees
-// of freedom, 99/95, add 4 % of what is missed, below 0.01.
-TEST(FirstOrderIndex, MissesWhatHappensInsideItsBins) {
-  constexpr std::size_t n = 100;
-  std::vector<double> x, magnitude, square;
-  for (std::size_t i = 0; i < n; ++i) {
-    x.push_back((2.0 * static_cast<double>(i) + 1.0) / n - 1.0);
-    magnitude.push_back(std::abs(x.back()));
+// y = x on a grid of n: neighbours differ by 2/n, half the square is 2/n². With the ends, which
+// count half as much again, all n make 2/n² on average, and Var(x) = (n + 1)/(3 n) with n − 1.
+TEST(FirstOrderIndex, LeavesOutTheSquareOfTheSpacingOnly) {
+  constexpr double n = 100;
+  std::vector<double> x, square;
+  for (int i = 0; i < static_cast<int>(n); ++i) {
+    x.push_back((2.0 * i + 1.0) / n - 1.0);
     square.push_back(x.back() * x.back());
   }
-  const auto linear = first_order_index(x, x);
-  EXPECT_EQ(linear->num_bins, 5u);
-  EXPECT_NEAR(linear->index, 1.0 - 1.0 / 25, 0.01);
-  EXPECT_NEAR(first_order_index(x, magnitude)->index, 1.0 - 0.8 * 0.16 - 0.2 * 0.04, 0.01);
-  EXPECT_NEAR(first_order_index(x, square)->index, 1.0 - 5.0 / 25, 0.01);
+  EXPECT_NEAR(first_order_index(x, x, 0.95)->index, 1.0 - 2.0 / (n * n) * 3.0 * n / (n + 1.0),
+              1e-12);
+  EXPECT_NEAR(first_order_index(x, square, 0.95)->index, 1.0, 0.003);
 }
 
-// Unrelated inputs: above the noise level in 5 % of 1000 cases, standard error 0.7 %; mean 0.
+// Values 1 to 4 in bins of four along the input, ranks 1 to 16: mean ranks 2.5, 6.5, 10.5 and 14.5
+// deviate by 6, 2, 2 and 6 from 8.5. H = 12/(16·17) · 4·(36 + 4 + 4 + 36) = 14.1176; with three
+// degrees of freedom the law of χ² has erfc(√(H/2)) + √(2H/π) exp(−H/2) beyond.
+TEST(FirstOrderIndex, HasThePValueOfKruskalAndWallis) {
+  std::vector<double> x;
+  for (int i = 1; i <= 16; ++i) x.push_back(i);
+  const double h = 12.0 / (16.0 * 17.0) * 4.0 * 80.0;
+  const double beyond =
+      std::erfc(std::sqrt(0.5 * h)) + std::sqrt(2.0 * h / std::numbers::pi) * std::exp(-0.5 * h);
+  EXPECT_NEAR(first_order_index(x, x, 0.95)->p_value, beyond, 1e-12);
+}
+
+// Unrelated inputs: a p-value below 5 % in 5 % of 1000 cases, standard error 0.7 %; mean 0,
+// standard deviation 1/√n.
 TEST(FirstOrderIndex, OfAnUnrelatedInputIsNoise) {
-  int num_above = 0;
+  int num_below = 0;
   double sum = 0.0;
   for (std::uint64_t repetition = 0; repetition < 1000; ++repetition) {
     const auto x = test::uniform_column(200, {.seed = 43, .repetition = repetition, .column = 0});
     const auto y = test::normal_column(200, {.seed = 43, .repetition = repetition, .column = 1});
-    const auto found = first_order_index(x, y);
-    if (found->index > found->noise_level) ++num_above;
+    const auto found = first_order_index(x, y, 0.95);
+    if (found->p_value < 0.05) ++num_below;
     sum += found->index;
   }
-  EXPECT_NEAR(num_above, 50, 28);
-  EXPECT_NEAR(sum / 1000.0, 0.0, 4.0 * std::sqrt(2.0 * 6.0) / 200.0 / std::sqrt(1000.0));
+  EXPECT_NEAR(num_below, 50, 28);
+  EXPECT_NEAR(sum / 1000.0, 0.0, 4.0 / std::sqrt(200.0 * 1000.0));
 }
 
 // The scatter of the estimate over 400 campaigns is what its standard error says; that of a
@@ -109,20 +117,21 @@ TEST(FirstOrderIndex, KnowsItsStandardError) {
     const auto x = test::uniform_column(400, {.seed = 44, .repetition = repetition, .column = 0});
     auto y = test::uniform_column(400, {.seed = 44, .repetition = repetition, .column = 1});
     for (std::size_t i = 0; i < y.size(); ++i) y[i] += x[i];
-    const auto found = first_order_index(x, y);
+    const auto found = first_order_index(x, y, 0.95);
     indices.push_back(found->index);
     claimed += found->standard_error / 400.0;
   }
   EXPECT_NEAR(moments(indices).standard_deviation / claimed, 1.0, 0.15);
+  EXPECT_NEAR(moments(indices).mean, 0.5, 0.005);
 }
 
 TEST(FirstOrderIndex, NeedsValuesThatVary) {
   const auto x = test::uniform_column(16, {.seed = 45});
-  EXPECT_TRUE(first_order_index(x, x).has_value());
-  EXPECT_FALSE(first_order_index(x, std::vector<double>(16, 1.0)).has_value());
-  EXPECT_FALSE(first_order_index(std::vector<double>(16, 1.0), x).has_value());
+  EXPECT_TRUE(first_order_index(x, x, 0.95).has_value());
+  EXPECT_FALSE(first_order_index(x, std::vector<double>(16, 1.0), 0.95).has_value());
+  EXPECT_FALSE(first_order_index(std::vector<double>(16, 1.0), x, 0.95).has_value());
   const std::vector<double> few(x.begin(), x.end() - 1);
-  EXPECT_FALSE(first_order_index(few, few).has_value());
+  EXPECT_FALSE(first_order_index(few, few, 0.95).has_value());
 }
 
 // Drawn: three quantities and a fixed one. Outputs: an error, its magnitude, a constant.
@@ -149,7 +158,9 @@ TEST_F(SensitivitiesOfAnError, AreRankedByTheirIndex) {
   EXPECT_EQ(all[0][0].input, 1u);
   EXPECT_EQ(all[0][1].input, 2u);
   EXPECT_EQ(all[0][2].input, 0u);
-  EXPECT_LT(all[0][2].first_order.index, 0.05);
+  EXPECT_LT(all[0][2].first_order.index, 0.08);
+  EXPECT_GT(all[0][2].adjusted_p_value, 0.05);
+  EXPECT_EQ(all[0][1].adjusted_p_value, 2.0 * all[0][1].first_order.p_value);
   EXPECT_TRUE(all[2].empty());
 }
 
@@ -160,8 +171,10 @@ TEST_F(SensitivitiesOfAnError, AreThoseOfTheSingleFunctions) {
             linear_correlation(inputs_[1], outputs_[0], 0.9)->coefficient);
   EXPECT_EQ(first.rank.interval.upper,
             rank_correlation(inputs_[1], outputs_[0], 0.9)->interval.upper);
-  EXPECT_EQ(first.first_order.index, first_order_index(inputs_[1], outputs_[0])->index);
-  EXPECT_EQ(first.first_order.noise_level, first_order_index(inputs_[1], outputs_[0])->noise_level);
+  const auto index = first_order_index(inputs_[1], outputs_[0], 0.9);
+  EXPECT_EQ(first.first_order.index, index->index);
+  EXPECT_EQ(first.first_order.interval.lower, index->interval.lower);
+  EXPECT_EQ(first.first_order.p_value, index->p_value);
 }
 
 // The magnitude is even in its driver: no correlation sees it, the index does.
