@@ -18,13 +18,6 @@ namespace {
 constexpr std::size_t num_exact_ranks_max = 50;  // 2⁵⁰ signs are counted exactly in a double.
 constexpr std::uint64_t num_exact_steps_max = 4'000'000;
 
-double sign_p_value(std::size_t num_larger, std::size_t num_smaller) {
-  const auto fewer = static_cast<double>(std::min(num_larger, num_smaller));
-  const auto count = static_cast<double>(num_larger + num_smaller);
-  if (count == 0.0) return 1.0;
-  return std::min(2.0 * binomial_at_most(fewer, count, 0.5), 1.0);
-}
-
 /// Sum of the ranks of the positive differences, by the ranks of their magnitudes.
 struct SignedRanks {
   double positive_sum = 0.0;
@@ -184,7 +177,7 @@ PairedComparison compare_differences(std::vector<double> differences, double con
     if (difference > 0.0) ++comparison.num_larger;
     if (difference < 0.0) ++comparison.num_smaller;
   }
-  comparison.sign_p_value = sign_p_value(comparison.num_larger, comparison.num_smaller);
+  comparison.sign_p_value = sign_test_p_value(comparison.num_larger, comparison.num_smaller);
   comparison.rank_p_value = rank_p_value(signed_ranks(std::move(differences)));
   return comparison;
 }
@@ -205,14 +198,30 @@ UnpairedComparison compare_unpaired(std::span<const double> first, std::span<con
   return comparison;
 }
 
-std::vector<double> holm_adjusted(std::span<const double> p_values) {
-  const std::vector<std::size_t> order = ascending_order(p_values);
+double sign_test_p_value(std::size_t num_larger, std::size_t num_smaller) {
+  const auto fewer = static_cast<double>(std::min(num_larger, num_smaller));
+  const auto count = static_cast<double>(num_larger + num_smaller);
+  if (count == 0.0) return 1.0;
+  return std::min(2.0 * binomial_at_most(fewer, count, 0.5), 1.0);
+}
+
+// Holm's with weights: the smallest p/w is held against the sum of all weights, the next against
+// that of the rest.
+std::vector<double> holm_adjusted(std::span<const double> p_values,
+                                  std::span<const double> weights) {
+  if (!weights.empty()) detail::check_same_size("weights", weights, p_values);
+  const auto weight = [&](std::size_t i) { return weights.empty() ? 1.0 : weights[i]; };
+  std::vector<double> weighted(p_values.size());
+  for (std::size_t i = 0; i < p_values.size(); ++i) weighted[i] = p_values[i] / weight(i);
+  const std::vector<std::size_t> order = ascending_order(weighted);
   std::vector<double> adjusted(p_values.size());
+  double rest = 0.0;
+  for (const std::size_t i : order) rest += weight(i);
   double largest = 0.0;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const double scaled = static_cast<double>(order.size() - i) * p_values[order[i]];
-    largest = std::max(largest, std::min(scaled, 1.0));
-    adjusted[order[i]] = largest;
+  for (const std::size_t i : order) {
+    largest = std::max(largest, std::min(rest * weighted[i], 1.0));
+    adjusted[i] = largest;
+    rest -= weight(i);
   }
   return adjusted;
 }

@@ -61,8 +61,14 @@ inline constexpr std::size_t num_welch_min = 100;
 [[nodiscard]] UnpairedComparison compare_means(const Moments& first, const Moments& second,
                                                double confidence);
 
+/// Two-sided p-value of the sign test, exact: as many larger as smaller?
+[[nodiscard]] double sign_test_p_value(std::size_t num_larger, std::size_t num_smaller);
+
 /// P-values such that comparing each with α errs in any of them with probability α at most
 /// [Holm1979]; in the given order.
-[[nodiscard]] std::vector<double> holm_adjusted(std::span<const double> p_values);
+/// @param weights  Above 0, one for each p-value, or none for equal ones: a test with twice the
+///                 weight finds effects at twice the p-value.
+[[nodiscard]] std::vector<double> holm_adjusted(std::span<const double> p_values,
+                                                std::span<const double> weights = {});
 
 }  // namespace proofmass

@@ -1,0 +1,157 @@
+#include "core/statistics/error_change.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/statistics/interval.hpp"
+
+namespace proofmass {
+namespace {
+
+constexpr double tail_factor = 2.0;
+/// Mean of |x| in standard deviations, for a normal x.
+constexpr double normal_deviation = 0.8;
+
+constexpr double location_weight = 0.7;
+constexpr double scale_weight = 0.2;
+constexpr double tail_weight = 0.1;
+
+double mean_of(std::span<const double> first, std::span<const double> second) {
+  CompensatedSum sum;
+  for (const double value : first) sum.add(value);
+  for (const double value : second) sum.add(value);
+  return sum.value() / static_cast<double>(first.size() + second.size());
+}
+
+std::vector<double> distances(std::span<const double> values, double centre) {
+  std::vector<double> distances(values.size());
+  std::ranges::transform(values, distances.begin(),
+                         [&](double value) { return std::abs(value - centre); });
+  return distances;
+}
+
+ErrorPasses first_pass_of(std::span<const double> values) {
+  ErrorPasses passes;
+  for (const double value : values) passes.add(value);
+  return passes;
+}
+
+std::size_t num_beyond(std::span<const double> values, double limit) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(values, [&](double value) { return std::abs(value) > limit; }));
+}
+
+}  // namespace
+
+void ErrorPasses::add(double error) {
+  ++count_;
+  sum_.add(error);
+  square_sum_.add(error * error);
+}
+
+double ErrorPasses::mean() const { return sum_.value() / static_cast<double>(count_); }
+
+void ErrorPasses::begin_second(double limit) {
+  mean_ = mean();
+  limit_ = limit;
+  const double mean_square = square_sum_.value() / static_cast<double>(count_);
+  const double variance = std::max(mean_square - mean_ * mean_, 0.0);
+  errors_ = MomentSums(mean_);
+  deviations_ = MomentSums(normal_deviation * std::sqrt(variance));
+}
+
+void ErrorPasses::add_again(double error) {
+  errors_.add(error);
+  deviations_.add(std::abs(error - mean_));
+  if (std::abs(error) > limit_) ++num_in_tail_;
+}
+
+double tail_limit(const ErrorPasses& first, const ErrorPasses& second) {
+  const double squares = first.square_sum() + second.square_sum();
+  return tail_factor * std::sqrt(squares / static_cast<double>(first.count() + second.count()));
+}
+
+ChangePValues compare_many_errors(const ErrorPasses& first, const ErrorPasses& second) {
+  return {
+      .location = compare_means(first.errors(), second.errors(), default_confidence).mean_p_value,
+      .scale =
+          compare_means(first.deviations(), second.deviations(), default_confidence).mean_p_value,
+      .tail = fisher_exact_p_value({.num_first = first.count(),
+                                    .tail_first = first.num_in_tail(),
+                                    .num_second = second.count(),
+                                    .tail_second = second.num_in_tail()})};
+}
+
+ChangePValues compare_few_errors(std::span<const double> first, std::span<const double> second) {
+  const double centre = mean_of(first, second);
+  const double limit = tail_limit(first_pass_of(first), first_pass_of(second));
+  return {.location = compare_unpaired(first, second, default_confidence).p_value,
+          .scale = compare_unpaired(distances(first, centre), distances(second, centre),
+                                    default_confidence)
+                       .p_value,
+          .tail = fisher_exact_p_value({.num_first = first.size(),
+                                        .tail_first = num_beyond(first, limit),
+                                        .num_second = second.size(),
+                                        .tail_second = num_beyond(second, limit)})};
+}
+
+ChangePValues compare_paired_errors(PairedErrors pairs) {
+  return {.location =
+              compare_differences(std::move(pairs.differences), default_confidence).rank_p_value,
+          .scale = compare_differences(std::move(pairs.deviation_differences), default_confidence)
+                       .rank_p_value,
+          .tail = sign_test_p_value(pairs.num_only_first, pairs.num_only_second)};
+}
+
+std::vector<ChangePValues> adjusted_changes(std::span<const ChangePValues> changes) {
+  std::vector<double> p_values, weights;
+  for (const ChangePValues& change : changes) {
+    p_values.insert(p_values.end(), {change.location, change.scale, change.tail});
+    weights.insert(weights.end(), {location_weight, scale_weight, tail_weight});
+  }
+  const std::vector<double> adjusted = holm_adjusted(p_values, weights);
+  std::vector<ChangePValues> all;
+  for (std::size_t i = 0; i < adjusted.size(); i += 3) {
+    all.push_back({adjusted[i], adjusted[i + 1], adjusted[i + 2]});
+  }
+  return all;
+}
+
+// Probabilities of the hypergeometric law follow from each other outwards from the mode: P(k + 1) =
+// P(k) (K − k)(m − k)/((k + 1)(n − K + k + 1)), K in the tail of m + n.
+double fisher_exact_p_value(const TailCounts& counts) {
+  const auto m = static_cast<double>(counts.num_first);
+  const auto n = static_cast<double>(counts.num_second);
+  const auto all = static_cast<double>(counts.tail_first + counts.tail_second);
+  const auto seen = static_cast<double>(counts.tail_first);
+  const double smallest = std::max(0.0, all - n);
+  const double largest = std::min(all, m);
+  const double mode =
+      std::clamp(std::floor((all + 1.0) * (m + 1.0) / (m + n + 2.0)), smallest, largest);
+  const auto up = [&](double k) { return (all - k) * (m - k) / ((k + 1.0) * (n - all + k + 1.0)); };
+  // The first sweep finds the probability of what is seen, the second adds up those below it.
+  double of_seen = 1.0;
+  for (double k = mode; k < seen; k += 1.0) of_seen *= up(k);
+  for (double k = mode; k > seen; k -= 1.0) of_seen /= up(k - 1.0);
+  const double bound = of_seen * (1.0 + 1e-7);  // As others have it: ties by rounding are ties.
+  CompensatedSum total, below;
+  const auto count = [&](double probability) {
+    total.add(probability);
+    if (probability <= bound) below.add(probability);
+  };
+  count(1.0);
+  double probability = 1.0;
+  for (double k = mode; k < largest && probability > 0.0; k += 1.0) {
+    probability *= up(k);
+    count(probability);
+  }
+  probability = 1.0;
+  for (double k = mode; k > smallest && probability > 0.0; k -= 1.0) {
+    probability /= up(k - 1.0);
+    count(probability);
+  }
+  return std::min(below.value() / total.value(), 1.0);
+}
+
+}  // namespace proofmass

@@ -1,0 +1,263 @@
+#include "core/statistics/error_change.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <iostream>
+#include <utility>
+#include <vector>
+
+#include "tests/core/statistics/columns.hpp"
+
+namespace proofmass {
+namespace {
+
+using Values = std::vector<double>;
+
+constexpr std::size_t num_columns = 10;  // As many as parameters.
+constexpr double significance = 0.05;
+
+/// Errors of both campaigns, the first pass of each.
+ChangePValues compare_many(const Values& first, const Values& second) {
+  ErrorPasses a, b;
+  for (const double error : first) a.add(error);
+  for (const double error : second) b.add(error);
+  const double limit = tail_limit(a, b);
+  a.begin_second(limit);
+  b.begin_second(limit);
+  for (const double error : first) a.add_again(error);
+  for (const double error : second) b.add_again(error);
+  return compare_many_errors(a, b);
+}
+
+ChangePValues compare(const Values& first, const Values& second) {
+  return std::min(first.size(), second.size()) < num_welch_min ? compare_few_errors(first, second)
+                                                               : compare_many(first, second);
+}
+
+ChangePValues compare_pairs(const Values& first, const Values& second) {
+  ErrorPasses a, b;
+  for (const double error : first) a.add(error);
+  for (const double error : second) b.add(error);
+  const double limit = tail_limit(a, b);
+  PairedErrors pairs;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    pairs.differences.push_back(second[i] - first[i]);
+    pairs.deviation_differences.push_back(std::abs(second[i] - b.mean()) -
+                                          std::abs(first[i] - a.mean()));
+    const bool is_first = std::abs(first[i]) > limit, is_second = std::abs(second[i]) > limit;
+    if (is_first && !is_second) ++pairs.num_only_first;
+    if (is_second && !is_first) ++pairs.num_only_second;
+  }
+  return compare_paired_errors(std::move(pairs));
+}
+
+// Of errors 1, 2, 3 and −2, 0, 8 the means are 2 and 2, the deviations 1, 0, 1 and 4, 2, 6; the
+// root mean square is √(82/6), so that 8 lies beyond twice of it: of the 6 ways to choose one of
+// six, all have the probability of what is seen or less.
+TEST(ErrorPasses, HoldMomentsOfErrorsAndDeviations) {
+  ErrorPasses first, second;
+  for (const double error : {1.0, 2.0, 3.0}) first.add(error);
+  for (const double error : {-2.0, 0.0, 8.0}) second.add(error);
+  const double limit = tail_limit(first, second);
+  EXPECT_NEAR(limit, 2.0 * std::sqrt(82.0 / 6.0), 1e-14);
+  second.begin_second(limit);
+  for (const double error : {-2.0, 0.0, 8.0}) second.add_again(error);
+  EXPECT_EQ(second.num_in_tail(), 1u);
+  EXPECT_EQ(second.mean(), 2.0);
+  EXPECT_NEAR(second.errors().standard_deviation, std::sqrt(28.0), 1e-14);
+  EXPECT_NEAR(second.deviations().mean, 4.0, 1e-14);
+  EXPECT_NEAR(second.deviations().standard_deviation, 2.0, 1e-14);
+}
+
+// Of 10 and 10, 3 and 0 in the tail: the 1140 ways to choose 3 of 20 have 120 with all in one
+// group, and as many in the other.
+TEST(FisherExact, CountsWaysToChoose) {
+  EXPECT_NEAR(
+      fisher_exact_p_value({.num_first = 10, .tail_first = 3, .num_second = 10, .tail_second = 0}),
+      240.0 / 1140.0, 1e-14);
+  EXPECT_EQ(
+      fisher_exact_p_value({.num_first = 10, .tail_first = 0, .num_second = 20, .tail_second = 0}),
+      1.0);
+  EXPECT_NEAR(
+      fisher_exact_p_value({.num_first = 2, .tail_first = 2, .num_second = 3, .tail_second = 3}),
+      1.0, 1e-14);
+}
+
+// A weight of 3 in 4 for 0.02, of 1 in 4 for 0.01: p/w is 0.0267 and 0.04.
+TEST(HolmAdjusted, HoldsEachAgainstItsWeight) {
+  const auto adjusted = holm_adjusted(Values{0.02, 0.01}, Values{0.75, 0.25});
+  EXPECT_NEAR(adjusted[0], 0.02 / 0.75, 1e-15);
+  EXPECT_NEAR(adjusted[1], 0.02 / 0.75, 1e-15);  // Never below the one before: 0.01 alone is less.
+}
+
+/// What ten parameters' errors are in one repetition.
+using Draw = std::function<double(double normal, double other)>;
+
+struct Case {
+  std::size_t num_first, num_second;
+  std::uint64_t num_repetitions;
+};
+
+Values errors_of(std::size_t count, const test::Selection& from, const Draw& draw) {
+  const Values normal = test::normal_column(
+      count, {.seed = from.seed, .repetition = from.repetition, .column = 2 * from.column});
+  const Values other = test::normal_column(
+      count, {.seed = from.seed, .repetition = from.repetition, .column = 2 * from.column + 1});
+  Values errors(count);
+  for (std::size_t i = 0; i < count; ++i) errors[i] = draw(normal[i], other[i]);
+  return errors;
+}
+
+/// In how many per cent of the repetitions each test finds a change, corrected for ten parameters.
+struct Found {
+  double location = 0.0, scale = 0.0, tail = 0.0, any = 0.0;
+};
+
+/// Nine parameters are drawn by `draw` in both campaigns, and one by `changed` in the second.
+Found found_in(const Case& one, const Draw& draw, const Draw& changed) {
+  Found found;
+  const double share = 100.0 / static_cast<double>(one.num_repetitions);
+  for (std::uint64_t repetition = 0; repetition < one.num_repetitions; ++repetition) {
+    std::vector<ChangePValues> changes;
+    for (std::uint32_t i = 0; i < num_columns; ++i) {
+      const test::Selection first{.seed = 81, .repetition = repetition, .column = 2 * i};
+      const test::Selection second{.seed = 81, .repetition = repetition, .column = 2 * i + 1};
+      changes.push_back(compare(errors_of(one.num_first, first, draw),
+                                errors_of(one.num_second, second, i == 0 ? changed : draw)));
+    }
+    const auto adjusted = adjusted_changes(changes);
+    const auto is_found = [](const ChangePValues& change) {
+      return std::min({change.location, change.scale, change.tail}) < significance;
+    };
+    if (adjusted[0].location < significance) found.location += share;
+    if (adjusted[0].scale < significance) found.scale += share;
+    if (adjusted[0].tail < significance) found.tail += share;
+    if (std::ranges::any_of(adjusted, is_found)) found.any += share;
+  }
+  return found;
+}
+
+void print(const std::string& name, const Case& one, const Found& found) {
+  std::cout << fmt::format(
+      "{}, {} and {}: location {:.1f}, scale {:.1f}, tail {:.1f}, any {:.1f}\n", name,
+      one.num_first, one.num_second, found.location, found.scale, found.tail, found.any);
+}
+
+double normal_error(double normal, double) { return normal; }
+double product_error(double normal, double other) { return normal * other; }
+
+// A bias of half a standard deviation: Welch's t of two hundred errors exceeds the 0.7/10 · 5 %
+// that are left to it in 73 % (a normal deviate of mean 0.5/√0.02 = 3.54 exceeds 2.92). Standard
+// error of 1,000 repetitions: 1.4 %. The mean of |error|, the only test there was, found it in 4 %.
+TEST(ErrorChange, FindsABiasOfHalfAStandardDeviation) {
+  const Case one{100, 100, 1000};
+  const Found found =
+      found_in(one, normal_error, [](double normal, double) { return normal + 0.5; });
+  print("bias 0.5", one, found);
+  EXPECT_NEAR(found.location, 73.0, 4.2);
+}
+
+TEST(ErrorChange, FindsALargerScatter) {
+  const Case one{100, 100, 500};
+  const Found found =
+      found_in(one, normal_error, [](double normal, double) { return 1.5 * normal; });
+  print("scatter x 1.5", one, found);
+  EXPECT_GT(found.scale, 55.0);
+  EXPECT_LT(found.location, 5.0);
+}
+
+// One in twenty errors is five times as large: 400 runs see it, by scale and tail.
+TEST(ErrorChange, FindsAHeavierTail) {
+  const Case one{1000, 1000, 200};
+  const Found found = found_in(one, normal_error, [](double normal, double other) {
+    return std::abs(other) > 1.96 ? 5.0 * normal : normal;
+  });
+  print("one in 20 x 5", one, found);
+  EXPECT_GT(found.tail, 20.0);
+  EXPECT_LT(found.location, 5.0);
+}
+
+// Without any change one is found in 5 % of all pairs of campaigns at most, whatever the law and
+// however few runs one has. Standard error of 1,000 repetitions 0.7 %; three of them are allowed.
+TEST(ErrorChange, IsRarelyFoundWhereThereIsNone) {
+  for (const Case& one : {Case{100, 100, 1000}, Case{100, 500, 500}, Case{10, 250, 1000},
+                          Case{2, 250, 1000}, Case{50, 50, 1000}}) {
+    const Found normal = found_in(one, normal_error, normal_error);
+    const Found product = found_in(one, product_error, product_error);
+    print("none, normal", one, normal);
+    print("none, product", one, product);
+    const double allowed =
+        5.0 + 300.0 * std::sqrt(0.05 * 0.95 / static_cast<double>(one.num_repetitions));
+    EXPECT_LE(normal.any, allowed) << one.num_first;
+    EXPECT_LE(product.any, allowed) << one.num_first;
+  }
+}
+
+/// The share of repetitions in which pairs differ, the second campaign being first·factor + noise.
+Found found_in_pairs(const Case& one, const Draw& draw, const Draw& change) {
+  Found found;
+  const double share = 100.0 / static_cast<double>(one.num_repetitions);
+  for (std::uint64_t repetition = 0; repetition < one.num_repetitions; ++repetition) {
+    std::vector<ChangePValues> changes;
+    for (std::uint32_t i = 0; i < num_columns; ++i) {
+      // Both campaigns have the draw in common, and a noise of a third of it each.
+      const test::Selection common{.seed = 82, .repetition = repetition, .column = 3 * i};
+      const test::Selection noise{.seed = 82, .repetition = repetition, .column = 3 * i + 1};
+      const Values of_draw = errors_of(one.num_first, common, draw);
+      const Values noise_first =
+          errors_of(one.num_first, noise, [](double normal, double) { return normal / 3.0; });
+      const Values noise_second =
+          errors_of(one.num_first, noise, [](double, double other) { return other / 3.0; });
+      Values first(one.num_first), second(one.num_first);
+      for (std::size_t run = 0; run < first.size(); ++run) {
+        first[run] = of_draw[run] + noise_first[run];
+        second[run] = of_draw[run] + noise_second[run];
+        if (i == 0) second[run] = change(second[run], 0.0);
+      }
+      changes.push_back(compare_pairs(first, second));
+    }
+    const auto adjusted = adjusted_changes(changes);
+    if (adjusted[0].location < significance) found.location += share;
+    if (adjusted[0].scale < significance) found.scale += share;
+    if (adjusted[0].tail < significance) found.tail += share;
+    if (std::ranges::any_of(adjusted, [](const ChangePValues& change_of) {
+          return std::min({change_of.location, change_of.scale, change_of.tail}) < significance;
+        })) {
+      found.any += share;
+    }
+  }
+  return found;
+}
+
+TEST(ErrorChange, OfPairsIsFoundFarMoreOften) {
+  const Case one{100, 100, 300};
+  const Found bias =
+      found_in_pairs(one, normal_error, [](double error, double) { return error + 0.3; });
+  const Found scatter =
+      found_in_pairs(one, normal_error, [](double error, double) { return 1.3 * error; });
+  print("pairs, bias 0.3", one, bias);
+  print("pairs, scatter x 1.3", one, scatter);
+  EXPECT_GT(bias.location, 95.0);
+  EXPECT_GT(scatter.scale, 75.0);
+  const Case few{100, 100, 1000};
+  EXPECT_LT(found_in(few, normal_error, [](double error, double) { return error + 0.3; }).location,
+            40.0);
+}
+
+TEST(ErrorChange, OfPairsIsRarelyFoundWhereThereIsNone) {
+  for (const Case& one : {Case{10, 10, 1000}, Case{30, 30, 1000}, Case{100, 100, 1000}}) {
+    const Found normal = found_in_pairs(one, normal_error, normal_error);
+    const Found product = found_in_pairs(one, product_error, normal_error);
+    print("pairs, none, normal", one, normal);
+    print("pairs, none, product", one, product);
+    EXPECT_LE(normal.any, 7.1) << one.num_first;
+    EXPECT_LE(product.any, 7.1) << one.num_first;
+  }
+}
+
+}  // namespace
+}  // namespace proofmass
