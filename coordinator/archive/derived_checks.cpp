@@ -91,9 +91,10 @@ Check check_stored_statistics(const Store& store, const Scenario& scenario,
   return Check::not_checked("they are not of the results that are in the file");
 }
 
-Check check_stored_stop_checks(const Store& store, const ResultScan& scan) {
+Check check_stored_stop_checks(const Store& store, const Scenario& scenario,
+                               const ResultScan& scan) {
   if (scan.num_violations > 0) return Check::not_checked("a result breaks its rule");
-  Lines lines = stop_check_differences(store);
+  Lines lines = stop_check_differences(store, scenario.objectives);
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
   const auto num_checks = static_cast<std::uint64_t>(store.stop_checks().size());
   return Check::holds(num_checks == 0 ? "none" : fmt::format("{} of a stop rule", num_checks));

@@ -17,7 +17,8 @@ namespace proofmass::coordinator {
                                             const ResultScan& scan);
 
 /// Holds `stop_check` against the results.
-[[nodiscard]] Check check_stored_stop_checks(const Store& store, const ResultScan& scan);
+[[nodiscard]] Check check_stored_stop_checks(const Store& store, const Scenario& scenario,
+                                             const ResultScan& scan);
 
 /// Fails if two workers delivered different results of one run.
 [[nodiscard]] Check check_contradictions(const Store& store);

@@ -157,7 +157,7 @@ class Verification {
 
   Check check_stop_checks() {
     if (!scan_) return Check::not_checked("the results cannot be read");
-    return check_stored_stop_checks(*store_, *scan_);
+    return check_stored_stop_checks(*store_, campaign_->scenario, *scan_);
   }
 
   Check check_draws() {

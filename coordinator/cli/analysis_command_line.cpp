@@ -27,7 +27,8 @@ void add_report(CLI::App& app, Command& chosen) {
   report.add_option("DB", options->database, "Database of a campaign")->required();
   report.add_option("--requirement", options->requirements,
                     "Answer instead whether it is met, as in\n"
-                    "\"a_c12 < 9e-4 for 99% with 95%\"; may be repeated");
+                    "\"a_c12 < 9e-4 for 99% with 95%\" or\n"
+                    "\"all objectives for 95% with 90%\"; may be repeated");
   report.callback([options, &chosen] { chosen = [options] { return print_report(*options); }; });
 }
 

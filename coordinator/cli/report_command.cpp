@@ -22,7 +22,7 @@ namespace {
 std::vector<RequirementAnswer> answers_of(const Store& store,
                                           const std::vector<std::string>& requirements) {
   try {
-    return check_requirements(store, requirements);
+    return check_requirements(store, stored_campaign(store).scenario.objectives, requirements);
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }

@@ -31,7 +31,7 @@ std::string report_of_one_state(const Store& store, const Scenario& scenario) {
   const DigestCheck check = check_digest(store, statistics.num_runs, results.digest);
   const std::vector<RunRange> given_up = store.given_up_runs();
   check_given_up(store, statistics, num_runs_in(given_up));
-  check_stop_checks(store);
+  check_stop_checks(store, scenario.objectives);
   std::string text = summary_text(store.name(), store.seed(), store.num_runs(), statistics,
                                   results.digest, check) +
                      given_up_text(given_up) + stop_text(store);

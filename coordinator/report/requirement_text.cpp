@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "coordinator/report/digest_check.hpp"
+#include "coordinator/report/exceedances.hpp"
+#include "coordinator/report/probability_text.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "core/campaign/run_ranges.hpp"
 #include "core/error.hpp"
@@ -12,56 +14,71 @@
 namespace proofmass::coordinator {
 namespace {
 
-std::string_view name_of(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::met:
-      return "met";
-    case Verdict::not_met:
-      return "not met";
-    case Verdict::undecided:
-      return "undecided";
-  }
-  PROOFMASS_EXPECT(false);
-}
-
-/// Keeps the errors of one parameter, 8 bytes a run, at a time.
-void check(const Store& store, RequirementAnswer& answer) {
-  const Parameter parameter = answer.requirement.parameter;
+/// Keeps the errors of one parameter, 8 bytes a run, at a time; none for all objectives.
+void check(const Store& store, const ParameterArray& objectives, RequirementAnswer& answer) {
+  const Requirement& requirement = answer.requirement;
+  const bool is_of_errors = requirement.subject == Requirement::Subject::parameter;
   answer.missing = {.num_given_up = num_runs_in(store.given_up_runs())};
   std::vector<double> errors;
+  Exceedances exceedances(requirement, objectives);
+  std::uint64_t num_runs = answer.missing.num_given_up;
   (void)walk_checked(store, [&](const RunResult& result) {
     require_in_range(result);
+    ++num_runs;
     answer.missing.add(result);
-    if (result.has_estimate()) errors.push_back(std::abs(result.error(parameter)));
+    exceedances.add(result);
+    if (is_of_errors && result.has_estimate()) {
+      errors.push_back(std::abs(result.error(requirement.parameter)));
+    }
   });
-  answer.check = check_requirement(answer.requirement, errors, answer.missing.total());
+  answer.check = is_of_errors ? check_requirement(requirement, errors, answer.missing.total())
+                              : check_requirement(requirement, exceedances.of(num_runs));
 }
 
-std::string percent(double fraction) { return fmt::format("{:.4g} %", 100.0 * fraction); }
+constexpr std::size_t margin = 13;
 
-// As it was asked for: 99.9999 % is not 100 %.
-std::string given_percent(double fraction) { return fmt::format("{:.12g} %", 100.0 * fraction); }
+std::string missing_lines(const RequirementAnswer& answer) {
+  const std::uint64_t num_missing = answer.check.num_without_estimate;
+  if (num_missing == 0) return "";
+  return fmt::format("{0:{1}}{2} of them for want of an estimate:\n{0:{1}}{3}\n", "", margin,
+                     num_missing, reasons_text(answer.missing));
+}
 
-std::string exceedance_line(const RequirementAnswer& answer) {
+/// How many exceed it, and the bound that decides.
+std::string exceedance_lines(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
+  const double allowed = 1.0 - answer.requirement.tolerance.coverage;
   const std::string counts =
       fmt::format("Exceeding    {} of {} runs", check.num_exceedances, check.num_runs);
-  constexpr std::size_t margin = 13;
   std::string text = counts + "\n";
   if (check.exceedance) {
-    text = line_of(counts + ";",
-                   fmt::format("{} to {} of all draws (95 % interval)",
-                               percent(check.exceedance->lower), percent(check.exceedance->upper)),
-                   margin);
+    text = line_of(counts + ";", bounds_text(*check.exceedance, allowed, check.verdict), margin);
   }
-  if (check.num_without_estimate == 0) return text;
-  return text + fmt::format("{0:{1}}{2} of them for want of an estimate:\n{0:{1}}{3}\n", "", margin,
-                            check.num_without_estimate, reasons_text(answer.missing));
+  return text + fmt::format("Allowed      {} of all draws\n", given_percent(allowed)) +
+         missing_lines(answer);
+}
+
+/// The same of the runs in which all objectives hold.
+std::string holding_lines(const RequirementAnswer& answer) {
+  const RequirementCheck& check = answer.check;
+  const double required = answer.requirement.tolerance.coverage;
+  const std::string counts = fmt::format("Holding      {} of {} runs",
+                                         check.num_runs - check.num_exceedances, check.num_runs);
+  std::string text = counts + "\n";
+  if (check.exceedance) {
+    const Interval bounds{.lower = 1.0 - check.exceedance->upper,
+                          .upper = 1.0 - check.exceedance->lower,
+                          .confidence = check.exceedance->confidence};
+    text = line_of(counts + ";", success_text(bounds, required, check.verdict), margin);
+  }
+  return text + fmt::format("Required     {} of all draws\n", given_percent(required)) +
+         missing_lines(answer);
 }
 
 std::string bound_line(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
   const Tolerance& tolerance = answer.requirement.tolerance;
+  if (answer.requirement.subject == Requirement::Subject::all_objectives) return "";
   if (!check.bound) {
     // Runs without an estimate are the largest errors.
     const auto least = wilks_num_runs(tolerance, check.num_without_estimate + 1);
@@ -90,6 +107,7 @@ std::string needed_line(const RequirementCheck& check) {
 }  // namespace
 
 std::vector<RequirementAnswer> check_requirements(const Store& store,
+                                                  const ParameterArray& objectives,
                                                   std::span<const std::string> texts) {
   std::vector<RequirementAnswer> answers;
   for (const std::string& text : texts) {
@@ -97,15 +115,17 @@ std::vector<RequirementAnswer> check_requirements(const Store& store,
         {.text = text, .requirement = parse_requirement(text), .check = {}, .missing = {}});
   }
   for (RequirementAnswer& answer : answers) {
-    store.read_one_state([&] { check(store, answer); });
+    store.read_one_state([&] { check(store, objectives, answer); });
   }
   return answers;
 }
 
 std::string requirement_text(const RequirementAnswer& answer) {
+  const bool is_joint = answer.requirement.subject == Requirement::Subject::all_objectives;
   return fmt::format("Requirement  {}\nAnswer       {}\n{}{}{}", answer.text,
-                     name_of(answer.check.verdict), exceedance_line(answer), bound_line(answer),
-                     needed_line(answer.check));
+                     name_of(answer.check.verdict),
+                     is_joint ? holding_lines(answer) : exceedance_lines(answer),
+                     bound_line(answer), needed_line(answer.check));
 }
 
 }  // namespace proofmass::coordinator

@@ -21,13 +21,15 @@ struct RequirementAnswer {
 /// Holds requirements against the results in a campaign file; runs without an estimate, and those
 /// that were given up, count as exceedances.
 ///
-/// @param texts  See parse_requirement().
+/// @param objectives  Those of the campaign's scenario.
+/// @param texts       See parse_requirement().
 /// @throws ConfigError if one cannot be read.
 [[nodiscard]] std::vector<RequirementAnswer> check_requirements(const Store& store,
+                                                                const ParameterArray& objectives,
                                                                 std::span<const std::string> texts);
 
-/// Answer, exceedances, bound, and the draws it takes; lines of at most 80 characters unless the
-/// requirement is longer.
+/// Answer, the bound by which it was decided, the tolerance bound, and the draws it takes; lines of
+/// at most 80 characters unless the requirement is longer.
 [[nodiscard]] std::string requirement_text(const RequirementAnswer& answer);
 
 }  // namespace proofmass::coordinator

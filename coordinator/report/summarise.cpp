@@ -7,6 +7,8 @@
 #include <iterator>
 #include <vector>
 
+#include "coordinator/report/exceedances.hpp"
+#include "coordinator/report/probability_text.hpp"
 #include "coordinator/report/report.hpp"
 #include "core/statistics/stop_rule.hpp"
 #include "core/statistics/value_passes.hpp"
@@ -14,11 +16,19 @@
 namespace proofmass::coordinator {
 namespace {
 
-/// `std(a_c13)` of `std(a_c13) within 5%`.
-std::string_view statistic_of(std::string_view rule) { return rule.substr(0, rule.find(')') + 1); }
+StopCheck check_exceedances(const StopRule& rule, const Store& store,
+                            const ParameterArray& objectives, std::uint64_t num_runs) {
+  Exceedances exceedances(rule.requirement, objectives);
+  ResultReader reader = store.results({RunIndex{0}, num_runs});
+  while (const std::optional<RunResult> result = reader.next()) exceedances.add(*result);
+  return check_stop_rule(rule, exceedances.of(num_runs));
+}
 
-/// The rule against the runs [0, num_runs) that have an estimate.
-StopCheck check_with(const StopRule& rule, const Store& store, std::uint64_t num_runs) {
+/// The rule against the runs [0, num_runs): errors of those that have an estimate, or how many of
+/// all exceed something.
+StopCheck check_with(const StopRule& rule, const Store& store, const ParameterArray& objectives,
+                     std::uint64_t num_runs) {
+  if (is_about_exceedances(rule)) return check_exceedances(rule, store, objectives, num_runs);
   ValuePasses errors(wanted_by(rule));
   do {
     ResultReader reader = store.results({RunIndex{0}, num_runs});
@@ -51,7 +61,7 @@ std::optional<std::uint64_t> summarise_file(
     num_runs = reader.num_runs();
     if (plan.stop_rule.empty()) return;
     rule = parse_stop_rule(plan.stop_rule);
-    check = check_with(rule, reader, num_runs);
+    check = check_with(rule, reader, scenario.objectives, num_runs);
   });
   if (plan.stop_rule.empty()) {
     write([&](Store& store) { write_statistics(store, scenario, results); });
@@ -70,8 +80,9 @@ namespace {
 
 /// A rule of the statistic that a row is of; empty if there is no such statistic.
 std::optional<StopRule> rule_of(const StopCheckRow& row) {
+  const bool is_whole = std::string_view(row.statistic).ends_with("decided");
   try {
-    return parse_stop_rule(row.statistic + " within 5%");
+    return parse_stop_rule(is_whole ? row.statistic : row.statistic + " within 5%");
   } catch (const ConfigError&) {
     return std::nullopt;
   }
@@ -83,22 +94,26 @@ bool was_reached(const StopCheck& check, bool stored) {
   return *check.relative_half_width == 0.0 || stored;
 }
 
-StopCheckRow recomputed(const StopCheckRow& row, const StopRule& rule, const Store& store) {
+StopCheckRow recomputed(const StopCheckRow& row, const StopRule& rule, const Store& store,
+                        const ParameterArray& objectives) {
   StopCheckRow must = row;
-  must.check = check_with(rule, store, row.num_runs);
-  must.check.is_reached = was_reached(must.check, row.check.is_reached);
+  must.check = check_with(rule, store, objectives, row.num_runs);
+  // A verdict depends on nothing that the row does not name.
+  if (rule.statistic != StopRule::Statistic::verdict) {
+    must.check.is_reached = was_reached(must.check, row.check.is_reached);
+  }
   return must;
 }
 
 /// The check that ended a campaign; empty if it has not ended, or has no rule.
-std::optional<StopCheckRow> deciding_check(const Store& store) {
+std::optional<StopCheckRow> deciding_check(const Store& store, const ParameterArray& objectives) {
   const std::string text = store.stop_plan().stop_rule;
   if (text.empty() || store.control().phase != wire::CampaignPhase::finished) return std::nullopt;
   const StopRule rule = parse_stop_rule(text);
   const std::uint64_t num_runs = store.num_runs();
   return StopCheckRow{.statistic = std::string(statistic_of(text)),
                       .num_runs = num_runs,
-                      .check = check_with(rule, store, num_runs)};
+                      .check = check_with(rule, store, objectives, num_runs)};
 }
 
 /// Runs [0, n) that are finished, and were before any stop check of as many runs: none of them was
@@ -111,7 +126,8 @@ std::uint64_t num_held(const Store& store) {
 
 }  // namespace
 
-std::vector<std::string> stop_check_differences(const Store& store) {
+std::vector<std::string> stop_check_differences(const Store& store,
+                                                const ParameterArray& objectives) {
   std::vector<std::string> differences;
   std::vector<StopCheckRow> expected;
   const std::uint64_t num_runs = store.num_runs();
@@ -125,38 +141,76 @@ std::vector<std::string> stop_check_differences(const Store& store) {
       differences.push_back(fmt::format("stop_check.num_runs of {} = {} (must be at most {})",
                                         row.statistic, row.num_runs, num_runs));
     } else if (row.num_runs <= num_runs_held) {
-      expected.push_back(recomputed(row, *rule, store));
+      expected.push_back(recomputed(row, *rule, store, objectives));
     }
   }
   // Comes last: of two expected rows of one check, this one holds.
   if (num_runs <= num_runs_held) {
-    if (const auto deciding = deciding_check(store)) expected.push_back(*deciding);
+    if (const auto deciding = deciding_check(store, objectives)) expected.push_back(*deciding);
   }
   std::ranges::copy(store.stop_check_differences(expected), std::back_inserter(differences));
   return differences;
 }
 
-void check_stop_checks(const Store& store) {
-  const std::vector<std::string> differences = stop_check_differences(store);
+void check_stop_checks(const Store& store, const ParameterArray& objectives) {
+  const std::vector<std::string> differences = stop_check_differences(store, objectives);
   if (!differences.empty()) store.refuse_as_damaged(differences.front());
 }
 
+namespace {
+
+Verdict verdict_of(const StopRule& rule, const StoredStopCheck& check) {
+  if (!check.is_reached) return Verdict::undecided;
+  const double allowed_rate = 1.0 - rule.requirement.tolerance.coverage;
+  return check.estimate < allowed_rate ? Verdict::met : Verdict::not_met;
+}
+
+std::string verdict_text(const StopRule& rule, const StoredStopCheck& check) {
+  const Tolerance& tolerance = rule.requirement.tolerance;
+  Interval bounds = check.interval.value_or(Interval{.lower = 0.0, .upper = 1.0});
+  bounds.confidence = tolerance.confidence;  // Stored with the rule and not with the bounds.
+  const Verdict verdict = verdict_of(rule, check);
+  return fmt::format("          {} after {} runs; exceeding: {:.0f}\n          {}\n",
+                     name_of(verdict), check.num_runs,
+                     check.estimate * static_cast<double>(check.num_runs),
+                     bounds_text(bounds, 1.0 - tolerance.coverage, verdict));
+}
+
+std::string width_text(const StopRule& rule, const StoredStopCheck& check) {
+  std::string text = check.relative_half_width
+                         ? fmt::format("within {:.3g} %, half its 95 % interval",
+                                       100.0 * *check.relative_half_width)
+                         : std::string("without an interval");
+  if (rule.statistic != StopRule::Statistic::success || !check.interval) return text + "\n";
+  return text +
+         fmt::format("\n          in {:.0f} of {} runs, {} of all draws",
+                     check.estimate * static_cast<double>(check.num_runs), check.num_runs,
+                     interval_percent(*check.interval)) +
+         "\n";
+}
+
+}  // namespace
+
 bool is_rule_missed(const Store& store) {
-  const auto check = last_check(store, store.stop_plan());
-  return check && !check->is_reached;
+  const StopPlan plan = store.stop_plan();
+  const auto check = last_check(store, plan);
+  if (!check) return false;
+  const StopRule rule = parse_stop_rule(plan.stop_rule);
+  if (rule.statistic != StopRule::Statistic::verdict) return !check->is_reached;
+  return verdict_of(rule, *check) != Verdict::met;
 }
 
 std::string stop_text(const Store& store) {
   const StopPlan plan = store.stop_plan();
   const auto check = last_check(store, plan);
   if (!check) return "";
-  const std::string width = check->relative_half_width
-                                ? fmt::format("within {:.3g} %, half its 95 % interval",
-                                              100.0 * *check->relative_half_width)
-                                : std::string("without an interval");
-  return fmt::format("Stopping  {} {}\n          after {} runs; {}: {}\n",
-                     statistic_of(plan.stop_rule), width, check->num_runs, plan.stop_rule,
-                     check->is_reached ? "reached" : "not reached");
+  const StopRule rule = parse_stop_rule(plan.stop_rule);
+  if (rule.statistic == StopRule::Statistic::verdict) {
+    return fmt::format("Stopping  {}\n{}", plan.stop_rule, verdict_text(rule, *check));
+  }
+  return fmt::format("Stopping  {} {}          after {} runs; {}: {}\n",
+                     statistic_of(plan.stop_rule), width_text(rule, *check), check->num_runs,
+                     plan.stop_rule, check->is_reached ? "reached" : "not reached");
 }
 
 }  // namespace proofmass::coordinator

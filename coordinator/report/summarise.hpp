@@ -31,16 +31,19 @@ std::optional<std::uint64_t> summarise_file(
 /// Rows of n runs are held against the results if all runs below n are finished, and were when the
 /// rule was checked, as no loss was blamed on any of them.
 /// @pre All results are in range, and one state of the file is read.
-[[nodiscard]] std::vector<std::string> stop_check_differences(const Store& store);
+/// @param objectives  Those of the campaign's scenario.
+[[nodiscard]] std::vector<std::string> stop_check_differences(const Store& store,
+                                                              const ParameterArray& objectives);
 
 /// @throws StoreError `campaign file = x.db (is damaged: ...)` with the first of these differences.
-void check_stop_checks(const Store& store);
+void check_stop_checks(const Store& store, const ParameterArray& objectives);
 
-/// What came of a campaign's stop rule, in two lines of at most 80 characters; empty if there is
-/// none or it was not checked.
+/// What came of a campaign's stop rule, in lines of at most 80 characters unless the rule is
+/// longer; empty if there is none or it was not checked.
 [[nodiscard]] std::string stop_text(const Store& store);
 
-/// True if a campaign has a stop rule that was checked and not reached.
+/// True if a campaign has a stop rule that was checked and not reached, or one that ends in
+/// `decided` whose requirement is not met.
 [[nodiscard]] bool is_rule_missed(const Store& store);
 
 }  // namespace proofmass::coordinator

@@ -140,6 +140,8 @@ struct StoredStopCheck {
   std::uint64_t num_runs = 0;
   bool is_reached = false;
   std::optional<double> relative_half_width;  ///< Empty if runs were too few for an interval.
+  double estimate = 0.0;                      ///< As in StopCheck; so is the interval.
+  std::optional<Interval> interval;
 };
 
 /// A row of `stop_check`.

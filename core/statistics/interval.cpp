@@ -28,6 +28,20 @@ std::size_t lower_rank(std::size_t n, double level, double confidence) {
   return holds;
 }
 
+/// The probability left beyond each end of an interval, and what the interval is called.
+struct Tail {
+  double tail;
+  double confidence;
+};
+
+Interval clopper_pearson(double num_hits, double num_runs, const Tail& beyond) {
+  PROOFMASS_EXPECT(num_hits >= 0.0 && num_hits <= num_runs && num_runs > 0.0);
+  const double misses = num_runs - num_hits;
+  return {.lower = num_hits == 0.0 ? 0.0 : beta_quantile(beyond.tail, num_hits, misses + 1.0),
+          .upper = misses == 0.0 ? 1.0 : beta_quantile(1.0 - beyond.tail, num_hits + 1.0, misses),
+          .confidence = beyond.confidence};
+}
+
 // Lower bound of a percentile, one-sided. Of the r values below the percentile the nearest lies an
 // exponential distance of rate r/level from it, of those above the nearest one of rate
 // (n − r)/(1 − level); the weight makes P(bound ≤ percentile) = confidence under this law.
@@ -96,12 +110,13 @@ std::optional<Interval> percentile_interval(std::span<const double> ascending, d
 
 Interval probability_interval(double num_hits, double num_runs, double confidence) {
   detail::check_fraction("confidence", confidence);
-  PROOFMASS_EXPECT(num_hits >= 0.0 && num_hits <= num_runs && num_runs > 0.0);
   const double tail = 0.5 - 0.5 * confidence;
-  const double misses = num_runs - num_hits;
-  return {.lower = num_hits == 0.0 ? 0.0 : beta_quantile(tail, num_hits, misses + 1.0),
-          .upper = misses == 0.0 ? 1.0 : beta_quantile(1.0 - tail, num_hits + 1.0, misses),
-          .confidence = confidence};
+  return clopper_pearson(num_hits, num_runs, {.tail = tail, .confidence = confidence});
+}
+
+Interval probability_bounds(double num_hits, double num_runs, double confidence) {
+  detail::check_fraction("confidence", confidence);
+  return clopper_pearson(num_hits, num_runs, {.tail = 1.0 - confidence, .confidence = confidence});
 }
 
 }  // namespace proofmass

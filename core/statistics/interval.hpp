@@ -52,4 +52,9 @@ struct IntervalPlaces {
 /// (Clopper-Pearson).
 [[nodiscard]] Interval probability_interval(double num_hits, double num_runs, double confidence);
 
+/// Of a probability, one-sided: each bound holds by itself with this confidence. Exact and
+/// conservative (Clopper-Pearson).
+/// @pre 0 ≤ num_hits ≤ num_runs, num_runs > 0.
+[[nodiscard]] Interval probability_bounds(double num_hits, double num_runs, double confidence);
+
 }  // namespace proofmass

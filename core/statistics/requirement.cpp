@@ -1,10 +1,14 @@
 #include "core/statistics/requirement.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/campaign/identifiers.hpp"
+#include "core/error.hpp"
 #include "core/statistics/detail/phrase.hpp"
+#include "core/statistics/detail/requirement_phrase.hpp"
 #include "core/statistics/distribution.hpp"
+#include "core/statistics/sequential.hpp"
 
 namespace proofmass {
 namespace {
@@ -58,40 +62,88 @@ void add_runs_needed(const Tolerance& tolerance, RequirementCheck& check) {
 }  // namespace
 
 Requirement parse_requirement(std::string_view text) {
-  detail::Phrase phrase("requirement", text, "PARAMETER < LIMIT for COVERAGE% with CONFIDENCE%");
-  Requirement requirement;
-  requirement.parameter = phrase.parameter();
-  phrase.expect("<");
-  requirement.limit = phrase.positive_number();
-  phrase.expect("for");
-  requirement.tolerance.coverage = phrase.percentage();
-  phrase.expect("with");
-  requirement.tolerance.confidence = phrase.percentage();
+  detail::Phrase phrase("requirement", text,
+                        "PARAMETER < LIMIT for COVERAGE% with CONFIDENCE%\" or \"all objectives "
+                        "for COVERAGE% with CONFIDENCE%");
+  const Requirement requirement = detail::read_requirement(phrase);
   phrase.expect_end();
   return requirement;
 }
 
+Requirement detail::read_requirement(Phrase& phrase) {
+  Requirement requirement;
+  if (phrase.takes("all")) {
+    requirement.subject = Requirement::Subject::all_objectives;
+    phrase.expect("objectives");
+  } else {
+    requirement.parameter = phrase.parameter();
+    phrase.expect("<");
+    requirement.limit = phrase.positive_number();
+  }
+  phrase.expect("for");
+  requirement.tolerance.coverage = phrase.percentage();
+  phrase.expect("with");
+  requirement.tolerance.confidence = phrase.percentage();
+  return requirement;
+}
+
+bool exceeds(const Requirement& requirement, const ParameterArray& errors,
+             const ParameterArray& objectives) {
+  if (requirement.subject == Requirement::Subject::parameter) {
+    return std::abs(errors[index(requirement.parameter)]) >= requirement.limit;
+  }
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    if (std::abs(errors[i]) > objectives[i]) return true;
+  }
+  return false;
+}
+
 RequirementCheck check_requirement(const Requirement& requirement, std::span<const double> errors,
                                    std::uint64_t num_without_estimate) {
-  const Tolerance& tolerance = requirement.tolerance;
+  PROOFMASS_EXPECT(requirement.subject == Requirement::Subject::parameter);
   const auto num_above =
       std::ranges::count_if(errors, [&](double error) { return error >= requirement.limit; });
+  RequirementCheck check = check_requirement(
+      requirement, {.num_runs = errors.size() + num_without_estimate,
+                    .num_exceedances = static_cast<std::uint64_t>(num_above) + num_without_estimate,
+                    .num_without_estimate = num_without_estimate});
+  check.bound = wilks_upper(errors, requirement.tolerance, num_without_estimate);
+  return check;
+}
+
+RequirementCheck check_requirement(const Requirement& requirement, const ExceedanceCount& count) {
+  PROOFMASS_EXPECT(count.num_exceedances <= count.num_runs);
+  const Tolerance& tolerance = requirement.tolerance;
+  tolerance.validate();
   RequirementCheck check;
-  check.num_runs = errors.size() + num_without_estimate;
-  check.num_exceedances = static_cast<std::uint64_t>(num_above) + num_without_estimate;
-  check.num_without_estimate = num_without_estimate;
+  check.num_runs = count.num_runs;
+  check.num_exceedances = count.num_exceedances;
+  check.num_without_estimate = count.num_without_estimate;
   const std::uint64_t order = wilks_order(tolerance, check.num_runs);
   check.num_allowed = order == 0 ? 0 : order - 1;
-  check.bound = wilks_upper(errors, tolerance, num_without_estimate);
 
   const auto num_exceedances = static_cast<double>(check.num_exceedances);
   const auto num_runs = static_cast<double>(check.num_runs);
   check.verdict = verdict(tolerance, num_exceedances, num_runs);
   if (check.num_runs > 0) {
-    check.exceedance = probability_interval(num_exceedances, num_runs, default_confidence);
+    check.exceedance = probability_bounds(num_exceedances, num_runs, tolerance.confidence);
   }
   if (check.verdict == Verdict::undecided) add_runs_needed(tolerance, check);
   return check;
+}
+
+Decision decide(const Tolerance& tolerance, const ExceedanceCount& count) {
+  PROOFMASS_EXPECT(count.num_exceedances <= count.num_runs);
+  tolerance.validate();
+  if (count.num_runs == 0) return {};
+  const auto num_exceedances = static_cast<double>(count.num_exceedances);
+  const auto num_runs = static_cast<double>(count.num_runs);
+  Decision decision;
+  decision.exceedance = sequential_bounds(num_exceedances, num_runs, tolerance.confidence);
+  const double allowed_rate = 1.0 - tolerance.coverage;
+  if (decision.exceedance->upper <= allowed_rate) decision.verdict = Verdict::met;
+  if (decision.exceedance->lower >= allowed_rate) decision.verdict = Verdict::not_met;
+  return decision;
 }
 
 }  // namespace proofmass

@@ -11,18 +11,39 @@
 
 namespace proofmass {
 
-/// "|estimate − truth| of the parameter is below the limit in at least `coverage` of all cases",
-/// to be shown with a confidence.
+/// "In at least `coverage` of all cases |estimate − truth| of the parameter is below the limit", or
+/// "all ten parameters meet their objectives", to be shown with a confidence.
 struct Requirement {
-  Parameter parameter = Parameter::a_c12;
-  double limit = 0.0;  ///< SI, > 0; an error on the limit exceeds it.
+  enum class Subject {
+    parameter,       ///< One parameter against a limit.
+    all_objectives,  ///< Every parameter of a run against its objective.
+  };
+
+  Parameter parameter = Parameter::a_c12;  ///< For Subject::parameter.
+  double limit = 0.0;                      ///< The same: SI, > 0; an error on it exceeds it.
   Tolerance tolerance;
+  Subject subject = Subject::parameter;
 };
 
-/// Reads `a_c12 < 9e-4 for 99% with 95%`; the limit is in SI units.
+/// Reads `a_c12 < 9e-4 for 99% with 95%`, the limit in SI units, or
+/// `all objectives for 95% with 90%`.
 /// @throws ConfigError such as `requirement = a_c14 < 1 for 9% with 9% (a_c14 is no parameter;
 /// ...)`.
 [[nodiscard]] Requirement parse_requirement(std::string_view text);
+
+/// True if a run with these errors does not do what is required: |error| of the parameter is at or
+/// above the limit, or of any parameter above its objective.
+/// @param errors      estimate − truth, SI.
+/// @param objectives  Largest acceptable |error| of each parameter, SI.
+[[nodiscard]] bool exceeds(const Requirement& requirement, const ParameterArray& errors,
+                           const ParameterArray& objectives);
+
+/// How many runs there are, and how many of them exceed what is required.
+struct ExceedanceCount {
+  std::uint64_t num_runs = 0;              ///< With and without an estimate.
+  std::uint64_t num_exceedances = 0;       ///< Those that exceed it or lack an estimate.
+  std::uint64_t num_without_estimate = 0;  ///< The latter.
+};
 
 enum class Verdict {
   met,        ///< The requirement holds, with the confidence asked for.
@@ -32,14 +53,16 @@ enum class Verdict {
 
 struct RequirementCheck {
   Verdict verdict = Verdict::undecided;
-  std::uint64_t num_runs = 0;              ///< Runs with and without an error.
-  std::uint64_t num_exceedances = 0;       ///< Errors at or above the limit, and runs without one.
-  std::uint64_t num_without_estimate = 0;  ///< Those runs.
-  std::uint64_t num_allowed = 0;           ///< Exceedances with which so many runs would meet it.
+  std::uint64_t num_runs = 0;  ///< As in ExceedanceCount; so are the next two.
+  std::uint64_t num_exceedances = 0;
+  std::uint64_t num_without_estimate = 0;
+  std::uint64_t num_allowed = 0;  ///< Exceedances with which so many runs would meet it.
   /// With this confidence at least `coverage` of all errors are below it; empty if runs are too
-  /// few. The requirement is met if and only if it is below the limit.
+  /// few, and for all objectives. The requirement is met if and only if it is below the limit.
   std::optional<ToleranceBound> bound;
-  /// Of the probability of an exceedance; two-sided, exact; empty without runs.
+  /// Of the probability of an exceedance, exact, each bound one-sided with the confidence of the
+  /// requirement: the latter is met if `upper` is 1 − coverage or less, and not met if `lower` is
+  /// 1 − coverage or more. Empty without runs.
   std::optional<Interval> exceedance;
   /// If undecided: all runs it takes to meet the requirement if none of the further ones exceeds.
   std::optional<std::uint64_t> num_runs_at_best;
@@ -50,13 +73,31 @@ struct RequirementCheck {
 };
 
 /// Verdict by the binomial law of the exceedances, with q = 1 − coverage and k of n exceeding: met
-/// if P(Bin(n, q) ≤ k) ≤ 1 − confidence, not met if P(Bin(n, q) ≥ k) ≤ 1 − confidence.
+/// if P(Bin(n, q) ≤ k) ≤ 1 − confidence, not met if P(Bin(n, q) ≥ k) ≤ 1 − confidence. It is that
+/// of a number of runs which was fixed beforehand; see decide() for others.
 ///
 /// @param errors                |estimate − truth| of the parameter, SI, in run order.
 /// @param num_without_estimate  Runs that have no error; each counts as an exceedance.
+/// @pre The requirement is one of a parameter.
 /// @throws InvalidArgument if an error is not finite.
 [[nodiscard]] RequirementCheck check_requirement(const Requirement& requirement,
                                                  std::span<const double> errors,
                                                  std::uint64_t num_without_estimate);
+
+/// The same of a count, and without a bound.
+[[nodiscard]] RequirementCheck check_requirement(const Requirement& requirement,
+                                                 const ExceedanceCount& count);
+
+/// A verdict that may be asked for after any number of runs and again after more, until it is one:
+/// if the requirement does not hold, "met" is ever answered with probability 1 − confidence at
+/// most, and likewise "not met" if it holds. That takes more runs than check_requirement(): 384
+/// without an exceedance for 99 % with 95 %, where that takes 299.
+struct Decision {
+  Verdict verdict = Verdict::undecided;
+  /// Of the probability of an exceedance, each bound one-sided; see sequential_bounds(). The
+  /// verdict compares them with 1 − coverage.
+  std::optional<Interval> exceedance;
+};
+[[nodiscard]] Decision decide(const Tolerance& tolerance, const ExceedanceCount& count);
 
 }  // namespace proofmass

@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
+#include "core/error.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/detail/phrase.hpp"
+#include "core/statistics/detail/requirement_phrase.hpp"
 
 namespace proofmass {
 namespace {
@@ -51,23 +54,66 @@ StopCheck estimated(const StopRule& rule, const ValuePasses& errors) {
       check.estimate = errors.percentile(rule.level);
       check.interval = errors.percentile_interval(rule.level);
       break;
+    case StopRule::Statistic::success:
+    case StopRule::Statistic::verdict:
+      PROOFMASS_EXPECT(false);
   }
   return check;
+}
+
+void check_width(const StopRule& rule, StopCheck& check) {
+  if (!check.interval) return;
+  const double half_width = 0.5 * (check.interval->upper - check.interval->lower);
+  const double relative = half_width == 0.0 ? 0.0 : half_width / std::abs(check.estimate);
+  if (!std::isfinite(relative)) return;
+  check.relative_half_width = relative;
+  check.is_reached = relative <= rule.relative_half_width;
+}
+
+StopRule rule_about_verdict(detail::Phrase& phrase) {
+  StopRule rule{.statistic = StopRule::Statistic::verdict,
+                .requirement = detail::read_requirement(phrase)};
+  phrase.expect("decided");
+  phrase.expect_end();
+  return rule;
 }
 
 }  // namespace
 
 StopRule parse_stop_rule(std::string_view text) {
-  detail::Phrase phrase("until", text, "STATISTIC(PARAMETER) within PERCENT%");
+  detail::Phrase phrase(
+      "until", text,
+      "STATISTIC(PARAMETER) within PERCENT%\", \"all objectives within PERCENT%\" "
+      "or \"REQUIREMENT decided");
+  if (phrase.ends_with("decided")) return rule_about_verdict(phrase);
   StopRule rule;
-  read_statistic(phrase, rule);
-  phrase.expect("(");
-  rule.parameter = phrase.parameter();
-  phrase.expect(")");
+  if (phrase.takes("all")) {
+    phrase.expect("objectives");
+    rule.statistic = StopRule::Statistic::success;
+    rule.requirement.subject = Requirement::Subject::all_objectives;
+  } else {
+    read_statistic(phrase, rule);
+    phrase.expect("(");
+    rule.parameter = phrase.parameter();
+    phrase.expect(")");
+  }
   phrase.expect("within");
   rule.relative_half_width = phrase.percentage();
   phrase.expect_end();
   return rule;
+}
+
+std::string_view statistic_of(std::string_view text) {
+  const std::size_t end = text.find(')');
+  if (end != std::string_view::npos) return text.substr(0, end + 1);
+  const std::string_view about = text.substr(0, text.find("within"));
+  const std::size_t first = std::min(about.find_first_not_of(" \t"), about.size());
+  return about.substr(first, about.find_last_not_of(" \t") + 1 - first);
+}
+
+bool is_about_exceedances(const StopRule& rule) {
+  return rule.statistic == StopRule::Statistic::success ||
+         rule.statistic == StopRule::Statistic::verdict;
 }
 
 std::uint64_t next_stop_check(std::uint64_t num_runs) {
@@ -98,12 +144,26 @@ StopCheck check_stop_rule(const StopRule& rule, std::span<const double> errors) 
 StopCheck check_stop_rule(const StopRule& rule, const ValuePasses& errors) {
   if (errors.count() == 0) return {};
   StopCheck check = estimated(rule, errors);
-  if (!check.interval) return check;
-  const double half_width = 0.5 * (check.interval->upper - check.interval->lower);
-  const double relative = half_width == 0.0 ? 0.0 : half_width / std::abs(check.estimate);
-  if (!std::isfinite(relative)) return check;
-  check.relative_half_width = relative;
-  check.is_reached = *check.relative_half_width <= rule.relative_half_width;
+  check_width(rule, check);
+  return check;
+}
+
+StopCheck check_stop_rule(const StopRule& rule, const ExceedanceCount& count) {
+  PROOFMASS_EXPECT(is_about_exceedances(rule) && count.num_exceedances <= count.num_runs);
+  if (count.num_runs == 0) return {};
+  StopCheck check;
+  const auto num_runs = static_cast<double>(count.num_runs);
+  if (rule.statistic == StopRule::Statistic::verdict) {
+    const Decision decision = decide(rule.requirement.tolerance, count);
+    check.estimate = static_cast<double>(count.num_exceedances) / num_runs;
+    check.interval = decision.exceedance;
+    check.is_reached = decision.verdict != Verdict::undecided;
+    return check;
+  }
+  const auto num_successes = static_cast<double>(count.num_runs - count.num_exceedances);
+  check.estimate = num_successes / num_runs;
+  check.interval = probability_interval(num_successes, num_runs, default_confidence);
+  check_width(rule, check);
   return check;
 }
 

@@ -7,23 +7,42 @@
 
 #include "core/campaign/parameter.hpp"
 #include "core/statistics/interval.hpp"
+#include "core/statistics/requirement.hpp"
 #include "core/statistics/value_passes.hpp"
 
 namespace proofmass {
 
-/// Stops a campaign once a statistic of |estimate − truth| is known well enough.
+/// Stops a campaign once a statistic is known well enough, or once a requirement is decided.
 struct StopRule {
-  enum class Statistic { mean, standard_deviation, percentile };
+  enum class Statistic {
+    mean,  ///< Of |estimate − truth| of the parameter; so are the next two.
+    standard_deviation,
+    percentile,
+    success,  ///< Probability that all objectives hold.
+    verdict,  ///< Of `requirement`: met or not met.
+  };
 
   Statistic statistic = Statistic::standard_deviation;
   double level = 0.0;  ///< For `percentile`, in (0, 1); else 0.
   Parameter parameter = Parameter::a_c13;
   double relative_half_width = 0.0;  ///< Of the 95 % interval, to be reached; in (0, 1).
+  /// For `verdict`; for `success` it says what a success is.
+  Requirement requirement = {};
 };
 
-/// Reads `std(a_c13) within 5%`; the statistic is `mean`, `std` or a percentile `p1` to `p99`.
+/// Reads `std(a_c13) within 5%`, where the statistic is `mean`, `std` or a percentile `p1` to
+/// `p99`; `all objectives within 2%`; or a requirement with the word `decided` behind it, as in
+/// `a_c12 < 9e-4 for 99% with 95% decided`, see parse_requirement().
 /// @throws ConfigError such as `until = max(k2c) within 5% (max is no statistic; ...)`.
 [[nodiscard]] StopRule parse_stop_rule(std::string_view text);
+
+/// What the rule is about, as it was written: `std(a_c13)` of `std(a_c13) within 5%`,
+/// `all objectives`, and a rule that ends in `decided` as a whole.
+/// @param text  That parse_stop_rule() can read.
+[[nodiscard]] std::string_view statistic_of(std::string_view text);
+
+/// True if the rule is one about the number of runs that exceed something, and not about errors.
+[[nodiscard]] bool is_about_exceedances(const StopRule& rule);
 
 /// The first run count ≥ 1 that a stop rule is evaluated at, above `num_runs`: 128, 192, 256, 384,
 /// 512, 768 and so on, 2ᵏ and 3·2ᵏ⁻¹, whole batches all of them. Fixed counts make the stopping
@@ -54,5 +73,12 @@ struct StopCheck {
 /// @param errors  Made for wanted_by(rule); no further pass is needed.
 [[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, const ValuePasses& errors);
 [[nodiscard]] ValuePasses::Wanted wanted_by(const StopRule& rule);
+
+/// The same for a rule about exceedances. The estimate of `success` is the fraction of the runs
+/// that meet all objectives, with its Clopper-Pearson interval. That of `verdict` is the fraction
+/// that exceed, with the bounds of decide(), each one-sided and with the requirement's confidence;
+/// it has no relative_half_width and is reached if there is a verdict.
+/// @pre is_about_exceedances(rule).
+[[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, const ExceedanceCount& count);
 
 }  // namespace proofmass

@@ -114,13 +114,20 @@ void write_stop_plan(const Database& database, const StopPlan& plan) {
 std::optional<StoredStopCheck> read_last_stop_check(const Database& database,
                                                     std::string_view statistic) {
   Statement select = database.prepare(
-      "SELECT num_runs, is_reached, relative_half_width FROM stop_check WHERE statistic = ? "
+      "SELECT num_runs, is_reached, relative_half_width, estimate, lower, upper FROM stop_check "
+      "WHERE statistic = ? "
       "ORDER BY num_runs DESC LIMIT 1");
   select.bind(1, statistic);
   if (!select.step()) return std::nullopt;
-  return StoredStopCheck{.num_runs = select.count(0),
-                         .is_reached = select.integer(1) != 0,
-                         .relative_half_width = select.optional_real(2)};
+  StoredStopCheck check{.num_runs = select.count(0),
+                        .is_reached = select.integer(1) != 0,
+                        .relative_half_width = select.optional_real(2),
+                        .estimate = select.real(3),
+                        .interval = {}};
+  const std::optional<double> lower = select.optional_real(4);
+  const std::optional<double> upper = select.optional_real(5);
+  if (lower && upper) check.interval = Interval{.lower = *lower, .upper = *upper};
+  return check;
 }
 
 std::vector<StopCheckRow> read_stop_checks(const Database& database) {

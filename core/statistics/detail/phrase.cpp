@@ -69,6 +69,20 @@ void Phrase::expect(std::string_view literal) {
   rest_ = without_blanks_in_front(rest_.substr(literal.size()));
 }
 
+bool Phrase::takes(std::string_view literal) {
+  const auto end = std::ranges::find_if_not(rest_, is_word_part);
+  if (std::string_view(rest_.begin(), end) != literal) return false;
+  (void)word();
+  return true;
+}
+
+bool Phrase::ends_with(std::string_view literal) const {
+  const std::string_view text = rest_.substr(0, rest_.find_last_not_of(" \t") + 1);
+  if (!text.ends_with(literal)) return false;
+  const std::string_view before = text.substr(0, text.size() - literal.size());
+  return before.empty() || !is_word_part(before.back());
+}
+
 void Phrase::expect_end() {
   if (!rest_.empty()) refuse_form();
 }

@@ -26,6 +26,10 @@ class Phrase {
   [[nodiscard]] double percentage();
   /// This very text.
   void expect(std::string_view literal);
+  /// True if this word comes next; it is then read.
+  [[nodiscard]] bool takes(std::string_view literal);
+  /// True if this word is the last one of the phrase.
+  [[nodiscard]] bool ends_with(std::string_view literal) const;
   void expect_end();
 
   [[noreturn]] void refuse(std::string_view rule) const;

@@ -21,12 +21,13 @@ std::string answer_to(const std::string& text, std::size_t num_runs, std::size_t
                            .missing = {}});
 }
 
-// [Wilks1941]: 299 runs for 99 % with 95 %. Clopper and Pearson: 1 - 0.025^(1/299) = 1.226 %.
+// [Wilks1941]: 299 runs for 99 % with 95 %. Clopper and Pearson, one-sided: 1 - 0.05^(1/299).
 TEST(RequirementText, SaysThatItIsMet) {
   EXPECT_EQ(answer_to("a_c12 < 9e-4 for 99% with 95%", 299, 0),
             "Requirement  a_c12 < 9e-4 for 99% with 95%\n"
             "Answer       met\n"
-            "Exceeding    0 of 299 runs; 0 % to 1.226 % of all draws (95 % interval)\n"
+            "Exceeding    0 of 299 runs; at most 0.9969 % of all draws, with 95 %\n"
+            "Allowed      1 % of all draws\n"
             "Bound        99 % of all draws below 0.0001 rad, with 95 %\n");
 }
 
@@ -40,9 +41,9 @@ TEST(RequirementText, SaysHowManyDrawsItTakes) {
 }
 
 TEST(RequirementText, BreaksALineOfManyRuns) {
-  EXPECT_THAT(answer_to("a_c12 < 9e-4 for 99% with 95%", 1'000'000, 909'905),
-              testing::HasSubstr("Exceeding    909905 of 1000000 runs;\n             90.93 % to "
-                                 "91.05 % of all draws (95 % interval)\n"));
+  EXPECT_THAT(answer_to("a_c12 < 9e-4 for 9% with 95%", 1'000'000, 909'905),
+              testing::HasSubstr("Exceeding    909905 of 1000000 runs;\n             at least "
+                                 "90.94 % and at most 91.04 % of all draws, each with 95 %\n"));
 }
 
 // 1 − 1e-9 with 1 − 1e-9 takes 2e10 draws, which is more than a campaign may have.
@@ -59,8 +60,10 @@ TEST(RequirementText, SaysThatNoNumberOfDrawsDecides) {
                                  "             none decide if"));
 }
 
+// scipy.stats.beta.ppf(0.05, 20, 81) = 13.67 %.
 TEST(RequirementText, SaysThatItIsNotMet) {
   const std::string text = answer_to("a_c12 < 9e-4 for 99% with 95%", 100, 20);
+  EXPECT_THAT(text, testing::HasSubstr("; at least 13.67 % of all draws, with 95 %\n"));
   EXPECT_THAT(text, testing::HasSubstr("Answer       not met\n"));
   EXPECT_THAT(text, testing::Not(testing::HasSubstr("Draws")));
 }
@@ -74,10 +77,47 @@ TEST(RequirementText, SaysHowManyDrawsExceedForWantOfAnEstimate) {
                                              .requirement = requirement,
                                              .check = check_requirement(requirement, errors, 5),
                                              .missing = {.num_not_finite = 1, .num_no_draw = 4}});
-  EXPECT_THAT(text, testing::HasSubstr("Exceeding    5 of 400 runs; "));
+  EXPECT_THAT(text, testing::HasSubstr("Exceeding    5 of 400 runs;\n"));
   EXPECT_THAT(text, testing::HasSubstr("\n             5 of them for want of an estimate:\n"
                                        "             1 not finite, 4 without draw\n"));
   EXPECT_THAT(text, testing::HasSubstr("Bound        none: 1049 draws at least, "));
+}
+
+// A bound that rounds to what is allowed has the digits that tell it apart: 1 − 0.05^(1/299) is
+// 0.99691 %, of which 0.9969 % are allowed.
+TEST(RequirementText, ShowsOnWhichSideABoundLies) {
+  EXPECT_THAT(answer_to("a_c12 < 9e-4 for 99.0031% with 95%", 299, 0),
+              testing::HasSubstr("at least 0 % and at most 0.99691 % of all draws, each with"));
+}
+
+// scipy.stats.beta.ppf: 0.1 with 97 and 4 is 93.44 %, 0.9 with 98 and 3 is 98.89 %.
+TEST(RequirementText, TellsOfAllObjectives) {
+  const Requirement requirement = parse_requirement("all objectives for 95% with 90%");
+  const auto answer_to_count = [&](std::uint64_t num_exceedances, double coverage) {
+    Requirement asked = requirement;
+    asked.tolerance.coverage = coverage;
+    return requirement_text(
+        {.text = "all objectives for 95% with 90%",
+         .requirement = asked,
+         .check = check_requirement(asked, {.num_runs = 100, .num_exceedances = num_exceedances}),
+         .missing = {}});
+  };
+  EXPECT_THAT(answer_to_count(3, 0.95),
+              testing::StartsWith("Requirement  all objectives for 95% with 90%\n"
+                                  "Answer       undecided\n"
+                                  "Holding      97 of 100 runs;\n"
+                                  "             at least 93.44 % and at most 98.89 % of all draws, "
+                                  "each with 90 %\n"
+                                  "Required     95 % of all draws\n"
+                                  "Draws        "));
+  EXPECT_THAT(answer_to_count(3, 0.90),
+              testing::HasSubstr("Answer       met\n"
+                                 "Holding      97 of 100 runs; at least 93.44 % of all draws, with "
+                                 "90 %\n"));
+  EXPECT_THAT(answer_to_count(3, 0.99),
+              testing::HasSubstr("Answer       not met\n"
+                                 "Holding      97 of 100 runs; at most 98.89 % of all draws, with "
+                                 "90 %\n"));
 }
 
 TEST(RequirementText, LeavesOutTheUnitOfAPureNumber) {
@@ -96,12 +136,34 @@ TEST_F(StoredRequirement, CountsRunsWithoutAnEstimateAsExceeding) {
   store.write({&given_up, 1});
   const std::vector<std::string> texts{"k2c < 1e9 for 50% with 50%"};
 
-  const auto answers = check_requirements(store, texts);
+  const auto answers = check_requirements(store, Scenario{}.objectives, texts);
 
   ASSERT_EQ(answers.size(), 1U);
   EXPECT_EQ(answers[0].check.num_runs, 11U);
   EXPECT_EQ(answers[0].check.num_exceedances, 2U);
   EXPECT_EQ(answers[0].missing, (MissingEstimates{.num_no_draw = 1, .num_given_up = 1}));
+}
+
+// Seven of ten runs meet every objective: one lacks an estimate, one is beyond an objective, and
+// another beyond two of them.
+TEST_F(StoredRequirement, CountsRunsThatMissAnyObjectiveOnce) {
+  Store store = Store::create(file(), test::campaign_of(10), "");
+  std::vector<Delivery> deliveries = test::deliveries_of(0, 10);
+  for (Delivery& delivery : deliveries) delivery.result.estimate = delivery.result.truth;
+  deliveries[4].result.status = RunStatus::no_draw;
+  const ParameterArray objectives = Scenario{}.objectives;
+  const auto miss = [&](std::size_t run, Parameter parameter) {
+    deliveries[run].result.estimate[index(parameter)] -= 2.0 * objectives[index(parameter)];
+  };
+  miss(2, Parameter::a_c12);
+  miss(7, Parameter::k2c);
+  miss(7, Parameter::a_c13);
+  store.commit(deliveries);
+  const std::vector<std::string> texts{"all objectives for 50% with 50%"};
+  const RequirementCheck check = check_requirements(store, objectives, texts)[0].check;
+  EXPECT_EQ(check.num_runs, 10U);
+  EXPECT_EQ(check.num_exceedances, 3U);
+  EXPECT_EQ(check.num_without_estimate, 1U);
 }
 
 TEST_F(StoredRequirement, IsOfErrorsOfEitherSign) {
@@ -113,7 +175,7 @@ TEST_F(StoredRequirement, IsOfErrorsOfEitherSign) {
   }
   store.commit(deliveries);
   const std::vector<std::string> texts{"k2c < 1 for 50% with 50%"};
-  EXPECT_EQ(check_requirements(store, texts)[0].check.num_exceedances, 4U);
+  EXPECT_EQ(check_requirements(store, Scenario{}.objectives, texts)[0].check.num_exceedances, 4U);
 }
 
 }  // namespace

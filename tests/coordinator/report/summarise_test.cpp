@@ -61,6 +61,49 @@ TEST_F(Summarise, TellsWhatTheRuleAskedForAndWhatItFound) {
             "          after 128 runs; mean(k2c) within 5%: not reached\n");
 }
 
+// All magnitudes are 1 but for run 3, which has no estimate: one of 128 exceeds. The bound is the
+// sequential one, 5.0833 % (scipy.optimize.brentq of the evidence).
+TEST_F(Summarise, DecidesARequirement) {
+  const std::string rule = "k2c < 2 for 90% with 95% decided";
+  Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 1, 1);
+  EXPECT_EQ(next_runs(store), std::nullopt);
+  EXPECT_FALSE(is_rule_missed(store));
+  EXPECT_EQ(stop_text(store),
+            "Stopping  k2c < 2 for 90% with 95% decided\n"
+            "          met after 128 runs; exceeding: 1\n"
+            "          at most 5.083 % of all draws, with 95 %\n");
+  EXPECT_TRUE(stop_check_differences(store, Scenario{}.objectives).empty());
+}
+
+// A requirement that is decided and not met is missed; the campaign ends all the same.
+TEST_F(Summarise, EndsWhenARequirementCannotBeMet) {
+  const std::string rule = "k2c < 2 for 90% with 95% decided";
+  Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 1, 3);
+  EXPECT_EQ(next_runs(store), std::nullopt);
+  EXPECT_TRUE(is_rule_missed(store));
+}
+
+TEST_F(Summarise, GoesOnWhileARequirementIsUndecided) {
+  const std::string rule = "k2c < 2 for 99% with 95% decided";
+  Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 1, 1);
+  EXPECT_EQ(next_runs(store), 192U);
+  EXPECT_TRUE(is_rule_missed(store));
+}
+
+// Errors of 1 exceed every objective but those of the quadratic factors.
+TEST_F(Summarise, CountsWhereAllObjectivesHold) {
+  const StopPlan plan{
+      .stop_rule = "all objectives within 50%", .num_runs_max = 1000, .failures_max = {}};
+  Store store = finished(128, plan, 0.0, 1.0);
+  EXPECT_EQ(next_runs(store), std::nullopt);
+  EXPECT_EQ(store.last_stop_check("all objectives")->estimate, 0.5);
+  EXPECT_EQ(stop_text(store),
+            "Stopping  all objectives within 17.9 %, half its 95 % interval\n"
+            "          in 64 of 128 runs, 41 to 59 % of all draws\n"
+            "          after 128 runs; all objectives within 50%: reached\n");
+  EXPECT_TRUE(stop_check_differences(store, Scenario{}.objectives).empty());
+}
+
 TEST_F(Summarise, AsksForNoMoreRunsThanThereMayBe) {
   Store store = finished(128, plan_of(150), 1.0, 3.0);
   EXPECT_EQ(next_runs(store), 150U);

@@ -34,6 +34,13 @@ TEST(ParseRequirement, ReadsEveryPart) {
   EXPECT_EQ(requirement.tolerance.confidence, 0.95);
 }
 
+TEST(ParseRequirement, ReadsAllObjectives) {
+  const Requirement requirement = parse_requirement("all objectives for 95% with 90%");
+  EXPECT_EQ(requirement.subject, Requirement::Subject::all_objectives);
+  EXPECT_EQ(requirement.tolerance.coverage, 0.95);
+  EXPECT_EQ(requirement.tolerance.confidence, 0.90);
+}
+
 TEST(ParseRequirement, TakesBlanksAsTheyCome) {
   const Requirement requirement = parse_requirement("  k2d<1000 for 99.9 %  with 90% ");
   EXPECT_EQ(requirement.parameter, Parameter::k2d);
@@ -42,10 +49,13 @@ TEST(ParseRequirement, TakesBlanksAsTheyCome) {
 }
 
 TEST(ParseRequirement, RefusesAnotherForm) {
-  const std::string rule = " (must read \"PARAMETER < LIMIT for COVERAGE% with CONFIDENCE%\")";
+  const std::string rule =
+      " (must read \"PARAMETER < LIMIT for COVERAGE% with CONFIDENCE%\" or \"all objectives for "
+      "COVERAGE% with CONFIDENCE%\")";
   for (const std::string text :
        {"", "a_c12", "a_c12 > 1 for 9% with 9%", "a_c12 < x for 9% with 9%",
-        "a_c12 < 1 for 9 with 9%", "a_c12 < 1 for 9%", "a_c12 < 1 for 9% with 9% or so"}) {
+        "a_c12 < 1 for 9 with 9%", "a_c12 < 1 for 9%", "a_c12 < 1 for 9% with 9% or so",
+        "all for 9% with 9%", "all objectives < 1 for 9% with 9%"}) {
     EXPECT_EQ(refusal(text), "requirement = " + text + rule);
   }
 }
@@ -83,6 +93,53 @@ TEST(CheckRequirement, IsUndecidedWithOneRunLess) {
   EXPECT_FALSE(check.bound.has_value());
   EXPECT_EQ(check.num_runs_at_best, 299u);
   EXPECT_EQ(check.num_runs_at_this_rate, 299u);
+}
+
+// The bound that decides is one-sided: 1 − 0.05^(1/299) = 0.99691 %, while a two-sided interval of
+// 95 % ends at 1.226 %, which is more than the 1 % that are allowed.
+TEST(CheckRequirement, GivesTheBoundThatItDecidesBy) {
+  const RequirementCheck met = check_requirement(a_c12_99_95, errors_with(299, 0), 0);
+  EXPECT_EQ(met.exceedance->lower, 0.0);
+  EXPECT_NEAR(met.exceedance->upper, 0.009969146792899267, 1e-14);
+  EXPECT_EQ(met.exceedance->confidence, 0.95);
+  // scipy.stats.beta.ppf(0.05, 4, 97).
+  const RequirementCheck not_met = check_requirement(a_c12_99_95, errors_with(96, 4), 0);
+  EXPECT_NEAR(not_met.exceedance->lower, 0.013776, 1e-6);
+}
+
+// Whatever is asked, verdict and bounds say the same.
+TEST(CheckRequirement, AgreesWithItsBounds) {
+  for (const Tolerance tolerance :
+       {Tolerance{0.99, 0.95}, Tolerance{0.9, 0.9}, Tolerance{0.6, 0.8}}) {
+    for (std::uint64_t num_runs = 1; num_runs < 700; num_runs += 37) {
+      for (std::uint64_t num_exceedances = 0; num_exceedances <= num_runs; ++num_exceedances) {
+        const RequirementCheck check = check_requirement(
+            {.tolerance = tolerance}, {.num_runs = num_runs, .num_exceedances = num_exceedances});
+        // One of one lies on the border, give or take a rounding.
+        if (num_runs == 1) continue;
+        const double allowed = 1.0 - tolerance.coverage;
+        EXPECT_EQ(check.verdict == Verdict::met, check.exceedance->upper <= allowed)
+            << num_exceedances << " of " << num_runs;
+        EXPECT_EQ(check.verdict == Verdict::not_met, check.exceedance->lower >= allowed)
+            << num_exceedances << " of " << num_runs;
+      }
+    }
+  }
+}
+
+TEST(Exceeds, IsAboutOneParameterOrAll) {
+  ParameterArray objectives{};
+  objectives.fill(2.0);
+  ParameterArray errors{};
+  errors[index(Parameter::k2c)] = -2.0;
+  const Requirement one{.parameter = Parameter::k2c, .limit = 2.0, .tolerance = {0.9, 0.9}};
+  const Requirement all{.tolerance = {0.9, 0.9}, .subject = Requirement::Subject::all_objectives};
+  EXPECT_TRUE(exceeds(one, errors, objectives));   // On the limit exceeds it.
+  EXPECT_FALSE(exceeds(all, errors, objectives));  // On the objective holds.
+  errors[index(Parameter::k2c)] = 1.9;
+  errors[index(Parameter::a_d13)] = -2.1;
+  EXPECT_FALSE(exceeds(one, errors, objectives));
+  EXPECT_TRUE(exceeds(all, errors, objectives));
 }
 
 // One exceedance allows no verdict before 473 runs (second order).

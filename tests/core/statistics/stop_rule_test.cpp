@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -39,11 +40,34 @@ TEST(ParseStopRule, RefusesAnUnknownStatistic) {
 }
 
 TEST(ParseStopRule, RefusesAnotherForm) {
-  for (const std::string text : {"", "std a_c13 within 5%", "std(a_c13) in 5%",
-                                 "std(a_c13) within 5", "std(a_c13) within 5% or less"}) {
+  for (const std::string text :
+       {"", "std a_c13 within 5%", "std(a_c13) in 5%", "std(a_c13) within 5",
+        "std(a_c13) within 5% or less", "a_c12 < 1 for 9% decided", "all within 5%", "< decided",
+        "a_c12 < 1 for 9% with 9% soon decided"}) {
     EXPECT_EQ(refusal(text),
-              "until = " + text + " (must read \"STATISTIC(PARAMETER) within PERCENT%\")");
+              "until = " + text +
+                  " (must read \"STATISTIC(PARAMETER) within PERCENT%\", \"all objectives within "
+                  "PERCENT%\" or \"REQUIREMENT decided\")");
   }
+}
+
+TEST(ParseStopRule, ReadsARequirement) {
+  const StopRule rule = parse_stop_rule("a_c12 < 9e-4 for 99% with 95% decided ");
+  EXPECT_EQ(rule.statistic, StopRule::Statistic::verdict);
+  EXPECT_EQ(rule.requirement.parameter, Parameter::a_c12);
+  EXPECT_EQ(rule.requirement.limit, 9e-4);
+  const StopRule joint = parse_stop_rule("all objectives for 95% with 90% decided");
+  EXPECT_EQ(joint.requirement.subject, Requirement::Subject::all_objectives);
+  const StopRule success = parse_stop_rule("all objectives within 2%");
+  EXPECT_EQ(success.statistic, StopRule::Statistic::success);
+  EXPECT_EQ(success.relative_half_width, 0.02);
+}
+
+TEST(StatisticOf, NamesWhatTheRuleIsAbout) {
+  EXPECT_EQ(statistic_of("std(a_c13) within 5%"), "std(a_c13)");
+  EXPECT_EQ(statistic_of(" all objectives within 2%"), "all objectives");
+  EXPECT_EQ(statistic_of("a_c12 < 9e-4 for 99% with 95% decided "),
+            "a_c12 < 9e-4 for 99% with 95% decided");
 }
 
 TEST(ParseStopRule, RefusesAWidthOutsideItsRange) {
@@ -95,7 +119,7 @@ TEST(CheckStopRule, IsNotReachedWithoutAnInterval) {
   const StopCheck check = check_stop_rule(rule, test::half_normal_column(100, {.seed = 63}));
   EXPECT_FALSE(check.is_reached);
   EXPECT_FALSE(check.relative_half_width.has_value());
-  EXPECT_FALSE(check_stop_rule(rule, {}).is_reached);
+  EXPECT_FALSE(check_stop_rule(rule, std::span<const double>()).is_reached);
 }
 
 // Half of 128 runs have no error at all; whether the median of all is 0 is open.
@@ -108,6 +132,32 @@ TEST(CheckStopRule, IsNotReachedByAnIntervalAboutZero) {
   EXPECT_GT(check.interval->upper, 0.0);
   EXPECT_FALSE(check.relative_half_width.has_value());
   EXPECT_FALSE(check.is_reached);
+}
+
+// 97 of 100: 91.48 to 99.38 % (scipy.stats.beta.ppf), half of which is 4.07 % of 97 %.
+TEST(CheckStopRule, KnowsHowOftenAllObjectivesHold) {
+  const ExceedanceCount count{.num_runs = 100, .num_exceedances = 3};
+  const StopCheck check = check_stop_rule(parse_stop_rule("all objectives within 4%"), count);
+  EXPECT_EQ(check.estimate, 0.97);
+  EXPECT_NEAR(check.interval->lower, 0.91482394702572, 1e-13);
+  EXPECT_NEAR(check.interval->upper, 0.9937700284616936, 1e-13);
+  EXPECT_NEAR(*check.relative_half_width, 0.0407, 1e-4);
+  EXPECT_FALSE(check.is_reached);
+  EXPECT_TRUE(check_stop_rule(parse_stop_rule("all objectives within 4.1%"), count).is_reached);
+}
+
+TEST(CheckStopRule, IsReachedWhenARequirementIsDecided) {
+  const StopRule rule = parse_stop_rule("a_c12 < 9e-4 for 99% with 95% decided");
+  EXPECT_FALSE(check_stop_rule(rule, ExceedanceCount{}).is_reached);
+  EXPECT_FALSE(check_stop_rule(rule, ExceedanceCount{.num_runs = 256}).is_reached);
+  const StopCheck met = check_stop_rule(rule, ExceedanceCount{.num_runs = 384});
+  EXPECT_TRUE(met.is_reached);
+  EXPECT_LT(met.interval->upper, 0.01);
+  EXPECT_FALSE(met.relative_half_width.has_value());
+  const StopCheck not_met =
+      check_stop_rule(rule, ExceedanceCount{.num_runs = 128, .num_exceedances = 20});
+  EXPECT_TRUE(not_met.is_reached);
+  EXPECT_EQ(not_met.estimate, 20.0 / 128.0);
 }
 
 TEST(CheckStopRule, TakesAnExactZeroForKnown) {
