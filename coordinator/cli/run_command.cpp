@@ -17,6 +17,7 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/local_workers.hpp"
 #include "coordinator/cli/progress_display.hpp"
+#include "coordinator/cli/signal_thread.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/net/private_endpoint.hpp"
@@ -144,6 +145,7 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
     return {.store = std::move(campaign.store), .is_done = true};
   }
   make_active(campaign.store, options);
+  const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   ProgressDisplay display(options.is_quiet ? DisplayMode::quiet : display_mode_for(stderr), stderr);
   const PrivateEndpoint endpoint;

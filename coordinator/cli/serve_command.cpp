@@ -12,6 +12,7 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_folder.hpp"
 #include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/signal_thread.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/report/report.hpp"
 #include "core/simulation/reference_digest.hpp"
@@ -155,6 +156,7 @@ bool has_given_up_runs(const Service& service) {
 
 int serve_campaigns(const ServeOptions& options) {
   const Log log = make_log(options.log_format);
+  const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::drain);
   CampaignFolder folder(options.directory);
   const ServiceConfig config = config_of(options, folder);

@@ -31,6 +31,22 @@ std::uint64_t num_oom_kills() {
   return oom_kills_in(std::string(std::istreambuf_iterator<char>(stream), {}));
 }
 
+/// Starts a program that can be ended with SIGINT and SIGTERM, also if they are blocked here.
+/// @return An error number, or 0.
+int spawn(const std::filesystem::path& program, char* const* arguments, pid_t& process_id) {
+  sigset_t mask;
+  pthread_sigmask(SIG_SETMASK, nullptr, &mask);
+  for (const int signal : {SIGINT, SIGTERM}) sigdelset(&mask, signal);
+  posix_spawnattr_t attributes;
+  if (const int error = posix_spawnattr_init(&attributes); error != 0) return error;
+  posix_spawnattr_setsigmask(&attributes, &mask);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+  const int error =
+      posix_spawn(&process_id, program.c_str(), nullptr, &attributes, arguments, environ);
+  posix_spawnattr_destroy(&attributes);
+  return error;
+}
+
 }  // namespace
 
 std::filesystem::path worker_executable() {
@@ -76,8 +92,7 @@ void WorkerProcesses::start(const std::string& name) {
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
   pid_t process_id = 0;
-  const int error =
-      posix_spawn(&process_id, executable_.c_str(), nullptr, nullptr, argv.data(), environ);
+  const int error = spawn(executable_, argv.data(), process_id);
   if (error != 0) {
     throw Error(fmt::format("worker program = {} ({})", executable_.string(), strerror(error)));
   }

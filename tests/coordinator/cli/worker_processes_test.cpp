@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "coordinator/cli/signal_thread.hpp"
 #include "core/error.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 
@@ -46,6 +47,11 @@ TEST(WorkerProcesses, GiveAWorkerItsNameItsCoordinatorAndItsParent) {
       "[ \"$1 $2 $3 $4 $5 $6 $7\" = \"--connect ipc:///nowhere --name local-1 --threads 1 "
       "--parent\" ]");
   EXPECT_EQ(exit.text, "exit code 0");
+}
+
+TEST(WorkerProcesses, AWorkerIsEndedBySignalsThatAreBlockedHere) {
+  const SignalThread signals;
+  EXPECT_EQ(exit_of("kill -TERM $$").text, "killed by signal 15 (Terminated)");
 }
 
 TEST(WorkerProcesses, SayThatAProgramCannotBeStarted) {
