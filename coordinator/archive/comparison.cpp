@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -14,7 +15,9 @@
 #include "coordinator/report/digest_check.hpp"
 #include "core/campaign/run_ranges.hpp"
 #include "core/statistics/comparison.hpp"
-#include "core/statistics/value_passes.hpp"
+#include "core/statistics/error_change.hpp"
+#include "core/statistics/moments.hpp"
+#include "core/statistics/sum.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -99,161 +102,172 @@ void walk_compared(const ComparedCampaign& first, const ComparedCampaign& second
   });
 }
 
-double magnitude(const RunResult& result, std::size_t parameter) {
-  return std::abs(result.error(parameter_infos()[parameter].parameter));
+double error_of(const RunResult& result, std::size_t parameter) {
+  return result.error(parameter_infos()[parameter].parameter);
 }
 
-/// |error| of each parameter of one side; the order of parameter_infos().
-using Magnitudes = std::vector<ValuePasses>;
+/// Errors of one side in two passes, and the largest |error| of each parameter; the order of
+/// parameter_infos().
+struct SideErrors {
+  std::array<ErrorPasses, num_parameters> errors;
+  std::array<double, num_parameters> worst{};
+  std::array<CompensatedSum, num_parameters> magnitudes;
 
-Magnitudes make_magnitudes() { return Magnitudes(num_parameters, ValuePasses({})); }
-
-void add_to(Magnitudes& magnitudes, const RunResult* result) {
-  if (result == nullptr) return;
-  for (std::size_t i = 0; i < num_parameters; ++i) magnitudes[i].add(magnitude(*result, i));
-}
-
-bool end_pass(Magnitudes& magnitudes) {
-  bool is_another_needed = false;
-  for (ValuePasses& parameter : magnitudes) {
-    if (parameter.end_pass()) is_another_needed = true;
+  void add(const RunResult* result) {
+    if (result == nullptr) return;
+    for (std::size_t i = 0; i < num_parameters; ++i) {
+      const double error = error_of(*result, i);
+      errors[i].add(error);
+      magnitudes[i].add(std::abs(error));
+      worst[i] = std::max(worst[i], std::abs(error));
+    }
   }
-  return is_another_needed;
-}
 
-struct BothMagnitudes {
-  Magnitudes first = make_magnitudes();
-  Magnitudes second = make_magnitudes();
+  void add_again(const RunResult* result) {
+    if (result == nullptr) return;
+    for (std::size_t i = 0; i < num_parameters; ++i) errors[i].add_again(error_of(*result, i));
+  }
+
+  [[nodiscard]] ComparedAccuracy accuracy(std::size_t parameter) const {
+    const ErrorPasses& passes = errors[parameter];
+    const Moments about = passes.errors();
+    return {.bias = about.mean,
+            .standard_deviation = about.standard_deviation,
+            .mean = magnitudes[parameter].value() / static_cast<double>(passes.count()),
+            .worst = worst[parameter],
+            .num_in_tail = passes.num_in_tail()};
+  }
+};
+
+struct BothErrors {
+  SideErrors first;
+  SideErrors second;
+  std::array<double, num_parameters> tail_limits{};
 
   void add(const RunResult* a, const RunResult* b) {
-    add_to(first, a);
-    add_to(second, b);
+    first.add(a);
+    second.add(b);
   }
-  /// @return True if another pass is needed.
-  [[nodiscard]] bool end() {
-    const bool first_needs = end_pass(first);
-    const bool second_needs = end_pass(second);
-    return first_needs || second_needs;
+  void begin_second() {
+    for (std::size_t i = 0; i < num_parameters; ++i) {
+      tail_limits[i] = tail_limit(first.errors[i], second.errors[i]);
+      first.errors[i].begin_second(tail_limits[i]);
+      second.errors[i].begin_second(tail_limits[i]);
+    }
+  }
+  void add_again(const RunResult* a, const RunResult* b) {
+    first.add_again(a);
+    second.add_again(b);
   }
 };
 
 /// Each pass reads both files, which takes most of the time, so that the first one has all that can
 /// be known at once: it takes runs for paired until they prove not to be.
-/// @return Whether the magnitudes need another pass.
-bool read_first_pass(const ComparedCampaign& first, const ComparedCampaign& second,
-                     CampaignComparison& comparison, BothMagnitudes& magnitudes) {
+void read_first_pass(const ComparedCampaign& first, const ComparedCampaign& second,
+                     CampaignComparison& comparison, BothErrors& errors) {
   Survey survey(first, second, comparison);
   const bool was_paired = comparison.is_paired();
   walk_both(first, second, [&](const RunResult* a, const RunResult* b) {
     if (survey.add(a, b) != was_paired) return;
     visit_compared(a, b, was_paired, [&](const RunResult* of_first, const RunResult* of_second) {
-      magnitudes.add(of_first, of_second);
+      errors.add(of_first, of_second);
     });
   });
   survey.end();
-  if (comparison.is_paired() == was_paired) return magnitudes.end();
-  magnitudes = {};
+  if (comparison.is_paired() == was_paired) return;
+  errors = {};
   walk_compared(first, second, false,
-                [&](const RunResult* a, const RunResult* b) { magnitudes.add(a, b); });
-  return magnitudes.end();
+                [&](const RunResult* a, const RunResult* b) { errors.add(a, b); });
 }
 
-ComparedAccuracy accuracy_of(const ValuePasses& magnitudes) {
-  return {.worst = magnitudes.largest(),
-          .mean = magnitudes.moments().mean,
-          .standard_deviation = magnitudes.moments().standard_deviation};
-}
-
-/// The differences of some parameters of all pairs.
-class Differences {
+/// What is compared of some parameters of all pairs; 16 bytes a pair and parameter.
+class Pairs {
  public:
-  Differences(std::size_t begin, std::size_t end, std::size_t num_pairs)
-      : begin_(begin), columns_(end - begin) {
-    for (std::vector<double>& column : columns_) column.reserve(num_pairs);
+  Pairs(std::size_t begin, std::size_t end, std::size_t num_pairs)
+      : begin_(begin), parameters_(end - begin) {
+    for (PairedErrors& parameter : parameters_) {
+      parameter.differences.reserve(num_pairs);
+      parameter.deviation_differences.reserve(num_pairs);
+    }
   }
 
-  void add(const RunResult& first, const RunResult& second) {
-    for (std::size_t i = 0; i < columns_.size(); ++i) {
-      columns_[i].push_back(magnitude(second, begin_ + i) - magnitude(first, begin_ + i));
+  void add(const RunResult& first, const RunResult& second, const BothErrors& errors) {
+    for (std::size_t i = 0; i < parameters_.size(); ++i) {
+      const std::size_t parameter = begin_ + i;
+      parameters_[i].add(
+          {.error = error_of(first, parameter), .mean = errors.first.errors[parameter].mean()},
+          {.error = error_of(second, parameter), .mean = errors.second.errors[parameter].mean()},
+          errors.tail_limits[parameter]);
     }
   }
 
   void compare(CampaignComparison& comparison) {
-    for (std::size_t i = 0; i < columns_.size(); ++i) {
-      const PairedComparison paired =
-          compare_differences(std::move(columns_[i]), default_confidence);
+    for (std::size_t i = 0; i < parameters_.size(); ++i) {
       ParameterComparison& parameter = comparison.parameters[begin_ + i];
-      parameter.mean_change = paired.mean_difference;
-      parameter.interval = paired.interval;
-      parameter.p_value = paired.rank_p_value;
+      parameter.bias_interval =
+          mean_interval(moments(parameters_[i].differences), default_confidence);
+      parameter.p_values = compare_paired_errors(std::move(parameters_[i]));
     }
   }
 
  private:
   std::size_t begin_;
-  std::vector<std::vector<double>> columns_;
+  std::vector<PairedErrors> parameters_;
 };
 
-/// @param need_pass  The magnitudes need a pass, which is one of those made here.
 void compare_pairs(const ComparedCampaign& first, const ComparedCampaign& second,
-                   BothMagnitudes& magnitudes, bool need_pass, CampaignComparison& comparison) {
-  const std::size_t size = comparison.num_first * sizeof(double);
+                   BothErrors& errors, CampaignComparison& comparison) {
+  const std::size_t size = comparison.num_first * 2 * sizeof(double);
   const std::size_t num_at_a_time = std::clamp(kept_size / size, std::size_t{1}, num_parameters);
   for (std::size_t begin = 0; begin < num_parameters; begin += num_at_a_time) {
-    const std::size_t end = std::min(begin + num_at_a_time, num_parameters);
-    Differences differences(begin, end, comparison.num_first);
+    Pairs pairs(begin, std::min(begin + num_at_a_time, num_parameters), comparison.num_first);
     walk_compared(first, second, true, [&](const RunResult* a, const RunResult* b) {
-      if (need_pass) magnitudes.add(a, b);
-      differences.add(*a, *b);
+      if (begin == 0) errors.add_again(a, b);
+      pairs.add(*a, *b, errors);
     });
-    if (need_pass) need_pass = magnitudes.end();
-    differences.compare(comparison);
+    pairs.compare(comparison);
   }
-}
-
-void keep(const UnpairedComparison& unpaired, ParameterComparison& parameter) {
-  parameter.mean_change = unpaired.mean_difference;
-  parameter.interval = unpaired.interval;
-  parameter.p_value = unpaired.p_value;
 }
 
 // Of few runs of one side, all of both are needed, one parameter after the other.
-void compare_few(const ComparedCampaign& first, const ComparedCampaign& second, std::size_t i,
-                 ParameterComparison& parameter) {
+ChangePValues compare_few(const ComparedCampaign& first, const ComparedCampaign& second,
+                          std::size_t parameter) {
   std::vector<double> of_first, of_second;
   walk_compared(first, second, false, [&](const RunResult* a, const RunResult* b) {
-    if (a != nullptr) of_first.push_back(magnitude(*a, i));
-    if (b != nullptr) of_second.push_back(magnitude(*b, i));
+    if (a != nullptr) of_first.push_back(error_of(*a, parameter));
+    if (b != nullptr) of_second.push_back(error_of(*b, parameter));
   });
-  keep(compare_unpaired(of_first, of_second, default_confidence), parameter);
+  return compare_few_errors(of_first, of_second);
 }
 
 void compare_unpaired_runs(const ComparedCampaign& first, const ComparedCampaign& second,
-                           BothMagnitudes& magnitudes, bool need_pass,
-                           CampaignComparison& comparison) {
-  while (need_pass) {
-    walk_compared(first, second, false,
-                  [&](const RunResult* a, const RunResult* b) { magnitudes.add(a, b); });
-    need_pass = magnitudes.end();
-  }
+                           BothErrors& errors, CampaignComparison& comparison) {
+  walk_compared(first, second, false,
+                [&](const RunResult* a, const RunResult* b) { errors.add_again(a, b); });
   const bool are_few = std::min(comparison.num_first, comparison.num_second) < num_welch_min;
   for (std::size_t i = 0; i < num_parameters; ++i) {
     ParameterComparison& parameter = comparison.parameters[i];
-    if (are_few) {
-      compare_few(first, second, i, parameter);
-    } else {
-      keep(compare_means(magnitudes.first[i].moments(), magnitudes.second[i].moments(),
-                         default_confidence),
-           parameter);
-    }
+    const ErrorPasses& a = errors.first.errors[i];
+    const ErrorPasses& b = errors.second.errors[i];
+    parameter.bias_interval = compare_means(a.errors(), b.errors(), default_confidence).interval;
+    parameter.p_values = are_few ? compare_few(first, second, i) : compare_many_errors(a, b);
+  }
+}
+
+void keep_accuracies(const BothErrors& errors, CampaignComparison& comparison) {
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    ParameterComparison& parameter = comparison.parameters[i];
+    parameter.first = errors.first.accuracy(i);
+    parameter.second = errors.second.accuracy(i);
+    parameter.tail_limit = errors.tail_limits[i];
   }
 }
 
 void adjust_p_values(std::array<ParameterComparison, num_parameters>& parameters) {
-  std::vector<double> p_values;
-  for (const ParameterComparison& parameter : parameters) p_values.push_back(parameter.p_value);
-  const std::vector<double> adjusted = holm_adjusted(p_values);
-  for (std::size_t i = 0; i < num_parameters; ++i) parameters[i].adjusted_p_value = adjusted[i];
+  std::vector<ChangePValues> p_values;
+  for (const ParameterComparison& parameter : parameters) p_values.push_back(parameter.p_values);
+  const std::vector<ChangePValues> adjusted = adjusted_changes(p_values);
+  for (std::size_t i = 0; i < num_parameters; ++i) parameters[i].adjusted_p_values = adjusted[i];
 }
 
 std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
@@ -332,18 +346,16 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                      const ComparedCampaign& second) {
   CampaignComparison comparison;
   comparison.differences = all_differences(first, second);
-  BothMagnitudes magnitudes;
-  const bool need_pass = read_first_pass(first, second, comparison, magnitudes);
-  comparison.num_first = magnitudes.first.front().count();
-  comparison.num_second = magnitudes.second.front().count();
+  BothErrors errors;
+  read_first_pass(first, second, comparison, errors);
+  comparison.num_first = errors.first.errors.front().count();
+  comparison.num_second = errors.second.errors.front().count();
   comparison.why_not_compared = why_too_few(comparison);
   if (!comparison.why_not_compared.empty()) return comparison;
+  errors.begin_second();
   const auto compare = comparison.is_paired() ? compare_pairs : compare_unpaired_runs;
-  compare(first, second, magnitudes, need_pass, comparison);
-  for (std::size_t i = 0; i < num_parameters; ++i) {
-    comparison.parameters[i].first = accuracy_of(magnitudes.first[i]);
-    comparison.parameters[i].second = accuracy_of(magnitudes.second[i]);
-  }
+  compare(first, second, errors, comparison);
+  keep_accuracies(errors, comparison);
   adjust_p_values(comparison.parameters);
   return comparison;
 }

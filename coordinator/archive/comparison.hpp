@@ -15,6 +15,7 @@
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/parameter.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/statistics/error_change.hpp"
 #include "core/statistics/interval.hpp"
 
 namespace proofmass::coordinator {
@@ -42,21 +43,23 @@ struct ComparedCampaign {
 ///         check_digest().
 [[nodiscard]] ComparedCampaign read_compared(const Store& store, const IsStopped& is_stopped);
 
-/// |estimate − truth| of one parameter over the runs of one side that are compared, SI.
+/// estimate − truth of one parameter over the runs of one side that are compared, SI.
 struct ComparedAccuracy {
-  double worst = 0.0;
-  double mean = 0.0;
-  double standard_deviation = 0.0;  ///< With n − 1; 0 for a single run.
+  double bias = 0.0;                ///< Mean of estimate − truth.
+  double standard_deviation = 0.0;  ///< Of estimate − truth, with n − 1; 0 for a single run.
+  double mean = 0.0;                ///< Of |estimate − truth|.
+  double worst = 0.0;               ///< Largest |estimate − truth|.
+  std::size_t num_in_tail = 0;  ///< Runs with |estimate − truth| > ParameterComparison::tail_limit.
 };
 
 /// One parameter in two campaigns.
 struct ParameterComparison {
   ComparedAccuracy first;
   ComparedAccuracy second;
-  double mean_change = 0.0;          ///< Of |error|: second − first, SI.
-  std::optional<Interval> interval;  ///< Of the mean change; empty if nothing varies.
-  double p_value = 1.0;              ///< That chance alone makes such a change.
-  double adjusted_p_value = 1.0;     ///< The same, in any of the ten parameters.
+  std::optional<Interval> bias_interval;  ///< Of second bias − first; empty if nothing varies.
+  double tail_limit = 0.0;                ///< tail_limit() of both campaigns, SI.
+  ChangePValues p_values;                 ///< That chance alone makes such a change.
+  ChangePValues adjusted_p_values;        ///< The same, in any test of the ten parameters.
 };
 
 /// What two campaigns differ in, and what that does to the accuracy.
@@ -81,10 +84,11 @@ struct CampaignComparison {
 
 /// Compares the runs with an estimate: those that both campaigns have, run by run, if their seed
 /// and the truths of all common runs agree to the last bit, and else all of each. P-values are of
-/// Wilcoxon's signed ranks for pairs and of UnpairedComparison else; intervals are of 95 %.
+/// compare_paired_errors() for pairs, else of compare_many_errors(), or compare_few_errors() below
+/// num_welch_min runs; intervals are of 95 %.
 ///
-/// Keeps 8 bytes a run, as ranks need all differences of a parameter, and 128 MB of several
-/// parameters' at a time to save passes.
+/// Keeps nothing of each run, but 16 bytes of each pair, as ranks need all differences of a
+/// parameter, and 128 MB of several parameters' at a time to save passes.
 [[nodiscard]] CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                                    const ComparedCampaign& second);
 

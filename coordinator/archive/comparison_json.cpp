@@ -10,22 +10,29 @@ using Json = nlohmann::ordered_json;
 Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
 Json json_of(const ComparedAccuracy& accuracy) {
-  return {{"worst", accuracy.worst},
-          {"mean", accuracy.mean},
-          {"standard_deviation", accuracy.standard_deviation}};
+  return {{"bias", accuracy.bias},
+          {"standard_deviation", accuracy.standard_deviation},
+          {"mean_magnitude", accuracy.mean},
+          {"worst_magnitude", accuracy.worst},
+          {"num_in_tail", accuracy.num_in_tail}};
+}
+
+Json json_of(const ChangePValues& p_values) {
+  return {{"bias", p_values.location}, {"scatter", p_values.scale}, {"tail", p_values.tail}};
 }
 
 Json json_of(const ParameterInfo& info, const ParameterComparison& parameter) {
   Json json{{"parameter", info.name},
             {"unit", info.unit},
+            {"tail_limit", parameter.tail_limit},
             {"first", json_of(parameter.first)},
             {"second", json_of(parameter.second)},
-            {"mean_change", parameter.mean_change},
-            {"mean_change_interval", nullptr},
-            {"p_value", parameter.p_value},
-            {"adjusted_p_value", parameter.adjusted_p_value}};
-  if (parameter.interval) {
-    json["mean_change_interval"] = {parameter.interval->lower, parameter.interval->upper};
+            {"bias_change", parameter.second.bias - parameter.first.bias},
+            {"bias_change_interval", nullptr},
+            {"p_values", json_of(parameter.p_values)},
+            {"adjusted_p_values", json_of(parameter.adjusted_p_values)}};
+  if (parameter.bias_interval) {
+    json["bias_change_interval"] = {parameter.bias_interval->lower, parameter.bias_interval->upper};
   }
   return json;
 }

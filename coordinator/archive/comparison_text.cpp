@@ -69,55 +69,105 @@ std::string row_label(const ParameterInfo& info) {
   return left_aligned(info.label, label_width) + left_aligned(info.display_unit, unit_width);
 }
 
-std::string mean_row(const ParameterInfo& info, const ParameterComparison& parameter) {
+std::string p_cell(double p_value) {
+  return right_aligned(measured_figure(p_value), figure_width) +
+         (p_value < significance ? " *" : "  ");
+}
+
+std::string ended(std::string row) {
+  row.erase(row.find_last_not_of(' ') + 1);
+  return row + "\n";
+}
+
+std::string bias_row(const ParameterInfo& info, const ParameterComparison& parameter) {
   const double scale = info.display_scale;
+  const double change = parameter.second.bias - parameter.first.bias;
   std::string text = row_label(info);
-  for (const double mean : {parameter.first.mean, parameter.second.mean}) {
-    text += right_aligned(measured_figure(mean / scale), figure_width);
+  for (const double bias : {parameter.first.bias, parameter.second.bias}) {
+    text += right_aligned(signed_figure(bias / scale), figure_width);
   }
-  text += right_aligned(signed_figure(parameter.mean_change / scale), change_width);
-  const auto& interval = parameter.interval;
+  text += right_aligned(signed_figure(change / scale), change_width);
+  const auto& interval = parameter.bias_interval;
   text += right_aligned(interval ? signed_figure(interval->lower / scale) : "-", change_width);
   text += right_aligned(interval ? signed_figure(interval->upper / scale) : "-", change_width);
-  text += right_aligned(measured_figure(parameter.adjusted_p_value), figure_width);
-  return text + (parameter.adjusted_p_value < significance ? " *\n" : "\n");
+  return ended(text + p_cell(parameter.adjusted_p_values.location));
 }
 
-std::string_view test_of(const CampaignComparison& comparison) {
-  if (comparison.is_paired()) return "Wilcoxon's signed ranks";
-  return std::min(comparison.num_first, comparison.num_second) < num_welch_min
-             ? "larger of Welch's and Smirnov's test"
-             : "Welch's t";
-}
+/// The tests of bias, scatter and tail.
+struct TestNames {
+  std::string_view bias, scatter, tail;
+};
 
-std::string mean_table(const CampaignComparison& comparison) {
-  std::string text = "Mean of |estimate − truth|\n\n" + heading({{"A", figure_width},
-                                                                 {"B", figure_width},
-                                                                 {"change", change_width},
-                                                                 {"from", change_width},
-                                                                 {"to", change_width},
-                                                                 {"p", figure_width}});
-  for (const ParameterInfo& info : parameter_infos()) {
-    text += mean_row(info, comparison.parameters[index(info.parameter)]);
+TestNames tests_of(const CampaignComparison& comparison) {
+  if (comparison.is_paired()) {
+    return {"Wilcoxon's signed ranks", "the same", "sign test"};
   }
-  return text + fmt::format(
-                    "from, to: 95 % interval of the change; p: {},\n"
-                    "adjusted for ten parameters (Holm); *: below {:.2f}\n",
-                    test_of(comparison), significance);
+  return std::min(comparison.num_first, comparison.num_second) < num_welch_min
+             ? TestNames{"larger of Welch's and Smirnov's test", "the same", "Fisher's exact test"}
+             : TestNames{"Welch's t", "the same", "Fisher's exact test"};
+}
+
+std::string bias_table(const CampaignComparison& comparison) {
+  std::string text = "Bias: mean of estimate − truth\n\n" + heading({{"A", figure_width},
+                                                                     {"B", figure_width},
+                                                                     {"change", change_width},
+                                                                     {"from", change_width},
+                                                                     {"to", change_width},
+                                                                     {"p", figure_width}});
+  for (const ParameterInfo& info : parameter_infos()) {
+    text += bias_row(info, comparison.parameters[index(info.parameter)]);
+  }
+  return text +
+         fmt::format("from, to: 95 % interval of the change; p: {}\n", tests_of(comparison).bias);
+}
+
+std::string percent_cell(std::size_t count, std::size_t of) {
+  const double share = static_cast<double>(count) / static_cast<double>(of);
+  return right_aligned(fmt::format("{:.1f} %", 100.0 * share), figure_width);
 }
 
 std::string scatter_table(const CampaignComparison& comparison) {
   std::string text =
-      "Worst and standard deviation of |estimate − truth|\n\n" + heading({{"worst A", change_width},
-                                                                          {"worst B", change_width},
-                                                                          {"std A", change_width},
-                                                                          {"std B", change_width}});
+      "Scatter and tail: standard deviation of estimate − truth, and runs far off\n\n" +
+      heading({{"std A", figure_width},
+               {"std B", figure_width},
+               {"p", figure_width},
+               {"tail A", figure_width + 2},
+               {"tail B", figure_width},
+               {"p", figure_width}});
+  for (const ParameterInfo& info : parameter_infos()) {
+    const auto& parameter = comparison.parameters[index(info.parameter)];
+    std::string row = row_label(info);
+    for (const ComparedAccuracy& side : {parameter.first, parameter.second}) {
+      row += right_aligned(measured_figure(side.standard_deviation / info.display_scale),
+                           figure_width);
+    }
+    row += p_cell(parameter.adjusted_p_values.scale) +
+           percent_cell(parameter.first.num_in_tail, comparison.num_first) +
+           percent_cell(parameter.second.num_in_tail, comparison.num_second) +
+           p_cell(parameter.adjusted_p_values.tail);
+    text += ended(row);
+  }
+  const TestNames tests = tests_of(comparison);
+  return text + fmt::format(
+                    "p: {} of distances from the mean; tail: beyond twice the root\n"
+                    "mean square of A and B, p: {}\n"
+                    "All p are adjusted for three tests of ten parameters (Holm); *: below "
+                    "{:.2f}\n",
+                    tests.scatter, tests.tail, significance);
+}
+
+std::string magnitude_table(const CampaignComparison& comparison) {
+  std::string text =
+      "Mean and worst of |estimate − truth|\n\n" + heading({{"mean A", change_width},
+                                                            {"mean B", change_width},
+                                                            {"worst A", change_width},
+                                                            {"worst B", change_width}});
   for (const ParameterInfo& info : parameter_infos()) {
     const auto& parameter = comparison.parameters[index(info.parameter)];
     text += row_label(info);
-    for (const double value :
-         {parameter.first.worst, parameter.second.worst, parameter.first.standard_deviation,
-          parameter.second.standard_deviation}) {
+    for (const double value : {parameter.first.mean, parameter.second.mean, parameter.first.worst,
+                               parameter.second.worst}) {
       text += right_aligned(measured_figure(value / info.display_scale), change_width);
     }
     text += "\n";
@@ -132,7 +182,8 @@ std::string comparison_text(const CampaignComparison& comparison, std::string_vi
   std::string text = fmt::format("A  {}\nB  {}\n\n{}{}{}", first, second, definitions(comparison),
                                  basis(comparison), left_out(comparison));
   if (!comparison.why_not_compared.empty()) return text;
-  return text + "\n" + mean_table(comparison) + "\n" + scatter_table(comparison);
+  return text + "\n" + bias_table(comparison) + "\n" + scatter_table(comparison) + "\n" +
+         magnitude_table(comparison);
 }
 
 }  // namespace proofmass::coordinator

@@ -96,6 +96,16 @@ ChangePValues compare_few_errors(std::span<const double> first, std::span<const 
                                         .tail_second = num_beyond(second, limit)})};
 }
 
+void PairedErrors::add(const CentredError& first, const CentredError& second, double limit) {
+  differences.push_back(second.error - first.error);
+  deviation_differences.push_back(std::abs(second.error - second.mean) -
+                                  std::abs(first.error - first.mean));
+  const bool is_first_beyond = std::abs(first.error) > limit;
+  const bool is_second_beyond = std::abs(second.error) > limit;
+  if (is_first_beyond && !is_second_beyond) ++num_only_first;
+  if (is_second_beyond && !is_first_beyond) ++num_only_second;
+}
+
 ChangePValues compare_paired_errors(PairedErrors pairs) {
   return {.location =
               compare_differences(std::move(pairs.differences), default_confidence).rank_p_value,

@@ -64,8 +64,17 @@ struct ChangePValues {
 [[nodiscard]] ChangePValues compare_few_errors(std::span<const double> first,
                                                std::span<const double> second);
 
+/// An error, and the mean of all errors of its campaign.
+struct CentredError {
+  double error = 0.0;
+  double mean = 0.0;
+};
+
 /// Of campaigns of the same draws, run by run.
 struct PairedErrors {
+  /// @param limit  From tail_limit() of both campaigns.
+  void add(const CentredError& first, const CentredError& second, double limit);
+
   std::vector<double> differences;            ///< Second error − first.
   std::vector<double> deviation_differences;  ///< Of |error − mean of its campaign|.
   std::size_t num_only_first = 0;             ///< Pairs of which only the first is in the tail.

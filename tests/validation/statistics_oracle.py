@@ -279,6 +279,17 @@ def compare_unpaired(a, b, confidence):
             law.pvalue)
 
 
+def compare_many_errors(a, b):
+    first, second = columns[a], columns[b]
+    limit = 2 * math.sqrt(np.mean(np.concatenate([first, second]) ** 2))
+    location = scipy.stats.ttest_ind(second, first, equal_var=False)
+    distances = [abs(side - float(exact_moments(side)[0])) for side in (first, second)]
+    scale = scipy.stats.ttest_ind(*distances, equal_var=False)
+    beyond = [int((abs(side) > limit).sum()) for side in (first, second)]
+    within = [len(first) - beyond[0], len(second) - beyond[1]]
+    return limit, location.pvalue, scale.pvalue, scipy.stats.fisher_exact([beyond, within])[1]
+
+
 def holm_adjusted(name):
     p = columns[name]
     return [max(min(1.0, (len(p) - i) * q) for i, q in enumerate(sorted(p)) if q <= value)
@@ -375,6 +386,7 @@ CHECKS = {  # function: (values, relative tolerance)
     "first_order_index": (first_order_index, TOLERANCE),
     "compare_paired": (compare_paired, TOLERANCE),
     "compare_unpaired": (compare_unpaired, TOLERANCE),
+    "compare_many_errors": (compare_many_errors, TOLERANCE),
     "holm_adjusted": (holm_adjusted, TOLERANCE),
     "student_quantile": (of_numbers(student_quantile), TOLERANCE),
     "student_two_sided": (of_numbers(lambda t, n: 2 * scipy.stats.t.sf(abs(t), n)), TOLERANCE),

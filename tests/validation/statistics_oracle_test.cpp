@@ -15,6 +15,7 @@
 #include "core/statistics/correlation.hpp"
 #include "core/statistics/detail/special.hpp"
 #include "core/statistics/distribution.hpp"
+#include "core/statistics/error_change.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
@@ -143,6 +144,20 @@ void ask_about_campaigns(Questions& questions, const std::string& a, const std::
                  found.mean_p_value, found.distance, found.law_p_value});
 }
 
+void ask_about_changes(Questions& questions, const std::string& a, const std::string& b) {
+  ErrorPasses first, second;
+  for (const double error : questions.column(a)) first.add(error);
+  for (const double error : questions.column(b)) second.add(error);
+  const double limit = tail_limit(first, second);
+  first.begin_second(limit);
+  second.begin_second(limit);
+  for (const double error : questions.column(a)) first.add_again(error);
+  for (const double error : questions.column(b)) second.add_again(error);
+  const ChangePValues found = compare_many_errors(first, second);
+  questions.ask(fmt::format("compare_many_errors {} {}", a, b),
+                {limit, found.location, found.scale, found.tail});
+}
+
 void ask_about_two_columns(Questions& questions) {
   ask_about_dependence(questions, "normal", "noisy");
   ask_about_dependence(questions, "equal_values", "noisy");
@@ -155,6 +170,8 @@ void ask_about_two_columns(Questions& questions) {
   ask_about_campaigns(questions, "few", "others");
   ask_about_campaigns(questions, "normal", "noisy");
   ask_about_campaigns(questions, "magnitudes", "equal_values");
+  ask_about_changes(questions, "normal", "noisy");
+  ask_about_changes(questions, "magnitudes", "equal_values");
   const std::vector<double> p_values{0.03, 0.002, 0.3, 0.04, 0.002, 0.9, 0.01, 0.5, 0.06, 0.2};
   questions.add_column("p_values", p_values);
   questions.ask("holm_adjusted p_values", holm_adjusted(p_values));

@@ -9,8 +9,9 @@
 
 #include "coordinator/archive/comparison_text.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/statistics/comparison.hpp"
+#include "core/statistics/error_change.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
+#include "tests/core/statistics/columns.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -66,7 +67,8 @@ void worsen(Side& side, Parameter parameter, double change) {
   }
 }
 
-// |error| of parameter i is (i + 1)·{1, 2, 3, 4}; everything follows by hand.
+// Errors of a_c12 are 4, −8, 12 and −16 in the first campaign, 4.5, −9, 13.5 and −18 in the second;
+// everything follows by hand.
 TEST(Comparison, OfPairsIsRunByRun) {
   const Side first = side(4);
   Side second = side(4);
@@ -78,32 +80,73 @@ TEST(Comparison, OfPairsIsRunByRun) {
   EXPECT_EQ(comparison.num_second, 4U);
   EXPECT_TRUE(comparison.differences.empty());
   const ParameterComparison& changed = comparison.parameters[index(Parameter::a_c12)];
+  EXPECT_EQ(changed.first.bias, -2.0);
+  EXPECT_EQ(changed.second.bias, -2.25);
   EXPECT_EQ(changed.first.mean, 10.0);
   EXPECT_EQ(changed.second.mean, 11.25);
   EXPECT_EQ(changed.first.worst, 16.0);
   EXPECT_EQ(changed.second.worst, 18.0);
-  EXPECT_NEAR(changed.first.standard_deviation, 4.0 * std::sqrt(5.0 / 3.0), 1e-14);
-  EXPECT_EQ(changed.mean_change, 1.25);
-  ASSERT_TRUE(changed.interval.has_value());
-  // Student's quantile for 3 degrees of freedom, from tables; the changes are 0.5, 1, 1.5 and 2.
-  const double half_width = 3.182446 * 0.5 * std::sqrt(5.0 / 3.0) / 2.0;
-  EXPECT_NEAR(changed.interval->lower, 1.25 - half_width, 1e-6);
-  EXPECT_NEAR(changed.interval->upper, 1.25 + half_width, 1e-6);
-  EXPECT_EQ(changed.p_value, 0.125) << "2 of the 2⁴ choices of signs";
-  EXPECT_EQ(changed.adjusted_p_value, 1.0) << "ten times that, at most 1";
+  EXPECT_NEAR(changed.first.standard_deviation, std::sqrt(464.0 / 3.0), 1e-13);
+  EXPECT_NEAR(changed.tail_limit, 2.0 * std::sqrt((480.0 + 607.5) / 8.0), 1e-13);
+  EXPECT_EQ(changed.second.num_in_tail, 0U);
+  ASSERT_TRUE(changed.bias_interval.has_value());
+  // Student's quantile for 3 degrees of freedom, from tables; the changes are 0.5, -1, 1.5 and -2.
+  const double half_width = 3.182446 * std::sqrt(7.25 / 3.0) / 2.0;
+  EXPECT_NEAR(changed.bias_interval->lower, -0.25 - half_width, 1e-6);
+  EXPECT_NEAR(changed.bias_interval->upper, -0.25 + half_width, 1e-6);
+  EXPECT_EQ(changed.p_values.location, 0.875) << "14 of the 2⁴ choices of signs";
+  // Distances from the mean grow by 0.75, 0.75, 1.75 and 1.75: ranks 1.5, 1.5, 3.5 and 3.5.
+  EXPECT_NEAR(changed.p_values.scale, std::erfc(5.0 / std::sqrt(7.25) / std::sqrt(2.0)), 1e-14);
+  EXPECT_EQ(changed.p_values.tail, 1.0);
+  EXPECT_EQ(changed.adjusted_p_values.scale, 1.0) << "fifty times that, at most 1";
   const ParameterComparison& same = comparison.parameters[index(Parameter::k2d)];
-  EXPECT_EQ(same.mean_change, 0.0);
-  EXPECT_EQ(same.p_value, 1.0);
+  EXPECT_EQ(same.first.bias, same.second.bias);
+  EXPECT_EQ(same.p_values.location, 1.0);
+  EXPECT_EQ(same.p_values.scale, 1.0);
 }
 
-TEST(Comparison, FindsASmallChangeOfManyRunsAndCorrectsForTenParameters) {
+// Scale has a weight of 0.2, and those of all tests add up to 10.
+TEST(Comparison, FindsASmallChangeOfManyRunsAndCorrectsForThreeTestsOfTenParameters) {
   const Side first = side(40);
   Side second = side(40);
   worsen(second, Parameter::a_c12, 1e-3);
   const CampaignComparison comparison = compare_campaigns(first, second);
   const ParameterComparison& changed = comparison.parameters[index(Parameter::a_c12)];
-  EXPECT_LT(changed.p_value, 1e-6);
-  EXPECT_NEAR(changed.adjusted_p_value, 10.0 * changed.p_value, 1e-12 * changed.p_value);
+  EXPECT_LT(changed.p_values.scale, 1e-6);
+  EXPECT_NEAR(changed.adjusted_p_values.scale, 50.0 * changed.p_values.scale,
+              1e-12 * changed.p_values.scale);
+}
+
+/// Runs whose errors of all parameters are normal, and of a_c13 with a bias.
+Side normal_side(std::uint64_t seed, double bias) {
+  constexpr std::uint64_t num_runs = 150;
+  Side normal = side(num_runs);
+  normal.campaign.seed = seed;
+  for (std::uint32_t i = 0; i < num_parameters; ++i) {
+    const auto errors =
+        test::normal_column(num_runs, {.seed = 91, .repetition = seed, .column = i});
+    const double shift = i == index(Parameter::a_c13) ? bias : 0.0;
+    for (std::uint64_t run = 0; run < num_runs; ++run) {
+      normal.results[run].truth[i] = 0.0;
+      normal.results[run].estimate[i] = errors[run] + shift;
+    }
+  }
+  return normal;
+}
+
+// The bias makes |error| larger by a tenth, within its scatter.
+TEST(Comparison, FindsABiasWhetherRunsArePairedOrNot) {
+  const CampaignComparison unpaired = compare_campaigns(normal_side(1, 0.0), normal_side(2, 0.6));
+  const CampaignComparison paired = compare_campaigns(normal_side(1, 0.0), normal_side(1, 0.01));
+  EXPECT_FALSE(unpaired.is_paired());
+  EXPECT_TRUE(paired.is_paired());
+  for (const CampaignComparison& comparison : {unpaired, paired}) {
+    for (std::size_t i = 0; i < num_parameters; ++i) {
+      const ChangePValues& p = comparison.parameters[i].adjusted_p_values;
+      EXPECT_EQ(p.location < 0.05, i == index(Parameter::a_c13)) << i;
+      EXPECT_GT(p.tail, 0.05) << i;
+    }
+  }
 }
 
 TEST(Comparison, TakesTheRunsThatBothHave) {
@@ -129,9 +172,13 @@ TEST(Comparison, OfOtherSeedsIsOfAllRuns) {
   const ParameterComparison& parameter = comparison.parameters[1];
   EXPECT_EQ(parameter.first.mean, 8.0);
   EXPECT_EQ(parameter.second.mean, 6.0);
-  EXPECT_EQ(parameter.mean_change, -2.0);
-  const std::vector<double> of_first{2, 4, 6, 8, 10, 12, 14}, of_second{2, 4, 6, 8, 10};
-  EXPECT_EQ(parameter.p_value, compare_unpaired(of_first, of_second, 0.95).p_value);
+  EXPECT_DOUBLE_EQ(parameter.first.bias, 8.0 / 7.0);
+  EXPECT_DOUBLE_EQ(parameter.second.bias, 6.0 / 5.0);
+  const std::vector<double> of_first{2, -4, 6, -8, 10, -12, 14}, of_second{2, -4, 6, -8, 10};
+  const ChangePValues expected = compare_few_errors(of_first, of_second);
+  EXPECT_EQ(parameter.p_values.location, expected.location);
+  EXPECT_EQ(parameter.p_values.scale, expected.scale);
+  EXPECT_EQ(parameter.p_values.tail, expected.tail);
   ASSERT_EQ(comparison.differences.size(), 1U);
   EXPECT_EQ(comparison.differences[0].field, "seed");
   EXPECT_EQ(comparison.differences[0].first, "1");
@@ -152,12 +199,14 @@ TEST(Comparison, OfTwoRunsFindsNoChange) {
   }
   const CampaignComparison comparison = compare_campaigns(side(250), second);
   for (const ParameterComparison& parameter : comparison.parameters) {
-    EXPECT_NEAR(parameter.p_value, 0.0221969265794, 1e-12);
-    EXPECT_GT(parameter.adjusted_p_value, 0.05);
+    EXPECT_NEAR(parameter.p_values.scale, 0.0221969265794, 1e-12);
+    EXPECT_GT(parameter.adjusted_p_values.location, 0.05);
+    EXPECT_GT(parameter.adjusted_p_values.scale, 0.05);
+    EXPECT_GT(parameter.adjusted_p_values.tail, 0.05);
   }
   EXPECT_THAT(comparison_text(comparison, "a", "b"),
               HasSubstr("\nfrom, to: 95 % interval of the change; "
-                        "p: larger of Welch's and Smirnov's test,\n"));
+                        "p: larger of Welch's and Smirnov's test\n"));
 }
 
 TEST(Comparison, OfOtherDrawsIsOfAllRuns) {
@@ -219,7 +268,7 @@ TEST(Comparison, ReadsEachCampaignTwice) {
       return open();
     };
     EXPECT_EQ(compare_campaigns(compared(first), counted).is_paired(), is_paired);
-    EXPECT_EQ(num_readings, is_paired ? 2 : 1);
+    EXPECT_EQ(num_readings, 2);
   }
 }
 
@@ -269,7 +318,10 @@ TEST(ComparisonText, FitsATerminalAndMarksWhatIsSignificant) {
   std::size_t num_marks = 0;
   for (std::string line; std::getline(lines, line);) {
     EXPECT_LE(text_width(line), 80U) << line;
-    if (line.ends_with(" *")) ++num_marks;
+    if (line.find(" *") != std::string::npos && line.find("*:") == std::string::npos) {
+      EXPECT_TRUE(line.starts_with("a_c12 ")) << line;
+      ++num_marks;
+    }
   }
   EXPECT_EQ(num_marks, 1U);
 }
@@ -318,13 +370,20 @@ TEST(ComparisonJson, HoldsAllNumbers) {
   ASSERT_EQ(json["parameters"].size(), 10U);
   EXPECT_EQ(json["parameters"][3]["parameter"], "a_c12");
   EXPECT_EQ(json["parameters"][3]["unit"], "rad");
-  EXPECT_EQ(json["parameters"][3]["first"]["worst"], 16.0);
-  EXPECT_EQ(json["parameters"][3]["mean_change"], 1.25);
-  ASSERT_EQ(json["parameters"][3]["mean_change_interval"].size(), 2U);
-  EXPECT_LT(json["parameters"][3]["mean_change_interval"][0], 1.25);
-  EXPECT_GT(json["parameters"][3]["mean_change_interval"][1], 1.25);
-  EXPECT_EQ(json["parameters"][3]["p_value"], 0.125);
-  EXPECT_EQ(json["parameters"][3]["adjusted_p_value"], 1.0);
+  const auto& parameter = json["parameters"][3];
+  EXPECT_EQ(parameter["first"]["bias"], -2.0);
+  EXPECT_EQ(parameter["first"]["mean_magnitude"], 10.0);
+  EXPECT_EQ(parameter["first"]["worst_magnitude"], 16.0);
+  EXPECT_EQ(parameter["second"]["num_in_tail"], 0);
+  EXPECT_NEAR(parameter["second"]["standard_deviation"], 1.125 * std::sqrt(464.0 / 3.0), 1e-12);
+  EXPECT_EQ(parameter["bias_change"], -0.25);
+  ASSERT_EQ(parameter["bias_change_interval"].size(), 2U);
+  EXPECT_LT(parameter["bias_change_interval"][0], -0.25);
+  EXPECT_GT(parameter["bias_change_interval"][1], -0.25);
+  EXPECT_NEAR(parameter["tail_limit"], 23.3, 0.05);
+  EXPECT_EQ(parameter["p_values"]["bias"], 0.875);
+  EXPECT_EQ(parameter["p_values"]["tail"], 1.0);
+  EXPECT_EQ(parameter["adjusted_p_values"]["scatter"], 1.0);
 }
 
 }  // namespace

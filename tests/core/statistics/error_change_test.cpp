@@ -45,12 +45,7 @@ ChangePValues compare_pairs(const Values& first, const Values& second) {
   const double limit = tail_limit(a, b);
   PairedErrors pairs;
   for (std::size_t i = 0; i < first.size(); ++i) {
-    pairs.differences.push_back(second[i] - first[i]);
-    pairs.deviation_differences.push_back(std::abs(second[i] - b.mean()) -
-                                          std::abs(first[i] - a.mean()));
-    const bool is_first = std::abs(first[i]) > limit, is_second = std::abs(second[i]) > limit;
-    if (is_first && !is_second) ++pairs.num_only_first;
-    if (is_second && !is_first) ++pairs.num_only_second;
+    pairs.add({.error = first[i], .mean = a.mean()}, {.error = second[i], .mean = b.mean()}, limit);
   }
   return compare_paired_errors(std::move(pairs));
 }
