@@ -45,9 +45,18 @@ std::string heading() {
          " │" + titles + "\n" + rule();
 }
 
+// The paper adds up the worst errors of all parameters, which no single run has.
+std::string totals_text(const RunTotals& totals) {
+  return fmt::format(
+      "worst adds up the worst errors of different runs, as the paper does; totals of\n"
+      "single runs: median {:.1e}, 95 % below {:.1e}, worst {:.1e} (run {})\n",
+      totals.median, totals.percentile_95, totals.worst, totals.worst_run.value);
+}
+
 }  // namespace
 
-std::string budget_table(const Scenario& scenario, const CampaignStatistics& statistics) {
+std::string budget_table(const Scenario& scenario, const CampaignStatistics& statistics,
+                         const std::optional<RunTotals>& totals) {
   const Budget before = budget_before_calibration(scenario);
   const Budget after_worst = budget_after_calibration(scenario, statistics.worst_errors());
   const Budget after_mean = budget_after_calibration(scenario, statistics.mean_errors());
@@ -62,7 +71,8 @@ std::string budget_table(const Scenario& scenario, const CampaignStatistics& sta
   }
   text +=
       rule() + row(budget_total_info, figures([](const Budget& budget) { return budget.total; }));
-  return text + "before: bounds of construction; worst, mean: left by the errors of calibration\n";
+  text += "before: bounds of construction; worst, mean: left by the errors of calibration\n";
+  return totals ? text + totals_text(*totals) : text;
 }
 
 }  // namespace proofmass::coordinator

@@ -65,6 +65,8 @@ std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy,
 /// Fewest runs that the bootstrap covers what it says from; core/statistics/README.md.
 constexpr std::uint64_t num_runs_of_bootstrap = 200;
 
+constexpr std::string_view of_one_parameter = "  (one parameter by itself, not all ten together)\n";
+
 /// What "the worst of n" is worth [Wilks1941].
 std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_estimate) {
   const double coverage = std::pow(1.0 - default_confidence, 1.0 / static_cast<double>(num_runs));
@@ -72,9 +74,10 @@ std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_est
   const std::string text =
       fmt::format("worst of {}: with 95 % confidence {} % of all draws stay below", num_runs,
                   std::floor(coverage * 1e5) / 1e3);
-  if (num_without_estimate == 0) return text + "\n";
-  return text + fmt::format(",\n  of those that have an estimate; {} more {} none\n",
-                            num_without_estimate, num_without_estimate == 1 ? "has" : "have");
+  if (num_without_estimate == 0) return fmt::format("{}\n{}", text, of_one_parameter);
+  return text + fmt::format(",\n  of those that have an estimate; {} more {} none\n{}",
+                            num_without_estimate, num_without_estimate == 1 ? "has" : "have",
+                            of_one_parameter);
 }
 
 }  // namespace

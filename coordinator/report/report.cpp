@@ -30,14 +30,16 @@ std::string report_of_one_state(const Store& store, const Scenario& scenario) {
   const CampaignStatistics& statistics = results.statistics;
   const DigestCheck check = check_digest(store, statistics.num_runs, results.digest);
   const std::vector<RunRange> given_up = store.given_up_runs();
-  check_given_up(store, statistics, num_runs_in(given_up));
+  const std::uint64_t num_given_up = num_runs_in(given_up);
+  check_given_up(store, statistics, num_given_up);
   check_stop_checks(store, scenario.objectives);
   std::string text = summary_text(store.name(), store.seed(), store.num_runs(), statistics,
                                   results.digest, check) +
                      given_up_text(given_up) + stop_text(store);
   for (const std::string& table :
-       {accuracy_table(scenario, statistics), interval_table(statistics, num_runs_in(given_up)),
-        budget_table(scenario, statistics)}) {
+       {accuracy_table(scenario, statistics), interval_table(statistics, num_given_up),
+        error_table(statistics, results.exceedances.of(statistics.num_runs + num_given_up)),
+        budget_table(scenario, statistics, results.totals)}) {
     if (!table.empty()) text += "\n" + table;
   }
   return text;
@@ -99,18 +101,36 @@ bool are_current(const Store& store) {
 
 ReadResults read_results(const Store& store, const Scenario& scenario) {
   StatisticsPasses passes(scenario.objectives);
-  ReadResults results;
+  RunTotalPasses totals(scenario);
+  const Requirement all_objectives{.tolerance = {},
+                                   .subject = Requirement::Subject::all_objectives};
+  ReadResults results{.statistics = {},
+                      .digest = {},
+                      .totals = {},
+                      .exceedances = Exceedances(all_objectives, scenario.objectives)};
+  // Both are asked each time: they may need different numbers of passes.
+  const auto is_pass_needed = [&] {
+    const bool is_for_statistics = passes.end_pass();
+    return totals.end_pass() || is_for_statistics;
+  };
   store.read_one_state([&] {
     Digest digest;
     store.for_each_result([&](const RunResult& result) {
       require_in_range(result);
       passes.add(result);
+      totals.add(result);
+      results.exceedances.add(result);
       digest.add(result);
     });
-    while (passes.end_pass()) {
-      store.for_each_result([&](const RunResult& result) { passes.add(result); });
+    while (is_pass_needed()) {
+      store.for_each_result([&](const RunResult& result) {
+        passes.add(result);
+        totals.add(result);
+      });
     }
-    results = {.statistics = passes.statistics(), .digest = digest.finish()};
+    results.statistics = passes.statistics();
+    results.digest = digest.finish();
+    results.totals = totals.totals();
   });
   return results;
 }

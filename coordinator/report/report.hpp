@@ -1,12 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "coordinator/report/digest_check.hpp"
+#include "coordinator/report/exceedances.hpp"
+#include "coordinator/report/run_totals.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/scenario.hpp"
 #include "core/campaign/statistics.hpp"
@@ -42,14 +45,24 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string interval_table(const CampaignStatistics& statistics,
                                          std::uint64_t num_given_up);
 
-/// Budget before and after calibration beside [Hardy2013] tab:Budget and tab:Budget_cali.
+/// Of the error with its sign the interval of its bias; percentiles of |error|; how often a
+/// parameter is beyond its objective; and how often all objectives hold together.
+/// @param missing_any  Runs in which an objective does not hold, or that lack an estimate.
+[[nodiscard]] std::string error_table(const CampaignStatistics& statistics,
+                                      const ExceedanceCount& missing_any);
+
+/// Budget before and after calibration beside [Hardy2013] tab:Budget and tab:Budget_cali, and what
+/// single runs have.
 [[nodiscard]] std::string budget_table(const Scenario& scenario,
-                                       const CampaignStatistics& statistics);
+                                       const CampaignStatistics& statistics,
+                                       const std::optional<RunTotals>& totals);
 
 /// What the results of a campaign file yield.
 struct ReadResults {
   CampaignStatistics statistics;
   std::string digest;
+  std::optional<RunTotals> totals;  ///< Empty if no run has an estimate.
+  Exceedances exceedances;          ///< Runs in which an objective does not hold.
 };
 
 /// Reads all results, of one state of the file, as often as StatisticsPasses needs them: twice if

@@ -50,7 +50,7 @@ std::optional<std::uint64_t> summarise_file(
     const std::filesystem::path& file, const Scenario& scenario,
     const std::function<void(const std::function<void(Store&)>&)>& write) {
   const Store reader = Store::open_read_only(file);
-  ReadResults results;
+  std::optional<ReadResults> results;
   StopPlan plan;
   StopRule rule;
   StopCheck check;
@@ -64,11 +64,11 @@ std::optional<std::uint64_t> summarise_file(
     check = check_with(rule, reader, scenario.objectives, num_runs);
   });
   if (plan.stop_rule.empty()) {
-    write([&](Store& store) { write_statistics(store, scenario, results); });
+    write([&](Store& store) { write_statistics(store, scenario, *results); });
     return std::nullopt;
   }
   write([&](Store& store) {
-    write_statistics(store, scenario, results);
+    write_statistics(store, scenario, *results);
     store.record_stop_check(num_runs, statistic_of(plan.stop_rule), check);
   });
   const std::uint64_t num_runs_max = plan.num_runs_max.value_or(num_runs);

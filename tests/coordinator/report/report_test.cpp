@@ -90,7 +90,8 @@ TEST(AccuracyTable, HasDashesWhileNoRunHasAnEstimate) {
 }
 
 TEST(BudgetTable, ShowsEachTermBesideThePaper) {
-  const std::vector<std::string> lines = lines_of(budget_table(Scenario{}, paper_statistics(100)));
+  const std::vector<std::string> lines =
+      lines_of(budget_table(Scenario{}, paper_statistics(100), {}));
   EXPECT_THAT(lines, Contains("a_c11·T_xx·Δx            8.4e-14  1.7e-16  4.2e-17 │"
                               "  8.4e-14  1.7e-16  4.2e-17"));
   EXPECT_THAT(lines, Contains("2·K2d·(Γ_d²+Γ_res,x²)    8.0e-16  7.1e-18  1.4e-18 │"
@@ -101,7 +102,8 @@ TEST(BudgetTable, ShowsEachTermBesideThePaper) {
 }
 
 TEST(BudgetTable, HasDashesAfterCalibrationWhileNoRunHasAnEstimate) {
-  const std::vector<std::string> lines = lines_of(budget_table(Scenario{}, CampaignStatistics{}));
+  const std::vector<std::string> lines =
+      lines_of(budget_table(Scenario{}, CampaignStatistics{}, {}));
   EXPECT_THAT(lines, Contains("Total                    2.0e-13        -        - │"
                               "  2.0e-13  1.1e-15  3.6e-16"));
 }
@@ -167,8 +169,60 @@ TEST(IntervalTable, WarnsOfTheBootstrapOfFewRuns) {
   EXPECT_THAT(interval_table(paper_statistics(200), 0), testing::Not(warning));
 }
 
+// 0 of 100: to 1 − 0.025^(1/100) = 3.62 %; 2 of 100: 0.243 to 7.04 %; 97 of 100: 91.5 to 99.4 %
+// (scipy.stats.beta.ppf).
+TEST(ErrorTable, ShowsBiasPercentilesAndHowOftenObjectivesHold) {
+  CampaignStatistics statistics = paper_statistics(100);
+  AccuracyStatistic& accuracy = statistics.accuracy[index(Parameter::a_c12)];
+  accuracy.num_beyond_objective = 2;
+  accuracy.error.bias_interval = Interval{.lower = -1.25e-5, .upper = 9e-5, .confidence = 0.95};
+  accuracy.percentiles[0].value = 2.5e-4;
+  accuracy.percentiles[3].value = 1.1e-3;
+  const std::vector<std::string> lines =
+      lines_of(error_table(statistics, {.num_runs = 100, .num_exceedances = 3}));
+  EXPECT_THAT(lines, Contains("a_c12        -0.125    0.900 │    2.50       0       0    11.0 │"
+                              "  0.243    7.04"));
+  EXPECT_THAT(lines, Contains("K2d/K1c²          -        - │       0       0       0       0 │"
+                              "      0    3.62"));
+  EXPECT_EQ(lines.back(), "all objectives together: 97 of 100 runs, 91.5 to 99.4 % of all draws");
+}
+
+// Run 1 has the worst total of all, and no run has the worst error of both parameters.
+TEST(RunTotals, AreThoseOfSingleRuns) {
+  const Scenario scenario;
+  RunTotalPasses passes(scenario);
+  std::vector<double> totals;
+  for (std::uint64_t run = 0; run < 3; ++run) {
+    RunResult result{.run = {run}};
+    ParameterArray errors{};
+    errors[index(Parameter::a_c12)] = run == 0 ? 1e-3 : 1e-5;
+    errors[index(Parameter::a_c13)] = run == 1 ? -2e-3 : 1e-5;
+    result.estimate = errors;
+    for (double& error : errors) error = std::abs(error);
+    totals.push_back(budget_after_calibration(scenario, errors).total);
+    passes.add(result);
+  }
+  RunResult without{.run = {3}, .status = RunStatus::no_draw};
+  without.estimate.fill(1.0);
+  passes.add(without);
+  ASSERT_FALSE(passes.end_pass());
+  EXPECT_EQ(passes.totals()->worst, totals[1]);
+  EXPECT_EQ(passes.totals()->worst_run, RunIndex{1});
+  EXPECT_EQ(passes.totals()->median, totals[0]);
+  EXPECT_FALSE(RunTotalPasses(scenario).totals().has_value());
+}
+
+TEST(BudgetTable, TellsTheTotalsOfSingleRuns) {
+  const RunTotals totals{
+      .worst = 6.4e-16, .worst_run = {57}, .median = 2.6e-16, .percentile_95 = 5.1e-16};
+  EXPECT_THAT(budget_table(Scenario{}, paper_statistics(100), totals),
+              testing::EndsWith("single runs: median 2.6e-16, 95 % below 5.1e-16, worst 6.4e-16 "
+                                "(run 57)\n"));
+}
+
 TEST(IntervalTable, IsLeftOutWhileNoRunHasAnEstimate) {
   EXPECT_EQ(interval_table(CampaignStatistics{}, 0), "");
+  EXPECT_EQ(error_table(CampaignStatistics{}, {}), "");
 }
 
 TEST(Summary, TellsHowTheRunsEnded) {
@@ -201,13 +255,19 @@ TEST(Report, FitsATerminal) {
       accuracy.mean_interval = accuracy.deviation_interval =
           Interval{.lower = 1.1111e-6 * factor, .upper = 1.3333e-6 * factor, .confidence = 0.95};
       accuracy.error.bias = -1.2345e-6 * factor;
+      accuracy.error.bias_interval =
+          Interval{.lower = -1.4e-6 * factor, .upper = -1.1e-6 * factor, .confidence = 0.95};
+      for (PercentileStatistic& percentile : accuracy.percentiles) percentile.value = 1e-6 * factor;
       accuracy.error.skewness = -12.345;
     }
     Scenario scenario;
     for (double& objective : scenario.objectives) objective *= factor;
     EXPECT_THAT(lines_of(accuracy_table(scenario, statistics)), Each(FitsATerminal()));
     EXPECT_THAT(lines_of(interval_table(statistics, 0)), Each(FitsATerminal()));
-    EXPECT_THAT(lines_of(budget_table(scenario, statistics)), Each(FitsATerminal()));
+    EXPECT_THAT(lines_of(error_table(statistics, {.num_runs = most, .num_exceedances = 3})),
+                Each(FitsATerminal()));
+    EXPECT_THAT(lines_of(budget_table(scenario, statistics, RunTotals{.worst_run = {most}})),
+                Each(FitsATerminal()));
   }
   EXPECT_THAT(lines_of(summary_text(std::string(64, 'n'), std::numeric_limits<std::uint64_t>::max(),
                                     most, statistics, std::string(64, 'f'))),
@@ -219,7 +279,8 @@ TEST(Report, AlignsEveryRow) {
   const CampaignStatistics statistics = paper_statistics(100);
   for (const std::string& table :
        {accuracy_table(Scenario{}, statistics), interval_table(statistics, 0),
-        budget_table(Scenario{}, statistics)}) {
+        error_table(statistics, {.num_runs = 100, .num_exceedances = 3}),
+        budget_table(Scenario{}, statistics, RunTotals{})}) {
     const std::vector<std::string> lines = lines_of(table);
     const auto is_row = [](const std::string& line) { return line.find("│") != line.npos; };
     for (std::size_t i = 3; i < lines.size(); ++i) {
@@ -258,7 +319,8 @@ TEST_F(StoredReport, IsThatOfTheResultsInTheFile) {
       report_text(store, scenario),
       summary_text("hardy2013", 1, 12, statistics, digest_of(store), DigestCheck::not_checked) +
           "\n" + accuracy_table(scenario, statistics) + "\n" + interval_table(statistics, 0) +
-          "\n" + budget_table(scenario, statistics));
+          "\n" + error_table(statistics, read_results(store, scenario).exceedances.of(10)) + "\n" +
+          budget_table(scenario, statistics, read_results(store, scenario).totals));
 }
 
 // One of nine finished runs has no estimate, nor has the one that was given up.

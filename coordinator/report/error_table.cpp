@@ -1,0 +1,88 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "coordinator/report/probability_text.hpp"
+#include "coordinator/report/report.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "core/statistics/interval.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t label_width = 10;
+constexpr std::size_t bias_width = 9;
+constexpr std::size_t biases_width = 2 * bias_width + 1;
+constexpr std::size_t percentile_width = 8;
+constexpr std::size_t percentiles_width = percentile_levels.size() * percentile_width + 1;
+constexpr std::size_t from_width = 7;
+constexpr std::size_t to_width = 8;
+constexpr std::size_t rates_width = from_width + to_width;
+
+std::string signed_figure(double value) {
+  return fmt::format("{}{}", value < 0.0 ? "-" : "", measured_figure(std::abs(value)));
+}
+
+std::string heading() {
+  std::string levels;
+  for (const double level : percentile_levels) {
+    levels += right_aligned(fmt::format("{:.0f} %", 100.0 * level), percentile_width);
+  }
+  const std::string left =
+      left_aligned("", label_width) + left_aligned(centred("bias", biases_width), biases_width);
+  return fmt::format(
+      "{}│{}│{}\n{}{}{} │{} │{}{}\n{}┼{}┼{}\n", left,
+      left_aligned(centred("percentiles of |error|", percentiles_width), percentiles_width),
+      centred("beyond, %", rates_width), left_aligned("parameter", label_width),
+      right_aligned("from", bias_width), right_aligned("to", bias_width), levels,
+      right_aligned("from", from_width), right_aligned("to", to_width),
+      horizontal_rule(label_width + biases_width), horizontal_rule(percentiles_width),
+      horizontal_rule(rates_width));
+}
+
+std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy,
+                std::uint64_t num_runs) {
+  const double scale = info.display_scale;
+  const std::optional<Interval>& bias = accuracy.error.bias_interval;
+  const auto bias_cell = [&](double bound) {
+    return right_aligned(bias ? signed_figure(bound / scale) : "-", bias_width);
+  };
+  std::string percentiles;
+  for (const PercentileStatistic& percentile : accuracy.percentiles) {
+    percentiles += right_aligned(measured_figure(percentile.value / scale), percentile_width);
+  }
+  const Interval beyond = probability_interval(static_cast<double>(accuracy.num_beyond_objective),
+                                               static_cast<double>(num_runs), default_confidence);
+  return fmt::format("{}{}{} │{} │{}{}\n", left_aligned(info.label, label_width),
+                     bias_cell(bias ? bias->lower : 0.0), bias_cell(bias ? bias->upper : 0.0),
+                     percentiles, right_aligned(measured_figure(100.0 * beyond.lower), from_width),
+                     right_aligned(measured_figure(100.0 * beyond.upper), to_width));
+}
+
+std::string joint_text(const ExceedanceCount& missing_any) {
+  const std::uint64_t num_holding = missing_any.num_runs - missing_any.num_exceedances;
+  const Interval holding =
+      probability_interval(static_cast<double>(num_holding),
+                           static_cast<double>(missing_any.num_runs), default_confidence);
+  constexpr std::size_t margin = 2;
+  return line_of(
+      fmt::format("all objectives together: {} of {} runs,", num_holding, missing_any.num_runs),
+      interval_percent(holding) + " of all draws", margin);
+}
+
+}  // namespace
+
+std::string error_table(const CampaignStatistics& statistics, const ExceedanceCount& missing_any) {
+  if (statistics.num_estimated == 0) return "";
+  std::string text =
+      fmt::format("95 % intervals of bias and of draws beyond the objective\n\n{}", heading());
+  for (const ParameterInfo& info : parameter_infos()) {
+    text += row(info, statistics.accuracy[index(info.parameter)], statistics.num_estimated);
+  }
+  return text + joint_text(missing_any);
+}
+
+}  // namespace proofmass::coordinator
