@@ -15,6 +15,7 @@
 #include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/entry_rows.hpp"
+#include "coordinator/store/detail/file_log.hpp"
 #include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/detail/integrity.hpp"
 #include "coordinator/store/detail/parts.hpp"
@@ -53,13 +54,6 @@ void check_that_name_is_the_only_one(const std::filesystem::path& path) {
       fmt::format("campaign file = {} (has {} names (hard links), must have one; make copies "
                   "instead)",
                   path.string(), num_names));
-}
-
-void check_absence(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (std::filesystem::exists(path, ignored)) {
-    throw StoreError(fmt::format("campaign file = {} (exists already)", path.string()));
-  }
 }
 
 // Lock and draft are named after the file, and would be made in a directory without it.
@@ -111,7 +105,7 @@ Store Store::create(const std::filesystem::path& path, const Campaign& campaign,
   check_name(path);
   detail::check_directory_of(path);
   auto lock = std::make_unique<detail::StoreLock>(path);
-  check_absence(path);
+  detail::check_absence(path);
   detail::appear_complete(path, detail::IfThere::keep, [&](const std::filesystem::path& draft) {
     write_draft(draft, campaign, definition);
   });
@@ -141,10 +135,12 @@ void Store::annotate(const std::filesystem::path& path,
   detail::check_directory_of(path);
   const std::unique_ptr<detail::StoreLock> lock = lock_if_free(path);
   Database database(path, Access::read_write);
+  database.leave_files_alone();  // Until the file is known to be sound.
   detail::configure(database);
   detail::check_campaign_file(database, path);
   detail::check_up_to_date(database, path);
   detail::check_that_log_is_there(database, path);
+  database.fold_log_at_close();
   {
     Transaction transaction(database);
     for (const Annotation& annotation : annotations) {
@@ -400,7 +396,7 @@ void Store::check_integrity() const {
 void Store::back_up(const std::filesystem::path& destination) const {
   check_name(destination);
   const detail::StoreLock lock(destination);
-  check_absence(destination);
+  detail::check_absence(destination);
   detail::appear_complete(
       destination, detail::IfThere::keep, [&](const std::filesystem::path& draft) {
         Database copy(draft, Access::create);

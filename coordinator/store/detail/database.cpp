@@ -339,6 +339,10 @@ void Database::leave_files_alone() {
   sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
 }
 
+void Database::fold_log_at_close() {
+  sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
+}
+
 void Database::refuse(std::string_view what) const {
   // It may quote the file.
   throw StoreError(

@@ -142,8 +142,11 @@ class Database {
   [[nodiscard]] bool fold_log(Fold fold);
 
   /// The file is not touched any more when the connection is closed, and its log stays: for a file
-  /// that has lost its name, and for one that says that it needs its log.
+  /// that has lost its name, for one that says that it needs its log, and for one that has not been
+  /// checked.
   void leave_files_alone();
+  /// Takes that back: as usual, the last connection copies the log into the file and removes it.
+  void fold_log_at_close();
 
   /// @throws StoreError `campaign file = path (what)`.
   [[noreturn]] void refuse(std::string_view what) const;

@@ -10,6 +10,9 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <system_error>
+
+#include "coordinator/store/store_error.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -61,6 +64,18 @@ bool is_sound_without_log(const std::filesystem::path& file) {
   const int end = sqlite3_exec(opened, "PRAGMA trusted_schema = OFF; PRAGMA quick_check(1)", take,
                                &is_sound, nullptr);
   return end == SQLITE_OK && is_sound;
+}
+
+void check_absence(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::exists(file, ignored)) {
+    throw StoreError(fmt::format("campaign file = {} (exists already)", file.string()));
+  }
+  if (!has_log(file)) return;
+  throw StoreError(fmt::format(
+      "campaign file = {0} (is gone, but its log {1} is there: put the file back, or move {1} away "
+      "and begin anew)",
+      file.string(), log_path(file).filename().string()));
 }
 
 }  // namespace proofmass::coordinator::detail

@@ -15,4 +15,9 @@ namespace proofmass::coordinator::detail {
 /// a million runs.
 [[nodiscard]] bool is_sound_without_log(const std::filesystem::path& file);
 
+/// For a file that is about to be made.
+/// @throws StoreError if it is there, or the log of one that is gone: SQLite would apply that to
+///         the new file.
+void check_absence(const std::filesystem::path& file);
+
 }  // namespace proofmass::coordinator::detail

@@ -99,6 +99,8 @@ Store::Parts::Parts(const std::filesystem::path& file, std::unique_ptr<detail::S
       lock(std::move(held_lock)),
       place(std::make_unique<detail::FilePlace>(file)),
       database(file, Access::read_write) {
+  // The log may be that of another file: until all is checked, nothing of it may reach this one.
+  database.leave_files_alone();
   detail::configure(database);
   detail::check_campaign_file(database, file);
   // Before anything is changed: a file that cannot be served is left as it is.
@@ -118,6 +120,7 @@ Store::Parts::Parts(const std::filesystem::path& file, std::unique_ptr<detail::S
   is_log_lost = is_perhaps_marked_ && !has_log;
   place->remember_log();
   check_place();
+  database.fold_log_at_close();
 }
 
 // Readers cannot open a file in WAL mode on read-only media, so that a closed one is in the other.

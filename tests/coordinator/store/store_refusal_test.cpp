@@ -49,6 +49,53 @@ TEST_F(StoreRefusal, ToCreateAFileThatExists) {
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
 }
 
+// SQLite would apply the log of the file that is gone to the new one.
+TEST_F(StoreRefusal, ToCreateAFileBesideTheLogOfOneThatIsGone) {
+  const std::filesystem::path log = file().string() + "-wal";
+  const std::filesystem::path kept = file().string() + ".kept";
+  {
+    Store store = Store::create(file(), campaign_of(4), "");
+    store.commit(deliveries_of(0, 4));
+    std::filesystem::copy_file(log, kept);
+  }
+  std::filesystem::remove(file());
+  std::filesystem::rename(kept, log);
+  EXPECT_EQ(store_error_of([&] { create(); }),
+            message("is gone, but its log campaign.db-wal is there: put the file back, or move "
+                    "campaign.db-wal away and begin anew"));
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db-wal"));
+  std::filesystem::remove(log);
+  create();
+  EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
+}
+
+// A file that was restored from a copy, beside the log of the file before it: SQLite would copy the
+// log into it when the connection is closed, and nothing could mend it any more.
+TEST_F(StoreRefusal, OfAFileWithTheLogOfAnotherLeavesItAsItIs) {
+  const std::filesystem::path log = file().string() + "-wal";
+  const std::filesystem::path copy = file().string() + ".copy";
+  const std::filesystem::path kept = file().string() + ".kept";
+  {
+    Store store = Store::create(file(), campaign_of(2000), "");
+    store.commit(deliveries_of(0, 10));
+    ASSERT_EQ(store.rest(), std::nullopt);
+    std::filesystem::copy_file(file(), copy);
+    store.commit(deliveries_of(10, 200));
+    ASSERT_EQ(store.rest(), std::nullopt);
+    store.commit(deliveries_of(200, 2000));
+    std::filesystem::copy_file(log, kept);
+  }
+  std::filesystem::rename(copy, file());
+  std::filesystem::rename(kept, log);
+  const std::string bytes = test::content_of(file());
+  EXPECT_THAT(error_of_open(), HasSubstr("is damaged"));
+  EXPECT_THAT(store_error_of([&] { Store::annotate(file(), {AddTag{"tag"}}); }),
+              HasSubstr("is damaged"));
+  EXPECT_EQ(test::content_of(file()), bytes);
+  std::filesystem::remove(log);
+  EXPECT_THAT(Store::open(file()).finished_runs(), ElementsAre(RunRange{RunIndex{0}, 10}));
+}
+
 TEST_F(StoreRefusal, OfAFileThatIsNotADatabase) {
   test::write_file(file(), "name = \"hardy2013\"\n" + std::string(1000, '#'));
   EXPECT_EQ(error_of_open(), message("is not an SQLite database"));
