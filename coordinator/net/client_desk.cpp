@@ -124,7 +124,13 @@ std::optional<std::uint64_t> ClientDesk::begin(const Address& from, std::uint64_
   const Waiter waiter{.routing_id = from.routing_id, .request = request};
   for (auto& [ticket, pending] : pending_) {
     if (pending.hash != hash || pending.size != bytes.size() || pending.key != from.key) continue;
-    pending.waiters.push_back(waiter);
+    if (pending.waiters.size() < waiters_max) {
+      pending.waiters.push_back(waiter);
+    } else {
+      send(waiter, refusal(fmt::format("request = the same {} times (is being carried out; try "
+                                       "again later)",
+                                       waiters_max)));
+    }
     return std::nullopt;
   }
   const std::uint64_t ticket = next_ticket_++;

@@ -37,6 +37,10 @@ class ClientDesk {
     std::function<TimePoint()> now;
   };
 
+  /// How many connections may wait for the same request, for example one client that connects
+  /// again.
+  static constexpr std::size_t waiters_max = 16;
+
   /// @param background  Outlives the desk.
   ClientDesk(Background& background, Surroundings surroundings);
 
