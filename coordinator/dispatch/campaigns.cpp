@@ -173,4 +173,9 @@ void on_ended(State& state, CampaignId id, std::uint64_t num_runs) {
   state.ended[id] = num_runs;
 }
 
+void on_unlisted(State& state, CampaignId id) {
+  PROOFMASS_EXPECT(!state.campaigns.contains(id));
+  state.ended.erase(id);
+}
+
 }  // namespace proofmass::coordinator

@@ -99,6 +99,24 @@ KnownCampaigns CampaignDesk::known() const {
   return known;
 }
 
+std::vector<EndedFile> CampaignDesk::ended_files() const {
+  std::vector<EndedFile> files;
+  for (const auto& [id, ended] : ended_) {
+    files.push_back(
+        {.id = id, .file = ended.file, .name = ended.status.name, .stamp = ended.stamp});
+  }
+  return files;
+}
+
+bool CampaignDesk::unlist(const EndedFile& changed) {
+  const auto found = ended_.find(changed.id);
+  if (found == ended_.end() || found->second.stamp != changed.stamp) return false;
+  ended_.erase(found);
+  std::erase(order_, changed.id);
+  on_unlisted(state_, changed.id);
+  return true;
+}
+
 CampaignDesk::Holdings CampaignDesk::holdings_of(std::string_view owner) const {
   Holdings holdings;
   for (const auto& [id, served] : served_) {
@@ -209,7 +227,7 @@ Phase CampaignDesk::phase_of(CampaignId id) const {
 
 void CampaignDesk::review() {
   const TimePoint now = surroundings_.now();
-  std::vector<CampaignId> closable;
+  std::vector<CampaignId> ended;
   for (auto& [id, served] : served_) {
     const CampaignState& campaign = state_.campaigns.at(id);
     const std::uint64_t num_committed = campaign.num_committed_here;
@@ -221,9 +239,14 @@ void CampaignDesk::review() {
     review_summary(id, served);
     review_control(id, served);
     review_rest(id, served);
-    if (can_be_closed(id, served, now)) closable.push_back(id);
+    if (!has_ended(id, served)) {
+      served.ended_at.reset();
+    } else {
+      if (!served.ended_at) served.ended_at = now;
+      ended.push_back(id);
+    }
   }
-  for (const CampaignId id : closable) begin_closing(id);
+  close_surplus(std::move(ended), now);
 }
 
 void CampaignDesk::review_failures(CampaignId id, const Served& served) {
@@ -260,7 +283,7 @@ void CampaignDesk::review_summary(CampaignId id, Served& served) {
     if (served.summary.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     take_summary(id, served);
   }
-  if (served.is_held) return;
+  if (served.is_held || surroundings_.now() < served.summary_after) return;
   const bool is_finished = state_.campaigns.at(id).phase == Phase::finished;
   const bool is_undecided = is_finished && phase_of(id) != Phase::finished;
   const bool is_due = std::exchange(served.is_summary_due, false);
@@ -272,7 +295,11 @@ void CampaignDesk::take_summary(CampaignId id, Served& served) {
   const Campaign& definition = *state_.campaigns.at(id).definition;
   // A rule that cannot be checked stops: nobody knows how much further it would go.
   served.is_decided = true;
+  const bool is_news = failure != std::exchange(served.summary_failure, failure);
   if (!failure.empty()) {
+    served.is_summary_due = true;
+    served.summary_after = surroundings_.now() + surroundings_.retry_after;
+    if (!is_news) return;
     outbox_.log({.severity = Severity::error,
                  .kind = "statistics_failed",
                  .text = fmt::format("reason=\"{}\"", failure),
@@ -332,18 +359,26 @@ void CampaignDesk::begin_summary(CampaignId id, Served& served) {
       });
 }
 
-bool CampaignDesk::can_be_closed(CampaignId id, const Served& served, TimePoint now) const {
-  constexpr std::chrono::seconds retry_after(1);
-  if (!surroundings_.closes_what_ended || served.is_held) return false;
-  if (served.closing_at && *served.closing_at != now && now - *served.closing_at < retry_after) {
-    return false;
-  }
+bool CampaignDesk::has_ended(CampaignId id, const Served& served) const {
   const CampaignState& campaign = state_.campaigns.at(id);
   const bool has_statistics = !served.is_summary_due && !served.summary.valid();
   const bool is_quiet =
       campaign.delivered.empty() && campaign.num_comparing == 0 && campaign.storage_failure.empty();
   return served.written.phase == Phase::finished && phase_of(id) == Phase::finished &&
-         has_statistics && is_quiet && is_finished(campaign);
+         has_statistics && is_quiet && !served.is_held && is_finished(campaign);
+}
+
+// A file that is open can be restored if somebody removes it. So the last ones stay open.
+void CampaignDesk::close_surplus(std::vector<CampaignId> ended, TimePoint now) {
+  const std::optional<std::size_t> count_max = surroundings_.finished_open_max;
+  if (!count_max || ended.size() <= *count_max) return;
+  const auto ended_at = [this](CampaignId id) { return served_.at(id).ended_at; };
+  std::ranges::stable_sort(ended, {}, ended_at);
+  ended.resize(ended.size() - *count_max);
+  for (const CampaignId id : ended) {
+    const std::optional<TimePoint> tried_at = served_.at(id).closing_at;
+    if (!tried_at || now - *tried_at >= surroundings_.retry_after) begin_closing(id);
+  }
 }
 
 void CampaignDesk::review_rest(CampaignId id, Served& served) {
@@ -370,26 +405,24 @@ void CampaignDesk::begin_closing(CampaignId id) {
       Served& served = served_.at(id);
       served.is_held = false;
       served.closing_at = surroundings_.now();
-      if (is_folded && can_be_closed(id, served, *served.closing_at)) close_ended(id);
+      if (is_folded && has_ended(id, served)) close_ended(id);
     };
   });
 }
 
 // The dispatch forgets the campaign first: nothing is written any more when the file is closed.
 void CampaignDesk::close_ended(CampaignId id) {
-  EndedCampaign ended{.id = id, .file = served_.at(id).file, .status = status_of_served(id)};
+  const std::filesystem::path file = served_.at(id).file;
+  EndedCampaign ended{.id = id, .file = file, .status = status_of_served(id), .stamp = {}};
   ended.status.rate_hz = 0.0;
   ended.status.remaining_s.reset();
-  outbox_.log({.kind = "campaign_closed",
-               .text = fmt::format("name={}", ended.status.name),
-               .campaign = id});
   surroundings_.on_closing(id);
   on_removed(state_, id, outbox_);
   on_ended(state_, id, ended.status.num_runs);
   served_.erase(id);
   ended_.emplace(id, std::move(ended));
   surroundings_.background.post_next(
-      [this, id, epoch = surroundings_.start.epoch]() -> Background::Finish {
+      [this, id, file, epoch = surroundings_.start.epoch]() -> Background::Finish {
         try {
           Store store = writer_.close(id);
           std::vector<coordinator::Entry> entries;
@@ -401,7 +434,13 @@ void CampaignDesk::close_ended(CampaignId id) {
         } catch (const std::exception& error) {
           return [this, reason = std::string(error.what())] { say_not_closed(reason); };
         }
-        return [] {};
+        return [this, id, stamp = stamp_of(file)] {
+          const auto found = ended_.find(id);
+          if (found == ended_.end()) return;
+          found->second.stamp = stamp;
+          outbox_.log({.kind = "campaign_closed",
+                       .text = fmt::format("name={}", found->second.status.name)});
+        };
       });
 }
 

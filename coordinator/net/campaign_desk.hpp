@@ -35,8 +35,11 @@ class CampaignDesk {
     Background& background;
     Outbox& outbox;
     std::function<TimePoint()> now;
-    CampaignFiles* files;    ///< Null if nothing can be submitted and nobody wants statistics.
-    bool closes_what_ended;  ///< The file of a finished campaign can be opened again later.
+    CampaignFiles* files;  ///< Null if nothing can be submitted and nobody wants statistics.
+    /// How many files of finished campaigns stay open. Those that are closed can be opened again
+    /// later; with nothing none is closed.
+    std::optional<std::size_t> finished_open_max;
+    Duration retry_after;                        ///< Until what a disk prevented is tried again.
     std::function<void(CampaignId)> on_closing;  ///< The dispatch is about to forget it.
     CoordinatorStart start;
   };
@@ -71,6 +74,11 @@ class CampaignDesk {
   [[nodiscard]] std::optional<Entry> find(std::string_view name) const;
   [[nodiscard]] bool is_served(CampaignId id) const { return served_.contains(id); }
   [[nodiscard]] KnownCampaigns known() const;
+  /// The files of the campaigns that are listed as ended.
+  [[nodiscard]] std::vector<EndedFile> ended_files() const;
+  /// Takes a campaign whose file has changed from the list of those that have ended.
+  /// @return False if it is not there any more, or was looked at again since.
+  bool unlist(const EndedFile& changed);
   /// Unfinished campaigns of an owner, and the bytes of their definitions.
   struct Holdings {
     std::size_t num_campaigns = 0;
@@ -134,10 +142,13 @@ class CampaignDesk {
     bool is_decided = false;                   ///< The stop rule was checked with the runs of now.
     std::uint64_t num_failures_before = 0;     ///< Runs without an estimate, when it came.
     bool is_at_rest = false;                   ///< Nothing is expected: the log is folded in.
+    std::optional<TimePoint> ended_at = {};    ///< Nothing is left to do since then.
     std::optional<TimePoint> closing_at = {};  ///< When closing was tried last, in vain.
     bool is_held = false;                      ///< See take_hold().
     bool is_summary_due = false;
     std::uint64_t num_summarised = 0;  ///< Of the runs committed here.
+    std::string summary_failure = {};  ///< Of the last statistics; empty if there was none.
+    TimePoint summary_after = {};      ///< When statistics may be computed next.
     std::future<Summarised> summary;
   };
 
@@ -152,7 +163,9 @@ class CampaignDesk {
   void take_summary(CampaignId id, Served& served);
   void go_on_to(CampaignId id, std::uint64_t num_runs);
   void begin_summary(CampaignId id, Served& served);
-  [[nodiscard]] bool can_be_closed(CampaignId id, const Served& served, TimePoint now) const;
+  /// True if the campaign is finished, its statistics are there, and nothing is under way.
+  [[nodiscard]] bool has_ended(CampaignId id, const Served& served) const;
+  void close_surplus(std::vector<CampaignId> ended, TimePoint now);
   void review_rest(CampaignId id, Served& served);
   void begin_closing(CampaignId id);
   void close_ended(CampaignId id);

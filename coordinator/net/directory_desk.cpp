@@ -20,18 +20,26 @@ std::filesystem::path file_of(const FileOutcome& outcome) {
   return std::get<FileFailure>(outcome).file;
 }
 
-std::vector<FileOutcome> look(const CampaignDirectory& directory, KnownCampaigns known,
-                              const CoordinatorStart& start) {
-  try {
-    return look_at_all(directory, known, start);
-  } catch (const std::exception& error) {
-    std::vector<FileOutcome> outcomes;
-    outcomes.emplace_back(FileFailure{.file = {}, .reason = error.what()});
-    return outcomes;
-  }
-}
-
 }  // namespace
+
+DirectoryDesk::Findings DirectoryDesk::look(const CampaignDirectory& directory,
+                                            KnownCampaigns known,
+                                            const std::vector<EndedFile>& ended,
+                                            const CoordinatorStart& start) {
+  Findings findings;
+  try {
+    for (const EndedFile& one : ended) {
+      if (!one.stamp || stamp_of(one.file) == one.stamp) continue;
+      known.remove(one);
+      findings.changed.push_back(one);
+    }
+    findings.outcomes = look_at_all(directory, known, start);
+  } catch (const std::exception& error) {
+    findings = {};
+    findings.outcomes.emplace_back(FileFailure{.file = {}, .reason = error.what()});
+  }
+  return findings;
+}
 
 DirectoryDesk::DirectoryDesk(Surroundings surroundings) : surroundings_(std::move(surroundings)) {}
 
@@ -67,20 +75,22 @@ void DirectoryDesk::review(TimePoint now) {
   if (directory == nullptr || is_looking_ || now - looked_at_ < retry_after) return;
   is_looking_ = true;
   background.post_next([this, &directory = *directory, start = start, now,
-                        known = campaigns.known()]() -> Background::Finish {
-    const auto outcomes = std::make_shared<std::vector<FileOutcome>>(look(directory, known, start));
-    return [this, outcomes, now] { finish(std::move(*outcomes), now); };
+                        known = campaigns.known(),
+                        ended = campaigns.ended_files()]() -> Background::Finish {
+    const auto findings = std::make_shared<Findings>(look(directory, known, ended, start));
+    return [this, findings, now] { finish(std::move(*findings), now); };
   });
 }
 
-void DirectoryDesk::finish(std::vector<FileOutcome> outcomes, TimePoint now) {
+void DirectoryDesk::finish(Findings findings, TimePoint now) {
   is_looking_ = false;
   looked_at_ = now;
   std::set<std::filesystem::path> seen;
+  for (const FileOutcome& outcome : findings.outcomes) seen.insert(file_of(outcome));
+  for (const EndedFile& changed : findings.changed) unlist(changed, seen.contains(changed.file));
   const std::set<std::filesystem::path> served = surroundings_.campaigns.known().files;
-  for (FileOutcome& outcome : outcomes) {
+  for (FileOutcome& outcome : findings.outcomes) {
     const std::filesystem::path file = file_of(outcome);
-    seen.insert(file);
     // It may have been submitted meanwhile.
     if (!served.contains(file)) take(std::move(outcome));
   }
@@ -90,6 +100,13 @@ void DirectoryDesk::finish(std::vector<FileOutcome> outcomes, TimePoint now) {
     if (!seen.contains(file)) gone.push_back(file);
   }
   for (const std::filesystem::path& file : gone) forget(file);
+}
+
+void DirectoryDesk::unlist(const EndedFile& changed, bool is_there) {
+  if (!surroundings_.campaigns.unlist(changed) || is_there) return;
+  surroundings_.outbox.log({.severity = Severity::warning,
+                            .kind = "campaign_file_gone",
+                            .text = fmt::format("file={}", changed.file.string())});
 }
 
 void DirectoryDesk::forget(const std::filesystem::path& file) {

@@ -16,7 +16,9 @@ namespace proofmass::coordinator {
 
 /// The files of a directory that are not served: looks at them again every few seconds, in the
 /// background, and serves those that can be by then. So a file that was locked, on a full disk or
-/// damaged is served once it can be, and one that is put into the directory is served as well.
+/// damaged is served once it can be, and one that is put into the directory is served as well. The
+/// closed file of a campaign that has ended is looked at when it changes: an older copy in its
+/// place is served, and a file that was removed takes its campaign from the list.
 class DirectoryDesk {
  public:
   /// What the desk works with; all of it outlives the desk.
@@ -44,9 +46,18 @@ class DirectoryDesk {
   [[nodiscard]] std::vector<wire::UnservedFile> unserved(std::size_t count_max) const;
 
  private:
+  /// What came of looking at the directory.
+  struct Findings {
+    std::vector<EndedFile> changed;
+    std::vector<FileOutcome> outcomes;
+  };
+
+  static Findings look(const CampaignDirectory& directory, KnownCampaigns known,
+                       const std::vector<EndedFile>& ended, const CoordinatorStart& start);
+  void unlist(const EndedFile& changed, bool is_there);
   void note(FileFailure failure);
   void forget(const std::filesystem::path& file);
-  void finish(std::vector<FileOutcome> outcomes, TimePoint now);
+  void finish(Findings findings, TimePoint now);
 
   Surroundings surroundings_;
   std::map<std::filesystem::path, FileFailure> unserved_;

@@ -1,6 +1,7 @@
 #include "coordinator/net/prepared_campaign.hpp"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <exception>
 #include <map>
@@ -41,7 +42,8 @@ FileFailure copy_of(const std::filesystem::path& file, const std::string& name) 
           .is_copy = true};
 }
 
-EndedCampaign ended_campaign(const std::filesystem::path& file, const CampaignPeek& peek) {
+EndedCampaign ended_campaign(const std::filesystem::path& file, const CampaignPeek& peek,
+                             const std::optional<FileStamp>& stamp) {
   return {.id = peek.id,
           .file = file,
           .status = {.name = peek.name,
@@ -52,7 +54,8 @@ EndedCampaign ended_campaign(const std::filesystem::path& file, const CampaignPe
                      .num_given_up = peek.num_given_up,
                      .remaining_s = {},
                      .storage_failure = {},
-                     .owner = peek.owner}};
+                     .owner = peek.owner},
+          .stamp = stamp};
 }
 
 /// How many of the files that are looked at hold a campaign, by its name.
@@ -84,6 +87,7 @@ std::optional<CampaignPeek> peek_without_log(const std::filesystem::path& file) 
 FileOutcome opened(const CampaignDirectory& directory, const std::filesystem::path& file,
                    const KnownCampaigns& known, const NumFiles& num_files,
                    const CoordinatorStart& start) {
+  const std::optional<FileStamp> stamp = stamp_of(file);  // Before anything is read.
   if (const std::optional<CampaignPeek> peek = peek_without_log(file)) {
     const bool is_known = known.ids.contains(peek->id) || known.names.contains(peek->name);
     const auto found = num_files.find(peek->name);
@@ -91,7 +95,7 @@ FileOutcome opened(const CampaignDirectory& directory, const std::filesystem::pa
     // Of several files a damaged one must not stand for the campaign.
     if (has_rival && !has_journal(file)) (void)peek_campaign(file, PeekDepth::pages);
     if (is_known) return copy_of(file, peek->name);
-    if (peek->is_at_rest) return ended_campaign(file, *peek);
+    if (peek->is_at_rest) return ended_campaign(file, *peek, stamp);
   }
   ServedCampaign campaign = directory.load(file);
   if (known.ids.contains(campaign.store.id()) || known.names.contains(campaign.definition->name)) {
@@ -112,6 +116,21 @@ void KnownCampaigns::add(const FileOutcome& outcome) {
     ids.insert(ended->id);
     names.insert(ended->status.name);
   }
+}
+
+void KnownCampaigns::remove(const EndedFile& ended) {
+  files.erase(ended.file);
+  ids.erase(ended.id);
+  names.erase(ended.name);
+}
+
+std::optional<FileStamp> stamp_of(const std::filesystem::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return std::nullopt;
+  constexpr std::int64_t ns_per_s = 1'000'000'000;
+  return FileStamp{.inode = status.st_ino,
+                   .size = status.st_size,
+                   .written_ns = status.st_mtim.tv_sec * ns_per_s + status.st_mtim.tv_nsec};
 }
 
 PreparedCampaign prepare(ServedCampaign campaign, GivenUpRuns given_up,

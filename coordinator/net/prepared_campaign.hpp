@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <string>
 #include <variant>
@@ -28,11 +29,32 @@ struct PreparedCampaign {
   std::vector<SessionId> sessions;  ///< Workers that may come back.
 };
 
+/// Tells whether a file is still the one that it was, with the same content.
+struct FileStamp {
+  std::uint64_t inode = 0;
+  std::int64_t size = 0;
+  std::int64_t written_ns = 0;
+
+  bool operator==(const FileStamp&) const = default;
+};
+
+/// Nothing if there is no such file.
+[[nodiscard]] std::optional<FileStamp> stamp_of(const std::filesystem::path& file);
+
 /// A finished or cancelled campaign whose file is closed and complete.
 struct EndedCampaign {
   CampaignId id;
   std::filesystem::path file;
   wire::CampaignStatus status;
+  std::optional<FileStamp> stamp;  ///< Of the file when it was last looked at; empty until it was.
+};
+
+/// The file of such a campaign.
+struct EndedFile {
+  CampaignId id;
+  std::filesystem::path file;
+  std::string name;
+  std::optional<FileStamp> stamp;
 };
 
 /// A file that cannot be served for now.
@@ -51,6 +73,7 @@ struct KnownCampaigns {
   std::set<std::string> names;
 
   void add(const FileOutcome& outcome);
+  void remove(const EndedFile& ended);
 };
 
 /// Reads what the service must know, and writes down that a coordinator begins.

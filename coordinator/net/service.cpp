@@ -173,7 +173,10 @@ class Service::Parts final : public Outbox {
             .outbox = *this,
             .now = [this] { return now(); },
             .files = config_.files,
-            .closes_what_ended = config_.directory != nullptr,
+            .finished_open_max = config_.directory == nullptr
+                                     ? std::nullopt
+                                     : std::optional(config_.finished_open_max),
+            .retry_after = config_.writer.retry_after,
             .on_closing = [this](CampaignId id) { history_.note_closed(id); },
             .start = start_};
   }

@@ -51,9 +51,11 @@ struct ServiceConfig {
   /// that can connect is trusted.
   std::optional<std::size_t> memory_size_max;
   CampaignFiles* files = nullptr;  ///< Outlives the service; null if nothing can be submitted.
-  /// Whose campaigns are served beside those that are handed over; null if there is none. A
-  /// campaign that finishes is closed then, and opened again when somebody asks for more of it.
+  /// Whose campaigns are served beside those that are handed over; null if there is none.
   const CampaignDirectory* directory = nullptr;
+  /// With a directory: how many files of finished campaigns stay open. The others are closed, and
+  /// opened again when somebody asks for more runs.
+  std::size_t finished_open_max = 16;
   SubmissionLimits limits;  ///< Of each client's key.
   std::string version;      ///< Of the program, for people.
   DispatchConfig dispatch;

@@ -210,7 +210,8 @@ void serve(const fs::path& file) {
   config.workers_endpoint = "ipc://" + (directory / "w").string();
   config.clients_endpoint = "ipc://" + (directory / "c").string();
   config.files = &folder;
-  Service service(folder.load([](const std::string&) {}), config, [](const Event&) {});
+  config.directory = &folder;
+  Service service({}, config, [](const Event&) {});
   const std::atomic<StopRequest> stop = StopRequest::now;
   service.run(stop, [] {});
   for (ServedCampaign& campaign : service.close()) {

@@ -240,17 +240,34 @@ TEST_F(FinishedCampaigns, CostNothing) {
   EXPECT_EQ(times(), before);
 }
 
-TEST_F(ServedDirectory, HasACampaignThatIsClosedWhenItFinishesAndOpenedForMore) {
+TEST_F(ServedDirectory, HasACampaignThatIsWholeWhenItFinishesAndGoesOn) {
   const Process coordinator = this->coordinator("coordinator", {"null.toml"});
   const Process worker = null_worker("worker", {"--run-time", "0"});
-  wait_for_log("coordinator", "campaign_closed name=null");
-  wait_until("closed file", [&] { return !fs::exists(file_of("null").concat("-wal")); });
+  const fs::path log = file_of("null").concat("-wal");
+  const auto wait_for_rest = [&](std::size_t num_summaries) {
+    wait_until("statistics", [&] {
+      return num_log_lines("coordinator", "campaign_summarised") == num_summaries;
+    });
+    wait_until("empty log", [&] { return !fs::exists(log) || fs::file_size(log) == 0; });
+  };
+  wait_for_rest(1);
   EXPECT_EQ(status_of("null").at("phase"), "finished");
   // A copy of the file alone has all of it.
   fs::copy_file(file_of("null"), path("copy.db"));
   EXPECT_EQ(num_stored(path("copy.db")), 500U);
   extend_null_campaign(700);
-  wait_until("second finish", [&] { return num_log_lines("coordinator", "campaign_closed") == 2; });
+  wait_for_rest(2);
+  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
+}
+
+// What was acknowledged is not lost because nothing remains to be done.
+TEST_F(ServedDirectory, HasTheFileOfAFinishedCampaignThatIsRemoved) {
+  const Process coordinator =
+      this->coordinator("coordinator", {"null.toml", "--time-scale", "0.05"});
+  const Process worker = null_worker("worker", {"--run-time", "0"});
+  wait_for_log("coordinator", "campaign_summarised");
+  fs::remove(file_of("null"));
+  wait_for_log("coordinator", "campaign_file_restored");
   EXPECT_EQ(digest("null"), undisturbed_digest("null"));
 }
 

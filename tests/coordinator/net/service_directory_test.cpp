@@ -8,6 +8,7 @@
 #include <iterator>
 #include <mutex>
 
+#include "coordinator/store/store_error.hpp"
 #include "tests/coordinator/net/playing_client.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 
@@ -192,6 +193,7 @@ TEST_F(ServiceWithADirectory, DoesNotOpenWhatHasEnded) {
 }
 
 TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
+  config.finished_open_max = 0;
   make_file("a");
   start_service();
   {
@@ -211,6 +213,75 @@ TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
   PlayingWorker worker(endpoint.address(), 1002);
   EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{1});
   EXPECT_THAT(served(), ElementsAre("a"));
+}
+
+// A file that is open can be restored if it is removed.
+TEST_F(ServiceWithADirectory, KeepsTheFilesOpenThatFinishedLast) {
+  config.finished_open_max = 1;
+  for (const std::string name : {"a", "b", "c"}) make_file(name);
+  start_service();
+  PlayingWorker worker(endpoint.address());
+  (void)worker.register_here();
+  for (int i = 0; i < 3; ++i) {
+    worker.want(1);
+    worker.deliver(worker.receive<wire::RunLease>());
+  }
+  while (num_events("campaign_summarised") < 3 || num_events("campaign_closed") < 2) {
+    std::this_thread::yield();
+  }
+  int num_open = 0;  // Whose lock the service has.
+  for (const std::string name : {"a.db", "b.db", "c.db"}) {
+    try {
+      (void)Store::open(directory / name);
+    } catch (const StoreError&) {
+      ++num_open;
+    }
+  }
+  EXPECT_EQ(num_open, 1);
+}
+
+TEST_F(ServiceWithADirectory, ServesAnOlderCopyInPlaceOfAFileThatWasClosed) {
+  config.finished_open_max = 0;
+  make_file("a");
+  fs::copy_file(directory / "a.db", directory / "older");
+  start_service();
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)worker.receive<wire::ResultAck>();
+  wait_for_event("campaign_closed name=a");
+  fs::rename(directory / "older", directory / "a.db");
+  while (folder.num_loads() < 2) std::this_thread::yield();
+  EXPECT_EQ(worker.receive<wire::RunLease>().runs.first, RunIndex{0});
+  EXPECT_THAT(served(), ElementsAre("a"));
+}
+
+TEST_F(ServiceWithADirectory, ListsNoCampaignWhoseFileWasRemoved) {
+  make_finished_file("a");
+  start_service();
+  EXPECT_THAT(served(), ElementsAre("a"));
+  fs::remove(directory / "a.db");
+  EXPECT_EQ(wait_for_event("campaign_file_gone"),
+            "campaign_file_gone file=" + (directory / "a.db").string());
+  EXPECT_THAT(served(), IsEmpty());
+}
+
+// Otherwise the campaign would be closed without them, and nobody would make them any more.
+TEST_F(ServiceWithADirectory, ComputesStatisticsAgainThatADiskPrevented) {
+  config.finished_open_max = 0;
+  std::atomic<int> num_failures = 0;
+  files.before_summary = [&] {
+    if (++num_failures <= 3) throw Error("the disk is full");
+  };
+  make_file("a");
+  start_service();
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)worker.receive<wire::ResultAck>();
+  wait_for_event("campaign_closed name=a");
+  EXPECT_EQ(num_failures, 4);
+  EXPECT_EQ(num_events("statistics_failed"), 1);
+  EXPECT_EQ(num_events("campaign_summarised"), 1);
+  end(StopRequest::now);
 }
 
 TEST_F(ServiceWithADirectory, GoesOnWithACancelledCampaignThatItDidNotOpen) {

@@ -56,6 +56,7 @@ class PlainFiles final : public coordinator::CampaignFiles {
   std::optional<std::uint64_t> summarise(
       const std::filesystem::path& file, const Scenario&,
       const std::function<void(const std::function<void(coordinator::Store&)>&)>& write) override {
+    before_summary();
     std::uint64_t num_runs = 0;
     write([&](coordinator::Store& store) {
       store.record_event("summarised", file.filename().string());
@@ -66,6 +67,9 @@ class PlainFiles final : public coordinator::CampaignFiles {
 
   /// May throw.
   std::function<void()> before_open = [] {};
+
+  /// May throw; called in another thread.
+  std::function<void()> before_summary = [] {};
 
   /// What a stop rule asks for, after so many runs.
   std::function<std::optional<std::uint64_t>(std::uint64_t)> next_runs =
