@@ -67,7 +67,7 @@ TEST_F(ReportCommand, NeedsAllRequirementsMet) {
 TEST_F(ReportCommand, RefusesARequirementThatCannotBeRead) {
   EXPECT_EQ(message_of<UsageError>([&] { (void)answer("a_c12 is small"); }),
             "requirement = a_c12 is small (must read \"PARAMETER < LIMIT for COVERAGE% with "
-            "CONFIDENCE%\")");
+            "CONFIDENCE%\" or \"all objectives for COVERAGE% with CONFIDENCE%\")");
 }
 
 TEST_F(ReportCommand, RefusesAnUnknownParameter) {

@@ -100,9 +100,10 @@ TEST_F(StoreDispatch, KeepsWhichCoordinatorsBeganAndEnded) {
       text("SELECT group_concat(epoch || ' ' || host || ' ' || process_id || ' ' || version ||"
            " ' ' || (ended_utc IS NOT NULL), ';') FROM coordinator_start"),
       "ffffffffffffffff node-0 12 0.1.0 0;0000000000000001 node-0 12 0.1.0 1");
-  EXPECT_EQ(store_error_of([&] { begin(ended); }),
-            "campaign file = " + file().string() +
-                " (UNIQUE constraint failed: coordinator_start.epoch)");
+  begin(ended);  // A coordinator may open a file again that it has closed.
+  EXPECT_EQ(text("SELECT group_concat(epoch || ' ' || (ended_utc IS NOT NULL), ';')"
+                 " FROM coordinator_start"),
+            "ffffffffffffffff 0;0000000000000001 0");
 }
 
 TEST_F(StoreDispatch, KnowsWhichWorkersMayComeBack) {
