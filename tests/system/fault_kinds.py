@@ -242,14 +242,22 @@ class BackupRestored(Fault):
     def end(self):
         """The state is as old as this fault is long, and often from before an extension."""
         self.world.look(self.campaign)
+        self.restore()
+        self.release_campaign()
+
+    def restore(self, *, removes_log=False):
         there = self.world.served / f"{self.campaign.name}.incoming"
+        file = self.world.file_of(self.campaign)
         try:
             shutil.copy(self.backup, there)
-            there.rename(self.world.file_of(self.campaign))
         except OSError as error:  # No room: the restoration does not take place.
             self.world.tell(f"not restored: {error}")
             there.unlink(missing_ok=True)
-        self.release_campaign()
+            return
+        if removes_log:  # Not before there is something to put in the file's place.
+            for suffix in ("-wal", "-shm"):
+                file.with_name(file.name + suffix).unlink(missing_ok=True)
+        there.rename(file)
 
 
 class BackupRestoredAfterExtension(BackupRestored):
@@ -285,11 +293,9 @@ class RestoredWhileDown(BackupRestored):
             coordinator.is_end_expected = True
             coordinator.signal(self.world.random.choice([signal.SIGTERM, signal.SIGKILL]))
             coordinator.wait()
-        file = self.world.file_of(self.campaign)
-        if self.world.coordinator.has_ended():
-            for suffix in ("-wal", "-shm"):
-                file.with_name(file.name + suffix).unlink(missing_ok=True)
-        super().end()
+        self.world.look(self.campaign)
+        self.restore(removes_log=self.world.coordinator.has_ended())
+        self.release_campaign()
         if coordinator is not None:
             self.world.start_coordinator()
 

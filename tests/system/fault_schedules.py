@@ -7,7 +7,8 @@ Each schedule follows from its seed: a coordinator in a directory of its own, tw
 or two small campaigns, and faults (fault_kinds.py) at random times. Then everything is mended,
 and within 300 s every campaign must be finished, with the digest of an undisturbed run, one row a run
 and nothing for `proofmass verify` to find; no program may have aborted, and no honest worker failed.
-Needs root, for file systems of its own. Exit code 1 if a schedule failed; its directory is kept.
+Needs root, for file systems of its own. Exit code 1 if a schedule failed, whose directory is kept; 77
+without root, but 1 if the environment has CI.
 """
 
 import argparse
@@ -91,7 +92,7 @@ class Undisturbed:
 # One schedule.
 
 def draw_faults(world):
-    """Times of begin and end, in order."""
+    """Times of begin and end, in order. These draws follow those of the setting."""
     draw = world.random
     moments = []
     for _ in range(draw.randint(3, 8)):
@@ -101,6 +102,13 @@ def draw_faults(world):
         moments.append((begin + draw.choice([0.05, draw.uniform(0.1, 1.0), draw.uniform(0.5, 4.0)]),
                         "end", fault))
     return sorted(moments, key=lambda moment: moment[0])
+
+
+def drawn_kinds(seed):
+    """@return Setting and kinds of faults of a seed, without starting anything."""
+    setting = fault_world.Setting(seed)
+    kinds = [type(fault).__name__ for _, action, fault in draw_faults(setting) if action == "begin"]
+    return setting, kinds
 
 
 def pass_time(world, until):
@@ -145,7 +153,7 @@ def act_out(world, moments):
             world.watch()  # What the fault ended is not held against it later.
             world.num_active -= 1
             world.quiet_since = time.monotonic()
-    return len(begun)
+    return [type(fault).__name__ for fault in begun]
 
 
 def remove_fault_plans(world):
@@ -168,9 +176,10 @@ def remove_fault_plans(world):
 
 
 def remove_refused_log(world, campaign):
-    """A restored file beside the log of another state: the operator does what the message says."""
-    text = world.coordinator.text()
-    if not re.search(rf"campaign_not_served.*{campaign.name}\.db.*-wal", text):
+    """A log beside a restored file, or without one: the operator does what the message says."""
+    is_named = re.search(rf"campaign_not_served.*{campaign.name}\.db.*-wal",
+                         world.coordinator.text())
+    if not is_named and "-wal" not in campaign.refusal:
         return
     file = world.file_of(campaign)
     for suffix in ("-wal", "-shm"):
@@ -274,7 +283,7 @@ def carry_out(options, seed, directory):
     try:
         moments = draw_faults(world)
         begin_campaigns(world)
-        report["num_faults"] = act_out(world, moments)
+        report["faults"] = act_out(world, moments)
         pass_time(world, time.monotonic() + 2 * fault_world.RESTART_DELAY_S)
         remove_fault_plans(world)
         report["healed_s"] = round(wait_until_done(world), 1)
@@ -320,9 +329,10 @@ def run_one(options, seed, folder, undisturbed):
 def print_report(report):
     verdict = "ok    " if report["failure"] is None else "FAILED"
     numbers = ", ".join(f"{name} {report[name]}" for name in
-                        ("num_faults", "healed_s", "wall_s", "coordinator starts",
+                        ("healed_s", "wall_s", "coordinator starts",
                          "runs computed again", "resubmissions") if name in report)
-    print(f"seed {report['seed']:>5} {verdict} {numbers} ({report.get('setting', '')})")
+    print(f"seed {report['seed']:>5} {verdict} {numbers} ({report.get('setting', '')}): "
+          f"{' '.join(report.get('faults', []))}")
     if report["failure"] is not None:
         print(f"    {report['failure']}")
     sys.stdout.flush()
@@ -333,9 +343,11 @@ def read_options():
     parser.add_argument("--programs", type=pathlib.Path, required=True)
     parser.add_argument("--faulty-calls", type=pathlib.Path, help="the library to preload; by "
                         "default that of the build that holds the programs")
-    parser.add_argument("--seeds", default="1:10", help="FIRST:LAST")
+    parser.add_argument("--seeds", default="1:10", help="FIRST:LAST, or some with commas")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--directory", type=pathlib.Path, help="where failed schedules stay")
+    parser.add_argument("--all-kinds", action="store_true", help="refuse seeds of which none "
+                        "draws some kind of fault")
     parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--reference", type=pathlib.Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -346,21 +358,27 @@ def read_options():
     return options
 
 
+def seeds_of(text):
+    if ":" in text:
+        first, last = map(int, text.split(":"))
+        return list(range(first, last + 1))
+    return list(map(int, text.split(",")))
+
+
 def run_all(options):
     folder = pathlib.Path(tempfile.mkdtemp(prefix="fault_schedules.", dir=options.directory))
     options.reference = folder / "undisturbed"
     options.reference.mkdir()
     undisturbed = Undisturbed(options.programs, options.reference)
-    first, last = map(int, options.seeds.split(":"))
+    seeds = seeds_of(options.seeds)
     begin = time.monotonic()
     failed = []
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        for report in pool.map(lambda seed: run_one(options, seed, folder, undisturbed),
-                               range(first, last + 1)):
+        for report in pool.map(lambda seed: run_one(options, seed, folder, undisturbed), seeds):
             print_report(report)
             if report["failure"] is not None:
                 failed.append(report["seed"])
-    print(f"{last - first + 1 - len(failed)} of {last - first + 1} schedules passed in "
+    print(f"{len(seeds) - len(failed)} of {len(seeds)} schedules passed in "
           f"{time.monotonic() - begin:.0f} s")
     if failed:
         print(f"failed: {' '.join(map(str, failed))}; see {folder}")
@@ -369,11 +387,24 @@ def run_all(options):
     return 0
 
 
+def kinds_that_lack(seeds):
+    drawn = {kind for seed in seeds for kind in drawn_kinds(seed)[1]}
+    return sorted({kind.__name__ for kind in fault_kinds.KINDS} - drawn)
+
+
 def main():
     options = read_options()
     if options.one is None:
+        lacking = kinds_that_lack(seeds_of(options.seeds)) if options.all_kinds else []
+        if lacking:
+            print(f"--seeds = {options.seeds} (no schedule has {' '.join(lacking)})")
+            return 2
+        if os.geteuid() != 0:
+            return fault_world.want_of("root, for file systems of its own")
         return run_all(options)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # So that all programs are ended.
+    # A shell's background jobs ignore SIGINT, and so would the programs until they catch it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     print(json.dumps(carry_out(options, options.one, options.directory)))
     return 0
 

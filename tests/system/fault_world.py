@@ -111,6 +111,7 @@ class Campaign:
         self.num_runs = sizes[0]  # Wanted at present.
         self.is_busy = False  # Something is being done to its file.
         self.is_paused = False
+        self.refusal = ""  # What the last submission was answered with.
         self.seen = {}  # Time of receipt of each run that was in its file some time.
 
     def next_size(self):
@@ -124,36 +125,23 @@ def mount_disk(folder, size=DISK_SIZE):
         raise OSError(ctypes.get_errno(), "cannot mount a file system (root is needed)")
 
 
+def want_of(what):
+    """Exit code of a script on a machine that lacks something: skipped, but failed in CI."""
+    print(f"needs {what}")
+    return 1 if "CI" in os.environ else 77
+
+
 def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
 
 
-class World:
-    """Everything that one schedule starts."""
+class Setting:
+    """What a seed decides before anything starts."""
 
-    def __init__(self, options, seed, directory):
-        self.options = options
-        self.programs = options.programs.resolve()
-        self.directory = directory
+    def __init__(self, seed):
         self.random = random.Random(seed)
-        self.served = directory / "served"
-        self.backups = directory / "backups"
-        self.served.mkdir(parents=True)
-        self.backups.mkdir()
-        mount_disk(self.served)
-        self.orders = Orders(directory / "orders")
-        self.num_active = 0  # Faults under way.
-        self.quiet_since = time.monotonic()
-        self.counts = {"coordinator starts": 0, "refused starts": 0, "worker starts": 0,
-                       "runs computed again": 0, "resubmissions": 0}
-        self.workers = []
-        self.ended_workers = []
-        self.coordinator = None
-        self.restart_at = None
-        self.story = open(directory / "story", "w")
-        self.start_time = time.monotonic()
         self.draw_setting()
 
     def draw_setting(self):
@@ -173,14 +161,6 @@ class World:
         self.has_spool = draw.random() < 0.5
         self.is_tcp = draw.random() < 0.4
         self.plans = self.draw_plans()
-        for campaign in self.campaigns:
-            shutil.copy(self.options.reference / f"{campaign.name}.toml", self.directory)
-        if self.is_tcp:
-            self.endpoints = [f"tcp://127.0.0.1:{free_port()}" for _ in range(2)]
-        else:
-            self.endpoints = [f"ipc://{self.directory}/{door}" for door in ("workers", "clients")]
-        if self.has_keys:
-            self.run("keygen", "keys")
 
     def draw_plans(self):
         """What goes wrong between the sockets, and where processes die."""
@@ -211,11 +191,6 @@ class World:
             plans["worker_kill"] = f"kill={point}:{draw.randint(1, 8)}"
         return plans
 
-    # Setting and story.
-
-    def tell(self, text):
-        print(f"{time.monotonic() - self.start_time:7.2f} {text}", file=self.story, flush=True)
-
     def setting(self):
         words = ["null" if self.is_null else "simulated", f"{self.num_workers} workers",
                  " ".join(campaign.name for campaign in self.campaigns),
@@ -223,6 +198,47 @@ class World:
         words += ["keys"] if self.has_keys else []
         words += ["spool"] if self.has_spool else []
         return ", ".join(words + [f"{name} {plan}" for name, plan in self.plans.items()])
+
+
+class World(Setting):
+    """Everything that one schedule starts."""
+
+    def __init__(self, options, seed, directory):
+        super().__init__(seed)
+        self.options = options
+        self.programs = options.programs.resolve()
+        self.directory = directory
+        self.served = directory / "served"
+        self.backups = directory / "backups"
+        self.served.mkdir(parents=True)
+        self.backups.mkdir()
+        mount_disk(self.served)
+        self.orders = Orders(directory / "orders")
+        self.num_active = 0  # Faults under way.
+        self.quiet_since = time.monotonic()
+        self.counts = {"coordinator starts": 0, "refused starts": 0, "worker starts": 0,
+                       "runs computed again": 0, "resubmissions": 0}
+        self.workers = []
+        self.ended_workers = []
+        self.coordinator = None
+        self.restart_at = None
+        self.story = open(directory / "story", "w")
+        self.start_time = time.monotonic()
+        self.prepare()
+
+    def prepare(self):
+        """What the setting needs in the directory."""
+        for campaign in self.campaigns:
+            shutil.copy(self.options.reference / f"{campaign.name}.toml", self.directory)
+        if self.is_tcp:
+            self.endpoints = [f"tcp://127.0.0.1:{free_port()}" for _ in range(2)]
+        else:
+            self.endpoints = [f"ipc://{self.directory}/{door}" for door in ("workers", "clients")]
+        if self.has_keys:
+            self.run("keygen", "keys")
+
+    def tell(self, text):
+        print(f"{time.monotonic() - self.start_time:7.2f} {text}", file=self.story, flush=True)
 
     # Programs.
 
@@ -246,8 +262,9 @@ class World:
 
     def submit(self, campaign):
         done = self.ask("submit", f"{campaign.name}.toml", "--runs", campaign.num_runs)
+        campaign.refusal = done.stderr.strip()
         self.tell(f"submit {campaign.name} {campaign.num_runs}: {done.returncode} "
-                  f"{done.stderr.strip()}")
+                  f"{campaign.refusal}")
         return done.returncode == 0
 
     def start_coordinator(self, is_faulty=True):

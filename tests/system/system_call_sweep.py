@@ -216,10 +216,13 @@ def require(condition, text):
         raise Failure(text)
 
 
-def check_whole(attempt, digest):
-    """The file, or the copy of it, is what it should be."""
+def check_whole(attempt, digest, log):
+    """The file, or the copy of it, is what it should be after exit code 0."""
     file = attempt.copy if attempt.phase == "backup" else attempt.file
-    found = verified_digest(attempt.bench.programs, file, is_null=True)
+    try:
+        found = verified_digest(attempt.bench.programs, file, is_null=True)
+    except Failure as failure:
+        raise Failure(f"{failure}\nthe program ended with 0 and said: {log[-700:]}") from None
     require(found == digest, f"{file.name} has the digest {found}")
 
 
@@ -241,7 +244,7 @@ def try_point(bench, point):
         is_partial = attempt.phase in ("backup_killed", "report")
         digest = None if is_partial else bench.digests[attempt.num_runs]
         if code == 0 and digest is not None:
-            check_whole(attempt, digest)
+            check_whole(attempt, digest, log)
         if attempt.phase.startswith("backup") and code != 0:
             require(not attempt.copy.exists() or rows_of(attempt.copy) == before,
                     "a copy is there that is not whole")
@@ -259,7 +262,7 @@ def check_rerun(attempt, after, digest):
     require(code == 0, f"undisturbed again it ended with {code}: {log[-700:]}")
     require(after <= rows_of(attempt.file), "stored runs are gone after the second time")
     if digest is not None:
-        check_whole(attempt, digest)
+        check_whole(attempt, digest, log)
 
 
 def count_calls(bench, phase):
