@@ -25,9 +25,8 @@ void add_override_options(CLI::App& command, Overrides& overrides) {
 void add_stop_options(CLI::App& command, StopOptions& options) {
   command
       .add_option("--until", options.rule,
-                  "Compute no more runs than it takes, as in\n\"std(a_c13) within 5%\","
-                  " \"all objectives within 2%\" or\n"
-                  "\"a_c12 < 9e-4 for 99% with 95% decided\"")
+                  "Compute no more runs than it takes, as in\n\"std(a_c13) within 5%\",\n"
+                  "\"all objectives within 2%\" or\n\"a_c12 < 9e-4 for 99% with 95% decided\"")
       ->check([](const std::string& rule) {
         try {
           (void)parse_stop_rule(rule);

@@ -79,7 +79,8 @@ TEST_F(Usage, IsRefusedWithTheRule) {
       {{"run", "a.toml", "--audit", "2"}, "--audit = 2 (must be in [0, 1])"},
       {{"run", "a.toml", "--workers", "0"}, "--workers = 0 (must be in [1, 1024])"},
       {{"run", "a.toml", "--until", "std(k2c) within 5"},
-       "until = std(k2c) within 5 (must read \"STATISTIC(PARAMETER) within PERCENT%\")"},
+       "until = std(k2c) within 5 (must read \"STATISTIC(PARAMETER) within PERCENT%\", "
+       "\"all objectives within PERCENT%\" or \"REQUIREMENT decided\")"},
       {{"export", "a.db", "--format", "xml"}, "--format = xml (must be one of csv, hdf5, json)"},
       {{"tag", "a.db", "delete"}, "ACTION = delete (must be one of add, remove)"},
       {{"sensitivity", "a.db", "--run", "one"}, "--run = one (must be in [0, 999999999])"},
