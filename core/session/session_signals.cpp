@@ -15,6 +15,9 @@ SessionSignals::SessionSignals(const Scenario& scenario, const Session& session,
                                const KeplerOrbit& orbit, const Environment& environment)
     : orbit_(&orbit),
       environment_(environment),
+      // An environment file is of the frame in which the satellite flies.
+      turns_environment_(session.spin_rate_rad_s != 0.0 &&
+                         scenario.environment.kind == EnvironmentKind::harmonic),
       gains_(attitude_gains(scenario.attitude, scenario.simulation.sample_period_s)),
       sample_period_s_(scenario.simulation.sample_period_s),
       spin_rate_rad_s_(session.spin_rate_rad_s),
@@ -58,6 +61,10 @@ void SessionSignals::advance(const SamplePhases& phases, SharedSample& sample) {
   sample.reference_rate = reference.rate;
   sample.earth_direction_R = to_target(reference.attitude_IR, sample.earth_direction_I);
   sample.external = environment_.at(time_s(0), point);
+  if (turns_environment_) {
+    sample.external = {to_target(reference.attitude_IR, sample.external.linear_m_s2),
+                       to_target(reference.attitude_IR, sample.external.angular_rad_s2)};
+  }
   if (has_excitation_) excite(phases.excitation, sample);
   commanded_.correct(gains_, sample.attitude_command_rad);
   sample.commanded = commanded_;
