@@ -18,6 +18,27 @@ std::string_view name_of(RunStatus status) {
       return "not_finite";
     case RunStatus::no_draw:
       return "no_draw";
+    case RunStatus::lost:
+      return "lost";
+  }
+  PROOFMASS_EXPECT(false);
+  return {};
+}
+
+std::string_view name_of(LossCause cause) {
+  switch (cause) {
+    case LossCause::none:
+      return "none";
+    case LossCause::saturation:
+      return "saturation";
+    case LossCause::attitude:
+      return "attitude";
+    case LossCause::residual:
+      return "residual";
+    case LossCause::quadratic_noise:
+      return "quadratic_noise";
+    case LossCause::square_noise:
+      return "square_noise";
   }
   PROOFMASS_EXPECT(false);
   return {};

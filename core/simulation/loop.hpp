@@ -22,14 +22,16 @@ struct LoopConstants {
   Matrix3<T> thrust_matrix;           ///< [M_DF].
   Vector3<T> angular_bias_rad_s2;
   Vector3<T> star_tracker_bias_rad;
+  double sensor_range_m_s2 = 0.0;  ///< The same for every lane.
 };
 
 /// What the instrument and the on-board estimator report at one sample.
 template <typename T>
 struct Observation {
-  std::array<Vector3<T>, 2> measured;  ///< Γ_mes,k, m/s².
-  Vector3<T> measured_angular;         ///< rad/s².
-  AttitudeEstimator<T> attitude;       ///< With the commanded motion still in its angles.
+  std::array<Vector3<T>, 2> measured;   ///< Γ_mes,k, m/s².
+  std::array<Vector3<T>, 2> kinematic;  ///< Γ_App,k + p_k, m/s².
+  Vector3<T> measured_angular;          ///< rad/s².
+  AttitudeEstimator<T> attitude;        ///< With the commanded motion still in its angles.
 };
 
 /// Satellite, instrument, drag-free and attitude loops, from sample to sample ([Hardy2013]
@@ -48,12 +50,17 @@ struct Loop {
   DragFreeController<T> drag_free;
   AttitudeEstimator<T> estimator;
   AttitudeController<T> controller;
+  T largest_acceleration{};  ///< |Γ_mes,k| on any axis before the range cuts it off, m/s².
+  T largest_angle{};         ///< |θ̂| about any axis, rad.
 
   /// Puts the satellite at rest in its reference attitude.
   void begin(const SessionSignals::Reference& reference) {
     attitude_IS = {T(reference.attitude_IR.scalar), broadcast<T>(reference.attitude_IR.vector)};
     rate = broadcast<T>(reference.rate);
   }
+
+  /// Forgets what the loops did while they settled.
+  void begin_record() { largest_acceleration = largest_angle = T(0.0); }
 
   PROOFMASS_INLINE Observation<T> advance(const LoopConstants<T>& constants,
                                           const DragFreeGains& drag_free_gains,
@@ -73,10 +80,16 @@ struct Loop {
     Observation<T> observation;
     for (std::size_t k = 0; k < 2; ++k) {
       const SensorModel<T>& sensor = constants.sensors[k];
+      observation.kinematic[k] = kinematic_acceleration(sensor, satellite, shared.mass_motion);
       observation.measured[k] =
-          measured_acceleration(sensor,
-                                kinematic_acceleration(sensor, satellite, shared.mass_motion)) +
-          noise.sensor[k];
+          measured_acceleration(sensor, observation.kinematic[k]) + noise.sensor[k];
+      largest_acceleration = largest_magnitude(observation.measured[k], largest_acceleration);
+    }
+    // Nothing is there to cut off while no lane has been beyond the range.
+    if (is_any_above(largest_acceleration, constants.sensor_range_m_s2)) [[unlikely]] {
+      for (Vector3<T>& measured : observation.measured) {
+        measured = clamped(measured, constants.sensor_range_m_s2);
+      }
     }
     observation.measured_angular =
         angular_acceleration + constants.angular_bias_rad_s2 + noise.angular;
@@ -87,6 +100,7 @@ struct Loop {
                                           constants.star_tracker_bias_rad + noise.star_tracker +
                                           broadcast<T>(shared.attitude_command_rad));
     observation.attitude = estimator;
+    largest_angle = largest_magnitude(estimator.angle, largest_angle);
     torque_command = controller.advance(attitude_gains, estimator);
     estimator.predict(attitude_gains, observation.measured_angular,
                       broadcast<T>(shared.reference_rate));
