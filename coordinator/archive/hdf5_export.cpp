@@ -172,7 +172,7 @@ class Column {
 Handle status_type(const Writer& writer) {
   Handle type = writer.handle(H5Tenum_create(H5T_STD_U8LE), H5Tclose);
   for (const RunStatus status : {RunStatus::completed, RunStatus::not_converged,
-                                 RunStatus::not_finite, RunStatus::no_draw}) {
+                                 RunStatus::not_finite, RunStatus::no_draw, RunStatus::lost}) {
     const auto value = static_cast<std::uint8_t>(status);
     writer.check(H5Tenum_insert(type, std::string(name_of(status)).c_str(), &value));
   }

@@ -54,8 +54,8 @@ std::string report_text(const Store& store, const Scenario& scenario) {
 std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_t num_runs,
                          const CampaignStatistics& statistics, std::string_view digest,
                          DigestCheck check) {
-  const std::uint64_t num_imperfect =
-      statistics.num_not_converged + statistics.num_not_finite + statistics.num_no_draw;
+  const std::uint64_t num_imperfect = statistics.num_not_converged + statistics.num_not_finite +
+                                      statistics.num_no_draw + statistics.num_lost;
   std::string text = fmt::format("Campaign  {}\nSeed      {}\nDigest    {}\n", name, seed, digest);
   if (check == DigestCheck::not_checked) {
     text += fmt::format("          (not checked: no stored one of these {} runs)\n",
@@ -64,9 +64,10 @@ std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_
   text += fmt::format("Runs      {} finished of {}, {} completed\n", statistics.num_runs, num_runs,
                       statistics.num_runs - num_imperfect);
   if (num_imperfect > 0) {
-    text += fmt::format("          {} not converged, {} not finite, {} without draw\n",
-                        statistics.num_not_converged, statistics.num_not_finite,
-                        statistics.num_no_draw);
+    text += fmt::format(
+        "          {} not converged, {} not finite, {} without draw{}\n",
+        statistics.num_not_converged, statistics.num_not_finite, statistics.num_no_draw,
+        statistics.num_lost > 0 ? fmt::format(", {} lost", statistics.num_lost) : std::string());
   }
   return text;
 }

@@ -164,6 +164,7 @@ struct Summary {
   std::uint64_t num_not_converged = 0;
   std::uint64_t num_not_finite = 0;
   std::uint64_t num_no_draw = 0;
+  std::uint64_t num_lost = 0;
   std::uint64_t num_given_up = 0;  ///< Not among the finished ones.
   std::string digest;              ///< Of the results, 64 hexadecimal digits.
   std::string computed_utc;

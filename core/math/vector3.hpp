@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "core/math/inline.hpp"
 
@@ -69,12 +70,15 @@ template <typename T>
 PROOFMASS_INLINE T largest_magnitude(const Vector3<T>& a, const T& most) {
   return larger(magnitude(a.x), larger(magnitude(a.y), larger(magnitude(a.z), most)));
 }
+/// The limit in each lane whose number is above it, no limit in the others.
+PROOFMASS_INLINE double limit_where_above(double a, double limit) {
+  return a > limit ? limit : std::numeric_limits<double>::infinity();
+}
 /// Each element cut off at ±limit; what is not a number stays.
 template <typename T>
-PROOFMASS_INLINE Vector3<T> clamped(const Vector3<T>& a, double limit) {
-  const T top = T(limit);
-  const T bottom = T(-limit);
-  const auto clamp = [&](const T& x) { return larger(bottom, smaller(top, x)); };
+PROOFMASS_INLINE Vector3<T> clamped(const Vector3<T>& a, const T& limit) {
+  const T bottom = -limit;
+  const auto clamp = [&](const T& x) { return larger(bottom, smaller(limit, x)); };
   return {clamp(a.x), clamp(a.y), clamp(a.z)};
 }
 

@@ -89,6 +89,13 @@ HWY_INLINE bool is_any_above(const Batch& a, double limit) {
   return !hn::AllFalse(Doubles(), above);
 }
 
+HWY_INLINE Batch limit_where_above(const Batch& a, double limit) {
+  return map(a, [limit](V x) HWY_ATTR {
+    const V top = hn::Set(Doubles(), limit);
+    return hn::IfThenElse(hn::Gt(x, top), top, hn::Inf(Doubles()));
+  });
+}
+
 HWY_INLINE Batch load(const double (&values)[num_lanes]) {
   Batch batch;
   for (std::size_t i = 0; i < num_vectors; ++i) {

@@ -47,7 +47,7 @@ struct LoopMonitor {
     const auto square = [](const T& x) { return x * x; };
     const auto term = [&](std::size_t k) {
       return sensors[k].quadratic_s2_m.x *
-             square(observation.kinematic[k].x - sensors[k].parasitic_m_s2.x);
+             square(observation.kinematic_x[k] - sensors[k].parasitic_m_s2.x);
     };
     quadratic.add(half * (term(0) - term(1)));
     common_square.add(square(common.x));

@@ -111,11 +111,14 @@ struct RunPlan::Parts {
         attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)) {
     weights.reserve(campaign.scenario.sessions.size());
     residual_weights.resize(campaign.scenario.sessions.size());
+    bool is_monitored = false;
     for (std::size_t i = 0; i < campaign.scenario.sessions.size(); ++i) {
       const Session& session = campaign.scenario.sessions[i];
       weights.emplace_back(line_fit(campaign.scenario, session));
-      if (!session.excitations.empty()) continue;
+      // The loops are the same in all sessions without excitation; one of them tells enough.
+      if (is_monitored || !session.excitations.empty()) continue;
       residual_weights[i].emplace(residual_fit(campaign.scenario, session));
+      is_monitored = true;
     }
   }
 
@@ -127,7 +130,7 @@ struct RunPlan::Parts {
       if (parts.is_quiet(i)) residual.emplace(*parts.residual_weights[i]);
     }
     WeightReader lines;
-    std::optional<WeightReader> residual;  ///< Of sessions without excitation.
+    std::optional<WeightReader> residual;  ///< Of the session that is monitored.
   };
 
   [[nodiscard]] SessionSetup setup(std::size_t i, Readers& readers) const {
@@ -197,7 +200,7 @@ struct RunPlan::Parts {
   DragFreeGains drag_free;
   AttitudeGains attitude;
   std::vector<LineWeights> weights;                          ///< Of each session.
-  std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those without excitation.
+  std::vector<std::optional<LineWeights>> residual_weights;  ///< Of the one that is monitored.
 };
 
 RunPlan::RunPlan(const Campaign& campaign) : parts_(std::make_unique<Parts>(campaign)) {}

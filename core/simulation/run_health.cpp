@@ -101,6 +101,9 @@ LoopHealth session_health(const Scenario& scenario, const Session& session,
                           const QuietSums& quiet) {
   LoopHealth health{.acceleration_m_s2 = bounded(record.acceleration_m_s2),
                     .attitude_rad = bounded(record.attitude_rad)};
+  // Loops that grew beyond all numbers left none to look at.
+  const auto& differential = phasors.amplitude[index(Signal::differential_x)];
+  if (!std::isfinite(differential[0].real())) health.acceleration_m_s2 = magnitude_max;
   health.square_noise = bounded(square_noise_of(scenario, session, phasors, quiet));
   if (!record.is_quiet) return health;
   health.residual_m_s2 = bounded(residual_amplitude(scenario, record));

@@ -149,8 +149,8 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
   for (std::size_t k = 0; k < num_samples; ++k) {
     const SharedSample& shared = signals.next();
     for (auto& [constants, noise, loop, sums, monitor] : groups) {
-      const auto observation =
-          loop.advance(constants, setup.drag_free, setup.attitude, shared, noise.next());
+      const auto observation = loop.advance(constants, setup.drag_free, setup.attitude, shared,
+                                            noise.next(), k % 4 == 0 ? Watch::yes : Watch::no);
       if (weights.lines == nullptr) continue;
       add_sample(ground_signals(observation, shared, setup.regressor),
                  weights.lines + k * num_outputs, num_outputs, setup.num_signals_used, sums);

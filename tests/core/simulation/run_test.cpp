@@ -99,7 +99,9 @@ TEST(RunPlan, SaysWhenTheSimulationDiverges) {
   Campaign campaign = unstable_campaign();
   campaign.scenario.sensor.range_m_s2 = 1e300;
   const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
-  EXPECT_EQ(result.status, RunStatus::not_finite);
+  EXPECT_EQ(result.status, RunStatus::lost);
+  EXPECT_EQ(result.loss.cause, LossCause::saturation);
+  EXPECT_EQ(result.health.acceleration_m_s2, magnitude_max);
   EXPECT_FALSE(result.has_estimate());
   EXPECT_TRUE(result.has_truth());
 }

@@ -52,5 +52,15 @@ TEST(ResultDigest, DependsOnEveryNumber) {
   EXPECT_EQ(digests.size(), 1 + changed.size());
 }
 
+TEST(AreEqual, ComparesHealthAndLoss) {
+  const RunResult known = known_result(RunStatus::lost);
+  RunResult other = known;
+  other.health.square_noise = 1e-9;
+  EXPECT_FALSE(are_equal(other, known));
+  other = known;
+  other.loss = {LossCause::attitude, SessionTarget::k2d};
+  EXPECT_FALSE(are_equal(other, known));
+}
+
 }  // namespace
 }  // namespace proofmass::coordinator::detail
