@@ -97,7 +97,7 @@ Campaign unstable_campaign() {
 // A drag-free loop beyond its stability limit grows without bound, unless a sensor's range ends it.
 TEST(RunPlan, SaysWhenTheSimulationDiverges) {
   Campaign campaign = unstable_campaign();
-  campaign.scenario.sensor.range_m_s2 = 1e300;
+  campaign.scenario.sensor.range_m_s2 = 1e80;
   const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
   EXPECT_EQ(result.status, RunStatus::lost);
   EXPECT_EQ(result.loss.cause, LossCause::saturation);
