@@ -239,5 +239,10 @@ int unlink(const char* path) {
   return static_cast<int>(syscall(SYS_unlink, path));
 }
 
+int remove(const char* path) {  // What std::filesystem::remove() calls.
+  static const auto real = next<int(const char*)>("remove");
+  return fails(call_unlink, AT_FDCWD, path) ? -1 : real(path);
+}
+
 }  // extern "C"
 // NOLINTEND

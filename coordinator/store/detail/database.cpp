@@ -95,6 +95,16 @@ std::string explanation(int code, sqlite3* connection, const std::filesystem::pa
   }
 }
 
+// In one step: with several, a writer in another process would begin the copy anew each time. The
+// end does not tell that the step found the file locked and copied nothing.
+int copy_all(sqlite3* from, sqlite3* to) {
+  sqlite3_backup* const backup = sqlite3_backup_init(to, "main", from, "main");
+  if (backup == nullptr) return sqlite3_errcode(to);
+  const int step_code = sqlite3_backup_step(backup, -1);
+  const int end_code = sqlite3_backup_finish(backup);
+  return step_code == SQLITE_BUSY || step_code == SQLITE_LOCKED ? step_code : end_code;
+}
+
 }  // namespace
 
 void Statement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
@@ -279,13 +289,8 @@ std::int64_t Database::last_row() const { return sqlite3_last_insert_rowid(conne
 
 bool Database::in_transaction() const { return sqlite3_get_autocommit(connection_.get()) == 0; }
 
-// In one step: with several, a writer in another process would begin the copy anew each time.
 void Database::copy_to(Database& copy) const {
-  sqlite3_backup* backup =
-      sqlite3_backup_init(copy.connection_.get(), "main", connection_.get(), "main");
-  if (backup == nullptr) copy.fail(sqlite3_errcode(copy.connection_.get()));
-  sqlite3_backup_step(backup, -1);
-  const int code = sqlite3_backup_finish(backup);
+  const int code = copy_all(connection_.get(), copy.connection_.get());
   if (code != SQLITE_OK) copy.fail(code);
 }
 
@@ -295,12 +300,7 @@ void Database::go_on_with_private_copy() {
   std::unique_ptr<sqlite3, Close> copy(connection);
   if (code == SQLITE_OK) {
     sqlite3_extended_result_codes(connection, 1);
-    sqlite3_backup* const backup =
-        sqlite3_backup_init(connection, "main", connection_.get(), "main");
-    if (backup == nullptr) fail(sqlite3_errcode(connection));
-    const int step_code = sqlite3_backup_step(backup, -1);
-    code = sqlite3_backup_finish(backup);
-    if (step_code == SQLITE_BUSY || step_code == SQLITE_LOCKED) code = step_code;
+    code = copy_all(connection_.get(), connection);
   }
   if (code != SQLITE_OK) refuse_copy(code);
   connection_ = std::move(copy);

@@ -27,6 +27,12 @@ std::filesystem::path index_path(const std::filesystem::path& file) {
   return std::filesystem::path(file).concat("-shm");
 }
 
+void remove_file(const std::filesystem::path& path) {
+  if (::unlink(path.c_str()) == 0 || errno == ENOENT) return;
+  throw StoreError(
+      fmt::format("file = {} (cannot be removed: {})", path.string(), std::strerror(errno)));
+}
+
 int open_and_lock(const std::filesystem::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
   if (descriptor < 0) {
@@ -74,12 +80,15 @@ Placement FilePlace::look() const {
 }
 
 void FilePlace::remove_own_log() const {
-  if (log_ != Identity{} && identity_at(log_path(path_)) == log_) {
-    ::unlink(log_path(path_).c_str());
-  }
+  if (log_ != Identity{} && identity_at(log_path(path_)) == log_) remove_file(log_path(path_));
   if (index_ != Identity{} && identity_at(index_path(path_)) == index_) {
-    ::unlink(index_path(path_).c_str());
+    remove_file(index_path(path_));
   }
+}
+
+void remove_log_of(const std::filesystem::path& file) {
+  remove_file(log_path(file));
+  remove_file(index_path(file));
 }
 
 }  // namespace proofmass::coordinator::detail

@@ -39,6 +39,10 @@ class FilePlace {
 
   /// Removes the log, and its index, that lie beside the name and belong to this file. A log that
   /// came with another file stays.
+  ///
+  /// Whatever opens a file of this name must come afterwards: it would share the index, and empty
+  /// it, since SQLite takes no lock of its own process for that of another user.
+  /// @throws StoreError if one of them cannot be removed.
   void remove_own_log() const;
 
  private:
@@ -59,5 +63,9 @@ class FilePlace {
   Identity log_;
   Identity index_;
 };
+
+/// Removes the write-ahead log and its index that lie beside this name, whosever they are.
+/// @throws StoreError if one of them cannot be removed.
+void remove_log_of(const std::filesystem::path& file);
 
 }  // namespace proofmass::coordinator::detail

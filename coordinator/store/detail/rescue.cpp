@@ -4,9 +4,7 @@
 
 #include <optional>
 #include <string>
-#include <system_error>
 
-#include "coordinator/store/detail/file_log.hpp"
 #include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/detail/parts.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
@@ -59,12 +57,6 @@ void copy_to_draft(const Database& open_file, const std::filesystem::path& draft
   open_file.copy_to(copy);
   // What is copied may say that there is a log.
   copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
-}
-
-void remove_log_of(const std::filesystem::path& path) {
-  std::error_code ignored;
-  std::filesystem::remove(log_path(path), ignored);
-  std::filesystem::remove(std::filesystem::path(path).concat("-shm"), ignored);
 }
 
 }  // namespace
