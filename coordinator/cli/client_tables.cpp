@@ -11,6 +11,7 @@
 
 #include "coordinator/cli/progress_display.hpp"
 #include "coordinator/report/text_cells.hpp"
+#include "proto/text/visible_text.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -99,7 +100,7 @@ std::string comparison_note(const CampaignStatus& campaign) {
 std::vector<std::string> notes_about(const CampaignStatus& campaign) {
   std::vector<std::string> notes;
   if (!campaign.storage_failure.empty()) {
-    notes.push_back("nothing can be stored: " + campaign.storage_failure);
+    notes.push_back("nothing can be stored: " + wire::visible_text(campaign.storage_failure));
   }
   if (campaign.num_given_up > 0) {
     notes.push_back(counted(campaign.num_given_up, "run") + " given up: too many workers crashed");
@@ -171,7 +172,7 @@ std::string quarantine_note(const std::string& host) {
 std::string service_notes(const wire::StatusReply& status) {
   std::string text;
   for (const wire::UnservedFile& file : status.unserved_files) {
-    text += fmt::format("not served, tried again: {}\n", file.reason);
+    text += fmt::format("not served, tried again: {}\n", wire::visible_text(file.reason));
   }
   text += further(status.num_unserved_files, status.unserved_files.size(), "more such file");
   for (const std::string& host : status.quarantined_hosts) text += quarantine_note(host);

@@ -64,6 +64,18 @@ TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {
       << text;
 }
 
+// A file that somebody made may have any name of a campaign in it, and the reason may quote it.
+TEST(StatusTable, ShowsAReasonInOneLine) {
+  wire::StatusReply status = status_of({campaign("a", 1)});
+  status.campaigns[0].storage_failure = "full\nb: all is well";
+  status.unserved_files = {{.file = "d/b.db", .reason = "d/b.db: campaign b\nc \x1b[2J"}};
+  const std::string text = status_table(status);
+  EXPECT_TRUE(
+      text.ends_with("a: nothing can be stored: full\\nb: all is well\n"
+                     "not served, tried again: d/b.db: campaign b\\nc \\u001b[2J\n"))
+      << text;
+}
+
 TEST(StatusTable, ShowsCampaignsAndWhatIsOutOfTheOrdinary) {
   wire::CampaignStatus first = campaign("hardy2013", 42);
   first.rate_hz = 12.34;
