@@ -6,6 +6,7 @@
 
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/text_cells.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -68,7 +69,9 @@ std::string check_text(const Check& check) {
   std::string text = left_aligned(check.name, name_width) +
                      left_aligned(word_for(check.verdict), verdict_width) +
                      wrapped(check.finding, name_width + verdict_width) + "\n";
-  for (const std::string& detail : check.details) text += "  " + detail + "\n";
+  for (const std::string& detail : check.details) {
+    text += "  " + wire::visible_text(detail) + "\n";  // It may quote the file.
+  }
   return text;
 }
 

@@ -18,6 +18,7 @@
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/store/store.hpp"
 #include "proto/command_line/standard_error.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -25,7 +26,7 @@ namespace {
 std::string text_of(const Note& note) {
   // Further lines of a note stand below its first.
   const std::string indent(note.time_utc.size() + 2, ' ');
-  std::string text = note.time_utc + "  ";
+  std::string text = wire::visible_text(note.time_utc) + "  ";
   for (const char character : note.text) {
     text += character;
     if (character == '\n') text += indent;

@@ -4,10 +4,13 @@
 #include <signal.h>
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <regex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/system/fault_fixture.hpp"
@@ -36,6 +39,10 @@ class HostileFile : public FaultTest {
  protected:
   void SetUp() override {
     FaultTest::SetUp();
+    // What `verify` simulates again takes little.
+    const std::string text = read_file(path("short.toml"));
+    std::ofstream(path("short.toml"))
+        << std::regex_replace(text, std::regex("\norbits = [0-9]+"), "\norbits = 1");
     ASSERT_EQ(start("good", {"--workers", "1", "--runs", "16"}).wait(), 0) << errors_of("good");
   }
 
@@ -44,14 +51,18 @@ class HostileFile : public FaultTest {
     change(path(name), sql);
   }
 
-  /// What a command says on both streams, without line breaks; it must end soon.
-  [[nodiscard]] std::string answer(const Arguments& arguments) const {
+  /// What a command says on both streams; it must end soon.
+  [[nodiscard]] std::string output_of(const Arguments& arguments) const {
     const auto begin = std::chrono::steady_clock::now();
     Process command(directory / "", "command", programs + "/proofmass", arguments);
     (void)command.wait();
     EXPECT_LT(std::chrono::steady_clock::now() - begin, soon);
-    return std::regex_replace(read_file(path("command.out")) + errors_of("command"),
-                              std::regex("\\s+"), " ");
+    return read_file(path("command.out")) + errors_of("command");
+  }
+
+  /// What a command says on both streams, without line breaks.
+  [[nodiscard]] std::string answer(const Arguments& arguments) const {
+    return std::regex_replace(output_of(arguments), std::regex("\\s+"), " ");
   }
 };
 
@@ -102,6 +113,79 @@ TEST_F(HostileFile, DoesNotKeepACoordinatorFromTheOtherCampaigns) {
   EXPECT_EQ(digest("null"), undisturbed_digest("null"));
   coordinator.signal(SIGTERM);
   EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+}
+
+// Clears the screen, rings, goes back to the begin of the line, begins another, turns the direction
+// of writing, and begins an order in eight bits.
+const std::string evil = "\x1b[2J\a\rroot\nforged line\u202e\x7f\u009b31m";
+const std::string evil_name = "\x1b[31m\nforged line.db";
+
+/// The first thing in a text that a terminal would obey, or a line that nobody wrote.
+std::string obeyed(const std::string& text) {
+  for (const char* const order : {"\nforged line", "\u202e", "\u009b"}) {
+    if (contains(text, order)) return order;
+  }
+  const auto is_control = [](unsigned char c) { return (c < 0x20 && c != '\n') || c == 0x7f; };
+  const auto found = std::find_if(text.begin(), text.end(), is_control);
+  return found == text.end() ? "" : std::string(1, *found);
+}
+
+/// Table and column of each text in a campaign file.
+std::vector<std::pair<std::string, std::string>> text_columns(const fs::path& file) {
+  sqlite3* database = nullptr;
+  EXPECT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+  std::vector<std::pair<std::string, std::string>> columns;
+  const auto add = [](void* list, int, char** values, char**) {
+    static_cast<decltype(columns)*>(list)->emplace_back(values[0], values[1]);
+    return 0;
+  };
+  sqlite3_exec(database,
+               "SELECT t.name, c.name FROM sqlite_schema AS t, pragma_table_info(t.name) AS c "
+               "WHERE t.type = 'table' AND c.type = 'TEXT'",
+               add, &columns, nullptr);
+  sqlite3_close(database);
+  return columns;
+}
+
+TEST_F(HostileFile, CannotSteerATerminalOrForgeALine) {
+  EXPECT_EQ(answer({"tag", "good.db", "add", "old"}), "");
+  EXPECT_EQ(answer({"note", "good.db", "text"}), "");
+  fs::create_directory(path(served));
+  const auto columns = text_columns(path("good.db"));
+  EXPECT_GT(columns.size(), 30U);
+  std::size_t num_shown = 0;
+  for (const auto& [table, column] : columns) {
+    const std::string file = served + "/" + table + "." + column + ".db";
+    make(file, "PRAGMA ignore_check_constraints = ON; UPDATE OR REPLACE " + table + " SET " +
+                   column + " = '" + evil + "'");
+    std::vector<Arguments> commands{{"report", file},
+                                    {"verify", file, "--fraction", "0"},
+                                    {"query", file, "SELECT " + column + " FROM " + table}};
+    if (table == "campaign") {
+      commands.push_back({"compare", file, "good.db"});
+      commands.push_back({"sensitivity", file});
+      commands.push_back({"query", file, "SELECT * FROM draw LIMIT 1"});
+      commands.push_back({"run", "short.toml", "--db", file, "--runs", "16"});
+    }
+    if (table == "tag") commands.push_back({"tag", file, "list"});
+    if (table == "note") commands.push_back({"note", file});
+    for (const Arguments& command : commands) {
+      const std::string text = output_of(command);
+      EXPECT_EQ(obeyed(text), "") << command.front() << " " << file << ": " << text;
+      if (contains(text, "\\u001b")) ++num_shown;
+    }
+  }
+  EXPECT_GT(num_shown, columns.size());  // What is hidden altogether would pass.
+  fs::copy_file(path("good.db"), path(served + "/" + evil_name));
+  EXPECT_EQ(obeyed(output_of({"list", served})), "");
+  Process coordinator = this->coordinator("coordinator", {});
+  wait_for_log("coordinator", "coordinator_started");
+  EXPECT_EQ(obeyed(told({"status"})), "");
+  EXPECT_EQ(obeyed(told({"workers"})), "");
+  coordinator.signal(SIGTERM);
+  EXPECT_EQ(coordinator.wait(), 0);
+  EXPECT_EQ(obeyed(errors_of("coordinator")), "") << errors_of("coordinator");
+  EXPECT_GT(num_log_lines("coordinator", "\\u001b"), 0U) << errors_of("coordinator");
 }
 
 }  // namespace
