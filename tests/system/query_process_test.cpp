@@ -166,5 +166,20 @@ TEST_F(QueryProcess, SaysWhatEndedItsChild) {
             "fault)\n");
 }
 
+// The kernel holds it. What it does then is tested with less, in query_memory_test.cpp.
+TEST_F(QueryProcess, MayHave8GibibytesOfAddressSpace) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers need more address space than any limit";
+#endif
+  Process query(directory(), "query", program(),
+                {"query", file().string(), "--format", "csv",
+                 "SELECT 1 UNION ALL SELECT " + endless_calls[0]});
+  wait_until("a row", [&] { return output().ends_with("1\r\n"); });
+  EXPECT_THAT(read_file("/proc/" + std::to_string(query.children().front()) + "/limits"),
+              testing::ContainsRegex("Max address space +8589934592 +8589934592 "));
+  query.signal(SIGINT);
+  EXPECT_EQ(query.wait(), 130);
+}
+
 }  // namespace
 }  // namespace proofmass::test
