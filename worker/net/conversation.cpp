@@ -72,6 +72,9 @@ void Conversation::on_packet(const wire::Packet& packet, TimePoint now) {
 void Conversation::handle(const wire::Welcome& welcome, const wire::Header& header, TimePoint now) {
   if (is_registered_) return;  // The answer to a repeated Hello.
   is_registered_ = true;
+  // The coordinator process that asked for the drain has ended; this one may need the worker.
+  const bool is_drained = leaving_ && leaving_->reason == wire::LossReason::drained;
+  if (is_drained && header.epoch != epoch_) leaving_.reset();
   epoch_ = header.epoch;
   welcome_sequence_ = header.sequence;
   noted_refusals_.clear();

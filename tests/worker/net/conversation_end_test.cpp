@@ -169,6 +169,31 @@ TEST_F(ConversationTest, DeliversToANewCoordinatorWhileItDrains) {
   expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
+// A worker that cannot deliver, as the file is gone, outlives the coordinator that drained it, and
+// would never be lent anything again. Who drains it anew must say so.
+TEST_F(ConversationTest, WorksForANewCoordinatorAfterTheDrainOfTheFormer) {
+  register_with_campaign();
+  (void)compute(lease(0, 1));
+  receive(wire::Drain{});
+  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
+  reject_unregistered(first_epoch);  // Of the same process: it is still draining.
+  (void)take_sent<wire::Hello>();
+  receive(welcome, first_epoch);
+  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
+  (void)take_sent<wire::ResultBatch>();
+  reject_unregistered(wire::Epoch{6});
+  (void)take_sent<wire::Hello>();
+  receive(welcome, wire::Epoch{6});
+  EXPECT_GT(take_sent<wire::Heartbeat>().num_runs_max, 0U);
+  (void)take_sent<wire::ResultBatch>();
+  receive(wire::ResultAck{campaign_1, {{0}}}, wire::Epoch{6});
+  EXPECT_FALSE(conversation->ending().has_value());
+  receive(wire::Drain{}, wire::Epoch{6});
+  EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::drained);
+  expect_ending(Ending::Kind::done, "drained");
+}
+
 // What is given back while nobody knows the worker is not in the heartbeat of the next Welcome.
 TEST_F(ConversationTest, GivesBackByNotNamingRunsIfItIsNotRegistered) {
   register_with_campaign();
