@@ -5,6 +5,7 @@
 #include <exception>
 #include <functional>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <variant>
 
@@ -32,6 +33,8 @@ constexpr std::chrono::milliseconds tick_interval(100);
 constexpr std::chrono::seconds review_interval(1);
 // Who follows a campaign asks every second, and wants to be told how it ended.
 constexpr std::chrono::seconds follow_up_max(3);
+constexpr std::chrono::seconds dismissal_max(1);
+constexpr std::chrono::milliseconds dismissal_interval(10);
 // So that ticks, completions and clients are not put off by workers that talk much ...
 constexpr int worker_messages_per_turn_max = 1000;
 // ... nor workers by clients that ask much.
@@ -389,10 +392,23 @@ class Service::Parts final : public Outbox {
       std::visit([this](const auto& content) { complete(content); }, completion);
     }
     for (const auto& [id, campaign] : state_.campaigns) note_unstored(id, campaign);
-    on_stop(state_, *this);
+    dismiss_workers();
     desk_.review();
     settle_background();
     history_.end_all(LossReason::drained);
+  }
+
+  /// Until all have gone: what is sent just before a socket is closed is sometimes lost, and a
+  /// worker without a coordinator would wait for another one.
+  void dismiss_workers() {
+    const auto deadline = now() + dismissal_max;
+    std::uint64_t num_unsent = 0;
+    do {
+      num_unsent = worker_desk_.num_unsent();
+      on_stop(state_, *this);
+      num_unsent = worker_desk_.num_unsent() - num_unsent;
+      if (num_unsent < state_.workers.size()) std::this_thread::sleep_for(dismissal_interval);
+    } while (num_unsent < state_.workers.size() && now() < deadline);
   }
 
   void note_unstored(CampaignId id, const CampaignState& campaign) {
