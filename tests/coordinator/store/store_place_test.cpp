@@ -1,13 +1,11 @@
 // Files that lose their name while they are open: removed, renamed, replaced, without their log.
 
 #include <gmock/gmock.h>
-#include <sqlite3.h>
-#include <unistd.h>
 
-#include <functional>
 #include <utility>
 
 #include "coordinator/store/detail/file_log.hpp"
+#include "tests/coordinator/store/before_writes.hpp"
 #include "tests/coordinator/store/writer_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -21,44 +19,6 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-/// What SQLite does before its next write, in whatever thread; then nothing.
-class BeforeNextWrite {
- public:
-  explicit BeforeNextWrite(std::function<void()> action) {
-    action_ = std::move(action);
-    // Which of them it uses depends on how it was built.
-    replace("write", reinterpret_cast<sqlite3_syscall_ptr>(&write_later));
-    replace("pwrite", reinterpret_cast<sqlite3_syscall_ptr>(&pwrite_later));
-    replace("pwrite64", reinterpret_cast<sqlite3_syscall_ptr>(&pwrite_later));
-  }
-  ~BeforeNextWrite() {
-    for (const char* const name : {"write", "pwrite", "pwrite64"}) replace(name, nullptr);
-  }
-  BeforeNextWrite(const BeforeNextWrite&) = delete;
-  BeforeNextWrite& operator=(const BeforeNextWrite&) = delete;
-
-  [[nodiscard]] static bool is_over() { return !action_; }
-
- private:
-  static void replace(const char* name, sqlite3_syscall_ptr function) {
-    sqlite3_vfs* const system = sqlite3_vfs_find(nullptr);
-    (void)system->xSetSystemCall(system, name, function);
-  }
-  static void act() {
-    if (const auto action = std::exchange(action_, nullptr)) action();
-  }
-  static ssize_t write_later(int descriptor, const void* bytes, std::size_t size) {
-    act();
-    return write(descriptor, bytes, size);
-  }
-  static ssize_t pwrite_later(int descriptor, const void* bytes, std::size_t size, off_t place) {
-    act();
-    return pwrite(descriptor, bytes, size, place);
-  }
-
-  static inline std::function<void()> action_;
-};
 
 class StorePlace : public test::WriterTest {
  protected:
@@ -92,15 +52,17 @@ TEST_F(StorePlace, AFileThatWasRemovedIsWrittenAgainBeforeAResultIsNamed) {
 }
 
 // No look before the commit can see it.
-TEST_F(StorePlace, AFileThatIsRemovedInTheMidstOfACommitIsWrittenAgainBeforeAResultIsNamed) {
+TEST_F(StorePlace, AFileThatIsRemovedInTheMidstOfACommitIsWrittenAgain) {
   StoreWriter& writer = start();
   writer.open(id, create());
   deliver(writer, 0, 10);
   (void)take_completions();
   {
-    const BeforeNextWrite removal([&] { std::filesystem::remove(file()); });
+    bool is_removed = false;  // The copy that takes its place stays.
+    const test::BeforeWrites removal([&] {
+      if (!std::exchange(is_removed, true)) std::filesystem::remove(file());
+    });
     deliver(writer, 10, 12);
-    EXPECT_TRUE(BeforeNextWrite::is_over());
   }
   EXPECT_THAT(take_completions(), ElementsAre("restored", test::committed({10, 11})));
   EXPECT_EQ(num_readable(), 12u);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "coordinator/store/detail/database.hpp"
+#include "tests/coordinator/store/before_writes.hpp"
 #include "tests/coordinator/store/writer_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -181,6 +182,28 @@ TEST_F(StoreRest, NoStepLeavesACopyThatPassesAsWholeAndIsNot) {
     EXPECT_EQ(error.empty(), is_rest) << round;
     EXPECT_EQ(num_read, is_rest ? num_stored : 0);
   }
+}
+
+// The same before each single write. With one result at a time most rounds need no new page, so
+// that a file of which only some pages are written has the right length.
+TEST_F(StoreRest, NoWriteLeavesACopyThatPassesAsWholeAndIsNot) {
+  Store store = Store::create(file(), campaign_of(1000), "");
+  std::uint64_t num_stored = 0, num_copies = 0, num_whole = 0;
+  const test::BeforeWrites copies([&] {
+    const std::filesystem::path alone = copy();
+    ++num_copies;
+    const std::string error = test::store_error_of([&] {
+      EXPECT_GE(results_in(Store::open_read_only(alone)).size(), num_stored);
+      ++num_whole;
+    });
+  });
+  for (int round = 0; round < 40; ++round) {
+    store.commit(deliveries_of(num_stored, num_stored + 1));
+    ++num_stored;
+    EXPECT_EQ(store.rest(), std::nullopt);
+  }
+  EXPECT_GT(num_whole, 40u);
+  EXPECT_GT(num_copies, 100u);
 }
 
 TEST_F(StoreRest, TheWriterBringsAFileToRestOnceAllIsWritten) {
