@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <map>
+#include <new>
 #include <string>
 #include <utility>
 #include <variant>
@@ -27,14 +29,23 @@ class ClientDeskTest : public testing::Test {
   }
 
   std::vector<Respond> carried_out;
+  std::function<void()> before_asker = [] {};
+  std::function<void()> before_carrying_out = [] {};
 
  private:
   ClientDesk::Surroundings surroundings() {
     return {.transmit = [this](const std::string& routing_id,
                                const std::string& bytes) { note(routing_id, bytes); },
-            .asker_of = [](const std::string&) { return Asker{}; },
-            .carry_out = [this](const wire::ClientRequest&, const Asker&,
-                                Respond respond) { carried_out.push_back(std::move(respond)); },
+            .asker_of =
+                [this](const std::string&) {
+                  before_asker();
+                  return Asker{};
+                },
+            .carry_out =
+                [this](const wire::ClientRequest&, const Asker&, Respond respond) {
+                  before_carrying_out();
+                  carried_out.push_back(std::move(respond));
+                },
             .now = [] { return TimePoint(); }};
   }
 
@@ -74,6 +85,21 @@ TEST_F(ClientDeskTest, LimitsHowManyWaitForTheSame) {
   carried_out[0](wire::DoneReply{"done"});
   EXPECT_EQ(replies_to("late").size(), 1U);
   EXPECT_EQ(replies_to("15").size(), 1U);
+}
+
+TEST_F(ClientDeskTest, OutlivesWhateverIsThrown) {
+  before_carrying_out = [] { throw std::bad_alloc(); };
+  ask("a", 5);
+  before_carrying_out = [] {};
+  before_asker = [] { throw std::bad_alloc(); };
+  ask("b", 5);
+  before_asker = [] {};
+  ask("c", 5);
+  for (const std::string client : {"a", "b"}) {
+    ASSERT_EQ(replies_to(client).size(), 1U) << client;
+    EXPECT_EQ(replies_to(client)[0].second, "std::bad_alloc") << client;
+  }
+  EXPECT_EQ(carried_out.size(), 1U);
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <string>
+#include <variant>
 
 namespace proofmass::coordinator {
 namespace {
@@ -68,6 +70,15 @@ TEST(RequestParts, TakeNoMoreMemoryThanTheyMay) {
   EXPECT_TRUE(std::holds_alternative<wire::ErrorReply>(parts.take("c", 1, {1, 0, "c"}, start)));
   parts.release(4);
   EXPECT_TRUE(std::holds_alternative<RequestParts::Whole>(parts.take("c", 1, {1, 0, "c"}, start)));
+}
+
+// Room is counted with the first part of a request.
+TEST(RequestParts, Take128MebibytesUnlessToldOtherwise) {
+  constexpr std::uint64_t half = std::uint64_t{64} << 20;
+  RequestParts parts;
+  EXPECT_EQ(next_offset(parts.take("a", 1, {half, 0, "a"}, start)), 1U);
+  EXPECT_EQ(next_offset(parts.take("b", 1, {half, 0, "b"}, start)), 1U);
+  EXPECT_TRUE(std::holds_alternative<wire::ErrorReply>(parts.take("c", 1, {1, 0, "c"}, start)));
 }
 
 TEST(RequestParts, ThatDoNotComeAreWaitedForHalfAMinute) {
