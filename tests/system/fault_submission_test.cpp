@@ -177,5 +177,15 @@ TEST_F(ClientRights, AreBoundedInTheSizeOfDefinitions) {
   EXPECT_TRUE(contains(told_to("anna", {"submit", "three.toml"}), "(must be at most 10000 of"));
 }
 
+// Whoever can reach the socket of a coordinator without keys may do everything.
+TEST_F(LargeSubmission, IsLimitedByKeysAlone) {
+  const Process coordinator = this->coordinator("coordinator", {"--campaigns-per-key", "1"});
+  for (const std::string name : {"one", "two"}) {
+    write_campaign(name, 16);
+    EXPECT_TRUE(contains(told({"submit", name + ".toml"}), "campaign " + name + ": active"));
+  }
+  EXPECT_TRUE(contains(told({"cancel", "one"}), "campaign one: cancelled"));
+}
+
 }  // namespace
 }  // namespace proofmass::test

@@ -59,6 +59,14 @@ TEST_F(Help, FitsATerminal) {
   expect_fits(help_of("proofmass-worker", {"--help"}));
 }
 
+// The READMEs promise them.
+TEST_F(Help, NamesTheLimitsThatHoldUnlessToldOtherwise) {
+  const std::string coordinator = help_of("proofmass-coordinator", {"--help"});
+  EXPECT_TRUE(contains(coordinator, "--memory-max UINT:[64, 16777216]=2048 ")) << coordinator;
+  EXPECT_TRUE(contains(coordinator, "--campaigns-per-key UINT:[1, 1000000]=100\n")) << coordinator;
+  EXPECT_TRUE(contains(coordinator, "]=1073741824\n")) << coordinator;
+}
+
 class Usage : public Help {
  protected:
   /// What a program says on standard error, having refused its arguments.

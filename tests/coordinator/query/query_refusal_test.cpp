@@ -174,6 +174,9 @@ TEST_F(QueryRefusal, AnswersWhatIsTooLarge) {
   std::string many = "SELECT 1";
   for (int i = 0; i < 200; ++i) many += " UNION ALL SELECT 1";
   EXPECT_THAT(error_of(many), HasSubstr("too many terms in compound SELECT"));
+  std::string wide = "SELECT 1";
+  for (int i = 0; i < 1000; ++i) wide += ", 1";
+  EXPECT_THAT(error_of(wide), HasSubstr("too many columns in result set"));
 }
 
 // A view runs whenever somebody looks at what seems a table: a file that has its own is refused

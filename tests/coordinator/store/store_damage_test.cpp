@@ -36,6 +36,8 @@ TEST_F(StoreDamage, AnInfiniteTimeOfAWorkerEndsNothing) {
   test::change(file(), "UPDATE worker SET compute_s = 9e999");
   Store store = Store::open(file());
   EXPECT_EQ(store.commit(deliveries_of(2, 4)).num_new, 2u);
+  // No number in the file stays infinite.
+  EXPECT_EQ(test::text_in(file(), "SELECT max(compute_s) FROM worker"), "1.0e+15");
   EXPECT_THAT(store_error_of([&] { store.check_integrity(); }),
               HasSubstr("is damaged: worker.compute_s"));
 }
