@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <tuple>
+#include <cstddef>
 #include <utility>
 
+#include "coordinator/query/per_cent.hpp"
 #include "core/error.hpp"
 #include "core/statistics/correlation.hpp"
+#include "core/statistics/kurtosis.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
+#include "core/statistics/regression.hpp"
 #include "core/statistics/tolerance.hpp"
 
 namespace proofmass::coordinator {
@@ -20,14 +23,35 @@ namespace {
 // Of a coefficient of correlation only the interval depends on it.
 constexpr double any_confidence = 0.95;
 
+// Values beyond are scaled: fourth powers of what is 2^-53 of them stay in the range of a double.
+constexpr int exponent_max = 128;
+
+bool varies(std::span<const double> column) {
+  return std::ranges::any_of(column, [&](double value) { return value != column.front(); });
+}
+
 std::optional<double> stdev(const AggregateColumns& columns) {
   if (columns.x.size() < 2) return std::nullopt;
+  if (!varies(columns.x)) return 0.0;
   return moments(columns.x).standard_deviation;
 }
 
 std::optional<double> skewness(const AggregateColumns& columns) {
-  if (columns.x.size() < 3 || columns.x.front() == columns.x.back()) return std::nullopt;
+  if (columns.x.size() < 3 || !varies(columns.x)) return std::nullopt;
   return moments(columns.x).skewness;
+}
+
+std::optional<double> kurtosis(const AggregateColumns& columns) {
+  return excess_kurtosis(columns.x);
+}
+
+// As percentile(), but for values whose difference is no finite double too.
+double percentile_at(std::span<const double> ascending, double level) {
+  const OrderPlace place = percentile_place(ascending.size(), level);
+  const double from = ascending[place.from];
+  const double to = ascending[place.to];
+  const double value = place.between(from, to);
+  return std::isfinite(value) ? value : 2.0 * place.between(0.5 * from, 0.5 * to);
 }
 
 std::optional<double> percentile_of(const AggregateColumns& columns) {
@@ -36,7 +60,29 @@ std::optional<double> percentile_of(const AggregateColumns& columns) {
     throw InvalidArgument(fmt::format("p = {} (must be in [0, 100])", percent));
   }
   if (columns.x.empty()) return std::nullopt;
-  return percentile(columns.x, percent / 100.0);
+  return percentile_at(columns.x, percent / 100.0);
+}
+
+std::optional<double> median(const AggregateColumns& columns) {
+  if (columns.x.empty()) return std::nullopt;
+  return percentile_at(columns.x, 0.5);
+}
+
+// SQL has y first: regr_slope(y, x).
+std::optional<RegressionLine> line_of(const AggregateColumns& columns) {
+  return fit_line(columns.y, columns.x);
+}
+
+std::optional<double> slope(const AggregateColumns& columns) {
+  const std::optional<RegressionLine> line = line_of(columns);
+  if (!line) return std::nullopt;
+  return line->slope;
+}
+
+std::optional<double> intercept(const AggregateColumns& columns) {
+  const std::optional<RegressionLine> line = line_of(columns);
+  if (!line) return std::nullopt;
+  return line->intercept;
 }
 
 std::optional<double> coefficient(const std::optional<Correlation>& correlation) {
@@ -45,6 +91,7 @@ std::optional<double> coefficient(const std::optional<Correlation>& correlation)
 }
 
 std::optional<double> linear(const AggregateColumns& columns) {
+  if (!varies(columns.x) || !varies(columns.y)) return std::nullopt;
   return coefficient(linear_correlation(columns.x, columns.y, any_confidence));
 }
 
@@ -54,17 +101,42 @@ std::optional<double> rank(const AggregateColumns& columns) {
 
 // A run without a number is one of which nothing is known to its advantage.
 std::optional<double> tolerance_bound(const AggregateColumns& columns) {
-  const Tolerance tolerance{.coverage = columns.parameters[0], .confidence = columns.parameters[1]};
+  const Tolerance tolerance{.coverage = fraction_of("coverage", columns.parameters[0]),
+                            .confidence = fraction_of("confidence", columns.parameters[1])};
   const auto bound = wilks_upper(columns.x, tolerance, columns.num_unknown);
   if (!bound) return std::nullopt;
   return bound->value;
 }
 
-void sort_pairs(std::vector<double>& x, std::vector<double>& y) {
-  std::vector<std::pair<double, double>> pairs(x.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i] = {x[i], y[i]};
-  std::sort(pairs.begin(), pairs.end());
-  for (std::size_t i = 0; i < pairs.size(); ++i) std::tie(x[i], y[i]) = pairs[i];
+/// Sorts what stands behind the sorted ones, and merges both.
+template <typename Row>
+void sort_behind(std::vector<Row>& rows, std::size_t num_sorted) {
+  const auto middle = rows.begin() + static_cast<std::ptrdiff_t>(num_sorted);
+  std::sort(middle, rows.end());
+  std::inplace_merge(rows.begin(), middle, rows.end());
+}
+
+/// Removes one of the equal rows, which have the same bits.
+template <typename Row>
+void remove_from(std::vector<Row>& ascending, const Row& row) {
+  const auto place = std::lower_bound(ascending.begin(), ascending.end(), row);
+  PROOFMASS_EXPECT(place != ascending.end() && *place == row);
+  ascending.erase(place);
+}
+
+/// Exponent of the power of two by which a column is divided; 0 if it is not.
+int scale_of(std::span<const double> column) {
+  double largest = 0.0;
+  for (const double value : column) largest = std::max(largest, std::abs(value));
+  if (largest == 0.0) return 0;
+  const int exponent = std::ilogb(largest);
+  return std::abs(exponent) <= exponent_max ? 0 : exponent;
+}
+
+std::vector<double> scaled(std::span<const double> column, int exponent) {
+  std::vector<double> values(column.begin(), column.end());
+  for (double& value : values) value = std::ldexp(value, -exponent);
+  return values;
 }
 
 }  // namespace
@@ -74,13 +146,19 @@ std::span<const Aggregate> aggregates() {
   static constexpr std::array<std::string_view, 2> two_columns{"x", "y"};
   static constexpr std::array<std::string_view, 2> with_percent{"x", "p"};
   static constexpr std::array<std::string_view, 3> with_tolerance{"x", "coverage", "confidence"};
-  static constexpr std::array<Aggregate, 6> all{{
-      {"stdev", one_column, 1, stdev},
-      {"skewness", one_column, 1, skewness},
-      {"percentile", with_percent, 1, percentile_of},
-      {"correlation", two_columns, 2, linear},
-      {"rank_correlation", two_columns, 2, rank},
-      {"wilks_upper", with_tolerance, 1, tolerance_bound},
+  static constexpr std::array<std::string_view, 2> response_first{"y", "x"};
+  static constexpr std::array<Aggregate, 11> all{{
+      {"stdev", one_column, 1, ScalePowers{.x = 1}, stdev},
+      {"skewness", one_column, 1, ScalePowers{}, skewness},
+      {"kurtosis", one_column, 1, ScalePowers{}, kurtosis},
+      {"median", one_column, 1, {}, median},
+      {"percentile", with_percent, 1, {}, percentile_of},
+      {"correlation", two_columns, 2, ScalePowers{}, linear},
+      {"corr", response_first, 2, ScalePowers{}, linear},
+      {"rank_correlation", two_columns, 2, {}, rank},
+      {"regr_slope", response_first, 2, ScalePowers{.x = 1, .y = -1}, slope},
+      {"regr_intercept", response_first, 2, ScalePowers{.x = 1}, intercept},
+      {"wilks_upper", with_tolerance, 1, {}, tolerance_bound},
   }};
   return all;
 }
@@ -94,19 +172,45 @@ void AggregateRows::add(std::span<const std::optional<double>> arguments) {
   add_parameters(arguments.subspan(aggregate_->num_columns));
   const auto columns = arguments.first(aggregate_->num_columns);
   if (!std::ranges::all_of(columns, [](const auto& value) { return value.has_value(); })) {
-    ++columns_.num_unknown;
+    ++num_unknown_;
     return;
   }
   for (std::size_t i = 0; i < columns.size(); ++i) {
     if (std::isfinite(*columns[i])) continue;
     throw InvalidArgument(fmt::format("{} = {} (must be finite)", names[i], *columns[i]));
   }
-  if (columns_.x.size() == num_rows_max_) {
+  if (values_.size() + pairs_.size() == num_rows_max_) {
     throw InvalidArgument(
         fmt::format("{} > {} rows (too many to collect)", names[0], num_rows_max_));
   }
-  columns_.x.push_back(*columns[0] + 0.0);  // A negative zero becomes one like the others.
-  if (columns.size() > 1) columns_.y.push_back(*columns[1] + 0.0);
+  // A negative zero becomes one like the others.
+  if (columns.size() == 1) {
+    values_.push_back(*columns[0] + 0.0);
+  } else {
+    pairs_.emplace_back(*columns[0] + 0.0, *columns[1] + 0.0);
+  }
+}
+
+void AggregateRows::remove(std::span<const std::optional<double>> arguments) {
+  const auto columns = arguments.first(aggregate_->num_columns);
+  if (!std::ranges::all_of(columns, [](const auto& value) { return value.has_value(); })) {
+    PROOFMASS_EXPECT(num_unknown_ > 0);
+    --num_unknown_;
+    return;
+  }
+  sort();
+  if (columns.size() == 1) {
+    remove_from(values_, *columns[0] + 0.0);
+  } else {
+    remove_from(pairs_, {*columns[0] + 0.0, *columns[1] + 0.0});
+  }
+  --num_sorted_;
+}
+
+void AggregateRows::sort() {
+  sort_behind(values_, aggregate_->num_columns == 1 ? num_sorted_ : 0);
+  sort_behind(pairs_, aggregate_->num_columns == 1 ? 0 : num_sorted_);
+  num_sorted_ = values_.size() + pairs_.size();
 }
 
 void AggregateRows::add_parameters(std::span<const std::optional<double>> arguments) {
@@ -123,13 +227,33 @@ void AggregateRows::add_parameters(std::span<const std::optional<double>> argume
 
 std::optional<double> AggregateRows::value() {
   if (parameters_.size() + aggregate_->num_columns < aggregate_->arguments.size()) return {};
-  columns_.parameters = parameters_;
-  if (aggregate_->num_columns == 1) {
-    std::sort(columns_.x.begin(), columns_.x.end());
-  } else {
-    sort_pairs(columns_.x, columns_.y);
-  }
-  return aggregate_->evaluate(columns_);
+  sort();
+  if (aggregate_->num_columns == 1) return evaluate_scaled(values_, {});
+  std::vector<double> x(pairs_.size()), y(pairs_.size());
+  std::ranges::transform(pairs_, x.begin(), [](const auto& pair) { return pair.first; });
+  std::ranges::transform(pairs_, y.begin(), [](const auto& pair) { return pair.second; });
+  return evaluate_scaled(x, y);
+}
+
+std::optional<double> AggregateRows::evaluate_scaled(std::span<const double> x,
+                                                     std::span<const double> y) const {
+  if (!aggregate_->powers) return evaluate(x, y);
+  const int x_exponent = scale_of(x);
+  const int y_exponent = scale_of(y);
+  if (x_exponent == 0 && y_exponent == 0) return evaluate(x, y);
+  const auto result = evaluate(scaled(x, x_exponent), scaled(y, y_exponent));
+  if (!result) return std::nullopt;
+  const ScalePowers& powers = *aggregate_->powers;
+  const double value = std::ldexp(*result, powers.x * x_exponent + powers.y * y_exponent);
+  if (std::isfinite(value)) return value;
+  throw InvalidArgument(
+      fmt::format("{} is too large (the result is no finite double)", aggregate_->arguments[0]));
+}
+
+std::optional<double> AggregateRows::evaluate(std::span<const double> x,
+                                              std::span<const double> y) const {
+  return aggregate_->evaluate(
+      {.x = x, .y = y, .num_unknown = num_unknown_, .parameters = parameters_});
 }
 
 }  // namespace proofmass::coordinator

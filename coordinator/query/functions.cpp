@@ -3,6 +3,7 @@
 #include <sqlite3ext.h>
 
 #include <array>
+#include <cstddef>
 #include <exception>
 #include <memory>
 #include <new>
@@ -13,6 +14,7 @@
 
 #include "coordinator/query/aggregates.hpp"
 #include "coordinator/query/draw_table.hpp"
+#include "coordinator/query/interval_functions.hpp"
 #include "core/error.hpp"
 
 SQLITE_EXTENSION_INIT3
@@ -33,6 +35,22 @@ std::optional<double> number_of(sqlite3_value* value, std::string_view name) {
   }
 }
 
+/// The arguments of a call, one for each name.
+class Arguments {
+ public:
+  Arguments(sqlite3_value** values, std::span<const std::string_view> names) : size_(names.size()) {
+    for (std::size_t i = 0; i < size_; ++i) numbers_[i] = number_of(values[i], names[i]);
+  }
+  [[nodiscard]] std::span<const std::optional<double>> numbers() const {
+    return std::span(numbers_).first(size_);
+  }
+
+ private:
+  std::size_t size_;
+  std::array<std::optional<double>, aggregate_arguments_max> numbers_;
+};
+static_assert(interval_arguments <= aggregate_arguments_max);
+
 // The rows of the group, which SQLite keeps as a pointer that is null at first; with `size` 0, as
 // in the end of a group without rows, there may be none.
 AggregateRows** rows_of(sqlite3_context* context, int size) {
@@ -45,48 +63,79 @@ const Aggregate& aggregate_of(sqlite3_context* context) {
 
 // What goes wrong in a function becomes the error of its statement: no exception passes SQLite.
 template <typename Work>
-void guard(sqlite3_context* context, const Work& work) noexcept {
+void guard(sqlite3_context* context, const char* name, const Work& work) noexcept {
   try {
     work();
   } catch (const std::bad_alloc&) {
     sqlite3_result_error_nomem(context);
   } catch (const std::exception& error) {
-    const std::string text = std::string(aggregate_of(context).name) + ": " + error.what();
+    const std::string text = std::string(name) + ": " + error.what();
     sqlite3_result_error(context, text.c_str(), -1);
   }
 }
 
-void step(sqlite3_context* context, int num_arguments, sqlite3_value** values) {
-  guard(context, [&] {
-    const Aggregate& aggregate = aggregate_of(context);
+void step(sqlite3_context* context, int, sqlite3_value** values) {
+  const Aggregate& aggregate = aggregate_of(context);
+  guard(context, aggregate.name, [&] {
     AggregateRows** rows = rows_of(context, sizeof(AggregateRows*));
     if (rows == nullptr) throw std::bad_alloc();
     if (*rows == nullptr) *rows = new AggregateRows(aggregate);
-    std::array<std::optional<double>, aggregate_arguments_max> arguments;
-    for (int i = 0; i < num_arguments; ++i) {
-      const auto place = static_cast<std::size_t>(i);
-      arguments[place] = number_of(values[i], aggregate.arguments[place]);
-    }
-    (*rows)->add(std::span(arguments).first(static_cast<std::size_t>(num_arguments)));
+    (*rows)->add(Arguments(values, aggregate.arguments).numbers());
   });
 }
 
-void finish(sqlite3_context* context) {
-  AggregateRows** place = rows_of(context, 0);
-  const std::unique_ptr<AggregateRows> rows(place == nullptr ? nullptr : *place);
-  if (!rows) return;  // NULL.
-  guard(context, [&] {
+// A row leaves the frame of a window.
+void inverse(sqlite3_context* context, int, sqlite3_value** values) {
+  const Aggregate& aggregate = aggregate_of(context);
+  guard(context, aggregate.name, [&] {
+    AggregateRows** rows = rows_of(context, 0);
+    PROOFMASS_EXPECT(rows != nullptr && *rows != nullptr);
+    (*rows)->remove(Arguments(values, aggregate.arguments).numbers());
+  });
+}
+
+void tell(sqlite3_context* context, AggregateRows* rows) {
+  if (rows == nullptr) return;  // NULL.
+  guard(context, aggregate_of(context).name, [&] {
     const std::optional<double> value = rows->value();
     if (value) sqlite3_result_double(context, *value);
   });
 }
 
+// Of a frame, which may go on.
+void value(sqlite3_context* context) {
+  AggregateRows** place = rows_of(context, 0);
+  tell(context, place == nullptr ? nullptr : *place);
+}
+
+void finish(sqlite3_context* context) {
+  AggregateRows** place = rows_of(context, 0);
+  const std::unique_ptr<AggregateRows> rows(place == nullptr ? nullptr : *place);
+  if (place != nullptr) *place = nullptr;
+  tell(context, rows.get());
+}
+
+void evaluate_interval(sqlite3_context* context, int, sqlite3_value** values) {
+  const auto& function = *static_cast<const IntervalFunction*>(sqlite3_user_data(context));
+  guard(context, function.name, [&] {
+    const auto bound = function.evaluate(Arguments(values, interval_argument_names()).numbers());
+    if (bound) sqlite3_result_double(context, *bound);
+  });
+}
+
+// Innocuous: functions of their arguments, which views in any file may call.
+constexpr int flags = SQLITE_UTF8 | SQLITE_DETERMINISTIC | SQLITE_INNOCUOUS;
+
 int register_aggregate(sqlite3* connection, const Aggregate& aggregate) {
-  // Innocuous: a function of its arguments, which views in any file may call.
-  constexpr int flags = SQLITE_UTF8 | SQLITE_DETERMINISTIC | SQLITE_INNOCUOUS;
-  return sqlite3_create_function_v2(
+  return sqlite3_create_window_function(
       connection, aggregate.name, static_cast<int>(aggregate.arguments.size()), flags,
-      const_cast<Aggregate*>(&aggregate), nullptr, step, finish, nullptr);
+      const_cast<Aggregate*>(&aggregate), step, finish, value, inverse, nullptr);
+}
+
+int register_interval(sqlite3* connection, const IntervalFunction& function) {
+  return sqlite3_create_function_v2(connection, function.name, interval_arguments, flags,
+                                    const_cast<IntervalFunction*>(&function), evaluate_interval,
+                                    nullptr, nullptr, nullptr);
 }
 
 }  // namespace
@@ -94,6 +143,10 @@ int register_aggregate(sqlite3* connection, const Aggregate& aggregate) {
 int register_functions(sqlite3* connection) {
   for (const Aggregate& aggregate : aggregates()) {
     const int code = register_aggregate(connection, aggregate);
+    if (code != SQLITE_OK) return code;
+  }
+  for (const IntervalFunction& function : interval_functions()) {
+    const int code = register_interval(connection, function);
     if (code != SQLITE_OK) return code;
   }
   return register_draw_table(connection);

@@ -47,6 +47,22 @@ def skewness(values):
     return mpmath.sqrt(n * (n - 1)) / (n - 2) * (cubes / n) / (squares / n) ** mpmath.mpf(1.5)
 
 
+def kurtosis(values):
+    values = [Fraction(v) for v in values]
+    n, mean = len(values), sum(values) / len(values)
+    m2, m4 = sum((v - mean) ** 2 for v in values), sum((v - mean) ** 4 for v in values)
+    plain = n * m4 / m2**2 - 3
+    return real(Fraction(n - 1, (n - 2) * (n - 3)) * ((n + 1) * plain + 6))
+
+
+def regression(y, x):
+    x, y = [Fraction(v) for v in x], [Fraction(v) for v in y]
+    n, x_mean, y_mean = len(x), sum(x) / len(x), sum(y) / len(y)
+    slope = sum((a - x_mean) * (b - y_mean) for a, b in zip(x, y))
+    slope /= sum((a - x_mean) ** 2 for a in x)
+    return real(slope), real(y_mean - slope * x_mean)
+
+
 def correlation(x, y):
     x, y = [Fraction(v) for v in x], [Fraction(v) for v in y]
     n = len(x)
@@ -112,13 +128,37 @@ def check(connection, name, x, y):
     confirm(f"{name} skewness", 1 + ask("skewness(x)"), 1 + skewness(x))
     confirm(f"{name} correlation", ask("correlation(x, y)"), correlation(x, y))
     confirm(f"{name} rank_correlation", ask("rank_correlation(x, y)"), rank_correlation(x, y))
+    # Of a normal law it is a difference from 3: its size is 1.
+    confirm(f"{name} kurtosis", 1 + ask("kurtosis(x)"), 1 + kurtosis(x))
+    confirm(f"{name} kurtosis of scipy", 1 + ask("kurtosis(x)"),
+            1 + scipy.stats.kurtosis(np.array(x) - np.mean(x), bias=False), 1e-6)
+    confirm(f"{name} median", ask("median(x)"), float(np.median(x)))
+    slope, intercept = regression(y, x)
+    confirm(f"{name} regr_slope", ask("regr_slope(y, x)"), slope)
+    confirm(f"{name} regr_intercept", ask("regr_intercept(y, x)"), intercept)
+    confirm(f"{name} corr", ask("corr(y, x)"), correlation(x, y))
     for percent in (0, 2.5, 50, 95, 99, 100):
         # A weighted mean of two values: its scale is theirs.
         expected = float(np.percentile(x, percent))
         confirm(f"{name} {percent} %", ask(f"percentile(x, {percent})"), expected)
     for coverage, confidence in ((0.95, 0.95), (0.5, 0.99), (0.99, 0.95), (0.99, 0.5)):
-        found = ask(f"wilks_upper(x, {coverage}, {confidence}) FILTER (WHERE x IS NOT NULL)")
+        found = ask(f"wilks_upper(x, {100 * coverage}, {100 * confidence}) FILTER (WHERE x IS NOT NULL)")
         confirm(f"{name} wilks_upper", found, wilks_upper(x, coverage, confidence), 0.0)
+
+
+def check_binomial_intervals(connection):
+    """Clopper and Pearson's bounds are quantiles of beta laws."""
+    for hits, runs in ((0, 1), (1, 2), (3, 100), (97, 100), (100, 100), (7, 100000), (50000, 100000)):
+        for confidence in (50, 90, 95, 99.9):
+            tail = 0.5 - 0.5 * (confidence / 100)
+            lower, upper = connection.execute(
+                "SELECT binomial_interval_lower(?1, ?2, ?3), binomial_interval_upper(?1, ?2, ?3)",
+                (hits, runs, confidence)).fetchone()
+            test = scipy.stats.beta
+            exact = (test.ppf(tail, hits, runs - hits + 1) if hits else 0.0,
+                     test.ppf(1 - tail, hits + 1, runs - hits) if hits < runs else 1.0)
+            confirm(f"{hits} of {runs}, lower, {confidence} %", lower, exact[0])
+            confirm(f"{hits} of {runs}, upper, {confidence} %", upper, exact[1])
 
 
 connection = sqlite3.connect(":memory:")
@@ -126,4 +166,5 @@ connection.enable_load_extension(True)
 connection.load_extension(sys.argv[1])
 for case in columns():
     check(connection, *case)
+check_binomial_intervals(connection)
 print(f"all {num_confirmed} confirmed")

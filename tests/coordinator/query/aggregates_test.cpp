@@ -84,6 +84,153 @@ TEST(Aggregates, PercentileInterpolatesBetweenNeighbours) {
   EXPECT_EQ(at(100.0), 9.0);
 }
 
+TEST(Aggregates, MedianIsTheMiddleValueOrTheMeanOfBoth) {
+  EXPECT_EQ(value_of("median", eight), 4.5);
+  EXPECT_EQ(value_of("median", rows_of({9, 1, 2})), 2.0);
+  EXPECT_EQ(value_of("median", rows_of({7})), 7.0);
+}
+
+// 1 to n: Σd² = n(n² − 1)/12 and Σd⁴ = n(n² − 1)(3n² − 7)/240, so that g2 = −6(n² + 1)/(5(n² − 1));
+// G2 of any uniform ladder is then −6/5, exactly.
+TEST(Aggregates, KurtosisOfAnEvenLadderIsMinusSixFifths) {
+  for (const int n : {4, 5, 8, 1000}) {
+    std::vector<Row> rows;
+    for (int i = 1; i <= n; ++i) rows.push_back({double(i)});
+    EXPECT_NEAR(*value_of("kurtosis", rows), -1.2, 1e-13) << n;
+  }
+}
+
+// Values 0 (n − 1 times) and 1: g2 = 1/(p q) − 6 with p = 1/n, here 25/4 − 6; G2 = 4/6 (6 g2 + 6).
+TEST(Aggregates, KurtosisIsTheAdjustedExcess) {
+  EXPECT_NEAR(*value_of("kurtosis", rows_of({0, 0, 0, 0, 1})), 4.0 / 6.0 * (6.0 * 0.25 + 6.0),
+              1e-14);
+  EXPECT_FALSE(value_of("kurtosis", rows_of({1, 2, 4})));
+  EXPECT_FALSE(value_of("kurtosis", rows_of({0.1, 0.1, 0.1, 0.1, 0.1})));
+}
+
+// Multiples of 2⁻²⁰ around 1e8 are doubles, so that only the statistics could round.
+TEST(Aggregates, KurtosisKeepsItsDigitsBesideALargeOffset) {
+  std::vector<Row> rows;
+  for (int i = -500; i <= 500; ++i) rows.push_back({1e8 + std::ldexp(i, -20)});
+  EXPECT_NEAR(*value_of("kurtosis", rows), -1.2, 1e-13);
+}
+
+// (1, 1), (2, 2), (4, 4.5): x̄ = 7/3, ȳ = 5/2, Σdx² = 14/3, Σdx dy = 5.5, both exact.
+TEST(Aggregates, RegressionIsTheLineOfLeastSquares) {
+  const std::vector<Row> rows{{1.0, 1.0}, {2.0, 2.0}, {4.5, 4.0}};  // y first.
+  EXPECT_NEAR(*value_of("regr_slope", rows), 5.5 / (14.0 / 3.0), 1e-15);
+  EXPECT_NEAR(*value_of("regr_intercept", rows), 2.5 - 5.5 / (14.0 / 3.0) * (7.0 / 3.0), 1e-15);
+}
+
+TEST(Aggregates, RegressionOfTwoPointsIsTheLineThroughBoth) {
+  const std::vector<Row> rows{{5.0, 1.0}, {11.0, 3.0}};
+  EXPECT_EQ(value_of("regr_slope", rows), 3.0);
+  EXPECT_EQ(value_of("regr_intercept", rows), 2.0);
+  EXPECT_FALSE(value_of("regr_slope", {{5.0, 1.0}}));
+  EXPECT_FALSE(value_of("regr_slope", {{5.0, 0.1}, {6.0, 0.1}, {7.0, 0.1}}));  // x does not vary.
+  EXPECT_EQ(value_of("regr_slope", {{5.0, 1.0}, {5.0, 2.0}}), 0.0);
+}
+
+// y = x/3 + 2 in whole numbers with x near 1e8: the rounding of the slope alone would put the line at
+// x = 0 off by 1.9e-9.
+TEST(Aggregates, RegressionKeepsItsDigitsBesideALargeOffset) {
+  std::vector<Row> rows;
+  for (int i = -500; i <= 500; ++i) {
+    const double third = 33333333.0 + i;
+    rows.push_back({third + 2.0, 3.0 * third});
+  }
+  EXPECT_EQ(value_of("regr_slope", rows), 1.0 / 3.0);
+  EXPECT_NEAR(*value_of("regr_intercept", rows), 2.0, 1e-12);
+}
+
+TEST(Aggregates, CorrIsCorrelationByItsOtherName) {
+  const std::vector<Row> rows{{1.0, 1.0}, {2.0, 3.0}, {3.0, 2.0}, {4.0, 4.0}};
+  EXPECT_EQ(value_of("corr", rows), value_of("correlation", rows));
+}
+
+// A power of two changes no digit, whatever squares and fourth powers would be.
+TEST(Aggregates, KeepTheirDigitsAtTheEndsOfTheRangeOfADouble) {
+  const std::vector<Row> plain{{1.0, 1.0}, {2.0, 3.0}, {3.5, 2.0}, {4.0, 4.0}, {7.0, 4.5}};
+  for (const int exponent : {1020, 400, -400, -1000}) {
+    std::vector<Row> rows = plain;
+    for (Row& row : rows) row = {std::ldexp(*row[0], exponent), std::ldexp(*row[1], -exponent)};
+    std::vector<Row> plain_x = plain, x = rows;
+    for (Row& row : plain_x) row.resize(1);
+    for (Row& row : x) row.resize(1);
+    EXPECT_EQ(value_of("stdev", x), std::ldexp(*value_of("stdev", plain_x), exponent));
+    for (const char* name : {"skewness", "kurtosis"}) {
+      EXPECT_EQ(value_of(name, x), value_of(name, plain_x)) << name;
+    }
+    for (const char* name : {"correlation", "rank_correlation"}) {
+      EXPECT_EQ(value_of(name, rows), value_of(name, plain)) << name;
+    }
+    EXPECT_EQ(value_of("regr_intercept", rows),
+              std::ldexp(*value_of("regr_intercept", plain), exponent));
+  }
+  constexpr double large = 1e308;
+  EXPECT_EQ(value_of("median", rows_of({-large, large})), 0.0);
+  EXPECT_EQ(value_of("percentile", with(rows_of({-large, large}), {75.0})), 0.5 * large);
+  EXPECT_EQ(value_of("median", rows_of({5e-324, 5e-324, 1e308})), 5e-324);
+}
+
+TEST(Aggregates, RefuseAResultThatIsNoDouble) {
+  EXPECT_EQ(error_of("stdev", rows_of({-1.7e308, 1.7e308})),
+            "x is too large (the result is no finite double)");
+  EXPECT_EQ(error_of("regr_slope", {{-1e308, 0.0}, {1e308, 1e-300}}),
+            "y is too large (the result is no finite double)");
+}
+
+// The mean of equal values may be off by a rounding, which is no variation.
+TEST(Aggregates, SeeThatEqualValuesDoNotVary) {
+  std::vector<Row> x, pairs;
+  for (int i = 0; i < 1000; ++i) {
+    x.push_back({0.1});
+    pairs.push_back({0.1, double(i)});
+  }
+  EXPECT_EQ(value_of("stdev", x), 0.0);
+  EXPECT_FALSE(value_of("skewness", x));
+  EXPECT_FALSE(value_of("correlation", pairs));
+  EXPECT_EQ(value_of("regr_slope", pairs), 0.0);
+}
+
+// Each value after some rows left is that of a group of the rows that stayed, to the last bit.
+TEST(Aggregates, OfAFrameHaveTheBitsOfAGroup) {
+  std::mt19937_64 engine(12);
+  const auto random = [&] { return 1e8 + std::ldexp(static_cast<double>(engine() >> 50U), -10); };
+  for (const Aggregate& function : aggregates()) {
+    std::vector<Row> rows;
+    for (int i = 0; i < 300; ++i) {
+      Row row{random()};
+      if (function.num_columns == 2) row.push_back(random());
+      if (i % 7 == 3) row[0] = std::nullopt;
+      row.resize(function.arguments.size(), 60.0);
+      rows.push_back(row);
+    }
+    AggregateRows frame(function);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      frame.add(rows[i]);
+      if (i >= 50) frame.remove(rows[i - 50]);
+      if (i % 3 == 0) continue;  // Two rows may come between values.
+      AggregateRows group(function);
+      for (std::size_t k = i < 50 ? 0 : i - 49; k <= i; ++k) group.add(rows[k]);
+      ASSERT_EQ(frame.value(), group.value()) << function.name << " " << i;
+    }
+  }
+}
+
+TEST(Aggregates, AreEmptyAgainWhenAllRowsLeft) {
+  for (const Aggregate& function : aggregates()) {
+    AggregateRows frame(function);
+    for (const double value : {1.0, 2.0, 4.0, 8.0, 9.0}) {
+      Row row(function.num_columns, value);
+      row.resize(function.arguments.size(), 50.0);
+      frame.add(row);
+      frame.remove(row);
+    }
+    EXPECT_FALSE(frame.value()) << function.name;
+  }
+}
+
 TEST(Aggregates, CorrelationIsThatOfAHandComputedCase) {
   // x = 1..4, y = 1, 3, 2, 4: Σxy about the means 4, Σx² and Σy² 5; the ranks are the values.
   const std::vector<Row> rows{{1.0, 1.0}, {2.0, 3.0}, {3.0, 2.0}, {4.0, 4.0}};
@@ -105,20 +252,20 @@ TEST(Aggregates, CorrelationNeedsFourRowsAndColumnsThatVary) {
 
 TEST(Aggregates, WilksUpperIsTheLargestOf59For95PercentWith95Percent) {
   std::vector<Row> rows;
-  for (int i = 1; i <= 58; ++i) rows.push_back({double(i), 0.95, 0.95});
+  for (int i = 1; i <= 58; ++i) rows.push_back({double(i), 95.0, 95.0});
   EXPECT_FALSE(value_of("wilks_upper", rows));
-  for (int i = 59; i <= 92; ++i) rows.push_back({double(i), 0.95, 0.95});
+  for (int i = 59; i <= 92; ++i) rows.push_back({double(i), 95.0, 95.0});
   EXPECT_EQ(value_of("wilks_upper", rows), 92.0);
-  rows.push_back({93.0, 0.95, 0.95});  // From 93 on it is the second largest [Wilks1941].
+  rows.push_back({93.0, 95.0, 95.0});  // From 93 on it is the second largest [Wilks1941].
   EXPECT_EQ(value_of("wilks_upper", rows), 92.0);
 }
 
 TEST(Aggregates, WilksUpperCountsANullAsLargerThanAnyValue) {
   std::vector<Row> rows;
-  for (int i = 1; i <= 92; ++i) rows.push_back({double(i), 0.95, 0.95});
-  rows.push_back({std::nullopt, 0.95, 0.95});
+  for (int i = 1; i <= 92; ++i) rows.push_back({double(i), 95.0, 95.0});
+  rows.push_back({std::nullopt, 95.0, 95.0});
   EXPECT_EQ(value_of("wilks_upper", rows), 92.0);
-  rows.push_back({std::nullopt, 0.95, 0.95});
+  rows.push_back({std::nullopt, 95.0, 95.0});
   EXPECT_FALSE(value_of("wilks_upper", rows));
 }
 
@@ -137,8 +284,8 @@ TEST(Aggregates, AreEmptyWithoutAnyValue) {
   for (const Aggregate& function : aggregates()) {
     EXPECT_FALSE(AggregateRows(function).value()) << function.name;
     Row row(function.num_columns);
-    row.resize(function.arguments.size(), 0.5);
-    EXPECT_FALSE(value_of(function.name, {row})) << function.name;
+    row.resize(function.arguments.size(), 50.0);
+    EXPECT_FALSE(value_of(function.name, {row})) << function.name;  // Of a NULL.
   }
 }
 
@@ -158,7 +305,7 @@ TEST(Aggregates, DoNotDependOnTheOrderOfRows) {
       AggregateRows group(function);
       for (Row row : rows) {
         row.resize(function.num_columns);
-        row.resize(function.arguments.size(), 0.9);
+        row.resize(function.arguments.size(), 90.0);
         group.add(row);
       }
       return std::bit_cast<std::uint64_t>(*group.value());
@@ -180,10 +327,10 @@ TEST(Aggregates, RefuseParametersThatBreakTheirRule) {
             "p = 60 (must be the same for all rows, was 50)");
   EXPECT_EQ(error_of("percentile", {{1.0, 50.0}, {std::nullopt, 60.0}}),
             "p = 60 (must be the same for all rows, was 50)");
-  EXPECT_EQ(error_of("wilks_upper", with(eight, {95.0, 0.95})),
-            "coverage = 95 (must be in (0, 1))");
-  EXPECT_EQ(error_of("wilks_upper", with(eight, {0.95, 1.0})),
-            "confidence = 1 (must be in (0, 1))");
+  EXPECT_EQ(error_of("wilks_upper", with(eight, {0.95, 95.0})),
+            "coverage = 0.95 (must be per cent in [1, 100), not a fraction)");
+  EXPECT_EQ(error_of("wilks_upper", with(eight, {95.0, 100.0})),
+            "confidence = 100 (must be per cent in [1, 100), not a fraction)");
 }
 
 TEST(Aggregates, RefuseInfinity) {

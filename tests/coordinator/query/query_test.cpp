@@ -52,7 +52,7 @@ TEST_F(Query, KnowsTheAggregates) {
   EXPECT_NEAR(number_of("SELECT correlation(truth_k2d_s2_m, run_index) FROM run_result"), 1.0,
               1e-15);
   EXPECT_EQ(number_of("SELECT rank_correlation(-truth_k2d_s2_m, run_index) FROM run_result"), -1.0);
-  EXPECT_EQ(number_of("SELECT wilks_upper(run_index, 0.95, 0.95) FROM run_result"), 98.0);
+  EXPECT_EQ(number_of("SELECT wilks_upper(run_index, 95, 95) FROM run_result"), 98.0);
 }
 
 TEST_F(Query, GroupsAggregates) {
