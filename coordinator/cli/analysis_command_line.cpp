@@ -57,6 +57,11 @@ void add_query(CLI::App& app, Command& chosen) {
   query.add_option("DB", options->database, "Database of a campaign")->required();
   query.add_option("SQL", options->sql, "One statement that reads; - for standard input")
       ->required();
+  query
+      .add_option("--attach", options->attached,
+                  "NAME=FILE: another campaign, whose tables are\n"
+                  "NAME.run_result and so on; may be repeated")
+      ->allow_extra_args(false);
   wire::add_choice(query, "--format", options->format, formats,
                    "table, csv, json or markdown; table by default");
   query.add_option("--timeout", options->timeout_s, "Seconds that it may take")

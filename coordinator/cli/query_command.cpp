@@ -3,13 +3,17 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <optional>
+#include <set>
 #include <string_view>
+#include <utility>
 
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
@@ -41,9 +45,39 @@ std::optional<std::size_t> terminal_columns() {
   return screen_size_of(stdout).columns;
 }
 
+// `NAME=FILE`; the names differ, and letters in them have no case.
+std::vector<AttachedFile> attached_files_of(const std::vector<std::string>& texts) {
+  std::vector<AttachedFile> files;
+  std::set<std::string> names;
+  for (const std::string& text : texts) {
+    const auto refuse = [&](std::string_view why) {
+      throw UsageError(fmt::format("--attach {} ({})", text, why));
+    };
+    const std::size_t sign = text.find('=');
+    if (sign == std::string::npos || sign + 1 == text.size()) refuse("must be NAME=FILE");
+    AttachedFile file{.name = text.substr(0, sign), .file = text.substr(sign + 1)};
+    try {
+      check_attached_name(file.name);
+    } catch (const InvalidArgument& error) {
+      refuse(error.what());
+    }
+    std::string small = file.name;
+    std::ranges::transform(small, small.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (!names.insert(small).second) refuse("its name is attached already");
+    files.push_back(std::move(file));
+  }
+  if (files.size() > attached_files_max) {
+    throw UsageError(
+        fmt::format("--attach = {} files (must be at most {})", files.size(), attached_files_max));
+  }
+  return files;
+}
+
 }  // namespace
 
 int query_database(const QueryOptions& options) {
+  const QueryFiles files(options.database, attached_files_of(options.attached));
   // While it waits for input, a signal ends the process at once.
   const std::string sql = options.sql == "-" ? read_standard_input() : options.sql;
   const auto& stop = catch_stop_signals(OnTerminate::stop_now);
@@ -54,7 +88,7 @@ int query_database(const QueryOptions& options) {
                            .table = table,
                            .sink = write_standard_output,
                            .flush = flush_standard_output};
-  const QueryEnd end = run_query_in_process(options.database, sql, limits, output);
+  const QueryEnd end = run_query_in_process(files, sql, limits, output);
   flush_standard_output();
   return end == QueryEnd::complete ? exit_done : exit_interrupted;
 }

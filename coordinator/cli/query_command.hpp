@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "coordinator/query/row_writer.hpp"
 
@@ -11,7 +12,8 @@ namespace proofmass::coordinator {
 /// What `proofmass query` is asked for.
 struct QueryOptions {
   std::filesystem::path database;
-  std::string sql;  ///< `-`: to be read from standard input.
+  std::vector<std::string> attached;  ///< `NAME=FILE`.
+  std::string sql;                    ///< `-`: to be read from standard input.
   RowFormat format = RowFormat::table;
   double timeout_s = 60.0;
   std::size_t num_rows_max = 1000;  ///< Of a table.

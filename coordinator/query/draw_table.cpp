@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <map>
 #include <memory>
 #include <new>
 #include <optional>
@@ -29,12 +30,17 @@ constexpr const char* declaration =
     "CREATE TABLE draw(run_index INTEGER, quantity TEXT, unit TEXT, value REAL, "
     "campaign TEXT HIDDEN)";
 
+/// A campaign that was read, and the state of its database then.
+struct DrawnDatabase {
+  DatabaseState state;
+  // Cursors own it too: each stays with what it began with.
+  std::shared_ptr<DrawnCampaign> runs;
+};
+
 /// One for a connection.
 struct DrawTable : sqlite3_vtab {
   sqlite3* connection = nullptr;
-  DatabaseState state;  // Of the database when `runs` was read.
-  // Its cursors own it too: each stays with what it began with.
-  std::shared_ptr<DrawnCampaign> runs;
+  std::map<std::string, DrawnDatabase> databases;  // Those that were asked for, by their names.
 };
 
 /// One for a place in a statement that names the table.
@@ -72,6 +78,14 @@ int connect(sqlite3* connection, void*, int, const char* const*, sqlite3_vtab** 
   made->connection = connection;
   *table = made;
   return SQLITE_OK;
+}
+
+// Another function than connect(), as SQLite takes a table whose functions are the same for one
+// that is there without having been created: it would then be found by the name of any database,
+// also `other.draw`, and hold the runs of another campaign than the name says.
+int create(sqlite3* connection, void* nothing, int num_arguments, const char* const* arguments,
+           sqlite3_vtab** table, char** error) {
+  return connect(connection, nothing, num_arguments, arguments, table, error);
 }
 
 int disconnect(sqlite3_vtab* table) {
@@ -152,21 +166,18 @@ int choose_plan(sqlite3_vtab*, sqlite3_index_info* plan) {
 }
 
 // Reads the campaign when it is first needed and when the database has changed since.
-std::shared_ptr<DrawnCampaign> current_runs(DrawTable& table) {
-  const DatabaseState state = state_of(table.connection);
-  if (!table.runs || !(table.state == state)) {
-    table.runs = std::make_shared<DrawnCampaign>(read_campaign_of(table.connection));
-    table.state = state;
+std::shared_ptr<DrawnCampaign> current_runs(DrawTable& table, const std::string& database) {
+  const DatabaseState state = state_of(table.connection, database);
+  DrawnDatabase& known = table.databases[database];
+  if (!known.runs || !(known.state == state)) {
+    known.runs = std::make_shared<DrawnCampaign>(read_campaign_of(table.connection, database));
+    known.state = state;
   }
-  return table.runs;
+  return known.runs;
 }
 
 int open(sqlite3_vtab* table, sqlite3_vtab_cursor** cursor) {
-  return guarded(*table, [&] {
-    auto made = std::make_unique<DrawCursor>();
-    made->runs = current_runs(table_of(table));
-    *cursor = made.release();
-  });
+  return guarded(*table, [&] { *cursor = std::make_unique<DrawCursor>().release(); });
 }
 
 int close(sqlite3_vtab_cursor* cursor) {
@@ -180,11 +191,10 @@ std::string text_of(sqlite3_value* value) {
                          : std::string(text, static_cast<std::size_t>(sqlite3_value_bytes(value)));
 }
 
-void check_campaign(sqlite3_value* value, std::string_view name) {
-  if (sqlite3_value_type(value) == SQLITE_NULL) return;
-  const std::string given = text_of(value);
-  if (given == name) return;
-  throw InvalidArgument(fmt::format("campaign = {} (the database holds {})", given, name));
+// The database whose runs a plan asks for: the main one unless it names another.
+std::string database_of(DrawTable& table, int plan, sqlite3_value** values) {
+  if ((plan & campaign_bit) == 0 || sqlite3_value_type(values[0]) == SQLITE_NULL) return "main";
+  return database_meant_by(table.connection, text_of(values[0]));
 }
 
 // Other types than these compare by rules of SQLite's own, and narrow nothing.
@@ -212,15 +222,13 @@ void go_to_run(DrawCursor& cursor, std::uint64_t run) {
 int filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value** values) {
   DrawCursor& cursor = cursor_of(base);
   return guarded(*base->pVtab, [&] {
+    DrawTable& table = table_of(base->pVtab);
+    cursor.runs = current_runs(table, database_of(table, plan, values));
     cursor.scan = {.first_run = 0, .end_run = cursor.runs->num_runs(), .quantity = {}};
     for (std::size_t i = 0; i < offers.size(); ++i) {
       if ((plan & (1 << i)) == 0) continue;
       sqlite3_value* value = *values++;
-      if (offers[i].column == campaign_column) {
-        check_campaign(value, cursor.runs->campaign_name());
-      } else {
-        narrow(cursor.scan, offers[i], value);
-      }
+      if (offers[i].column != campaign_column) narrow(cursor.scan, offers[i], value);
     }
     go_to_run(cursor, cursor.scan.first_run);
   });
@@ -269,12 +277,13 @@ int row_identifier(sqlite3_vtab_cursor* base, sqlite3_int64* identifier) {
   return SQLITE_OK;
 }
 
-// Without xCreate the table is there under its own name, and CREATE VIRTUAL TABLE is refused.
 constexpr sqlite3_module draw_module = [] {
   sqlite3_module module{};
+  module.xCreate = create;
   module.xConnect = connect;
   module.xBestIndex = choose_plan;
   module.xDisconnect = disconnect;
+  module.xDestroy = disconnect;
   module.xOpen = open;
   module.xClose = close;
   module.xFilter = filter;
@@ -288,7 +297,12 @@ constexpr sqlite3_module draw_module = [] {
 }  // namespace
 
 int register_draw_table(sqlite3* connection) {
-  return sqlite3_create_module_v2(connection, "draw", &draw_module, nullptr, nullptr);
+  const int code =
+      sqlite3_create_module_v2(connection, "proofmass_draw", &draw_module, nullptr, nullptr);
+  if (code != SQLITE_OK) return code;
+  return sqlite3_exec(connection,
+                      "CREATE VIRTUAL TABLE IF NOT EXISTS temp.draw USING proofmass_draw", nullptr,
+                      nullptr, nullptr);
 }
 
 }  // namespace proofmass::coordinator

@@ -19,7 +19,7 @@ SQLITE_EXTENSION_INIT3
 namespace proofmass::coordinator {
 namespace {
 
-/// A statement that reads the main database of a connection.
+/// A statement that reads a database of a connection.
 class Selection {
  public:
   Selection(sqlite3* connection, std::string_view sql) : connection_(connection) {
@@ -66,10 +66,18 @@ class Selection {
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
 };
 
-EnvironmentTable environment_table_of(sqlite3* connection) {
+std::string quoted_name(std::string_view name) {
+  std::string quoted = "\"";
+  for (const char character : name) quoted.append(character == '"' ? 2 : 1, character);
+  return quoted + "\"";
+}
+
+EnvironmentTable environment_table_of(sqlite3* connection, const std::string& database) {
   Selection row(connection,
-                "SELECT time_s, linear_x_m_s2, linear_y_m_s2, linear_z_m_s2, angular_x_rad_s2, "
-                "angular_y_rad_s2, angular_z_rad_s2 FROM main.environment_row ORDER BY position");
+                fmt::format("SELECT time_s, linear_x_m_s2, linear_y_m_s2, "
+                            "linear_z_m_s2, angular_x_rad_s2, angular_y_rad_s2, "
+                            "angular_z_rad_s2 FROM {}.environment_row ORDER BY position",
+                            quoted_name(database)));
   EnvironmentTable table;
   while (row.step()) {
     table.push_back({.time_s = row.real(0),
@@ -80,11 +88,14 @@ EnvironmentTable environment_table_of(sqlite3* connection) {
 }
 
 // One column for each quantity that has values, in the order of drawn_names().
-std::vector<std::vector<double>> table_columns_of(sqlite3* connection) {
+std::vector<std::vector<double>> table_columns_of(sqlite3* connection,
+                                                  const std::string& database) {
+  const std::string sql =
+      fmt::format("SELECT value FROM {}.dispersion_value WHERE name = ? ORDER BY run_index",
+                  quoted_name(database));
   std::vector<std::vector<double>> columns;
   for (const std::string& name : drawn_names()) {
-    Selection row(connection,
-                  "SELECT value FROM main.dispersion_value WHERE name = ? ORDER BY run_index");
+    Selection row(connection, sql);
     row.bind(name);
     std::vector<double> column;
     while (row.step()) column.push_back(row.real(0));
@@ -93,20 +104,61 @@ std::vector<std::vector<double>> table_columns_of(sqlite3* connection) {
   return columns;
 }
 
+std::string name_in(sqlite3* connection, const std::string& database) {
+  Selection row(connection, fmt::format("SELECT name FROM {}.campaign", quoted_name(database)));
+  row.require_row();
+  return row.text(0);
+}
+
+// In the order in which they were opened; `temp` holds no campaign.
+std::vector<std::string> databases_of(sqlite3* connection) {
+  Selection row(connection, "PRAGMA database_list");
+  std::vector<std::string> names;
+  while (row.step()) {
+    if (row.text(1) != "temp") names.push_back(row.text(1));
+  }
+  return names;
+}
+
 }  // namespace
 
-Campaign read_campaign_of(sqlite3* connection) {
-  Selection row(connection, "SELECT definition, name, seed, num_runs FROM main.campaign");
+Campaign read_campaign_of(sqlite3* connection, const std::string& database) {
+  Selection row(connection, fmt::format("SELECT definition, name, seed, num_runs FROM {}.campaign",
+                                        quoted_name(database)));
   row.require_row();
-  Campaign campaign = parse_stored_campaign(row.text(0), environment_table_of(connection),
-                                            table_columns_of(connection));
+  Campaign campaign = parse_stored_campaign(row.text(0), environment_table_of(connection, database),
+                                            table_columns_of(connection, database));
   require_identity(campaign, {.name = row.text(1), .seed = row.text(2), .num_runs = row.text(3)});
   campaign.validate();
   return campaign;
 }
 
-DatabaseState state_of(sqlite3* connection) {
-  Selection row(connection, "PRAGMA main.data_version");
+std::string database_meant_by(sqlite3* connection, const std::string& argument) {
+  const std::vector<std::string> databases = databases_of(connection);
+  const auto is_meant = [&](const std::string& name) {
+    return sqlite3_stricmp(name.c_str(), argument.c_str()) == 0;
+  };
+  const auto found = std::ranges::find_if(databases, is_meant);
+  if (found != databases.end() && *found == "main") return "main";
+  const std::string in_main = name_in(connection, "main");
+  if (found == databases.end() && argument == in_main) return "main";
+  if (found != databases.end() && argument != in_main) return *found;
+  if (found != databases.end()) {
+    throw InvalidArgument(fmt::format(
+        "campaign = {} (is attached under the name of the campaign in main: attach it under "
+        "another name)",
+        argument));
+  }
+  std::string others;
+  for (const std::string& name : databases) {
+    if (name != "main") others += (others.empty() ? "; attached: " : ", ") + name;
+  }
+  throw InvalidArgument(
+      fmt::format("campaign = {} (the database holds {}{})", argument, in_main, others));
+}
+
+DatabaseState state_of(sqlite3* connection, const std::string& database) {
+  Selection row(connection, fmt::format("PRAGMA {}.data_version", quoted_name(database)));
   row.require_row();
   return {.data_version = row.integer(0), .num_changes = sqlite3_total_changes64(connection)};
 }

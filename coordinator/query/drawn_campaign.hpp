@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "core/campaign/campaign.hpp"
@@ -11,9 +12,16 @@ struct sqlite3;
 
 namespace proofmass::coordinator {
 
-/// The campaign that a connection's main database holds, read through that connection.
+/// The campaign that a database of a connection holds, read through that connection.
+/// @param database  `main`, or the name under which it is attached.
 /// @throws Error if it holds none or a damaged one.
-[[nodiscard]] Campaign read_campaign_of(sqlite3* connection);
+[[nodiscard]] Campaign read_campaign_of(sqlite3* connection, const std::string& database);
+
+/// The database of a connection that a query means by an argument of a table.
+/// @param argument  `main`, the name under which a database is attached, or the name of the
+/// campaign
+///                  in the main database. @throws InvalidArgument if it is neither, or two of them.
+[[nodiscard]] std::string database_meant_by(sqlite3* connection, const std::string& argument);
 
 /// Counts whatever may have changed the database, by this connection or by others.
 struct DatabaseState {
@@ -24,7 +32,7 @@ struct DatabaseState {
 };
 
 /// @throws Error if the database cannot be read.
-[[nodiscard]] DatabaseState state_of(sqlite3* connection);
+[[nodiscard]] DatabaseState state_of(sqlite3* connection, const std::string& database);
 
 /// What the runs of a campaign draw, computed again when asked for.
 class DrawnCampaign {

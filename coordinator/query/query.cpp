@@ -12,9 +12,9 @@
 
 #include "coordinator/query/display_text.hpp"
 #include "coordinator/query/functions.hpp"
+#include "coordinator/query/open_files.hpp"
 #include "coordinator/query/read_rule.hpp"
-#include "coordinator/store/detail/private_copy.hpp"
-#include "coordinator/store/store.hpp"
+#include "coordinator/store/store_error.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -28,9 +28,6 @@ constexpr std::size_t shown_sql_width = 60;
 // takes a few steps, and 10 ms in the worst case.
 constexpr int steps_between_looks = 100;
 
-struct Close {
-  void operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }
-};
 struct Finalize {
   void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 };
@@ -57,12 +54,24 @@ std::string place_text(std::string_view sql, std::size_t position) {
       fmt::format("sql = {} ({})", shown_sql(sql, sql.find_first_not_of(" \t\r\n")), reason));
 }
 
+// The tables that are computed belong to no database: `b.draw` would be those of another one.
+std::string with_remedy(std::string text) {
+  const std::string_view missing = "no such table: ";
+  for (const std::string_view table : {"draw", "definition_entry"}) {
+    const std::string end = fmt::format(".{}", table);
+    if (!text.starts_with(missing) || !text.ends_with(end)) continue;
+    const std::string database =
+        text.substr(missing.size(), text.size() - missing.size() - end.size());
+    text += fmt::format("; name the database in the argument, as in {}('{}')", table, database);
+    break;
+  }
+  return text;
+}
+
 /// A read-only connection on which nothing but reading is possible, for some time.
 class Reader {
  public:
-  /// @param is_older  The file is of an older version: a private copy is read.
-  Reader(std::filesystem::path file, bool is_older, const QueryLimits& limits,
-         Clock::time_point end);
+  Reader(const QueryFiles& files, const QueryLimits& limits, Clock::time_point end);
 
   /// @throws QueryError unless the text is one statement that reads.
   [[nodiscard]] Statement prepare(const std::string& sql);
@@ -71,7 +80,6 @@ class Reader {
   [[nodiscard]] bool is_interrupted() const { return is_interrupted_; }
 
  private:
-  void open_file();
   void restrict_connection();
   void set_limits();
   static int on_progress(void* reader);
@@ -80,38 +88,29 @@ class Reader {
   [[noreturn]] void fail_query(const std::string& sql) const;
   void require_one_statement(const std::string& sql, const char* rest);
 
-  std::filesystem::path file_;
+  std::string files_text_;  ///< Their names, for messages.
   QueryLimits limits_;
   Clock::time_point end_;
   bool is_late_ = false;
   bool is_interrupted_ = false;
   ReadRule rule_;
-  std::unique_ptr<sqlite3, Close> connection_;
+  Connection connection_;
 };
 
-Reader::Reader(std::filesystem::path file, bool is_older, const QueryLimits& limits,
-               Clock::time_point end)
-    : file_(std::move(file)), limits_(limits), end_(end) {
-  if (is_older) {
-    connection_.reset(detail::open_private_copy(file_));
-  } else {
-    open_file();
-  }
+std::string text_of(const QueryFiles& files) {
+  std::string text = files.main.string();
+  for (const AttachedFile& attached : files.attached) text += " or " + attached.file.string();
+  return text;
+}
+
+Reader::Reader(const QueryFiles& files, const QueryLimits& limits, Clock::time_point end)
+    : files_text_(text_of(files)), limits_(limits), end_(end), connection_(open_files(files)) {
   sqlite3* const connection = connection_.get();
   sqlite3_extended_result_codes(connection, 1);
   sqlite3_busy_timeout(connection, busy_timeout_ms);
   check(register_functions(connection));
   set_limits();
   restrict_connection();
-}
-
-void Reader::open_file() {
-  // An absolute path is never mistaken for `:memory:` or a URI.
-  const std::string name = std::filesystem::absolute(file_).string();
-  sqlite3* connection = nullptr;
-  const int code = sqlite3_open_v2(name.c_str(), &connection, SQLITE_OPEN_READONLY, nullptr);
-  connection_.reset(connection);
-  check(code);
 }
 
 // A file from elsewhere is data: nothing in its schema may call a function with side effects, and
@@ -175,14 +174,14 @@ void Reader::fail(int code, const std::string& sql) const {
       fail_query(sql);
     case SQLITE_CORRUPT:
       throw StoreError(fmt::format("campaign file = {} (is damaged: {}; restore it from a copy)",
-                                   file_.string(), text));
+                                   files_text_, text));
     default:
-      throw StoreError(fmt::format("campaign file = {} ({})", file_.string(), text));
+      throw StoreError(fmt::format("campaign file = {} ({})", files_text_, text));
   }
 }
 
 void Reader::fail_query(const std::string& sql) const {
-  const char* text = sqlite3_errmsg(connection_.get());
+  const std::string text = with_remedy(sqlite3_errmsg(connection_.get()));
   const int offset = sqlite3_error_offset(connection_.get());
   if (offset < 0) refuse(sql, text);
   const auto position = static_cast<std::size_t>(offset);
@@ -274,13 +273,11 @@ std::string memory_limit_text(const QueryLimits& limits) {
   return fmt::format("memory = {} MiB (the query needs more)", limits.memory_size_max >> 20);
 }
 
-QueryEnd run_query(const std::filesystem::path& file, const std::string& sql,
-                   const QueryLimits& limits, RowWriter& writer) {
+QueryEnd run_query(const QueryFiles& files, const std::string& sql, const QueryLimits& limits,
+                   RowWriter& writer) {
   const Clock::time_point end =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(limits.time_limit);
-  // It knows a campaign file and says what is wrong with others.
-  const bool is_older = Store::open_read_only(file).is_of_older_version();
-  Reader reader(file, is_older, limits, end);
+  Reader reader(files, limits, end);
   const Statement statement = reader.prepare(sql);
   const std::vector<std::string> names = column_names(statement.get());
   writer.begin(names);

@@ -5,6 +5,9 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "coordinator/query/row_writer.hpp"
 #include "core/error.hpp"
@@ -22,6 +25,28 @@ class QueryError : public InvalidArgument {
 class TimeLimitError : public Error {
  public:
   using Error::Error;
+};
+
+/// Another campaign file, whose tables a query finds under `name.`.
+struct AttachedFile {
+  std::string name;  ///< Checked by check_attached_name().
+  std::filesystem::path file;
+};
+
+/// Most files that one query attaches; SQLite has no room for more.
+inline constexpr std::size_t attached_files_max = 10;
+
+/// @throws InvalidArgument unless the name is 1 to 64 letters, digits and _, does not begin with a
+///         digit, and is neither main nor temp.
+void check_attached_name(std::string_view name);
+
+/// What a query may read.
+struct QueryFiles {
+  QueryFiles(std::filesystem::path main_file, std::vector<AttachedFile> attached_files = {})
+      : main(std::move(main_file)), attached(std::move(attached_files)) {}
+
+  std::filesystem::path main;
+  std::vector<AttachedFile> attached;  ///< With different names.
 };
 
 struct QueryLimits {
@@ -42,15 +67,15 @@ enum class QueryEnd : std::uint8_t { complete, interrupted };
 /// Longest query that is read, bytes.
 inline constexpr std::size_t sql_size_max = 1'000'000;
 
-/// Asks one question of a campaign file, also while a coordinator writes to it. The statement may
-/// read, and nothing else; it sees the file as it was when it began.
+/// Asks one question of campaign files, also while coordinators write to them. The statement may
+/// read, and nothing else; it sees each file as it was when it began.
 ///
 /// @param writer  Has got part of the rows if an exception comes after begin().
 /// The limits are looked at between steps of the query; see run_query_in_process() for calls that
 /// do not end.
 /// @throws QueryError, TimeLimitError; StoreError if the file cannot be read; Error if memory is
 ///         lacking; and what the writer throws.
-[[nodiscard]] QueryEnd run_query(const std::filesystem::path& file, const std::string& sql,
+[[nodiscard]] QueryEnd run_query(const QueryFiles& files, const std::string& sql,
                                  const QueryLimits& limits, RowWriter& writer);
 
 }  // namespace proofmass::coordinator

@@ -38,14 +38,14 @@ ChildLimits child_limits(const QueryLimits& limits) {
 }
 
 /// In the child.
-void run_and_tell(const std::filesystem::path& file, const std::string& sql,
-                  const QueryLimits& limits, const QueryOutput& output, int pipe) {
+void run_and_tell(const QueryFiles& files, const std::string& sql, const QueryLimits& limits,
+                  const QueryOutput& output, int pipe) {
   PartWriter parts(pipe);
   try {
     const auto writer = make_row_writer(output.format, output.table, [&](std::string_view text) {
       parts.add(PartKind::rows, text);
     });
-    const QueryEnd end = run_query(file, sql, limits, *writer);
+    const QueryEnd end = run_query(files, sql, limits, *writer);
     parts.add(end == QueryEnd::complete ? PartKind::complete : PartKind::interrupted, {});
   } catch (const QueryError& error) {
     parts.add(PartKind::query_error, error.what());
@@ -160,12 +160,12 @@ class Follower {
 
 }  // namespace
 
-QueryEnd run_query_in_process(const std::filesystem::path& file, const std::string& sql,
+QueryEnd run_query_in_process(const QueryFiles& files, const std::string& sql,
                               const QueryLimits& limits, const QueryOutput& output) {
   const Clock::time_point late_at =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(limits.time_limit);
   ChildProcess child(child_limits(limits),
-                     [&](int pipe) { run_and_tell(file, sql, limits, output, pipe); });
+                     [&](int pipe) { run_and_tell(files, sql, limits, output, pipe); });
   return Follower(child, limits, output).follow(late_at);
 }
 

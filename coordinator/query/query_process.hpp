@@ -25,8 +25,7 @@ struct QueryOutput {
 /// @pre This process has one thread.
 /// @throws QueryError, TimeLimitError, StoreError, InvalidArgument; Error if the query needs more
 ///         memory than it may have, or its process ends by itself; and what the sink throws.
-[[nodiscard]] QueryEnd run_query_in_process(const std::filesystem::path& file,
-                                            const std::string& sql, const QueryLimits& limits,
-                                            const QueryOutput& output);
+[[nodiscard]] QueryEnd run_query_in_process(const QueryFiles& files, const std::string& sql,
+                                            const QueryLimits& limits, const QueryOutput& output);
 
 }  // namespace proofmass::coordinator

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <signal.h>
 
@@ -70,6 +71,31 @@ TEST_F(QueryProcess, ReadsTheQueryFromStandardInput) {
       << "SELECT count(*) AS n -- results\nFROM run_result;\n";
   EXPECT_EQ(query_in_shell("- --format csv < question.sql"), 0);
   EXPECT_EQ(output(), "n\r\n3\r\n");
+}
+
+TEST_F(QueryProcess, AttachesOtherFiles) {
+  const std::string other = "b=" + file().string();
+  EXPECT_EQ(query({"--attach", other, "--attach", "c=" + file().string(),
+                   "SELECT (SELECT count(*) FROM b.run_result) AS n, (SELECT count(*) FROM "
+                   "draw('c') WHERE run_index = 0) AS m",
+                   "--format", "csv"}),
+            0);
+  EXPECT_EQ(output(), "n,m\r\n3,60\r\n");
+  EXPECT_EQ(query({"SELECT 1", "--attach", other, "--attach", "B=x.db"}), 2);
+  EXPECT_EQ(errors(), "proofmass: error: --attach B=x.db (its name is attached already)\n");
+  EXPECT_EQ(query({"SELECT 1", "--attach", "x.db"}), 2);
+  EXPECT_EQ(errors(), "proofmass: error: --attach x.db (must be NAME=FILE)\n");
+  EXPECT_EQ(query({"SELECT 1", "--attach", "main=x.db"}), 2);
+  EXPECT_THAT(errors(), HasSubstr("--attach main=x.db (name = main (must be 1 to 64 letters"));
+  EXPECT_EQ(query({"SELECT 1", "--attach", "b=none.db"}), 1);
+  EXPECT_EQ(errors(), "proofmass: error: campaign file = none.db (does not exist)\n");
+  std::vector<std::string> arguments{"SELECT 1"};
+  for (int i = 0; i < 11; ++i) {
+    arguments.push_back("--attach");
+    arguments.push_back(fmt::format("b{}={}", i, file().string()));
+  }
+  EXPECT_EQ(query(arguments), 2);
+  EXPECT_EQ(errors(), "proofmass: error: --attach = 11 files (must be at most 10)\n");
 }
 
 TEST_F(QueryProcess, EndsWith2ForAWrongQuery) {

@@ -131,8 +131,8 @@ TEST(Aggregates, RegressionOfTwoPointsIsTheLineThroughBoth) {
   EXPECT_EQ(value_of("regr_slope", {{5.0, 1.0}, {5.0, 2.0}}), 0.0);
 }
 
-// y = x/3 + 2 in whole numbers with x near 1e8: the rounding of the slope alone would put the line at
-// x = 0 off by 1.9e-9.
+// y = x/3 + 2 in whole numbers with x near 1e8: the rounding of the slope alone would put the line
+// at x = 0 off by 1.9e-9.
 TEST(Aggregates, RegressionKeepsItsDigitsBesideALargeOffset) {
   std::vector<Row> rows;
   for (int i = -500; i <= 500; ++i) {

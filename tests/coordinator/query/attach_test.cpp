@@ -1,0 +1,227 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/schema.hpp"
+#include "tests/coordinator/query/query_fixture.hpp"
+#include "tests/message_of.hpp"
+
+namespace proofmass::test {
+namespace {
+
+using coordinator::AttachedFile;
+using coordinator::QueryFiles;
+using coordinator::Store;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using Rows = std::vector<std::vector<OwnCell>>;
+
+std::string content_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Campaign files of two seeds and numbers of runs.
+class Attach : public QueryTest {
+ protected:
+  Attach() {
+    make_file(campaign_of(3), 3);
+    Campaign other = campaign_of(5);
+    other.name = "other";
+    other.seed = 77;
+    make(other_file(), other, 4);
+  }
+
+  static void make(const std::filesystem::path& path, const Campaign& campaign,
+                   std::uint64_t num_results) {
+    Store store = Store::create(path, campaign, coordinator::canonical_definition(campaign));
+    const coordinator::Entry worker = worker_1();
+    store.write({&worker, 1});
+    store.commit(deliveries_of(0, num_results));
+  }
+  // A name that a URI would read as something else.
+  [[nodiscard]] std::filesystem::path other_file() const { return directory() / "o%20?x#y.db"; }
+
+  [[nodiscard]] Rows both(const std::string& sql) const {
+    return ask(QueryFiles(file(), {{"b", other_file()}}), sql);
+  }
+  [[nodiscard]] static Rows ask(const QueryFiles& files, const std::string& sql) {
+    RecordingWriter writer;
+    EXPECT_EQ(coordinator::run_query(files, sql, {}, writer), coordinator::QueryEnd::complete);
+    return writer.rows;
+  }
+  [[nodiscard]] std::string error_of_both(const std::string& sql) const {
+    try {
+      (void)both(sql);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return {};
+  }
+};
+
+TEST_F(Attach, ReadsEachFileUnderItsName) {
+  EXPECT_EQ(both("SELECT (SELECT count(*) FROM run_result), (SELECT count(*) FROM "
+                 "main.run_result), (SELECT count(*) FROM b.run_result), (SELECT seed FROM "
+                 "b.campaign), (SELECT count(*) FROM b.error_long)"),
+            (Rows{{std::int64_t{3}, std::int64_t{3}, std::int64_t{4}, "77", std::int64_t{40}}}));
+}
+
+TEST_F(Attach, JoinsRunsOfBoth) {
+  EXPECT_EQ(both("SELECT count(*), max(abs(x.truth_k2d_s2_m - y.truth_k2d_s2_m)) FROM "
+                 "run_result AS x JOIN b.run_result AS y USING (run_index)"),
+            (Rows{{std::int64_t{3}, 0.0}}));
+}
+
+TEST_F(Attach, DrawsTheRunsOfTheNamedDatabase) {
+  const Rows mine = ask(other_file(), "SELECT * FROM draw");
+  ASSERT_EQ(mine.size(), 300U);
+  EXPECT_EQ(both("SELECT * FROM draw('b')"), mine);
+  EXPECT_EQ(both("SELECT * FROM draw('B')"), mine);
+  EXPECT_NE(both("SELECT * FROM draw WHERE run_index < 3"),
+            both("SELECT * FROM draw('b') WHERE run_index < 3"));
+  for (const std::string argument : {"", "('main')", "(NULL)", "('hardy2013')"}) {
+    EXPECT_EQ(both("SELECT * FROM draw" + argument), rows_of("SELECT * FROM draw")) << argument;
+  }
+  EXPECT_EQ(both("SELECT count(*), sum(x.value = y.value) FROM draw AS x JOIN draw('b') AS y "
+                 "USING (run_index, quantity)"),
+            (Rows{{std::int64_t{180}, std::int64_t{0}}}));
+}
+
+// It would else be the table of the main database under the name of the other.
+TEST_F(Attach, RefusesDrawsUnderTheNameOfADatabase) {
+  EXPECT_EQ(error_of_both("SELECT * FROM b.draw"),
+            "sql = SELECT * FROM b.draw (no such table: b.draw; name the database in the argument, "
+            "as in draw('b'))");
+  EXPECT_THAT(error_of_both("SELECT * FROM draw('c')"),
+              HasSubstr("(draw: campaign = c (the database holds hardy2013; attached: b))"));
+}
+
+TEST_F(Attach, RefusesANameThatMeansTwoDatabases) {
+  const QueryFiles files(file(), {{"hardy2013", other_file()}});
+  const auto text = message_of<Error>([&] { (void)ask(files, "SELECT * FROM draw('hardy2013')"); });
+  EXPECT_THAT(text, HasSubstr("draw: campaign = hardy2013 (is attached under the name of the "
+                              "campaign in main: attach it under another name)"));
+}
+
+TEST_F(Attach, ChecksEachFileAsTheMainOne) {
+  const auto broken = directory() / "broken.db";
+  write_file(broken, "no database, but long enough that SQLite looks at what it says");
+  const auto text_with = [&](const std::filesystem::path& path) {
+    return store_error_of([&] { (void)ask(QueryFiles(file(), {{"b", path}}), "SELECT 1"); });
+  };
+  EXPECT_EQ(text_with(broken),
+            "campaign file = " + broken.string() + " (is not an SQLite database)");
+  EXPECT_EQ(text_with(directory() / "none.db"),
+            "campaign file = " + (directory() / "none.db").string() + " (does not exist)");
+  sqlite3* connection = nullptr;
+  ASSERT_EQ(sqlite3_open(other_file().c_str(), &connection), SQLITE_OK);
+  sqlite3_exec(connection, "CREATE VIEW trap AS SELECT 1", nullptr, nullptr, nullptr);
+  sqlite3_close(connection);
+  EXPECT_EQ(text_with(other_file()), "campaign file = " + other_file().string() +
+                                         " (has what is no part of a campaign: view trap)");
+}
+
+TEST_F(Attach, LetsNoStatementWriteOrAttach) {
+  const std::string before = content_of(other_file());
+  for (const std::string sql :
+       {"DELETE FROM b.run_result", "ATTACH 'c.db' AS c", "DETACH b", "VACUUM b",
+        "CREATE TABLE b.a (c)", "DROP TABLE draw", "DROP TABLE temp.draw",
+        "INSERT INTO draw VALUES (1)", "CREATE VIRTUAL TABLE temp.a USING proofmass_draw"}) {
+    EXPECT_EQ(error_of_both(sql).empty(), false) << sql;
+  }
+  EXPECT_EQ(error_of_both("PRAGMA b.user_version = 3"),
+            "sql = PRAGMA b.user_version = 3 (PRAGMA user_version may be read, not set)");
+  EXPECT_EQ(content_of(other_file()), before);
+}
+
+// A live file has a log beside it, which a connection that may write would fold in.
+TEST_F(Attach, LeavesAFileAloneThatACoordinatorWrites) {
+  Store store = Store::open(other_file());
+  store.commit(deliveries_of(4, 5));
+  EXPECT_EQ(both("SELECT count(*) FROM b.run_result"), (Rows{{std::int64_t{5}}}));
+  EXPECT_EQ(store.is_in_place(), true);
+  EXPECT_GT(store.log_size(), 0U);
+}
+
+/// A file of version 3 with a result of run 4.
+void make_old_file(const std::filesystem::path& path) {
+  using namespace coordinator::detail;
+  Database old(path, Access::create);
+  for (std::size_t i = 0; i < 3; ++i) old.execute(std::string(migrations()[i]));
+  old.execute("INSERT INTO campaign VALUES (1, 'old', '42', 5, 'text', 'hardy2013-1', '')");
+  for (const ParameterInfo& info : parameter_infos()) {
+    old.execute(fmt::format("INSERT INTO parameter VALUES ({}, '{}', '', '', 1, 0, 0, 0)",
+                            index(info.parameter) + 1, info.name));
+  }
+  old.execute(
+      "INSERT INTO run_result (run_index, status, num_draws, num_rounds) VALUES (4, 4, 1, 0)");
+  old.execute("INSERT INTO delivery VALUES (4, 'w', 0, 1.0, '2024-03-01T00:00:00.000Z')");
+}
+
+// Views of this version are there, and the file stays as it was.
+TEST_F(Attach, ReadsACopyOfAnOlderFile) {
+  const auto old = directory() / "old.db";
+  make_old_file(old);
+  const std::string before = content_of(old);
+  const std::string sql =
+      "SELECT (SELECT name FROM campaign), (SELECT num_finished FROM campaign_progress), "
+      "(SELECT name FROM b.campaign), (SELECT num_finished FROM b.campaign_progress)";
+  EXPECT_EQ(ask(QueryFiles(file(), {{"b", old}}), sql),
+            (Rows{{"hardy2013", std::int64_t{3}, "old", std::int64_t{1}}}));
+  EXPECT_EQ(ask(QueryFiles(old, {{"b", other_file()}}), sql),
+            (Rows{{"old", std::int64_t{1}, "other", std::int64_t{4}}}));
+  EXPECT_EQ(ask(QueryFiles(old, {{"b", old}}), sql),
+            (Rows{{"old", std::int64_t{1}, "old", std::int64_t{1}}}));
+  EXPECT_EQ(content_of(old), before);
+}
+
+// The connection to the copy of an older main file may write; the last one that may would fold the
+// log of an attached file into it when it ends.
+TEST_F(Attach, LeavesALogAloneBesideAnOlderMainFile) {
+  const auto old = directory() / "old.db";
+  make_old_file(old);
+  sqlite3* writer = nullptr;
+  ASSERT_EQ(sqlite3_open(other_file().c_str(), &writer), SQLITE_OK);
+  sqlite3_exec(writer, "PRAGMA journal_mode = WAL; INSERT INTO tag VALUES ('a', '')", nullptr,
+               nullptr, nullptr);
+  const std::string before = content_of(other_file());
+  const auto copy = directory() / "copy.db";
+  std::filesystem::copy_file(other_file(), copy);
+  std::filesystem::copy_file(other_file().string() + "-wal", copy.string() + "-wal");
+  sqlite3_close(writer);
+  EXPECT_EQ(ask(QueryFiles(old, {{"b", copy}}), "SELECT count(*) FROM b.tag"),
+            (Rows{{std::int64_t{1}}}));
+  EXPECT_EQ(content_of(copy), before);
+  EXPECT_TRUE(std::filesystem::exists(copy.string() + "-wal"));
+}
+
+TEST_F(Attach, TakesAsManyFilesAsThereIsRoomFor) {
+  std::vector<AttachedFile> attached;
+  for (std::size_t i = 0; i < coordinator::attached_files_max; ++i) {
+    attached.push_back({fmt::format("b{}", i), other_file()});
+  }
+  EXPECT_EQ(ask(QueryFiles(file(), attached),
+                "SELECT (SELECT count(*) FROM b9.run_result), (SELECT count(*) FROM draw('b9'))"),
+            (Rows{{std::int64_t{4}, std::int64_t{300}}}));
+}
+
+TEST_F(Attach, TakesNamesThatSqlReadsWithoutQuotes) {
+  for (const char* name : {"b", "_1", "Seed2"})
+    EXPECT_NO_THROW(coordinator::check_attached_name(name));
+  for (const std::string name : {"", "main", "TEMP", "1b", "a.b", "a b", "a\"b"}) {
+    EXPECT_EQ(message_of<Error>([&] { coordinator::check_attached_name(name); }),
+              fmt::format("name = {} (must be 1 to 64 letters, digits and _, not begin with a "
+                          "digit, and be neither main nor temp)",
+                          name));
+  }
+}
+
+}  // namespace
+}  // namespace proofmass::test
