@@ -42,7 +42,9 @@ NEVER = 0xFFFFFFFF
 ERRORS = {"open": ["EIO", "ENOSPC", "EMFILE"], "write": ["EIO", "ENOSPC"], "sync": ["EIO", "ENOSPC"],
           "rename": ["EIO", "ENOSPC"], "truncate": ["EIO", "ENOSPC"],
           "map": ["EIO", "ENOSPC", "EMFILE"], "link": ["EIO", "ENOSPC"], "unlink": ["EIO"]}
-REFUSAL = re.compile(r"(?m)^proofmass(-coordinator)?: error: .+ (=|:) .+")
+# As a last line, or in the log of a coordinator that could not store something and ends with that.
+REFUSAL = re.compile(r"(?m)^proofmass(-coordinator)?: error: .+ (=|:) .+"
+                     r"|\[error\] \w+ .*reason=\".+ = .+ \(.+\)")
 LOCAL, SERVED = "proofmass", "proofmass-coordinator"
 
 # Phase: program, state of the directory before, number of runs wanted, arguments.
