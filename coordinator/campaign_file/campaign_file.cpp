@@ -141,7 +141,7 @@ Campaign hardy2013_campaign() {
   campaign.name = "hardy2013";
   campaign.seed = 1;
   campaign.num_runs = 100;
-  campaign.scenario.estimation.correction = Correction::first_order;
+  campaign.scenario.estimation.correction = Correction::hardy2013;
   return campaign;
 }
 

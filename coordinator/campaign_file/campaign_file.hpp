@@ -72,7 +72,7 @@ void require_identity(const Campaign& defined, const StoredIdentity& stored);
 /// The same for people: each field with its meaning and rule, dispersions by group.
 [[nodiscard]] std::string commented_campaign(const Campaign& campaign);
 
-/// The campaign of [Hardy2013] section 5: 100 draws, corrections of first order.
+/// The campaign of [Hardy2013] section 5: 100 draws, the corrections of the paper.
 [[nodiscard]] Campaign hardy2013_campaign();
 
 /// A value that two campaigns do not share.

@@ -27,7 +27,8 @@ std::span<const std::string_view> names_of(EstimationMethod) {
 }
 
 std::span<const std::string_view> names_of(Correction) {
-  static constexpr std::array<std::string_view, 2> names{"first_order", "second_order"};
+  static constexpr std::array<std::string_view, 3> names{"first_order", "second_order",
+                                                         "hardy2013"};
   return names;
 }
 

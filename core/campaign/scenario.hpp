@@ -16,7 +16,8 @@ namespace proofmass {
 enum class EnvironmentKind : std::uint8_t { harmonic = 1, file = 2 };
 enum class NoisePreset : std::uint8_t { design_2013 = 1, flight_suref = 2 };
 enum class EstimationMethod : std::uint8_t { hardy2013 = 1 };
-enum class Correction : std::uint8_t { first_order = 1, second_order = 2 };
+/// What an estimation round subtracts of what the round before found, see calibrate_hardy2013().
+enum class Correction : std::uint8_t { first_order = 1, second_order = 2, hardy2013 = 3 };
 
 /// Spelling of an enumerator in campaign files; the list of all of them, in value order from 1.
 [[nodiscard]] std::span<const std::string_view> names_of(EnvironmentKind);

@@ -118,7 +118,8 @@ template <typename Config, typename Visitor>
 void visit_estimation(Config& estimation, Visitor& visit) {
   visit(FieldInfo{"estimation.method", "\"hardy2013\": one parameter a session, iterated."},
         estimation.method);
-  visit(FieldInfo{"estimation.correction", "\"first_order\" (the paper's) or \"second_order\"."},
+  visit(FieldInfo{"estimation.correction",
+                  "\"hardy2013\" (the paper's), \"first_order\" or \"second_order\"."},
         estimation.correction);
   visit(FieldInfo{"estimation.transient_s", "Filtered record dropped at a session's start.",
                   range::not_negative},

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <complex>
+#include <optional>
 
 namespace proofmass {
 namespace {
@@ -37,7 +38,7 @@ constexpr std::array<Term, 6> first_order_terms{{
     {Signal::gradient_xz, Parameter::a_c11_delta_z, 0.5, SessionTarget::a_c11_delta_z},
 }};
 
-/// ½ a_c12 [T − In]_yj Δ_j and ½ a_c13 [T − In]_zj Δ_j.
+/// ½ a_c12 [T − In]_yj Δ_j or ½ a_c13 [T − In]_zj Δ_j.
 struct ProductTerm {
   Signal signal;
   Parameter misalignment;
@@ -52,6 +53,23 @@ constexpr std::array<ProductTerm, 6> second_order_terms{{
     {Signal::gradient_zy, Parameter::a_c13, Parameter::a_c11_delta_y},
     {Signal::gradient_zz, Parameter::a_c13, Parameter::a_c11_delta_z},
 }};
+
+/// The one product that `hardy2013` subtracts in a session: ½ â_c13 T̂_zz Δ̂_z for Δx as printed
+/// in [Hardy2013] 5.2; for Δz and Δy the product whose gradient shares line and phase with the
+/// session's own. The paper's Δ̂ is the estimate of a_c11Δ here: nothing estimates a_c11, which
+/// is 1 to 1 %.
+std::optional<ProductTerm> printed_product(SessionTarget target) {
+  switch (target) {
+    case SessionTarget::a_c11_delta_x:
+      return ProductTerm{Signal::gradient_zz, Parameter::a_c13, Parameter::a_c11_delta_z};
+    case SessionTarget::a_c11_delta_z:
+      return ProductTerm{Signal::gradient_zx, Parameter::a_c13, Parameter::a_c11_delta_x};
+    case SessionTarget::a_c11_delta_y:
+      return ProductTerm{Signal::gradient_yx, Parameter::a_c12, Parameter::a_c11_delta_x};
+    default:
+      return std::nullopt;
+  }
+}
 
 bool is_offcentring(SessionTarget target) {
   return target == SessionTarget::a_c11_delta_x || target == SessionTarget::a_c11_delta_y ||
@@ -71,13 +89,17 @@ Lines corrected_signal(const SessionPhasors& phasors, SessionTarget target, Corr
       lines[i] -= factor * phasors.amplitude[index(signal)][i];
     }
   };
+  const auto subtract_product = [&](const ProductTerm& term) {
+    subtract(term.signal, 0.5 * known[term.misalignment] * known[term.offcentring]);
+  };
   for (const Term& term : first_order_terms) {
     if (term.own != target) subtract(term.signal, term.factor * known[term.parameter]);
   }
+  if (correction == Correction::hardy2013) {
+    if (const auto product = printed_product(target)) subtract_product(*product);
+  }
   if (correction == Correction::second_order && is_offcentring(target)) {
-    for (const ProductTerm& term : second_order_terms) {
-      subtract(term.signal, 0.5 * known[term.misalignment] * known[term.offcentring]);
-    }
+    for (const ProductTerm& term : second_order_terms) subtract_product(term);
   }
   return lines;
 }
@@ -133,13 +155,13 @@ class Round {
   /// after a_d11 mes_c is taken away is (K2d − a_d11 K2c)/K1c².
   [[nodiscard]] double differential_quadratic() const {
     const double fitted = fit(SessionTarget::k2d, Signal::regressor);
-    if (correction_ == Correction::first_order) return fitted;
+    if (correction_ != Correction::second_order) return fitted;
     return fitted + known_[Parameter::a_d11_prime] * known_[Parameter::k2c];
   }
 
   /// The slope s_1 is (1 − a) K21/K11² with K11 = K1c (1 + a), a = a_d11; s_2 likewise with −a.
   [[nodiscard]] double common_quadratic(const std::array<double, 2>& s) const {
-    if (correction_ == Correction::first_order) return 0.5 * (s[0] + s[1]);
+    if (correction_ != Correction::second_order) return 0.5 * (s[0] + s[1]);
     const double a = known_[Parameter::a_d11_prime];
     return 0.5 *
            (s[0] * (1.0 + a) * (1.0 + a) / (1.0 - a) + s[1] * (1.0 - a) * (1.0 - a) / (1.0 + a));

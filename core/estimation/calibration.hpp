@@ -24,8 +24,11 @@ struct CalibrationResult {
 /// what the round before says of the others, until no estimate moves by more than
 /// config.convergence of its objective.
 ///
-/// The corrections of first order are those of the paper's Γ_calib,2 for all ten parameters; second
-/// order adds the products of two instrument errors.
+/// What is subtracted depends on config.correction:
+/// - `first_order`: every term of eq:Gamma-mesdx that is linear in one estimated parameter;
+/// - `hardy2013`: the same and in each Δ session the product that the paper's Γ_calib,2 has for Δx,
+///   or its counterpart (core/estimation/README.md says which terms the paper prints);
+/// - `second_order`: all products of two instrument errors.
 [[nodiscard]] CalibrationResult calibrate_hardy2013(const CalibrationRecord& record,
                                                     const EstimationConfig& config,
                                                     const ParameterArray& objectives);

@@ -49,8 +49,8 @@ double fixed_value(const Campaign& campaign, std::string_view name) {
   return 0.0;
 }
 
-/// What each estimate may be off, SI: 1/50 of its objective; a_c12 and a_c13 |η_c| more, because
-/// the moving masses follow θ while a_c1j also contains η, which their sessions cannot see.
+/// What each estimate may be off, SI: 1/50 of its objective; a_c12 |η_c| more and a_c13 half of that,
+/// because the moving masses follow θ while a_c1j also contains η, which their sessions cannot see.
 ParameterArray allowance_without_biases(const Campaign& campaign) {
   ParameterArray allowance = campaign.scenario.objectives;
   for (double& value : allowance) value *= part_of_objective;
@@ -59,7 +59,8 @@ ParameterArray allowance_without_biases(const Campaign& campaign) {
                            fixed_value(campaign, "coupling_rad.sensor_2_" + axis)));
   };
   allowance[index(Parameter::a_c12)] += common_coupling("z");
-  allowance[index(Parameter::a_c13)] += common_coupling("y");
+  // η_c T_zz/(T_zz − T_xx) of it is seen, with T_zz = −T_xx at 2 f_orb.
+  allowance[index(Parameter::a_c13)] += 0.5 * common_coupling("y");
   return allowance;
 }
 

@@ -116,7 +116,7 @@ TEST(Hardy2013File, IsThePapersCampaign) {
   const Campaign campaign = read_campaign(PROOFMASS_HARDY2013_FILE);
   EXPECT_EQ(campaign.name, "hardy2013");
   EXPECT_EQ(campaign.num_runs, 100u);
-  EXPECT_EQ(campaign.scenario.estimation.correction, Correction::first_order);
+  EXPECT_EQ(campaign.scenario.estimation.correction, Correction::hardy2013);
   EXPECT_EQ(campaign.scenario.estimation.transient_s, 1000.0);
 }
 

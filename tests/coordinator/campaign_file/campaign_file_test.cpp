@@ -157,7 +157,8 @@ TEST(Overrides, AreRefusedByTheirOwnText) {
   EXPECT_EQ(refusal("=1"), "--set =1: must be key=value");
   EXPECT_EQ(refusal("noise=1"), "--set noise=1: unknown key");
   EXPECT_EQ(refusal("estimation.correction=third"),
-            "--set estimation.correction=third: must be \"first_order\" or \"second_order\"");
+            "--set estimation.correction=third: must be \"first_order\", \"second_order\" or "
+            "\"hardy2013\"");
   EXPECT_EQ(refusal("estimation.transient_s=60000"),
             "--set estimation.transient_s=60000: estimation.transient_s = 60000 (must leave half "
             "of session[0], 59500 s)");

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "core/random/stream.hpp"
 
@@ -65,6 +68,29 @@ Complex product_model(const SessionPhasors& phasors, std::size_t line,
               z * signal(Signal::gradient_zz));
 }
 
+/// What each session makes large.
+constexpr std::array<Signal, num_session_targets> own_signals{
+    Signal::gradient_xx, Signal::gradient_xz, Signal::gradient_xy, Signal::regressor,
+    Signal::regressor,   Signal::common_x,    Signal::common_y,    Signal::common_z,
+    Signal::regressor,   Signal::regressor,   Signal::regressor};
+
+/// Γ_mes,dx per unit of that signal.
+double own_factor(SessionTarget target, const ParameterArray& truth) {
+  const double k2c = at(truth, Parameter::k2c);
+  const std::array<double, num_session_targets> factors{0.5 * at(truth, Parameter::a_c11_delta_x),
+                                                        0.5 * at(truth, Parameter::a_c11_delta_z),
+                                                        0.5 * at(truth, Parameter::a_c11_delta_y),
+                                                        at(truth, Parameter::a_c12),
+                                                        at(truth, Parameter::a_c13),
+                                                        at(truth, Parameter::a_d11_prime),
+                                                        at(truth, Parameter::a_d12),
+                                                        at(truth, Parameter::a_d13),
+                                                        at(truth, Parameter::k2d),
+                                                        0.5 * k2c,
+                                                        -0.5 * k2c};
+  return factors[index(target)];
+}
+
 /// What a record holds if Γ_mes,dx obeys the model with `truth`; `slopes` as the K2 sessions show
 /// them.
 struct ModelRecord {
@@ -98,12 +124,9 @@ struct ModelRecord {
 
   /// Each session makes its own signal a hundred times larger: that is what it is for.
   static void dominate(SessionTarget target, SessionPhasors& phasors) {
-    constexpr std::array<Signal, num_session_targets> own{
-        Signal::gradient_xx, Signal::gradient_xz, Signal::gradient_xy, Signal::regressor,
-        Signal::regressor,   Signal::common_x,    Signal::common_y,    Signal::common_z,
-        Signal::regressor,   Signal::regressor,   Signal::regressor};
-    for (Complex& amplitude : phasors.amplitude[index(own[index(target)])]) amplitude *= 100.0;
-    if (own[index(target)] != Signal::regressor) return;
+    for (Complex& amplitude : phasors.amplitude[index(own_signals[index(target)])])
+      amplitude *= 100.0;
+    if (own_signals[index(target)] != Signal::regressor) return;
     // The gradients of these sessions lie elsewhere in frequency.
     for (std::size_t s = 1; s < num_signals; ++s) {
       if (s == index(Signal::regressor)) continue;
@@ -166,6 +189,137 @@ TEST(CalibrateHardy2013, SecondOrderInvertsTheModelWithProducts) {
       calibrate_hardy2013(record, precise(Correction::first_order), objectives());
   EXPECT_NEAR(first.estimate[index(Parameter::k2d)] - k2d, -a * k2c, 1e-6);
 }
+
+/// What Γ_calib,2 takes off 2Γ_mes,dx for Δx as printed.
+Complex printed_terms(const SessionPhasors& phasors, const ParameterArray& estimate) {
+  const auto signal = [&](Signal s) { return phasors.amplitude[index(s)][0]; };
+  return at(estimate, Parameter::a_c13) * signal(Signal::gradient_zz) *
+             at(estimate, Parameter::a_c11_delta_z) +
+         2.0 * at(estimate, Parameter::a_d11_prime) * signal(Signal::common_x) +
+         2.0 * at(estimate, Parameter::a_d12) * signal(Signal::common_y) +
+         2.0 * at(estimate, Parameter::a_d13) * signal(Signal::common_z);
+}
+
+/// The part of a phasor in phase with another, as a multiple of it.
+double in_phase(Complex signal, Complex regressor) {
+  return (signal * std::conj(regressor)).real() / std::norm(regressor);
+}
+
+// [Hardy2013] 5.2 to the letter: Γ_calib,2 / T̂_xx is the estimate, with the other estimates in it.
+TEST(CalibrateHardy2013, EstimatesDeltaXFromThePrintedEquation) {
+  const CalibrationRecord record = ModelRecord{.with_products = true}.make();
+  const CalibrationResult result =
+      calibrate_hardy2013(record, precise(Correction::hardy2013), objectives());
+  ASSERT_TRUE(result.converged);
+  const SessionPhasors& session = record[index(SessionTarget::a_c11_delta_x)];
+  // The paper separates Δx from Δz by phase, here both have both phases: the other is taken off.
+  const Complex other_phase = at(result.estimate, Parameter::a_c11_delta_z) *
+                                  session.amplitude[index(Signal::gradient_xz)][0] +
+                              at(result.estimate, Parameter::a_c11_delta_y) *
+                                  session.amplitude[index(Signal::gradient_xy)][0];
+  const Complex calibrated = 2.0 * session.amplitude[index(Signal::differential_x)][0] -
+                             printed_terms(session, result.estimate) - other_phase;
+  const double expected = in_phase(calibrated, session.amplitude[index(Signal::gradient_xx)][0]);
+  EXPECT_NEAR(at(result.estimate, Parameter::a_c11_delta_x), expected, 1e-9 * objectives()[0]);
+}
+
+/// A signal that the Δ session of `target` may hold, and the parameters that multiply it.
+struct SessionTerm {
+  SessionTarget target;
+  Signal signal;
+  double factor;
+  Parameter first;
+  std::optional<Parameter> second;  ///< None: the term has one parameter.
+  bool is_subtracted;
+};
+
+/// The signal that a session is fitted against, and what that yields, for the three Δ sessions.
+std::pair<Signal, Parameter> own_term(SessionTarget target) {
+  if (target == SessionTarget::a_c11_delta_x)
+    return {Signal::gradient_xx, Parameter::a_c11_delta_x};
+  if (target == SessionTarget::a_c11_delta_z)
+    return {Signal::gradient_xz, Parameter::a_c11_delta_z};
+  return {Signal::gradient_xy, Parameter::a_c11_delta_y};
+}
+
+/// A record in which each session has no signal but the one that it is fitted against.
+CalibrationRecord lone_terms(const ParameterArray& truth) {
+  ModelRecord model;
+  model.truth = truth;
+  model.k2d_slope = at(truth, Parameter::k2d);
+  model.k2_slopes = {at(truth, Parameter::k2c), at(truth, Parameter::k2c)};
+  CalibrationRecord record = model.make();
+  for (std::size_t i = 0; i < num_session_targets; ++i) {
+    const Signal own = own_signals[i];
+    for (std::size_t line = 0; line < record[i].num_lines; ++line) {
+      const Complex regressor = record[i].amplitude[index(own)][line];
+      for (auto& signal : record[i].amplitude) signal[line] = 0.0;
+      record[i].amplitude[index(own)][line] = regressor;
+      record[i].amplitude[0][line] =
+          own_factor(static_cast<SessionTarget>(i + 1), truth) * regressor;
+    }
+  }
+  return record;
+}
+
+class TermOfHardy2013 : public testing::TestWithParam<SessionTerm> {};
+
+// Every session holds its own term alone, so that its estimate is exact, and this one a second
+// term: that moves the estimate unless the correction takes it off again.
+TEST_P(TermOfHardy2013, IsSubtractedIfListedAndOnlyThen) {
+  const SessionTerm& term = GetParam();
+  const ParameterArray truth = example_truth();
+  CalibrationRecord record = lone_terms(truth);
+  const auto& [own, parameter] = own_term(term.target);
+  SessionPhasors& session = record[index(term.target)];
+  const Complex regressor = session.amplitude[index(own)][0];
+  const Complex other = Complex(0.6, -0.3) * regressor;
+  session.amplitude[index(term.signal)][0] = other;
+  const double size =
+      term.factor * at(truth, term.first) * (term.second ? at(truth, *term.second) : 1.0);
+  session.amplitude[0][0] += size * other;
+  const CalibrationResult result =
+      calibrate_hardy2013(record, precise(Correction::hardy2013), objectives());
+  const double left = term.is_subtracted ? 0.0 : 2.0 * size * 0.6;
+  EXPECT_NEAR(at(result.estimate, parameter) - at(truth, parameter), left,
+              1e-6 * std::abs(2.0 * size));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    OfEachDeltaSession, TermOfHardy2013, testing::ValuesIn([] {
+      std::vector<SessionTerm> terms;
+      for (const auto target : {SessionTarget::a_c11_delta_x, SessionTarget::a_c11_delta_z,
+                                SessionTarget::a_c11_delta_y}) {
+        terms.push_back({target, Signal::common_x, 1.0, Parameter::a_d11_prime, {}, true});
+        terms.push_back({target, Signal::common_y, 1.0, Parameter::a_d12, {}, true});
+        terms.push_back({target, Signal::common_z, 1.0, Parameter::a_d13, {}, true});
+      }
+      const auto product = [&](SessionTarget target, Signal signal, Parameter misalignment,
+                               Parameter offcentring, bool is_subtracted) {
+        terms.push_back({target, signal, 0.5, misalignment, offcentring, is_subtracted});
+      };
+      product(SessionTarget::a_c11_delta_x, Signal::gradient_zz, Parameter::a_c13,
+              Parameter::a_c11_delta_z, true);
+      product(SessionTarget::a_c11_delta_x, Signal::gradient_zx, Parameter::a_c13,
+              Parameter::a_c11_delta_x, false);
+      product(SessionTarget::a_c11_delta_x, Signal::gradient_yy, Parameter::a_c12,
+              Parameter::a_c11_delta_y, false);
+      product(SessionTarget::a_c11_delta_z, Signal::gradient_zx, Parameter::a_c13,
+              Parameter::a_c11_delta_x, true);
+      product(SessionTarget::a_c11_delta_z, Signal::gradient_zz, Parameter::a_c13,
+              Parameter::a_c11_delta_z, false);
+      product(SessionTarget::a_c11_delta_y, Signal::gradient_yx, Parameter::a_c12,
+              Parameter::a_c11_delta_x, true);
+      product(SessionTarget::a_c11_delta_y, Signal::gradient_zx, Parameter::a_c13,
+              Parameter::a_c11_delta_x, false);
+      terms.push_back({SessionTarget::a_c11_delta_x,
+                       Signal::gradient_xz,
+                       0.5,
+                       Parameter::a_c11_delta_z,
+                       {},
+                       true});
+      return terms;
+    }()));
 
 // Only the part of the signal in phase with the regressor counts.
 TEST(CalibrateHardy2013, IgnoresWhatIsInQuadratureWithTheRegressor) {
