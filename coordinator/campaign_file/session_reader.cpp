@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include <limits>
+#include <array>
 #include <optional>
 
 #include "coordinator/campaign_file/readers.hpp"
@@ -19,21 +19,17 @@ bool read_needed(Document& document, const std::string& path, Value& value) {
   return !is_absent && document.read(path, value);
 }
 
-std::optional<int> multiple_of(const toml::node& entry) {
-  const auto* const integer = entry.as_integer();
-  if (integer == nullptr) return std::nullopt;
-  using limits = std::numeric_limits<int>;
-  if (integer->get() < limits::min() || integer->get() > limits::max()) return std::nullopt;
-  return static_cast<int>(integer->get());
-}
-
 std::optional<LineMultiple> line_of(const toml::node& entry) {
-  const toml::array* const pair = entry.as_array();
-  if (pair == nullptr || pair->size() != 2) return std::nullopt;
-  const std::optional<int> orbital = multiple_of((*pair)[0]);
-  const std::optional<int> excitation = multiple_of((*pair)[1]);
-  if (!orbital || !excitation) return std::nullopt;
-  return LineMultiple{*orbital, *excitation};
+  const toml::array* const multiples = entry.as_array();
+  if (multiples == nullptr || multiples->size() < 2 || multiples->size() > 3) return std::nullopt;
+  LineMultiple line;
+  const std::array<double*, 3> values{&line.orbital, &line.excitation, &line.spin};
+  for (std::size_t i = 0; i < multiples->size(); ++i) {
+    const std::optional<double> value = (*multiples)[i].value<double>();
+    if (!value || !(*multiples)[i].is_number()) return std::nullopt;
+    *values[i] = *value;
+  }
+  return line;
 }
 
 void read_lines(Document& document, const std::string& path, std::vector<LineMultiple>& lines) {
@@ -45,7 +41,8 @@ void read_lines(Document& document, const std::string& path, std::vector<LineMul
     const std::optional<LineMultiple> line = line_of((*list)[i]);
     if (!line) {
       document.refuse(fmt::format("{}[{}]", path, i),
-                      "must be two whole numbers, the multiples of f_orb and of the excitation");
+                      "must be two or three numbers, the multiples of f_orb, of the excitation and "
+                      "of the spin");
       return;
     }
     lines.push_back(*line);

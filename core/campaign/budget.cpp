@@ -1,12 +1,13 @@
 #include "core/campaign/budget.hpp"
 
+#include <algorithm>
 #include <numbers>
 
 namespace proofmass {
 namespace {
 
-// Amplitudes at the orbital frequency of the gravity gradient in an inertial frame, s⁻², to first
-// order in the eccentricity; T_xy comes from a tilt and is a level of the scenario.
+// Amplitudes at f_EP of the gravity gradient in a session's frame, s⁻², to first order in the
+// eccentricity; T_xy comes from a tilt and is a level of the scenario.
 struct GradientLevels {
   double xx;
   double xz;
@@ -14,10 +15,26 @@ struct GradientLevels {
   double zz;
 };
 
-GradientLevels gradient_levels(const OrbitConfig& orbit) {
+//
+// In an inertial frame f_EP = f_orb. In one that spins, the gradient has lines at f_orb, at 2 f_EP
+// and at 2 f_EP ± f_orb, none of which is at f_EP = f_orb + f_spin.
+GradientLevels gradient_levels(const Scenario& scenario, SessionTarget target) {
+  const auto session = std::ranges::find(scenario.sessions, target, &Session::target);
+  const bool is_spinning = session != scenario.sessions.end() && session->spin_rate_rad_s != 0.0;
+  if (is_spinning) return {.xx = 0.0, .xz = 0.0, .yy = 0.0, .zz = 0.0};
+  const OrbitConfig& orbit = scenario.orbit;
   const double mean_motion = 2.0 * std::numbers::pi / orbit.period_s;
   const double level = orbit.eccentricity * mean_motion * mean_motion;
   return {.xx = 0.75 * level, .xz = 0.75 * level, .yy = 3.0 * level, .zz = 2.25 * level};
+}
+
+// Each element in the session that finds the parameter of its entry.
+GradientLevels entry_levels(const Scenario& scenario) {
+  using enum SessionTarget;
+  return {.xx = gradient_levels(scenario, a_c11_delta_x).xx,
+          .xz = gradient_levels(scenario, a_c11_delta_z).xz,
+          .yy = gradient_levels(scenario, a_c12).yy,
+          .zz = gradient_levels(scenario, a_c13).zz};
 }
 
 // A quadratic factor makes a line at f_EP from the product of a constant and the residue there.
@@ -51,7 +68,7 @@ const std::array<BudgetEntryInfo, num_budget_entries>& budget_entry_infos() {
 }
 
 Budget budget_before_calibration(const Scenario& scenario) {
-  const GradientLevels gradient = gradient_levels(scenario.orbit);
+  const GradientLevels gradient = entry_levels(scenario);
   const BudgetConfig& bound = scenario.budget;
   const AcceptanceConfig& acceptance = scenario.acceptance;
   const double delta = bound.offcentring_max_m;
@@ -71,7 +88,7 @@ Budget budget_before_calibration(const Scenario& scenario) {
 Budget budget_after_calibration(const Scenario& scenario, const ParameterArray& errors) {
   using enum Parameter;
   const auto error = [&](Parameter parameter) { return errors[index(parameter)]; };
-  const GradientLevels gradient = gradient_levels(scenario.orbit);
+  const GradientLevels gradient = entry_levels(scenario);
   const BudgetConfig& bound = scenario.budget;
   const double delta_max = bound.offcentring_max_m;
   const double a_c1j_max = scenario.acceptance.a_c1j_max_rad;

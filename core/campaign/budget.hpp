@@ -32,7 +32,10 @@ struct Budget {
   double total = 0.0;  ///< Plain sum of the entries.
 };
 
-/// Budget from the construction bounds, before any calibration ([Hardy2013] tab:Budget).
+/// Budget from the construction bounds, before any calibration ([Hardy2013] tab:Budget). The
+/// gravity gradient of an entry is that at f_EP in the session that finds the entry's parameter:
+/// T(f_orb) in inertial pointing, and none to first order in the eccentricity where that session
+/// spins.
 [[nodiscard]] Budget budget_before_calibration(const Scenario& scenario);
 
 /// Budget left by estimation errors ([Hardy2013] tab:Budget_cali); linear in them.

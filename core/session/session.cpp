@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "core/error.hpp"
@@ -48,14 +50,20 @@ std::string_view amplitude_key(ExcitationKind kind) {
 }
 
 std::string text_of(const LineMultiple& line) {
-  return fmt::format("[{}, {}]", line.orbital, line.excitation);
+  if (line.spin == 0.0) return fmt::format("[{}, {}]", line.orbital, line.excitation);
+  return fmt::format("[{}, {}, {}]", line.orbital, line.excitation, line.spin);
 }
 
 double line_frequency_hz(const Session& session, const LineMultiple& line, double orbit_period_s) {
-  PROOFMASS_EXPECT(line.excitation == 0 || !session.excitations.empty());
+  PROOFMASS_EXPECT(line.excitation == 0.0 || !session.excitations.empty());
   const double excitation_hz =
-      line.excitation == 0 ? 0.0 : session.excitations.front().frequency_hz;
-  return line.orbital / orbit_period_s + line.excitation * excitation_hz;
+      line.excitation == 0.0 ? 0.0 : session.excitations.front().frequency_hz;
+  const double spin_hz = session.spin_rate_rad_s / (2.0 * std::numbers::pi);
+  return line.orbital / orbit_period_s + line.excitation * excitation_hz + line.spin * spin_hz;
+}
+
+double test_frequency_hz(const Session& session, double orbit_period_s) {
+  return std::abs(1.0 / orbit_period_s + session.spin_rate_rad_s / (2.0 * std::numbers::pi));
 }
 
 namespace {

@@ -42,10 +42,13 @@ struct Excitation {
   bool operator==(const Excitation&) const = default;
 };
 
-/// The frequency orbital·f_orb + excitation·f, f being that of the session's excitation.
+/// The frequency orbital·f_orb + excitation·f + spin·f_spin, with f that of the session's
+/// excitation and f_spin = spin_rate_rad_s/2π. Multiples need not be whole: 5.5 f_orb is a line of
+/// a session that spins at 4.5 f_orb.
 struct LineMultiple {
-  int orbital = 0;
-  int excitation = 0;
+  double orbital = 0.0;
+  double excitation = 0.0;
+  double spin = 0.0;
 
   bool operator==(const LineMultiple&) const = default;
 };
@@ -89,6 +92,11 @@ struct Session {
 /// Frequency of a line of the session, Hz; f_orb = 1/orbit_period_s.
 [[nodiscard]] double line_frequency_hz(const Session& session, const LineMultiple& line,
                                        double orbit_period_s);
+
+/// f_EP in the session's attitude, Hz: a violation of the equivalence principle follows the
+/// direction of the Earth, which turns by f_orb in an inertial frame and faster by f_spin in one
+/// that turns about +Y.
+[[nodiscard]] double test_frequency_hz(const Session& session, double orbit_period_s);
 
 /// Names for files: `a_c11_delta_x`.
 [[nodiscard]] const char* name_of(SessionTarget target);

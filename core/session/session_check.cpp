@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <optional>
 #include <string>
 
@@ -19,7 +18,7 @@ namespace {
 constexpr std::size_t name_length_max = 64;
 constexpr std::size_t num_lines_max = LineWeights::num_lines_max;
 constexpr std::size_t fit_lines_max = 2;
-constexpr int multiple_max = 1000;
+constexpr double multiple_max = 1000.0;
 
 // What must be shaken, and which measurement nulled, for a session to determine its target.
 struct Stimulus {
@@ -181,12 +180,16 @@ void SessionCheck::check_lines() const {
 }
 
 void SessionCheck::check_multiple(const std::string& key, const LineMultiple& line) const {
-  if (std::abs(static_cast<long>(line.orbital)) > multiple_max ||
-      std::abs(static_cast<long>(line.excitation)) > multiple_max) {
+  const Range multiples = range::between(-multiple_max, multiple_max);
+  for (const double multiple : {line.orbital, line.excitation, line.spin}) {
+    if (multiples.contains(multiple)) continue;
     refuse(key, text_of(line), fmt::format("must be multiples from -{0} to {0}", multiple_max));
   }
-  if (line.excitation != 0 && session_.excitations.empty()) {
+  if (line.excitation != 0.0 && session_.excitations.empty()) {
     refuse(key, text_of(line), "the session has no excitation to take a multiple of");
+  }
+  if (line.spin != 0.0 && session_.spin_rate_rad_s == 0.0) {
+    refuse(key, text_of(line), "the session has no spin to take a multiple of");
   }
 }
 

@@ -18,7 +18,7 @@ namespace proofmass {
 /// Name of the key that holds an excitation's amplitude, with its unit: `amplitude_rad`.
 [[nodiscard]] std::string_view amplitude_key(ExcitationKind kind);
 
-/// `[2, 1]`: the line at 2 f_orb + f.
+/// `[2, 1]`: the line at 2 f_orb + f; `[1, 0, 1]`: that at f_orb + f_spin.
 [[nodiscard]] std::string text_of(const LineMultiple& line);
 
 }  // namespace proofmass

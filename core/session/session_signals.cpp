@@ -11,10 +11,22 @@ std::int64_t num_record_samples(const Scenario& scenario, const Session& session
   return static_cast<std::int64_t>(std::floor(samples + 1e-6));
 }
 
+namespace {
+
+// Not inlined: in inertial pointing, the common case, advance() is then small enough to be.
+__attribute__((noinline)) void turn(const Quaternion<double>& attitude, ExternalAcceleration& at) {
+  at = {to_target(attitude, at.linear_m_s2), to_target(attitude, at.angular_rad_s2)};
+}
+
+}  // namespace
+
 SessionSignals::SessionSignals(const Scenario& scenario, const Session& session,
                                const KeplerOrbit& orbit, const Environment& environment)
     : orbit_(&orbit),
       environment_(environment),
+      // An environment file is of the frame in which the satellite flies.
+      turns_environment_(session.spin_rate_rad_s != 0.0 &&
+                         scenario.environment.kind == EnvironmentKind::harmonic),
       gains_(attitude_gains(scenario.attitude, scenario.simulation.sample_period_s)),
       sample_period_s_(scenario.simulation.sample_period_s),
       spin_rate_rad_s_(session.spin_rate_rad_s),
@@ -58,6 +70,8 @@ void SessionSignals::advance(const SamplePhases& phases, SharedSample& sample) {
   sample.reference_rate = reference.rate;
   sample.earth_direction_R = to_target(reference.attitude_IR, sample.earth_direction_I);
   sample.external = environment_.at(time_s(0), point);
+  if (turns_environment_) [[unlikely]]
+    turn(reference.attitude_IR, sample.external);
   if (has_excitation_) excite(phases.excitation, sample);
   commanded_.correct(gains_, sample.attitude_command_rad);
   sample.commanded = commanded_;

@@ -97,6 +97,7 @@ class SessionSignals {
 
   const KeplerOrbit* orbit_;
   Environment environment_;
+  bool turns_environment_;
   AttitudeGains gains_;
   double sample_period_s_;
   double spin_rate_rad_s_;

@@ -17,7 +17,7 @@ namespace {
 constexpr int sessions_max = 64;
 constexpr int excitations_max = 16;
 constexpr int lines_max = 64;
-constexpr int line_multiple_max = 1000;
+constexpr double line_multiple_max = 1000.0;
 constexpr int session_orbits_max = 10000;
 constexpr int values_per_row = 7;
 
@@ -116,14 +116,15 @@ class FieldReader {
 void encode_line(const LineMultiple& line, proto::LineMultiple& message) {
   message.set_orbital(line.orbital);
   message.set_excitation(line.excitation);
+  message.set_spin(line.spin);
 }
 
 LineMultiple decode_line(const proto::LineMultiple& message) {
-  for (const int multiple : {message.orbital(), message.excitation()}) {
+  for (const double multiple : {message.orbital(), message.excitation(), message.spin()}) {
     require(multiple >= -line_multiple_max && multiple <= line_multiple_max, "session.line",
             fmt::format("{}", multiple), fmt::format("must be within ±{}", line_multiple_max));
   }
-  return {.orbital = message.orbital(), .excitation = message.excitation()};
+  return {.orbital = message.orbital(), .excitation = message.excitation(), .spin = message.spin()};
 }
 
 void encode_excitation(const Excitation& excitation, proto::Excitation& message) {

@@ -114,13 +114,13 @@ TEST(SessionErrors, NameAWrongLine) {
   EXPECT_EQ(refusal_of(with_session(head + "fit_lines = 2")),
             "campaign.toml:4: session[0].fit_lines = 2 (must be a list such as [[2, 0], [0, 1]])");
   const std::string rule =
-      " (must be two whole numbers, the multiples of f_orb and of the excitation)";
+      " (must be two or three numbers, the multiples of f_orb, of the excitation and of the spin)";
   EXPECT_EQ(refusal_of(with_session(head + "fit_lines = [[2, 0],\n [1]]")),
             "campaign.toml:5: session[0].fit_lines[1] = [1]" + rule);
-  EXPECT_EQ(refusal_of(with_session(head + "fit_lines = [[2.5, 0]]")),
-            "campaign.toml:4: session[0].fit_lines[0] = [2.5, 0]" + rule);
-  EXPECT_EQ(refusal_of(with_session(head + "fit_lines = [[2, 3000000000]]")),
-            "campaign.toml:4: session[0].fit_lines[0] = [2, 3000000000]" + rule);
+  EXPECT_EQ(refusal_of(with_session(head + "fit_lines = [[2, 0, 1, 0]]")),
+            "campaign.toml:4: session[0].fit_lines[0] = [2, 0, 1, 0]" + rule);
+  EXPECT_EQ(refusal_of(with_session(head + "fit_lines = [[2, true]]")),
+            "campaign.toml:4: session[0].fit_lines[0] = [2, true]" + rule);
   EXPECT_EQ(refusal_of(with_session(head + "orbits = 3000000000")),
             "campaign.toml:4: session[0].orbits = 3000000000 (must be in [-2147483648, "
             "2147483647])");

@@ -5,7 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <cstddef>
+#include <functional>
+#include <numbers>
+
+#include "core/orbit/kepler_orbit.hpp"
 
 namespace proofmass {
 namespace {
@@ -128,6 +133,56 @@ TEST(BudgetBeforeCalibration, IsThePapersTable) {
         << budget_entry_infos()[i].name;
   }
   EXPECT_NEAR(budget.total, 2e-13, 0.5e-13);
+}
+
+/// Amplitude at f_EP of an element of the gravity gradient in a frame that spins by `turns` a
+/// revolution, from two revolutions of the exact orbit: a whole number of periods of every line.
+double amplitude_at_test_frequency(double turns, const std::function<double(double, double)>& of) {
+  const KeplerOrbit orbit{OrbitConfig{}};
+  constexpr int num_samples = 4000;
+  std::complex<double> sum;
+  for (int k = 0; k < num_samples; ++k) {
+    const double revolutions = 2.0 * k / num_samples;
+    const OrbitPoint point = orbit.at(revolutions * orbit.period_s());
+    const double angle = 2.0 * std::numbers::pi * turns * revolutions;
+    const double x = std::cos(angle) * point.direction_x - std::sin(angle) * point.direction_z;
+    const double z = std::sin(angle) * point.direction_x + std::cos(angle) * point.direction_z;
+    const double phase = 2.0 * std::numbers::pi * (1.0 + turns) * revolutions;
+    sum += point.gradient_s2 * of(x, z) * std::polar(2.0 / num_samples, phase);
+  }
+  return std::abs(sum);
+}
+
+double gradient_xx(double x, double /*z*/) { return 3.0 * x * x - 1.0; }
+double gradient_xz(double x, double z) { return 3.0 * x * z; }
+double gradient_yy(double /*x*/, double /*z*/) { return -1.0; }
+double gradient_zz(double /*x*/, double z) { return 3.0 * z * z - 1.0; }
+
+// An error of one metre makes an entry as large as the gradient's element at f_EP.
+TEST(BudgetAfterCalibration, TakesTheGradientAtTheTestFrequencyOfTheSession) {
+  ParameterArray errors{};
+  errors[index(Parameter::a_c11_delta_x)] = 1.0;
+  errors[index(Parameter::a_c11_delta_z)] = 1.0;
+  errors[index(Parameter::a_c12)] = 1.0;
+  errors[index(Parameter::a_c13)] = 1.0;
+  Scenario scenario;
+  scenario.acceptance.a_c1j_max_rad = 1e-30;
+  scenario.budget.offcentring_max_m = 1.0;
+  for (const double turns : {0.0, 4.5, 17.5}) {
+    for (Session& session : scenario.sessions) {
+      session.spin_rate_rad_s = 2.0 * std::numbers::pi * turns / scenario.orbit.period_s;
+    }
+    const Budget budget = budget_after_calibration(scenario, errors);
+    const auto expect = [&](std::size_t entry, const std::function<double(double, double)>& of) {
+      const double level = amplitude_at_test_frequency(turns, of);
+      // First order in e: what it leaves out is of the order of e² n².
+      EXPECT_NEAR(budget.entries[entry], level, 1e-3 * 4.18e-9) << turns << " turns, " << entry;
+    };
+    expect(0, gradient_xx);
+    expect(1, gradient_xz);
+    expect(3, gradient_yy);
+    expect(4, gradient_zz);
+  }
 }
 
 TEST(Budget, TotalIsThePlainSumOfItsEntries) {

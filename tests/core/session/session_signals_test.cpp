@@ -225,6 +225,27 @@ TEST(SessionSignals, SpinTheReferenceAboutY) {
   }
 }
 
+// Drag and radiation pressure do not turn with the satellite: in S their vector turns against it.
+TEST(SessionSignals, TurnTheHarmonicEnvironmentIntoTheFrameThatSpins) {
+  Fixture fixture;
+  const auto inertial = all_samples(fixture);
+  const double rate = 4.2e-3;
+  fixture.session.spin_rate_rad_s = rate;
+  const auto spinning = all_samples(fixture);
+  for (std::size_t i = 0; i < inertial.size(); ++i) {
+    const double c = std::cos(rate * spinning[i].time_s);
+    const double s = std::sin(rate * spinning[i].time_s);
+    const auto expect_turned = [&](const Vector3<double>& a_I, const Vector3<double>& a_R) {
+      ASSERT_NEAR(a_R.x, c * a_I.x - s * a_I.z, 1e-20);
+      ASSERT_NEAR(a_R.y, a_I.y, 1e-20);
+      ASSERT_NEAR(a_R.z, s * a_I.x + c * a_I.z, 1e-20);
+    };
+    expect_turned(inertial[i].sample.external.linear_m_s2, spinning[i].sample.external.linear_m_s2);
+    expect_turned(inertial[i].sample.external.angular_rad_s2,
+                  spinning[i].sample.external.angular_rad_s2);
+  }
+}
+
 TEST(SessionSignals, ReferenceThatFollowsTheOrbitSeesTheEarthAtRest) {
   Fixture fixture;
   fixture.scenario.orbit.eccentricity = 0.0;

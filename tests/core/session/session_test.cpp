@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <string>
 
 #include "core/error.hpp"
@@ -60,6 +61,23 @@ TEST(LineFrequency, AddsMultiplesOfOrbitAndExcitation) {
   EXPECT_DOUBLE_EQ(line_frequency_hz(sessions[at_a_c12], {-2, 1}, orbit_period_s),
                    9.88e-3 - 2.0 / 5950.0);
   EXPECT_DOUBLE_EQ(line_frequency_hz(sessions[8], {0, 2}, orbit_period_s), 2 * 1.22847554e-3);
+}
+
+TEST(LineFrequency, TakesPartsOfTheOrbitAndMultiplesOfTheSpin) {
+  Sessions sessions = hardy2013_sessions();
+  sessions[0].spin_rate_rad_s = 2.0 * std::numbers::pi * 4.5 / orbit_period_s;
+  EXPECT_DOUBLE_EQ(line_frequency_hz(sessions[0], {5.5, 0}, orbit_period_s), 5.5 / 5950.0);
+  EXPECT_DOUBLE_EQ(line_frequency_hz(sessions[0], {1, 0, 1}, orbit_period_s), 5.5 / 5950.0);
+  EXPECT_DOUBLE_EQ(line_frequency_hz(sessions[0], {-1, 0, 1}, orbit_period_s), 3.5 / 5950.0);
+}
+
+TEST(TestFrequency, IsThatOfTheEarthsDirectionInTheFrame) {
+  Session session;
+  EXPECT_DOUBLE_EQ(test_frequency_hz(session, orbit_period_s), 1.0 / 5950.0);
+  session.spin_rate_rad_s = 2.0 * std::numbers::pi * 4.5 / orbit_period_s;
+  EXPECT_DOUBLE_EQ(test_frequency_hz(session, orbit_period_s), 5.5 / 5950.0);
+  session.spin_rate_rad_s = -session.spin_rate_rad_s;
+  EXPECT_DOUBLE_EQ(test_frequency_hz(session, orbit_period_s), 3.5 / 5950.0);
 }
 
 TEST(ValidateSessions, RefusesABadName) {
@@ -134,7 +152,7 @@ TEST(ValidateSessions, WantsAFewLinesInsideTheBand) {
             "session[0].fit_lines = 3 lines (must be one or two)");
   EXPECT_EQ(refusal_after([](Sessions& s) {
               s[0].known_lines.clear();
-              for (int i = 3; i < 19; ++i) s[0].known_lines.push_back({i, 0});
+              for (int i = 3; i < 19; ++i) s[0].known_lines.push_back({static_cast<double>(i), 0});
             }),
             "session[0].known_lines = 17 lines with fit_lines (must be at most 16)");
   EXPECT_EQ(refusal_after([](Sessions& s) {
@@ -156,6 +174,23 @@ TEST(ValidateSessions, WantsAFewLinesInsideTheBand) {
               s[0].fit_lines = {{1001, 0}};
             }),
             "session[0].fit_lines[0] = [1001, 0] (must be multiples from -1000 to 1000)");
+}
+
+TEST(ValidateSessions, WantsASpinForItsMultiples) {
+  EXPECT_EQ(
+      refusal_after([](Sessions& s) {
+        s[0].known_lines = {{1, 0, 1}};
+      }),
+      "session[0].known_lines[0] = [1, 0, 1] (the session has no spin to take a multiple of)");
+  EXPECT_EQ(refusal_after([](Sessions& s) {
+              s[0].spin_rate_rad_s = 4.7e-3;
+              s[0].known_lines = {{1, 0, 1}, {5.75, 0}};
+            }),
+            "");
+  EXPECT_EQ(refusal_after([](Sessions& s) {
+              s[0].fit_lines = {{std::numeric_limits<double>::quiet_NaN(), 0}};
+            }),
+            "session[0].fit_lines[0] = [nan, 0] (must be multiples from -1000 to 1000)");
 }
 
 TEST(ValidateSessions, WantsLinesThatTheSessionCanTellApart) {

@@ -166,7 +166,7 @@ TEST(MalformedRequest, OfAnotherVersionIsRefused) {
   envelope.set_protocol_version(protocol_version + 1);
   const DecodeError error = refusal_of_request(envelope.SerializeAsString());
   EXPECT_EQ(error.fault, DecodeFault::wrong_version);
-  EXPECT_EQ(error.text, "protocol_version = 5 (must be 4)");
+  EXPECT_EQ(error.text, "protocol_version = 6 (must be 5)");
 }
 
 TEST(MalformedRequest, WithoutContentIsRefused) {
