@@ -15,6 +15,7 @@ constexpr std::string_view line_end = "\r\n";
 std::string heading() {
   std::string line = "run_index,status,num_draws,num_rounds";
   for (const ValueColumn& column : value_columns()) line += "," + column.name;
+  line += ",loss_cause,loss_session";
   return line.append(line_end);
 }
 
@@ -43,6 +44,11 @@ void export_csv(const Store& store, TextOutput& output, const IsStopped& is_stop
       const std::optional<double> value = column.value_in(result);
       line.push_back(',');
       if (value) fmt::format_to(end, "{}", *value);
+    }
+    if (result.status == RunStatus::lost) {
+      fmt::format_to(end, ",{},{}", name_of(result.loss.cause), name_of(result.loss.session));
+    } else {
+      fmt::format_to(end, ",,");
     }
     line.append(line_end);
     output.write({line.data(), line.size()});

@@ -39,6 +39,7 @@ Lines count_differences(const Summary& stored, const CampaignStatistics& now) {
   require_same("num_not_converged", stored.num_not_converged, now.num_not_converged);
   require_same("num_not_finite", stored.num_not_finite, now.num_not_finite);
   require_same("num_no_draw", stored.num_no_draw, now.num_no_draw);
+  require_same("num_lost", stored.num_lost, now.num_lost);
   return lines;
 }
 
@@ -76,13 +77,13 @@ Check check_stored_statistics(const Store& store, const Scenario& scenario,
                               const ResultScan& scan) {
   const std::optional<Summary> summary = store.summary();
   if (!summary) return check_first(store, scenario);
-  if (summary->num_finished == num_runs_in(scan.runs) && summary->digest == scan.digest &&
+  if (summary->num_finished == num_runs_in(scan.runs) && summary->digests == scan.digests &&
       scan.num_violations == 0) {
     return check_current(store, scenario, *summary, read_results(store, scenario).statistics);
   }
   Lines lines = store.budget_differences(budget_before_calibration(scenario));
   const std::uint64_t num_counted =
-      summary->num_estimated + summary->num_not_finite + summary->num_no_draw;
+      summary->num_estimated + summary->num_not_finite + summary->num_no_draw + summary->num_lost;
   if (num_counted != summary->num_finished) {
     lines.push_back(fmt::format("summary.num_finished = {} (must be {}, the sum of its kinds)",
                                 summary->num_finished, num_counted));

@@ -169,13 +169,23 @@ class Column {
   hsize_t num_written_ = 0;
 };
 
-Handle status_type(const Writer& writer) {
+/// A type of the numbers [first, last] with the names that name_of() has for them.
+template <typename Enumeration>
+Handle enumeration_type(const Writer& writer, Enumeration first, Enumeration last) {
   Handle type = writer.handle(H5Tenum_create(H5T_STD_U8LE), H5Tclose);
-  for (const RunStatus status : {RunStatus::completed, RunStatus::not_converged,
-                                 RunStatus::not_finite, RunStatus::no_draw}) {
-    const auto value = static_cast<std::uint8_t>(status);
-    writer.check(H5Tenum_insert(type, std::string(name_of(status)).c_str(), &value));
+  for (auto value = static_cast<std::uint8_t>(first); value <= static_cast<std::uint8_t>(last);
+       ++value) {
+    const std::string name(name_of(static_cast<Enumeration>(value)));
+    writer.check(H5Tenum_insert(type, name.c_str(), &value));
   }
+  return type;
+}
+
+/// The sessions by their targets; 0 is none.
+Handle loss_session_type(const Writer& writer) {
+  Handle type = enumeration_type(writer, SessionTarget::a_c11_delta_x, SessionTarget::k2_sensor_2);
+  constexpr std::uint8_t none = 0;
+  writer.check(H5Tenum_insert(type, "none", &none));
   return type;
 }
 
@@ -183,11 +193,16 @@ Handle status_type(const Writer& writer) {
 class Columns {
  public:
   explicit Columns(const Writer& writer)
-      : status_type_(status_type(writer)),
+      : status_type_(enumeration_type(writer, RunStatus::completed, RunStatus::lost)),
+        loss_cause_type_(enumeration_type(writer, LossCause::none, LossCause::square_noise)),
+        loss_session_type_(loss_session_type(writer)),
         run_index_(writer, writer.root(), "run_index", H5T_STD_U64LE, H5T_NATIVE_UINT64),
         status_(writer, writer.root(), "status", status_type_, status_type_),
         num_draws_(writer, writer.root(), "num_draws", H5T_STD_U32LE, H5T_NATIVE_UINT32),
-        num_rounds_(writer, writer.root(), "num_rounds", H5T_STD_U32LE, H5T_NATIVE_UINT32) {
+        num_rounds_(writer, writer.root(), "num_rounds", H5T_STD_U32LE, H5T_NATIVE_UINT32),
+        loss_cause_(writer, writer.root(), "loss_cause", loss_cause_type_, loss_cause_type_),
+        loss_session_(writer, writer.root(), "loss_session", loss_session_type_,
+                      loss_session_type_) {
     Handle group;
     std::string_view group_name;
     for (const ValueColumn& column : value_columns()) {
@@ -195,7 +210,7 @@ class Columns {
         group_name = name_of(column.kind);
         group = writer.make_group(std::string(group_name));
       }
-      values_.emplace_back(writer, group, column.parameter_name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE);
+      values_.emplace_back(writer, group, column.own_name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE);
       writer.set_text(values_.back().dataset(), "unit", std::string(column.unit));
     }
   }
@@ -205,6 +220,9 @@ class Columns {
     status_.add(static_cast<std::uint8_t>(result.status));
     num_draws_.add(result.num_draws);
     num_rounds_.add(result.num_rounds);
+    const bool is_lost = result.status == RunStatus::lost;
+    loss_cause_.add(static_cast<std::uint8_t>(result.loss.cause));
+    loss_session_.add(is_lost ? static_cast<std::uint8_t>(result.loss.session) : std::uint8_t{0});
     for (std::size_t i = 0; i < num_value_columns; ++i) {
       constexpr double no_meaning = std::numeric_limits<double>::quiet_NaN();
       values_[i].add(value_columns()[i].value_in(result).value_or(no_meaning));
@@ -216,15 +234,21 @@ class Columns {
     status_.flush();
     num_draws_.flush();
     num_rounds_.flush();
+    loss_cause_.flush();
+    loss_session_.flush();
     for (Column<double>& column : values_) column.flush();
   }
 
  private:
   Handle status_type_;
+  Handle loss_cause_type_;
+  Handle loss_session_type_;
   Column<std::uint64_t> run_index_;
   Column<std::uint8_t> status_;
   Column<std::uint32_t> num_draws_;
   Column<std::uint32_t> num_rounds_;
+  Column<std::uint8_t> loss_cause_;
+  Column<std::uint8_t> loss_session_;
   std::vector<Column<double>> values_;
 };
 

@@ -54,7 +54,12 @@ class RunLines {
         fmt::format_to(end, "null");
       }
     }
-    line_.push_back('}');
+    if (result.status == RunStatus::lost) {
+      fmt::format_to(end, R"(,"loss_cause":"{}","loss_session":"{}"}})", name_of(result.loss.cause),
+                     name_of(result.loss.session));
+    } else {
+      fmt::format_to(end, R"(,"loss_cause":null,"loss_session":null}})");
+    }
     output_.write({line_.data(), line_.size()});
     is_first_ = false;
   }

@@ -125,8 +125,15 @@ std::vector<ResultDifference> differences_of(const RunResult& stored, const RunR
   for (const ValueColumn& column : value_columns()) {
     if (column.kind == ValueKind::error) continue;  // It follows from the others.
     const std::optional<double> a = column.value_in(stored), b = column.value_in(computed);
-    if (!a || have_same_bits(*a, *b)) continue;
+    // Files from before version 7 have no health.
+    if (!a || !b || have_same_bits(*a, *b)) continue;
     differ(column.name, fmt::format("{}", *a), fmt::format("{}", *b));
+  }
+  if (!(stored.loss == computed.loss)) {
+    const auto text_of = [](const Loss& loss) {
+      return fmt::format("{} in {}", name_of(loss.cause), name_of(loss.session));
+    };
+    differ("loss_cause", text_of(stored.loss), text_of(computed.loss));
   }
   return differences;
 }

@@ -15,12 +15,34 @@ std::array<ValueColumn, num_value_columns> make_columns() {
       ValueColumn& column = columns[i++];
       column.kind = kind;
       column.parameter = info.parameter;
-      column.parameter_name = std::string(info.name) + std::string(info.unit_suffix);
-      column.name = std::string(name_of(kind)) + "_" + column.parameter_name;
+      column.own_name = std::string(info.name) + std::string(info.unit_suffix);
+      column.name = std::string(name_of(kind)) + "_" + column.own_name;
       column.unit = info.unit;
     }
   }
+  for (const HealthValue& value : health_values()) {
+    ValueColumn& column = columns[i++];
+    column.kind = ValueKind::health;
+    column.health = value.member;
+    column.own_name = std::string(value.name) + std::string(value.unit_suffix);
+    column.name = "health_" + column.own_name;
+    column.unit = value.unit;
+  }
   return columns;
+}
+
+bool is_known(ValueKind kind, const RunResult& result) {
+  switch (kind) {
+    case ValueKind::truth:
+      return result.has_truth();
+    case ValueKind::estimate:
+    case ValueKind::error:
+      return result.has_estimate();
+    case ValueKind::health:
+      return result.health.has_value();
+  }
+  PROOFMASS_EXPECT(false);
+  return false;
 }
 
 }  // namespace
@@ -33,14 +55,15 @@ std::string_view name_of(ValueKind kind) {
       return "estimate";
     case ValueKind::error:
       return "error";
+    case ValueKind::health:
+      return "health";
   }
   PROOFMASS_EXPECT(false);
   return {};
 }
 
 std::optional<double> ValueColumn::value_in(const RunResult& result) const {
-  const bool is_known = kind == ValueKind::truth ? result.has_truth() : result.has_estimate();
-  if (!is_known) return std::nullopt;
+  if (!is_known(kind, result)) return std::nullopt;
   switch (kind) {
     case ValueKind::truth:
       return result.truth[index(parameter)];
@@ -48,6 +71,8 @@ std::optional<double> ValueColumn::value_in(const RunResult& result) const {
       return result.estimate[index(parameter)];
     case ValueKind::error:
       return result.error(parameter);
+    case ValueKind::health:
+      return (*result.health).*health;
   }
   PROOFMASS_EXPECT(false);
   return {};

@@ -12,10 +12,10 @@
 
 namespace proofmass::coordinator {
 
-/// What is known of a parameter in one run.
-enum class ValueKind : std::uint8_t { truth, estimate, error };
+/// What is known of a parameter in one run, or of the health of its loops.
+enum class ValueKind : std::uint8_t { truth, estimate, error, health };
 
-/// `truth`, `estimate`, `error`.
+/// `truth`, `estimate`, `error`, `health`.
 [[nodiscard]] std::string_view name_of(ValueKind kind);
 
 /// True if both are the same to the last bit; zeros have no sign, as in a campaign file.
@@ -26,18 +26,20 @@ enum class ValueKind : std::uint8_t { truth, estimate, error };
 /// A column of doubles, one for each run, SI.
 struct ValueColumn {
   ValueKind kind = ValueKind::truth;
-  Parameter parameter = Parameter::a_c11_delta_x;
-  std::string parameter_name;  ///< With its unit: `a_c12_rad`.
-  std::string name;            ///< As in the table `run_result`: `truth_a_c12_rad`.
-  std::string_view unit;       ///< `m`, `rad`, `s²/m` or `1`.
+  Parameter parameter = Parameter::a_c11_delta_x;  ///< Unless the kind is `health`.
+  double LoopHealth::*health = nullptr;            ///< If it is.
+  std::string own_name;                            ///< With its unit: `a_c12_rad`, `attitude_rad`.
+  std::string name;       ///< As in the table `run_result`: `truth_a_c12_rad`.
+  std::string_view unit;  ///< `m`, `rad`, `s²/m`, `m/s²` or `1`.
 
   /// Nothing if the run's status leaves it without a meaning.
   [[nodiscard]] std::optional<double> value_in(const RunResult& result) const;
 };
 
-inline constexpr std::size_t num_value_columns = 3 * num_parameters;
+inline constexpr std::size_t num_value_columns = 3 * num_parameters + num_health_values;
 
-/// Ten truths, ten estimates, ten errors, in the order of the table `run_result`.
+/// Ten truths, ten estimates, ten errors, five numbers of health, in the order of the table
+/// `run_result`.
 [[nodiscard]] const std::array<ValueColumn, num_value_columns>& value_columns();
 
 }  // namespace proofmass::coordinator

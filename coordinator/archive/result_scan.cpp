@@ -80,7 +80,7 @@ ResultScan scan_results(const Store& store, const Scenario& scenario, const IsSt
     digest.add(result);
     append(scan.runs, result.run);
   });
-  scan.digest = digest.finish();
+  scan.digests = digest.finish();
   const std::vector<RunRange> delivered = store.finished_runs();
   violate_missing(scan.runs, delivered, "has a delivery and no result", rules);
   violate_missing(delivered, scan.runs, "has a result and no delivery", rules);

@@ -15,7 +15,7 @@ namespace proofmass::coordinator {
 /// with them unless every other one is missing.
 struct ResultScan {
   std::vector<RunRange> runs;  ///< Finished ones, ascending.
-  std::string digest;          ///< Of their results.
+  ResultDigests digests;       ///< Of their results.
   std::uint64_t num_violations = 0;
   std::vector<std::string> violations;  ///< The first ones: `run 3: num_draws = 0 (rule)`.
 };

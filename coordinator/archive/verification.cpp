@@ -139,14 +139,19 @@ class Verification {
       return Check::fails(fmt::format("it is of {} runs, of which {} are in the file",
                                       summary->num_finished, num_now));
     }
-    if (summary->digest == scan_->digest) {
+    const ResultDigests& stored = summary->digests;
+    const ResultDigests& computed = scan_->digests;
+    if (stored == computed) {
       Check check = Check::holds(fmt::format("of {} runs", num_now));
-      check.details = {scan_->digest};
+      check.details = {computed.results};
       return check;
     }
-    Check check =
-        Check::fails(fmt::format("the results of {} runs are not those it was made of", num_now));
-    check.details = {"stored", "  " + summary->digest, "computed", "  " + scan_->digest};
+    const bool is_of_health = stored.results == computed.results;
+    Check check = Check::fails(fmt::format(
+        "the {} of {} runs {} not {} it was made of", is_of_health ? "health" : "results", num_now,
+        is_of_health ? "is" : "are", is_of_health ? "that" : "those"));
+    check.details = {"stored", "  " + (is_of_health ? stored.health : stored.results), "computed",
+                     "  " + (is_of_health ? computed.health : computed.results)};
     return check;
   }
 

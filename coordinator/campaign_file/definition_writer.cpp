@@ -121,13 +121,14 @@ class CommentedWriter {
     text_ +=
         "\n# The sessions, in the order in which they are flown. Each starts at perigee and lasts "
         "whole\n"
-        "# orbits. Lines are [i, j]: the frequency i f_orb + j f, f being that of the excitation; "
+        "# orbits. Lines are [i, j] or [i, j, k]: the frequency i f_orb + j f + k f_spin, f being "
+        "that\n"
+        "# of the excitation; i, j and k need not be whole. Those of fit_lines give the estimate, "
         "those\n"
-        "# of fit_lines give the estimate, those of known_lines are fitted beside them. Every "
-        "target\n"
-        "# must be there once. Further keys: spin_rate_rad_s = 0 (of the frame that the attitude "
-        "loop\n"
-        "# holds, about Y) and drag_free = \"common\" (\"sensor_1\", \"sensor_2\").\n";
+        "# of known_lines are fitted beside them. Every target must be there once. Further keys:\n"
+        "# spin_rate_rad_s = 0 (2π f_spin, of the frame that the attitude loop holds, about Y) "
+        "and\n"
+        "# drag_free = \"common\" (\"sensor_1\", \"sensor_2\").\n";
     const std::vector<Entry> plain = detail::session_entries(Session{});
     for (const Session& session : campaign_.scenario.sessions) {
       text_ += "\n[[session]]\n";
@@ -171,12 +172,15 @@ class CommentedWriter {
     }
   }
 
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 5> table_notes{{
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 6> table_notes{{
       {"environment",
        "# External accelerations of the satellite, each axis mean + a1 cos(n t + phase) +\n"
        "# a2 cos(2 n t + phase), n being the mean motion; or rows of a file (kind = \"file\",\n"
        "# file = \"environment.csv\") with the columns time_s,linear_x_m_s2,linear_y_m_s2,\n"
        "# linear_z_m_s2,angular_x_rad_s2,angular_y_rad_s2,angular_z_rad_s2.\n"},
+      {"health",
+       "# Beyond one of these, or at the end of a sensor's range, a run is lost: it has no "
+       "estimates.\n"},
       {"noise",
        "# Sensor noise has the one-sided density white²(1 + f_p/f) + rise²(f/f_r)⁴/(1 + "
        "(f/f_l)⁴).\n"

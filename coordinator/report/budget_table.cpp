@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 
@@ -53,6 +54,17 @@ std::string totals_text(const RunTotals& totals) {
       totals.median, totals.percentile_95, totals.worst, totals.worst_run.value);
 }
 
+// In inertial pointing, the paper's, f_EP is f_orb and needs no word.
+std::string test_frequency_note(const Scenario& scenario) {
+  const auto spinning = std::ranges::count_if(
+      scenario.sessions, [](const Session& session) { return session.spin_rate_rad_s != 0.0; });
+  if (spinning == 0) return "";
+  return fmt::format(
+      "T at f_EP of the session that finds the parameter; {} of {} sessions spin, where T has no\n"
+      "line at f_EP = f_orb + f_spin to first order in the eccentricity\n",
+      spinning, scenario.sessions.size());
+}
+
 }  // namespace
 
 std::string budget_table(const Scenario& scenario, const CampaignStatistics& statistics,
@@ -72,6 +84,7 @@ std::string budget_table(const Scenario& scenario, const CampaignStatistics& sta
   text +=
       rule() + row(budget_total_info, figures([](const Budget& budget) { return budget.total; }));
   text += "before: bounds of construction; worst, mean: left by the errors of calibration\n";
+  text += test_frequency_note(scenario);
   return totals ? text + totals_text(*totals) : text;
 }
 

@@ -14,18 +14,24 @@ namespace proofmass::coordinator {
 /// A result is 184 bytes, little-endian: run index (64 bits), status, draws, rounds (32 bits each),
 /// 32 bits of zero, then ten truths and ten estimates (doubles; 0 where they mean nothing, no
 /// negative zeros).
+///
+/// The health of loops has a digest of its own, so that that of the results is the same as of
+/// before there was any. Of a result that has it, that is 56 bytes: run index, the five numbers in
+/// the order of LoopHealth, cause and session of the loss (32 bits each; 0 unless the run is lost).
 class Digest {
  public:
   void add(const RunResult& result);
 
-  /// 64 hexadecimal digits. @pre Called once, at the end.
-  [[nodiscard]] std::string finish();
+  /// @pre Called once, at the end.
+  [[nodiscard]] ResultDigests finish();
 
  private:
   Sha256 hash_;
+  Sha256 health_hash_;
+  bool has_health_ = false;
 };
 
-/// Digest of the results in a campaign file.
+/// Digest of the results in a campaign file, without that of their health.
 [[nodiscard]] std::string digest_of(const Store& store);
 
 }  // namespace proofmass::coordinator

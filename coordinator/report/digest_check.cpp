@@ -8,7 +8,8 @@
 
 namespace proofmass::coordinator {
 
-DigestCheck check_digest(const Store& store, std::uint64_t num_results, const std::string& digest) {
+DigestCheck check_digest(const Store& store, std::uint64_t num_results,
+                         const ResultDigests& digests) {
   const std::optional<Summary> summary = store.summary();
   if (!summary) {
     // Both are written in one transaction.
@@ -16,7 +17,7 @@ DigestCheck check_digest(const Store& store, std::uint64_t num_results, const st
     return DigestCheck::not_checked;
   }
   const std::uint64_t num_counted =
-      summary->num_estimated + summary->num_not_finite + summary->num_no_draw;
+      summary->num_estimated + summary->num_not_finite + summary->num_no_draw + summary->num_lost;
   if (summary->num_finished != num_counted) {
     store.refuse_as_damaged(fmt::format("summary.num_finished is {} and its kinds are {}",
                                         summary->num_finished, num_counted));
@@ -26,9 +27,16 @@ DigestCheck check_digest(const Store& store, std::uint64_t num_results, const st
                                         num_results, summary->num_finished));
   }
   if (num_results > summary->num_finished) return DigestCheck::not_checked;
-  if (digest == summary->digest) return DigestCheck::holds;
-  store.refuse_as_damaged(fmt::format("the digest of its {} results is {} and not {}, as stored",
-                                      num_results, digest, summary->digest));
+  const auto require_same = [&](const std::string& now, const std::string& stored,
+                                const char* what) {
+    if (now == stored) return;
+    store.refuse_as_damaged(fmt::format("the digest of {} {} results is {} and not {}, as stored",
+                                        what, num_results, now.empty() ? "none" : now,
+                                        stored.empty() ? "none" : stored));
+  };
+  require_same(digests.results, summary->digests.results, "its");
+  require_same(digests.health, summary->digests.health, "the health of its");
+  return DigestCheck::holds;
 }
 
 WalkedResults walk_checked(const Store& store, const std::function<void(const RunResult&)>& visit) {
@@ -40,8 +48,9 @@ WalkedResults walk_checked(const Store& store, const std::function<void(const Ru
       digest.add(result);
       ++walked.num_results;
     });
-    walked.digest = digest.finish();
-    walked.check = check_digest(store, walked.num_results, walked.digest);
+    const ResultDigests digests = digest.finish();
+    walked.digest = digests.results;
+    walked.check = check_digest(store, walked.num_results, digests);
   });
   return walked;
 }

@@ -18,12 +18,12 @@ enum class DigestCheck : std::uint8_t {
 /// Holds the results of a file against the digest that is stored with its statistics.
 ///
 /// @param num_results  All results of the file, in the state of the file that is being read.
-/// @param digest       Theirs.
+/// @param digests      Theirs.
 /// @throws StoreError `campaign file = x.db (is damaged: ...)` if the digest is of as many results
 ///         and another one, if it is of more results, if the counts beside it do not add up, or if
 ///         there are statistics and none is there.
 [[nodiscard]] DigestCheck check_digest(const Store& store, std::uint64_t num_results,
-                                       const std::string& digest);
+                                       const ResultDigests& digests);
 
 /// What one walk over all results of a file tells of them.
 struct WalkedResults {

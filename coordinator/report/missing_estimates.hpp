@@ -11,6 +11,7 @@ namespace proofmass::coordinator {
 struct MissingEstimates {
   std::uint64_t num_not_finite = 0;
   std::uint64_t num_no_draw = 0;
+  std::uint64_t num_lost = 0;
   std::uint64_t num_given_up = 0;  ///< Having crashed workers: without a result.
 
   /// Counts a result if it has no estimate.

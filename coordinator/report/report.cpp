@@ -28,13 +28,13 @@ void check_given_up(const Store& store, const CampaignStatistics& statistics,
 std::string report_of_one_state(const Store& store, const Scenario& scenario) {
   const ReadResults results = read_results(store, scenario);
   const CampaignStatistics& statistics = results.statistics;
-  const DigestCheck check = check_digest(store, statistics.num_runs, results.digest);
+  const DigestCheck check = check_digest(store, statistics.num_runs, results.digests);
   const std::vector<RunRange> given_up = store.given_up_runs();
   const std::uint64_t num_given_up = num_runs_in(given_up);
   check_given_up(store, statistics, num_given_up);
   check_stop_checks(store, scenario.objectives);
   std::string text = summary_text(store.name(), store.seed(), store.num_runs(), statistics,
-                                  results.digest, check) +
+                                  results.digests.results, check) +
                      given_up_text(given_up) + stop_text(store);
   for (const std::string& table :
        {accuracy_table(scenario, statistics), interval_table(statistics, num_given_up),
@@ -56,8 +56,8 @@ std::string report_text(const Store& store, const Scenario& scenario) {
 std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_t num_runs,
                          const CampaignStatistics& statistics, std::string_view digest,
                          DigestCheck check) {
-  const std::uint64_t num_imperfect =
-      statistics.num_not_converged + statistics.num_not_finite + statistics.num_no_draw;
+  const std::uint64_t num_imperfect = statistics.num_not_converged + statistics.num_not_finite +
+                                      statistics.num_no_draw + statistics.num_lost;
   std::string text = fmt::format("Campaign  {}\nSeed      {}\nDigest    {}\n", name, seed, digest);
   if (check == DigestCheck::not_checked) {
     text += fmt::format("          (not checked: no stored one of these {} runs)\n",
@@ -66,9 +66,10 @@ std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_
   text += fmt::format("Runs      {} finished of {}, {} completed\n", statistics.num_runs, num_runs,
                       statistics.num_runs - num_imperfect);
   if (num_imperfect > 0) {
-    text += fmt::format("          {} not converged, {} not finite, {} without draw\n",
-                        statistics.num_not_converged, statistics.num_not_finite,
-                        statistics.num_no_draw);
+    text += fmt::format(
+        "          {} not converged, {} not finite, {} without draw{}\n",
+        statistics.num_not_converged, statistics.num_not_finite, statistics.num_no_draw,
+        statistics.num_lost > 0 ? fmt::format(", {} lost", statistics.num_lost) : std::string());
   }
   return text;
 }
@@ -105,7 +106,7 @@ ReadResults read_results(const Store& store, const Scenario& scenario) {
   const Requirement all_objectives{.tolerance = {},
                                    .subject = Requirement::Subject::all_objectives};
   ReadResults results{.statistics = {},
-                      .digest = {},
+                      .digests = {},
                       .totals = {},
                       .exceedances = Exceedances(all_objectives, scenario.objectives)};
   // Both are asked each time: they may need different numbers of passes.
@@ -129,7 +130,7 @@ ReadResults read_results(const Store& store, const Scenario& scenario) {
       });
     }
     results.statistics = passes.statistics();
-    results.digest = digest.finish();
+    results.digests = digest.finish();
     results.totals = totals.totals();
   });
   return results;
@@ -160,7 +161,7 @@ StoredBudgets budgets_of(const Scenario& scenario, const CampaignStatistics& sta
 void write_statistics(Store& store, const Scenario& scenario, const ReadResults& results) {
   const StoredBudgets budgets = budgets_of(scenario, results.statistics);
   store.write_statistics(results.statistics, budgets.before, budgets.after_worst,
-                         budgets.after_mean, results.digest);
+                         budgets.after_mean, results.digests);
 }
 
 std::vector<std::string> statistic_differences(const Store& store, const Scenario& scenario,

@@ -60,7 +60,7 @@ namespace proofmass::coordinator {
 /// What the results of a campaign file yield.
 struct ReadResults {
   CampaignStatistics statistics;
-  std::string digest;
+  ResultDigests digests;
   std::optional<RunTotals> totals;  ///< Empty if no run has an estimate.
   Exceedances exceedances;          ///< Runs in which an objective does not hold.
 };

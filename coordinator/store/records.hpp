@@ -159,6 +159,14 @@ struct Contradiction {
   std::string second_digest;
 };
 
+/// What tells whether results are those that were stored, each 64 hexadecimal digits.
+struct ResultDigests {
+  std::string results;  ///< Of what was found of each run.
+  std::string health;   ///< Of the health of their loops; empty if none of them has any.
+
+  bool operator==(const ResultDigests&) const = default;
+};
+
 /// What the stored statistics were computed from.
 struct Summary {
   std::uint64_t num_finished = 0;
@@ -166,8 +174,9 @@ struct Summary {
   std::uint64_t num_not_converged = 0;
   std::uint64_t num_not_finite = 0;
   std::uint64_t num_no_draw = 0;
+  std::uint64_t num_lost = 0;
   std::uint64_t num_given_up = 0;  ///< Not among the finished ones.
-  std::string digest;              ///< Of the results, 64 hexadecimal digits.
+  ResultDigests digests;
   std::string computed_utc;
 
   bool operator==(const Summary&) const = default;

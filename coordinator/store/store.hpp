@@ -184,10 +184,10 @@ class Store {
   /// Replaces the stored statistics and budgets, and the summary of what they were computed from.
   /// @param after_worst  With each parameter's worst error; ignored while no run has an estimate.
   /// @param after_mean   The same with the mean errors.
-  /// @param digest       Of the same results, 64 hexadecimal digits.
+  /// @param digests      Of the same results.
   void write_statistics(const CampaignStatistics& statistics, const Budget& before,
                         const Budget& after_worst, const Budget& after_mean,
-                        std::string_view digest);
+                        const ResultDigests& digests);
   /// That of the last write_statistics(); empty before the first.
   [[nodiscard]] std::optional<Summary> summary() const;
 

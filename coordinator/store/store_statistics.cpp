@@ -30,10 +30,10 @@ void replace_all(Database& database, const CampaignStatistics& statistics, const
 
 void Store::write_statistics(const CampaignStatistics& statistics, const Budget& before,
                              const Budget& after_worst, const Budget& after_mean,
-                             std::string_view digest) {
+                             const ResultDigests& digests) {
   parts_->change([&](Database& database) {
     replace_all(database, statistics, before, after_worst, after_mean);
-    detail::replace_summary(database, statistics, digest);
+    detail::replace_summary(database, statistics, digests);
   });
 }
 

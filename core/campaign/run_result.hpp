@@ -2,11 +2,13 @@
 
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/campaign/identifiers.hpp"
+#include "core/campaign/loop_health.hpp"
 #include "core/campaign/parameter.hpp"
 
 namespace proofmass {
@@ -25,6 +27,7 @@ enum class RunStatus : std::uint8_t {
   not_finite =
       3,        ///< An estimate is out of range, see is_in_range(); truth holds, estimates do not.
   no_draw = 4,  ///< No draw inside the acceptance bounds was found; neither truth nor estimate.
+  lost = 5,     ///< A loop or a sensor left its limits, see Loss; truth holds, estimates do not.
 };
 
 /// `not_converged`, for people and files.
@@ -38,6 +41,9 @@ struct RunResult {
   std::uint32_t num_rounds = 0;  ///< Estimation rounds until no estimate moved any more.
   ParameterArray truth{};        ///< SI, from the drawn instrument's exact matrices.
   ParameterArray estimate{};     ///< SI.
+  /// Nothing if has_truth() does not hold, and of runs from before model hardy2013-3.
+  std::optional<LoopHealth> health{};
+  Loss loss{};  ///< Says more if the status is `lost`, nothing otherwise.
 
   /// True if `truth` means something.
   [[nodiscard]] bool has_truth() const { return status != RunStatus::no_draw; }

@@ -107,6 +107,20 @@ struct EstimationConfig {
   std::int64_t num_rounds_max = 10;
 };
 
+struct SensorConfig {
+  /// Largest acceleration that a sensor reports on an axis, m/s²; a larger one reads as this.
+  double range_m_s2 = 1e-5;
+};
+
+/// Limits beyond which a run is `lost`: its estimates are not what the method claims of them. A
+/// sensor at the end of its range is lost, too.
+struct HealthConfig {
+  double attitude_max_rad = 1.4e-3;  ///< The tilt behind the budget's T_xy.
+  double residual_max_m_s2 = 1e-10;  ///< K2 of its square: 1e-3 of Δx's objective at the bound.
+  double quadratic_noise_max = 1.0;  ///< Then noise is √2 of what the sensors have.
+  double square_noise_max = 5e-4;    ///< K2 is then known to 1.6 %, and its estimate still linear.
+};
+
 /// A draw outside these bounds is drawn again.
 struct AcceptanceConfig {
   double a_d11_max = 1e-2;
@@ -132,6 +146,8 @@ struct Scenario {
   NoiseConfig noise;
   DragFreeConfig drag_free;
   AttitudeConfig attitude;
+  SensorConfig sensor;
+  HealthConfig health;
   EstimationConfig estimation;
   AcceptanceConfig acceptance;
   BudgetConfig budget;

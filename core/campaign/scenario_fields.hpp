@@ -115,6 +115,26 @@ void visit_control(Config& scenario, Visitor& visit) {
 }
 
 template <typename Config, typename Visitor>
+void visit_limits(Config& scenario, Visitor& visit) {
+  visit(FieldInfo{"sensor.range_m_s2", "Largest acceleration that a sensor reports.",
+                  range::positive},
+        scenario.sensor.range_m_s2);
+  auto& health = scenario.health;
+  visit(FieldInfo{"health.attitude_max_rad", "Angle that the attitude loop has to remove.",
+                  range::positive},
+        health.attitude_max_rad);
+  visit(FieldInfo{"health.residual_max_m_s2", "Measured acceleration at the test frequency.",
+                  range::positive},
+        health.residual_max_m_s2);
+  visit(FieldInfo{"health.quadratic_noise_max",
+                  "Noise of quadratic terms over the sensors', power.", range::positive},
+        health.quadratic_noise_max);
+  visit(FieldInfo{"health.square_noise_max", "Noise of a squared measurement over its line, power.",
+                  range::positive},
+        health.square_noise_max);
+}
+
+template <typename Config, typename Visitor>
 void visit_estimation(Config& estimation, Visitor& visit) {
   visit(FieldInfo{"estimation.method", "\"hardy2013\": one parameter a session, iterated."},
         estimation.method);
@@ -186,6 +206,7 @@ void for_each_field(Config& scenario, Visitor&& visit) {
   detail::visit_environment(scenario.environment, visit);
   detail::visit_noise(scenario.noise, visit);
   detail::visit_control(scenario, visit);
+  detail::visit_limits(scenario, visit);
   detail::visit_estimation(scenario.estimation, visit);
   detail::visit_tables(scenario, visit);
 }

@@ -57,6 +57,7 @@ struct CampaignStatistics {
   std::uint64_t num_not_converged = 0;
   std::uint64_t num_not_finite = 0;
   std::uint64_t num_no_draw = 0;
+  std::uint64_t num_lost = 0;
   /// Indexed by `index(parameter)`; all zero if num_estimated = 0.
   std::array<AccuracyStatistic, num_parameters> accuracy{};
 

@@ -44,6 +44,7 @@ void StatisticsPasses::count(const RunResult& result) {
   if (result.status == RunStatus::not_converged) ++counts_.num_not_converged;
   if (result.status == RunStatus::not_finite) ++counts_.num_not_finite;
   if (result.status == RunStatus::no_draw) ++counts_.num_no_draw;
+  if (result.status == RunStatus::lost) ++counts_.num_lost;
   if (result.has_estimate()) ++counts_.num_estimated;
 }
 

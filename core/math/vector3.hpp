@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "core/math/inline.hpp"
 
@@ -55,6 +57,31 @@ template <typename T>
 PROOFMASS_INLINE Vector3<T> scaled(const Vector3<T>& a, const Vector3<T>& b) {
   return {a.x * b.x, a.y * b.y, a.z * b.z};
 }
+/// |a|, and the larger of two numbers: `b` if `a` is not a number, as vector instructions have it.
+PROOFMASS_INLINE double magnitude(double a) { return std::abs(a); }
+PROOFMASS_INLINE double larger(double a, double b) { return a > b ? a : b; }
+PROOFMASS_INLINE double smaller(double a, double b) { return a < b ? a : b; }
+/// True if the number of any lane is above a limit.
+PROOFMASS_INLINE bool is_any_above(double a, double limit) { return a > limit; }
+
+/// Largest magnitude of a vector's elements and `most`; elements that are not numbers are passed
+/// over.
+template <typename T>
+PROOFMASS_INLINE T largest_magnitude(const Vector3<T>& a, const T& most) {
+  return larger(magnitude(a.x), larger(magnitude(a.y), larger(magnitude(a.z), most)));
+}
+/// The limit in each lane whose number is above it, no limit in the others.
+PROOFMASS_INLINE double limit_where_above(double a, double limit) {
+  return a > limit ? limit : std::numeric_limits<double>::infinity();
+}
+/// Each element cut off at ±limit; what is not a number stays.
+template <typename T>
+PROOFMASS_INLINE Vector3<T> clamped(const Vector3<T>& a, const T& limit) {
+  const T bottom = -limit;
+  const auto clamp = [&](const T& x) { return larger(bottom, smaller(limit, x)); };
+  return {clamp(a.x), clamp(a.y), clamp(a.z)};
+}
+
 /// The same number for every lane.
 template <typename T>
 PROOFMASS_INLINE Vector3<T> broadcast(const Vector3<double>& a) {

@@ -70,6 +70,32 @@ HWY_INLINE Batch sqrt(const Batch& a) {
   return map(a, [](V x) HWY_ATTR { return hn::Sqrt(x); });
 }
 
+HWY_INLINE Batch magnitude(const Batch& a) {
+  return map(a, [](V x) HWY_ATTR { return hn::Abs(x); });
+}
+// The instructions yield the second operand if the first is not a number, as the functions of
+// core/math/vector3.hpp do.
+HWY_INLINE Batch larger(const Batch& a, const Batch& b) {
+  return map(a, b, [](V x, V y) HWY_ATTR { return hn::Max(x, y); });
+}
+HWY_INLINE Batch smaller(const Batch& a, const Batch& b) {
+  return map(a, b, [](V x, V y) HWY_ATTR { return hn::Min(x, y); });
+}
+HWY_INLINE bool is_any_above(const Batch& a, double limit) {
+  auto above = hn::Gt(a.part[0], hn::Set(Doubles(), limit));
+  for (std::size_t i = 1; i < num_vectors; ++i) {
+    above = hn::Or(above, hn::Gt(a.part[i], hn::Set(Doubles(), limit)));
+  }
+  return !hn::AllFalse(Doubles(), above);
+}
+
+HWY_INLINE Batch limit_where_above(const Batch& a, double limit) {
+  return map(a, [limit](V x) HWY_ATTR {
+    const V top = hn::Set(Doubles(), limit);
+    return hn::IfThenElse(hn::Gt(x, top), top, hn::Inf(Doubles()));
+  });
+}
+
 HWY_INLINE Batch load(const double (&values)[num_lanes]) {
   Batch batch;
   for (std::size_t i = 0; i < num_vectors; ++i) {

@@ -63,7 +63,8 @@ HWY_INLINE LoopConstants<Batch> gather_constants(ConstantsOfLanes of) {
           gather_vector([&](std::size_t lane) { return of[lane].subtracted_bias_m_s2; }),
           gather_matrix([&](std::size_t lane) { return of[lane].thrust_matrix; }),
           gather_vector([&](std::size_t lane) { return of[lane].angular_bias_rad_s2; }),
-          gather_vector([&](std::size_t lane) { return of[lane].star_tracker_bias_rad; })};
+          gather_vector([&](std::size_t lane) { return of[lane].star_tracker_bias_rad; }),
+          of[0].sensor_range_m_s2};
 }
 
 HWY_INLINE NoiseStates<Batch> gather_states(
@@ -103,14 +104,46 @@ HWY_INLINE std::array<Group, num_groups> make_groups(const BatchSession& session
                 make_noise(session, g * num_lanes)}...};
 }
 
-HWY_INLINE void scatter(const SignalSums<Batch>& sums,
-                        std::span<SignalSums<double>, num_lanes> result) {
-  for (std::size_t s = 0; s < num_signals; ++s) {
-    for (std::size_t i = 0; i < 2 * num_fit_lines_max; ++i) {
-      const Lanes values(sums[s][i]);
-      for (std::size_t lane = 0; lane < num_lanes; ++lane) result[lane][s][i] = values[lane];
+using OutcomesOfLanes = std::span<SessionOutcome, num_lanes>;
+
+/// Gives each lane its number; place(outcome) is where it belongs.
+template <typename Place>
+HWY_INLINE void scatter_number(const Batch& numbers, OutcomesOfLanes outcomes, const Place& place) {
+  const Lanes values(numbers);
+  for (std::size_t lane = 0; lane < num_lanes; ++lane) place(outcomes[lane]) = values[lane];
+}
+
+HWY_INLINE void scatter_health(const Group& group, OutcomesOfLanes outcomes) {
+  const auto put = [&](const Batch& numbers, const auto& place) {
+    scatter_number(numbers, outcomes,
+                   [&](SessionOutcome& outcome) -> double& { return place(outcome.health); });
+  };
+  const LoopMonitor<Batch>& monitor = group.monitor;
+  put(group.loop.largest_acceleration,
+      [](SessionHealth& h) -> double& { return h.acceleration_m_s2; });
+  put(group.loop.largest_angle, [](SessionHealth& h) -> double& { return h.attitude_rad; });
+  put(monitor.quadratic.squares, [](SessionHealth& h) -> double& { return h.quadratic_squares; });
+  put(monitor.common_square.squares, [](SessionHealth& h) -> double& { return h.common_squares; });
+  for (std::size_t k = 0; k < 2; ++k) {
+    put(monitor.sensor_square[k].squares,
+        [k](SessionHealth& h) -> double& { return h.sensor_squares[k]; });
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      put(monitor.residual[axis][i],
+          [=](SessionHealth& h) -> double& { return h.residual[axis][i]; });
     }
   }
+}
+
+HWY_INLINE void scatter(const Group& group, OutcomesOfLanes outcomes) {
+  for (std::size_t s = 0; s < num_signals; ++s) {
+    for (std::size_t i = 0; i < 2 * num_fit_lines_max; ++i) {
+      scatter_number(group.sums[s][i], outcomes,
+                     [=](SessionOutcome& outcome) -> double& { return outcome.sums[s][i]; });
+    }
+  }
+  scatter_health(group, outcomes);
 }
 
 }  // namespace
@@ -120,7 +153,7 @@ HWY_INLINE void scatter(const SignalSums<Batch>& sums,
 
 void PROOFMASS_NAME(record_batch_,
                     PROOFMASS_KERNEL_SET)(const BatchSession& session,
-                                          std::span<SignalSums<double>, batch_lanes> sums) {
+                                          std::span<SessionOutcome, batch_lanes> outcomes) {
   BatchSignals signals(*session.signals);
   auto groups = make_groups(session, std::make_index_sequence<num_groups>());
   const auto progress = [&](std::size_t num_samples) {
@@ -130,7 +163,7 @@ void PROOFMASS_NAME(record_batch_,
   const auto used = std::span(groups).first(num_used);
   record_session(signals, session.setup, used, session.weights_buffer, progress);
   for (std::size_t g = 0; g < num_used; ++g) {
-    scatter(groups[g].sums, lanes_of(sums, g * num_lanes));
+    scatter(groups[g], lanes_of(outcomes, g * num_lanes));
   }
 }
 

@@ -27,19 +27,19 @@ struct BatchSession {
   const void* progress_context = nullptr;
 };
 
-/// record_session() for batch_lanes runs at once, into one SignalSums a lane, the same bits as for
+/// record_session() for batch_lanes runs at once, into one outcome a lane, the same bits as for
 /// each alone.
 using BatchKernel = void (*)(const BatchSession& session,
-                             std::span<SignalSums<double>, batch_lanes> sums);
+                             std::span<SessionOutcome, batch_lanes> outcomes);
 
 // One for each instruction set that has more than one lane; compiled with that set's flags, to be
 // called only where available_instruction_sets() holds it.
 void record_batch_sse4(const BatchSession& session,
-                       std::span<SignalSums<double>, batch_lanes> sums);
+                       std::span<SessionOutcome, batch_lanes> outcomes);
 void record_batch_avx2(const BatchSession& session,
-                       std::span<SignalSums<double>, batch_lanes> sums);
+                       std::span<SessionOutcome, batch_lanes> outcomes);
 void record_batch_avx512(const BatchSession& session,
-                         std::span<SignalSums<double>, batch_lanes> sums);
+                         std::span<SessionOutcome, batch_lanes> outcomes);
 
 /// @pre set is not `scalar`.
 [[nodiscard]] BatchKernel batch_kernel(InstructionSet set);

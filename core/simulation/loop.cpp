@@ -76,6 +76,7 @@ LoopConstants<double> make_loop_constants(const Instrument& instrument, const Sc
         sensor, instrument.centre_offset_m + side * instrument.offcentring_m, direction);
     subtracted_bias += weights[k] * sensor.read_out_bias_m_s2;
   }
+  constants.sensor_range_m_s2 = scenario.sensor.range_m_s2;
   constants.drag_free_weight = weights;
   constants.subtracted_bias_m_s2 = vector(subtracted_bias);
   constants.thrust_matrix = matrix(instrument.thrust_matrix);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "core/control/attitude_loop.hpp"
 #include "core/control/drag_free_loop.hpp"
@@ -22,15 +23,22 @@ struct LoopConstants {
   Matrix3<T> thrust_matrix;           ///< [M_DF].
   Vector3<T> angular_bias_rad_s2;
   Vector3<T> star_tracker_bias_rad;
+  double sensor_range_m_s2 = 0.0;  ///< The same for every lane.
 };
 
 /// What the instrument and the on-board estimator report at one sample.
 template <typename T>
 struct Observation {
   std::array<Vector3<T>, 2> measured;  ///< Γ_mes,k, m/s².
+  std::array<T, 2> kinematic_x;        ///< Γ_App,k + p_k along X, m/s².
   Vector3<T> measured_angular;         ///< rad/s².
   AttitudeEstimator<T> attitude;       ///< With the commanded motion still in its angles.
 };
+
+/// Whether the largest acceleration and angle are looked at in a sample: in every fourth it costs
+/// little, and a limit cycle at half the sample rate has the same size in all of them. From the
+/// sample on in which a sensor is found beyond its range, its measurements end there.
+enum class Watch : std::uint8_t { no, yes };
 
 /// Satellite, instrument, drag-free and attitude loops, from sample to sample ([Hardy2013]
 /// section 5.1).
@@ -48,6 +56,9 @@ struct Loop {
   DragFreeController<T> drag_free;
   AttitudeEstimator<T> estimator;
   AttitudeController<T> controller;
+  T largest_acceleration{};  ///< |Γ_mes,k| on any axis before the range cuts it off, m/s².
+  T largest_angle{};         ///< |θ̂| about any axis, rad.
+  bool is_any_saturated = false;
 
   /// Puts the satellite at rest in its reference attitude.
   void begin(const SessionSignals::Reference& reference) {
@@ -55,10 +66,17 @@ struct Loop {
     rate = broadcast<T>(reference.rate);
   }
 
+  /// Forgets what the loops did while they settled.
+  void begin_record() {
+    largest_acceleration = largest_angle = T(0.0);
+    is_any_saturated = false;
+  }
+
   PROOFMASS_INLINE Observation<T> advance(const LoopConstants<T>& constants,
                                           const DragFreeGains& drag_free_gains,
                                           const AttitudeGains& attitude_gains,
-                                          const SharedSample& shared, const SampleNoise<T>& noise) {
+                                          const SharedSample& shared, const SampleNoise<T>& noise,
+                                          Watch watch = Watch::yes) {
     // Γ_sat = Γ_propu + Γ_ext, Γ_propu = −[M_DF] Γ_DF + Γ_n,DF
     const Vector3<T> thrust = noise.thrust - constants.thrust_matrix * thrust_command;
     const Vector3<T> angular_acceleration =
@@ -73,10 +91,19 @@ struct Loop {
     Observation<T> observation;
     for (std::size_t k = 0; k < 2; ++k) {
       const SensorModel<T>& sensor = constants.sensors[k];
-      observation.measured[k] =
-          measured_acceleration(sensor,
-                                kinematic_acceleration(sensor, satellite, shared.mass_motion)) +
-          noise.sensor[k];
+      const Vector3<T> kinematic = kinematic_acceleration(sensor, satellite, shared.mass_motion);
+      observation.kinematic_x[k] = kinematic.x;
+      observation.measured[k] = measured_acceleration(sensor, kinematic) + noise.sensor[k];
+    }
+    if (watch == Watch::yes) {
+      for (const Vector3<T>& measured : observation.measured) {
+        largest_acceleration = largest_magnitude(measured, largest_acceleration);
+      }
+      is_any_saturated = is_any_above(largest_acceleration, constants.sensor_range_m_s2);
+    }
+    if (is_any_saturated) [[unlikely]] {
+      const T limit = limit_where_above(largest_acceleration, constants.sensor_range_m_s2);
+      for (Vector3<T>& measured : observation.measured) measured = clamped(measured, limit);
     }
     observation.measured_angular =
         angular_acceleration + constants.angular_bias_rad_s2 + noise.angular;
@@ -87,6 +114,7 @@ struct Loop {
                                           constants.star_tracker_bias_rad + noise.star_tracker +
                                           broadcast<T>(shared.attitude_command_rad));
     observation.attitude = estimator;
+    if (watch == Watch::yes) largest_angle = largest_magnitude(estimator.angle, largest_angle);
     torque_command = controller.advance(attitude_gains, estimator);
     estimator.predict(attitude_gains, observation.measured_angular,
                       broadcast<T>(shared.reference_rate));

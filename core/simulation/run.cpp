@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "core/campaign/draw.hpp"
 #include "core/error.hpp"
 #include "core/estimation/calibration.hpp"
 #include "core/simulation/batch_kernel.hpp"
+#include "core/simulation/run_health.hpp"
 #include "core/simulation/session_record.hpp"
 
 namespace proofmass {
@@ -41,6 +43,16 @@ SessionPhasors to_phasors(const SignalSums<double>& sums, std::size_t num_lines)
     }
   }
   return phasors;
+}
+
+SessionHealth to_health(const LaneGroup<double, SessionNoise>& run) {
+  const LoopMonitor<double>& monitor = run.monitor;
+  return {.acceleration_m_s2 = run.loop.largest_acceleration,
+          .attitude_rad = run.loop.largest_angle,
+          .quadratic_squares = monitor.quadratic.squares,
+          .common_squares = monitor.common_square.squares,
+          .sensor_squares = {monitor.sensor_square[0].squares, monitor.sensor_square[1].squares},
+          .residual = monitor.residual};
 }
 
 /// What is known of a run before it is simulated.
@@ -98,31 +110,68 @@ struct RunPlan::Parts {
         drag_free(drag_free_gains(c.scenario.drag_free, c.scenario.simulation.sample_period_s)),
         attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)) {
     weights.reserve(campaign.scenario.sessions.size());
-    for (const Session& session : campaign.scenario.sessions) {
+    residual_weights.resize(campaign.scenario.sessions.size());
+    for (std::size_t i = 0; i < campaign.scenario.sessions.size(); ++i) {
+      const Session& session = campaign.scenario.sessions[i];
       weights.emplace_back(line_fit(campaign.scenario, session));
+      if (!session.excitations.empty() || is_monitored_before(i)) continue;
+      residual_weights[i].emplace(residual_fit(campaign.scenario, session));
     }
   }
 
-  [[nodiscard]] SessionSetup setup(std::size_t i, WeightReader& reader) const {
-    return {.reader = &reader,
+  /// True if the loops of a session without excitation are those of one before, which tells enough.
+  [[nodiscard]] bool is_monitored_before(std::size_t i) const {
+    const Session& session = campaign.scenario.sessions[i];
+    for (std::size_t k = 0; k < i; ++k) {
+      const Session& before = campaign.scenario.sessions[k];
+      if (is_quiet(k) && before.spin_rate_rad_s == session.spin_rate_rad_s &&
+          before.drag_free == session.drag_free) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  [[nodiscard]] bool is_quiet(std::size_t i) const { return residual_weights[i].has_value(); }
+
+  /// Makes the weights of a session, block by block.
+  struct Readers {
+    explicit Readers(const Parts& parts, std::size_t i) : lines(parts.weights[i]) {
+      if (parts.is_quiet(i)) residual.emplace(*parts.residual_weights[i]);
+    }
+    WeightReader lines;
+    std::optional<WeightReader> residual;  ///< Of a session that is monitored.
+  };
+
+  [[nodiscard]] SessionSetup setup(std::size_t i, Readers& readers) const {
+    return {.reader = &readers.lines,
             .drag_free = drag_free,
             .attitude = attitude,
             .regressor = regressor_kind(campaign.scenario.sessions[i].target),
-            .num_signals_used = num_signals_used(campaign.scenario.sessions[i].target)};
+            .num_signals_used = num_signals_used(campaign.scenario.sessions[i].target),
+            .residual_reader = readers.residual ? &*readers.residual : nullptr};
   }
 
-  SessionPhasors simulate_session(std::size_t i, const Instrument& instrument, RunIndex run,
-                                  const SessionProgress& progress) const {
+  void record_session_of_run(std::size_t i, const Instrument& instrument,
+                             const SessionProgress& progress, RunRecord& record) const {
     const Scenario& scenario = campaign.scenario;
     const Session& session = scenario.sessions[i];
     SessionSignals signals(scenario, session, orbit, environment);
     LaneGroup<double, SessionNoise> alone{
         .constants = make_loop_constants(instrument, scenario, session),
-        .noise = SessionNoise(noise, campaign.seed, run, session.name)};
-    std::vector<double> buffer(LineWeights::block_size * 2 * weights[i].num_fit_lines());
-    WeightReader reader(weights[i]);
-    record_session(signals, setup(i, reader), std::span(&alone, 1), buffer, progress);
-    return to_phasors(alone.sums, weights[i].num_fit_lines());
+        .noise = SessionNoise(noise, campaign.seed, record.run, session.name)};
+    std::vector<double> buffer(weights_buffer_size(weights[i].num_fit_lines()));
+    Readers readers(*this, i);
+    record_session(signals, setup(i, readers), std::span(&alone, 1), buffer, progress);
+    keep(i, {alone.sums, to_health(alone)}, record);
+  }
+
+  /// Keeps what a session left of a run.
+  void keep(std::size_t i, const SessionOutcome& outcome, RunRecord& record) const {
+    const std::size_t target = index(campaign.scenario.sessions[i].target);
+    record.phasors[target] = to_phasors(outcome.sums, weights[i].num_fit_lines());
+    record.health[target] = outcome.health;
+    record.health[target].is_quiet = is_quiet(i);
   }
 
   void record_session_batch(std::size_t i, std::span<const Lane> lanes, BatchKernel kernel,
@@ -132,10 +181,10 @@ struct RunPlan::Parts {
     const Session& session = scenario.sessions[i];
     SessionSignals signals(scenario, session, orbit, environment);
     const NoiseStreams streams = noise_streams(session.name);
-    std::vector<double> buffer(LineWeights::block_size * 2 * weights[i].num_fit_lines());
-    WeightReader reader(weights[i]);
+    std::vector<double> buffer(weights_buffer_size(weights[i].num_fit_lines()));
+    Readers readers(*this, i);
     BatchSession batch{.signals = &signals,
-                       .setup = setup(i, reader),
+                       .setup = setup(i, readers),
                        .noise = &noise,
                        .streams = &streams,
                        .seed = campaign.seed,
@@ -149,12 +198,9 @@ struct RunPlan::Parts {
       batch.constants[l] = make_loop_constants(lane.instrument, scenario, session);
       batch.noise_states[l] = stationary_states(noise, campaign.seed, lane.run, session.name);
     }
-    std::array<SignalSums<double>, batch_lanes> sums{};
-    kernel(batch, sums);
-    for (std::size_t l = 0; l < lanes.size(); ++l) {
-      records[lanes[l].index].phasors[index(session.target)] =
-          to_phasors(sums[l], weights[i].num_fit_lines());
-    }
+    std::array<SessionOutcome, batch_lanes> outcomes{};
+    kernel(batch, outcomes);
+    for (std::size_t l = 0; l < lanes.size(); ++l) keep(i, outcomes[l], records[lanes[l].index]);
   }
 
   Campaign campaign;
@@ -163,7 +209,8 @@ struct RunPlan::Parts {
   NoiseModel noise;
   DragFreeGains drag_free;
   AttitudeGains attitude;
-  std::vector<LineWeights> weights;  ///< Of each session.
+  std::vector<LineWeights> weights;                          ///< Of each session.
+  std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
 };
 
 RunPlan::RunPlan(const Campaign& campaign) : parts_(std::make_unique<Parts>(campaign)) {}
@@ -185,8 +232,7 @@ RunRecord RunPlan::record(RunIndex run, std::span<const double> table_values,
   if (!draw.instrument) return recorded;
   SessionProgress sessions(scenario, progress);
   for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
-    recorded.phasors[index(scenario.sessions[i].target)] =
-        parts_->simulate_session(i, *draw.instrument, run, sessions);
+    parts_->record_session_of_run(i, *draw.instrument, sessions, recorded);
     sessions.end_session(i);
   }
   return recorded;
@@ -239,6 +285,13 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
   const CalibrationResult calibration =
       calibrate_hardy2013(record.phasors, scenario.estimation, scenario.objectives);
   result.num_rounds = calibration.num_rounds;
+  const HealthFinding finding = judge_health(scenario, record.health, record.phasors);
+  result.health = finding.health;
+  result.loss = finding.loss;
+  if (finding.loss.cause != LossCause::none) {
+    result.status = RunStatus::lost;
+    return result;
+  }
   if (!are_in_range(calibration.estimate)) {
     result.status = RunStatus::not_finite;
     return result;

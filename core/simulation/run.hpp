@@ -11,12 +11,13 @@
 #include "core/campaign/run_result.hpp"
 #include "core/estimation/calibration.hpp"
 #include "core/simulation/instruction_set.hpp"
+#include "core/simulation/run_health.hpp"
 
 namespace proofmass {
 
 /// Changes with every change of core that may change a result's bits. Coordinator and workers must
 /// agree on it, and a campaign is finished by the model that began it.
-inline constexpr std::string_view model_version = "hardy2013-2";
+inline constexpr std::string_view model_version = "hardy2013-3";
 
 /// Runs that one batch advances together at most.
 inline constexpr std::size_t batch_lanes = 16;
@@ -34,6 +35,7 @@ struct RunRecord {
   bool has_draw = false;  ///< False if no draw was accepted; then the rest means nothing.
   ParameterArray truth{};
   CalibrationRecord phasors{};
+  HealthRecord health{};
 };
 
 /// Everything that the runs of a campaign share: filters, weights, orbit, environment. Made once,
@@ -59,7 +61,7 @@ class RunPlan {
       std::span<const RunRequest> requests, InstructionSet set,
       const std::function<void(int)>& progress = {}) const;
 
-  /// Estimates the ten parameters from a record.
+  /// Estimates the ten parameters from a record, unless its loops left their limits.
   [[nodiscard]] RunResult estimate(const RunRecord& record) const;
 
   /// record(), then estimate(): all of a run.

@@ -9,6 +9,7 @@
 #include "core/session/session_signals.hpp"
 #include "core/signal/line_weights.hpp"
 #include "core/simulation/loop.hpp"
+#include "core/simulation/loop_monitor.hpp"
 
 namespace proofmass {
 
@@ -84,6 +85,14 @@ struct SessionSetup {
   AttitudeGains attitude;
   RegressorKind regressor = RegressorKind::none;
   std::size_t num_signals_used = num_signals;  ///< num_common_signals or all.
+  /// Weights of the line at f_EP; null in a session that is not monitored.
+  WeightReader* residual_reader = nullptr;
+};
+
+/// Weights of a block of samples.
+struct BlockWeights {
+  const double* lines = nullptr;     ///< Of the session's lines; null while the loops settle.
+  const double* residual = nullptr;  ///< Of the line at f_EP; null where it is not monitored.
 };
 
 /// Adds one sample's signals to the sums of one output of the line weights.
@@ -109,6 +118,11 @@ PROOFMASS_INLINE void add_sample(const std::array<T, num_signals>& values, const
   }
 }
 
+/// Weights of a block for the session's lines and for that at f_EP.
+[[nodiscard]] constexpr std::size_t weights_buffer_size(std::size_t num_fit_lines) {
+  return LineWeights::block_size * 2 * (num_fit_lines + 1);
+}
+
 /// The runs that one T holds, in one session.
 template <typename T, typename Noise>
 struct LaneGroup {
@@ -116,23 +130,32 @@ struct LaneGroup {
   Noise noise;  ///< next() yields the SampleNoise<T> of each sample, settling included.
   Loop<T> loop{};
   SignalSums<T> sums{};
+  LoopMonitor<T> monitor{};
+};
+
+/// What a session leaves of a run.
+struct SessionOutcome {
+  SignalSums<double> sums{};
+  SessionHealth health;
 };
 
 /// Advances all groups by some samples.
-/// @param weights  Of these samples; null while the loops settle, when nothing is summed.
+/// @param weights  Of these samples; none while the loops settle, when nothing is summed.
 template <typename Signals, typename Group>
 __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSetup& setup,
                                               std::span<Group> groups, std::size_t num_samples,
-                                              const double* weights) {
+                                              const BlockWeights& weights) {
   const std::size_t num_outputs = 2 * setup.reader->weights().num_fit_lines();
   for (std::size_t k = 0; k < num_samples; ++k) {
     const SharedSample& shared = signals.next();
-    for (auto& [constants, noise, loop, sums] : groups) {
-      const auto observation =
-          loop.advance(constants, setup.drag_free, setup.attitude, shared, noise.next());
-      if (weights == nullptr) continue;
-      add_sample(ground_signals(observation, shared, setup.regressor), weights + k * num_outputs,
-                 num_outputs, setup.num_signals_used, sums);
+    for (auto& [constants, noise, loop, sums, monitor] : groups) {
+      const auto observation = loop.advance(constants, setup.drag_free, setup.attitude, shared,
+                                            noise.next(), k % 4 == 0 ? Watch::yes : Watch::no);
+      if (weights.lines == nullptr) continue;
+      add_sample(ground_signals(observation, shared, setup.regressor),
+                 weights.lines + k * num_outputs, num_outputs, setup.num_signals_used, sums);
+      if (weights.residual == nullptr) continue;
+      monitor.add(constants.sensors, observation, weights.residual + 2 * k);
     }
   }
 }
@@ -141,19 +164,30 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
 ///
 /// @param signals   Like SessionSignals, not yet asked for any sample.
 /// @param groups    With zero sums and a loop that has not begun.
-/// @param buffer    Room for a block of weights.
+/// @param buffer    Room for weights_buffer_size() weights.
 /// @param progress  Called with the number of record samples done after each block.
 template <typename Signals, typename Group, typename Progress>
 inline void record_session(Signals& signals, const SessionSetup& setup, std::span<Group> groups,
                            std::span<double> buffer, const Progress& progress) {
   for (Group& group : groups) group.loop.begin(signals.reference_at_start());
-  advance_groups(signals, setup, groups, static_cast<std::size_t>(signals.num_settling()), nullptr);
+  advance_groups(signals, setup, groups, static_cast<std::size_t>(signals.num_settling()), {});
+  for (Group& group : groups) group.loop.begin_record();
   const LineWeights& weights = setup.reader->weights();
   std::size_t num_done = 0;
   for (std::size_t block = 0; block < weights.num_blocks(); ++block) {
     setup.reader->fill_block(block, buffer);
+    BlockWeights block_weights{.lines = buffer.data()};
+    if (setup.residual_reader != nullptr) {
+      const std::span<double> residual = buffer.last(2 * LineWeights::block_size);
+      setup.residual_reader->fill_block(block, residual);
+      block_weights.residual = residual.data();
+    }
     const std::size_t num_samples = weights.samples_in(block);
-    advance_groups(signals, setup, groups, num_samples, buffer.data());
+    advance_groups(signals, setup, groups, num_samples, block_weights);
+    // A block that is not full has a sum of its own size.
+    if (num_samples == LineWeights::block_size) {
+      for (Group& group : groups) group.monitor.end_block(block == 0);
+    }
     num_done += num_samples;
     progress(num_done);
   }

@@ -93,6 +93,14 @@ void write(const GiveBack& give_back, proto::Envelope& envelope) {
   for (const HeldRuns& held : give_back.runs) write_held(held, *message.add_runs());
 }
 
+void write_health(const LoopHealth& health, proto::LoopHealth& message) {
+  message.set_acceleration_m_s2(health.acceleration_m_s2);
+  message.set_attitude_rad(health.attitude_rad);
+  message.set_residual_m_s2(health.residual_m_s2);
+  message.set_quadratic_noise(health.quadratic_noise);
+  message.set_square_noise(health.square_noise);
+}
+
 void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
   const RunResult& result = computed.result;
   message.set_run(result.run.value);
@@ -104,6 +112,14 @@ void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
   }
   if (result.has_estimate()) {
     message.mutable_estimate()->Assign(result.estimate.begin(), result.estimate.end());
+  }
+  // What was simulated has health; the message has it whenever the status allows it.
+  if (result.has_truth()) {
+    write_health(result.health.value_or(LoopHealth{}), *message.mutable_health());
+  }
+  if (result.status == RunStatus::lost) {
+    message.set_loss_cause(static_cast<proto::LossCause>(result.loss.cause));
+    message.set_loss_session(static_cast<proto::SessionTarget>(result.loss.session));
   }
   message.set_compute_s(computed.compute_s);
   message.set_elapsed_s(computed.elapsed_s);

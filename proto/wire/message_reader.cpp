@@ -187,9 +187,40 @@ double checked_time(double time_s, std::string_view field) {
   throw ConfigError(field, fmt::format("{}", time_s), fmt::format("must be <= {}", time_s_max));
 }
 
+double checked_health(double value, std::string_view field) {
+  if (value >= 0.0 && value <= magnitude_max) return value;
+  throw ConfigError(field, fmt::format("{}", value),
+                    fmt::format("must be in [0, {}]", magnitude_max));
+}
+
+void read_health(const proto::ComputedRun& message, RunResult& result) {
+  if (message.has_health() != result.has_truth()) {
+    throw ConfigError("health", message.has_health() ? "there" : "none",
+                      "must be there unless the status is no_draw");
+  }
+  if (!message.has_health()) return;
+  const proto::LoopHealth& health = message.health();
+  result.health = LoopHealth{
+      .acceleration_m_s2 = checked_health(health.acceleration_m_s2(), "health.acceleration_m_s2"),
+      .attitude_rad = checked_health(health.attitude_rad(), "health.attitude_rad"),
+      .residual_m_s2 = checked_health(health.residual_m_s2(), "health.residual_m_s2"),
+      .quadratic_noise = checked_health(health.quadratic_noise(), "health.quadratic_noise"),
+      .square_noise = checked_health(health.square_noise(), "health.square_noise")};
+  const bool is_lost = result.status == RunStatus::lost;
+  const int cause = static_cast<int>(message.loss_cause());
+  const int session = static_cast<int>(message.loss_session());
+  require_in(static_cast<std::uint64_t>(cause), is_lost ? 1 : 0, is_lost ? num_loss_causes : 0,
+             "loss_cause");
+  require_in(static_cast<std::uint64_t>(session), is_lost ? 1 : 0,
+             is_lost ? num_session_targets : 0, "loss_session");
+  if (!is_lost) return;
+  result.loss = {.cause = static_cast<LossCause>(cause),
+                 .session = static_cast<SessionTarget>(session)};
+}
+
 ComputedRun read_run(const proto::ComputedRun& message) {
   const int status = static_cast<int>(message.status());
-  require_in(static_cast<std::uint64_t>(status), 1, 4, "status");
+  require_in(static_cast<std::uint64_t>(status), 1, 5, "status");
   RunResult result;
   result.run = checked_run(message.run());
   result.status = static_cast<RunStatus>(status);
@@ -197,6 +228,7 @@ ComputedRun read_run(const proto::ComputedRun& message) {
   result.num_rounds = message.num_rounds();
   result.truth = read_parameters(message.truth(), result.has_truth(), "truth");
   result.estimate = read_parameters(message.estimate(), result.has_estimate(), "estimate");
+  read_health(message, result);
   return {.result = result,
           .compute_s = checked_time(message.compute_s(), "compute_s"),
           .elapsed_s = checked_time(message.elapsed_s(), "elapsed_s")};

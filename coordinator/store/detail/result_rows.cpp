@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -16,7 +17,12 @@ namespace {
 
 // Columns before the parameters': run_index, status, num_draws, num_rounds.
 constexpr int num_leading_columns = 4;
-constexpr int num_columns = num_leading_columns + 2 * static_cast<int>(num_parameters);
+// After them, from 0: those of LoopHealth, then loss_cause and loss_session.
+constexpr int first_health_column = num_leading_columns + 2 * static_cast<int>(num_parameters);
+constexpr int num_health_columns = static_cast<int>(num_health_values);
+constexpr int loss_cause_column = first_health_column + num_health_columns;
+constexpr int loss_session_column = loss_cause_column + 1;
+constexpr int num_columns = loss_session_column + 1;
 
 // Position of a parameter's truth among the columns, from 0; its estimate stands num_parameters on.
 int truth_column(const ParameterInfo& info) {
@@ -32,7 +38,12 @@ std::string column_list() {
     truths += fmt::format(", truth_{}{}", info.name, info.unit_suffix);
     estimates += fmt::format(", estimate_{}{}", info.name, info.unit_suffix);
   }
-  return "run_index, status, num_draws, num_rounds" + truths + estimates;
+  std::string health;
+  for (const HealthValue& value : health_values()) {
+    health += fmt::format(", health_{}{}", value.name, value.unit_suffix);
+  }
+  return "run_index, status, num_draws, num_rounds" + truths + estimates + health +
+         ", loss_cause, loss_session";
 }
 
 std::string insert_sql() {
@@ -55,10 +66,12 @@ std::uint64_t digest_with(std::uint64_t digest, std::uint64_t number) {
   return digest;
 }
 
+std::uint64_t digest_with(std::uint64_t digest, double value) {
+  return digest_with(digest, std::bit_cast<std::uint64_t>(value + 0.0));  // -0 + 0 is +0.
+}
+
 std::uint64_t digest_with(std::uint64_t digest, const ParameterArray& values) {
-  for (const double value : values) {
-    digest = digest_with(digest, std::bit_cast<std::uint64_t>(value + 0.0));  // -0 + 0 is +0.
-  }
+  for (const double value : values) digest = digest_with(digest, value);
   return digest;
 }
 
@@ -73,9 +86,46 @@ std::uint32_t read_number(const Statement& row, int column) {
 RunStatus read_status(const Statement& row) {
   const std::int64_t status = row.integer(1);
   const bool is_known = status >= static_cast<std::int64_t>(RunStatus::completed) &&
-                        status <= static_cast<std::int64_t>(RunStatus::no_draw);
+                        status <= static_cast<std::int64_t>(RunStatus::lost);
   if (is_known) return static_cast<RunStatus>(status);
   row.refuse_as_damaged(fmt::format("status = {} of run {}", status, row.count(0)));
+}
+
+// Rows from before version 7 have none.
+std::optional<LoopHealth> read_health(const Statement& row) {
+  if (!row.optional_real(first_health_column)) return std::nullopt;
+  LoopHealth health;
+  for (std::size_t i = 0; i < num_health_values; ++i) {
+    const int column = first_health_column + static_cast<int>(i);
+    const double value = row.optional_real(column).value_or(-1.0);
+    if (!(value >= 0.0 && value <= magnitude_max)) {
+      row.refuse_as_damaged(fmt::format("{} of run {} (must be in [0, {}])",
+                                        row.column_name(column), row.count(0), magnitude_max));
+    }
+    health.*health_values()[i].member = value;
+  }
+  return health;
+}
+
+std::int64_t read_choice(const Statement& row, int column, std::size_t count) {
+  const std::int64_t value = row.integer(column);
+  if (value >= 1 && value <= static_cast<std::int64_t>(count)) return value;
+  row.refuse_as_damaged(
+      fmt::format("{} = {} of run {}", row.column_name(column), value, row.count(0)));
+}
+
+Loss read_loss(const Statement& row, RunStatus status) {
+  if (status != RunStatus::lost) {
+    for (const int column : {loss_cause_column, loss_session_column}) {
+      if (!row.optional_count(column)) continue;
+      row.refuse_as_damaged(
+          fmt::format("{} of run {}, which is not lost", row.column_name(column), row.count(0)));
+    }
+    return {};
+  }
+  return {.cause = static_cast<LossCause>(read_choice(row, loss_cause_column, num_loss_causes)),
+          .session = static_cast<SessionTarget>(
+              read_choice(row, loss_session_column, num_session_targets))};
 }
 
 // SQLite would read a missing number as 0.
@@ -107,6 +157,17 @@ bool ResultRows::insert(const RunResult& result) {
     insert_.bind(truth_column(info) + 1, truth);
     insert_.bind(estimate_column(info) + 1, estimate);
   }
+  for (std::size_t i = 0; i < num_health_values; ++i) {
+    const auto value =
+        result.health ? std::optional((*result.health).*health_values()[i].member) : std::nullopt;
+    insert_.bind(first_health_column + static_cast<int>(i) + 1, value);
+  }
+  const auto choice = [&](auto value) {
+    return result.status == RunStatus::lost ? std::optional(static_cast<std::uint64_t>(value))
+                                            : std::nullopt;
+  };
+  insert_.bind(loss_cause_column + 1, choice(result.loss.cause));
+  insert_.bind(loss_session_column + 1, choice(result.loss.session));
   insert_.finish();
   return database_.num_changes() == 1;
 }
@@ -139,6 +200,8 @@ RunResult read_result(const Statement& row) {
     result.estimate[index(info.parameter)] =
         read_value(row, estimate_column(info), result.has_estimate());
   }
+  result.health = read_health(row);
+  result.loss = read_loss(row, result.status);
   return result;
 }
 
@@ -147,7 +210,8 @@ bool are_equal(const RunResult& left, const RunResult& right) {
   return left.run == right.run && left.status == right.status &&
          left.num_draws == right.num_draws && left.num_rounds == right.num_rounds &&
          (!left.has_truth() || left.truth == right.truth) &&
-         (!left.has_estimate() || left.estimate == right.estimate);
+         (!left.has_estimate() || left.estimate == right.estimate) && left.health == right.health &&
+         left.loss == right.loss;
 }
 
 std::uint64_t digest(const RunResult& result) {
@@ -160,7 +224,13 @@ std::uint64_t digest(const RunResult& result) {
   }
   if (result.has_truth()) digest = digest_with(digest, result.truth);
   if (result.has_estimate()) digest = digest_with(digest, result.estimate);
-  return digest;
+  if (!result.health) return digest;
+  for (const HealthValue& value : health_values()) {
+    digest = digest_with(digest, (*result.health).*value.member);
+  }
+  if (result.status != RunStatus::lost) return digest;
+  digest = digest_with(digest, static_cast<std::uint64_t>(result.loss.cause));
+  return digest_with(digest, static_cast<std::uint64_t>(result.loss.session));
 }
 
 void check_delivery(const Delivery& delivery, std::uint64_t num_runs) {

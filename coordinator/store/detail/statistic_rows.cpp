@@ -87,28 +87,31 @@ void replace_statistics(Database& database, const CampaignStatistics& statistics
 }
 
 void replace_summary(const Database& database, const CampaignStatistics& statistics,
-                     std::string_view digest) {
+                     const ResultDigests& digests) {
   database
       .prepare(
           "INSERT OR REPLACE INTO summary (summary_id, num_finished, num_estimated,"
-          " num_not_converged, num_not_finite, num_no_draw, num_given_up, digest)"
-          " VALUES (1, ?, ?, ?, ?, ?, (SELECT count(*) FROM run_failure), ?)")
+          " num_not_converged, num_not_finite, num_no_draw, num_lost, num_given_up, digest,"
+          " health_digest)"
+          " VALUES (1, ?, ?, ?, ?, ?, ?, (SELECT count(*) FROM run_failure), ?, ?)")
       .run(statistics.num_runs, statistics.num_estimated, statistics.num_not_converged,
-           statistics.num_not_finite, statistics.num_no_draw, digest);
+           statistics.num_not_finite, statistics.num_no_draw, statistics.num_lost, digests.results,
+           digests.health);
 }
 
 std::optional<Summary> read_summary(const Database& database) {
   Statement select = database.prepare(
       "SELECT num_finished, num_estimated, num_not_converged, num_not_finite, num_no_draw,"
-      " num_given_up, digest, computed_utc FROM summary");
+      " num_given_up, digest, computed_utc, num_lost, health_digest FROM summary");
   if (!select.step()) return std::nullopt;
   return Summary{.num_finished = select.count(0),
                  .num_estimated = select.count(1),
                  .num_not_converged = select.count(2),
                  .num_not_finite = select.count(3),
                  .num_no_draw = select.count(4),
+                 .num_lost = select.count(8),
                  .num_given_up = select.count(5),
-                 .digest = select.text(6),
+                 .digests = {.results = select.text(6), .health = select.text(9)},
                  .computed_utc = select.text(7)};
 }
 

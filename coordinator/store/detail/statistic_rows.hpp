@@ -1,7 +1,6 @@
 #pragma once
 
 #include <optional>
-#include <string_view>
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/records.hpp"
@@ -15,7 +14,7 @@ void replace_statistics(Database& database, const CampaignStatistics& statistics
 
 /// Replaces the row of `summary`.
 void replace_summary(const Database& database, const CampaignStatistics& statistics,
-                     std::string_view digest);
+                     const ResultDigests& digests);
 [[nodiscard]] std::optional<Summary> read_summary(const Database& database);
 
 /// A campaign's three budgets; those after calibration are absent while no run has an estimate.

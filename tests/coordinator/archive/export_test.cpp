@@ -74,10 +74,12 @@ TEST_F(Export, OfCsvHasALineARunThatReadsBackToTheSameBits) {
   EXPECT_EQ(rows[0][0], "run_index");
   EXPECT_EQ(rows[0][4], "truth_a_c11_delta_x_m");
   EXPECT_EQ(rows[0][33], "error_k2c_s2_m");
+  EXPECT_EQ(rows[0][34], "health_acceleration_m_s2");
+  EXPECT_EQ(rows[0][40], "loss_session");
   const std::vector<RunResult> results = test::results_in(store_);
   for (std::size_t run = 0; run < results.size(); ++run) {
     const auto& row = rows[run + 1];
-    ASSERT_EQ(row.size(), 34U);
+    ASSERT_EQ(row.size(), 41U);
     EXPECT_EQ(row[0], std::to_string(run));
     EXPECT_EQ(row[2], "2");
     EXPECT_EQ(row[3], "3");
@@ -105,7 +107,7 @@ TEST_F(Export, OfJsonHoldsCampaignColumnsRunsAndDigest) {
   EXPECT_EQ(parsed["campaign"]["definition"], store_.definition());
   EXPECT_EQ(parsed["num_finished"], 5);
   EXPECT_EQ(parsed["digest"], digest_of(store_));
-  EXPECT_EQ(parsed["columns"].size(), 30U);
+  EXPECT_EQ(parsed["columns"].size(), 35U);
   EXPECT_EQ(parsed["columns"][3]["unit"], "rad");
   const RunResult result = test::result_of(0);
   EXPECT_EQ(test::bits_of(parsed["runs"][0]["estimate_k2d_s2_m"]),
@@ -116,7 +118,48 @@ TEST_F(Export, OfJsonHoldsCampaignColumnsRunsAndDigest) {
   EXPECT_FALSE(parsed["runs"][2]["truth_k2d_s2_m"].is_null());
   EXPECT_TRUE(parsed["runs"][2]["estimate_k2d_s2_m"].is_null());
   EXPECT_TRUE(parsed["runs"][3]["truth_k2d_s2_m"].is_null());
-  EXPECT_EQ(parsed["runs"][4].size(), 34U);
+  EXPECT_EQ(parsed["runs"][4].size(), 41U);
+}
+
+/// A lost run, one that is completed, and one of an older program, without health.
+Store store_with_health(const std::filesystem::path& file) {
+  std::vector<Delivery> deliveries = test::deliveries_of(0, 3);
+  RunResult& lost = deliveries[0].result;
+  lost.status = RunStatus::lost;
+  lost.health = LoopHealth{2e-5, 1.0 / 3.0, 1e-12, 0.25, 1e90};
+  lost.loss = {LossCause::saturation, SessionTarget::k2_sensor_1};
+  deliveries[1].result.health = LoopHealth{1e-7, 2e-5, 1e-12, 0.25, 3e-4};
+  Store store = test::store_of(file, test::campaign_of(3), {});
+  (void)store.commit(deliveries);
+  return store;
+}
+
+TEST_F(Export, OfCsvHasHealthAndWhereARunWasLost) {
+  const Store store = store_with_health(directory() / "lost.db");
+  TextOutput text(output());
+  export_csv(store, text, test::never_stopped);
+  const std::string content = test::content_of(output());
+  EXPECT_THAT(content, HasSubstr(",health_acceleration_m_s2,health_attitude_rad,"
+                                 "health_residual_m_s2,health_quadratic_noise,health_square_noise,"
+                                 "loss_cause,loss_session\r\n0,lost,"));
+  EXPECT_THAT(content,
+              HasSubstr(",2e-05,0.3333333333333333,1e-12,0.25,1e+90,saturation,k2_sensor_1\r\n"));
+  EXPECT_THAT(content, HasSubstr(",1e-07,2e-05,1e-12,0.25,0.0003,,\r\n2,completed,"));
+  EXPECT_THAT(content, EndsWith(",,,,,,,\r\n"));
+}
+
+TEST_F(Export, OfJsonHasHealthAndWhereARunWasLost) {
+  const Store store = store_with_health(directory() / "lost.db");
+  TextOutput text(output());
+  export_json(store, text, test::never_stopped);
+  const auto runs = nlohmann::json::parse(test::content_of(output()))["runs"];
+  EXPECT_EQ(runs[0]["status"], "lost");
+  EXPECT_EQ(runs[0]["health_attitude_rad"], 1.0 / 3.0);
+  EXPECT_EQ(runs[0]["loss_cause"], "saturation");
+  EXPECT_EQ(runs[0]["loss_session"], "k2_sensor_1");
+  EXPECT_TRUE(runs[1]["loss_cause"].is_null());
+  EXPECT_EQ(runs[1]["health_square_noise"], 3e-4);
+  EXPECT_TRUE(runs[2]["health_square_noise"].is_null());
 }
 
 TEST_F(Export, OfJsonHasALineARun) {
@@ -165,14 +208,30 @@ TEST_F(Export, IsOfOneInstant) {
   EXPECT_EQ(num_runs, 3U);
 }
 
-// h5py is another reader of the format than the library's own functions.
+/// What h5py, another reader of the format than the library's own functions, has read.
+nlohmann::json read_by_h5py(const std::filesystem::path& file, const std::filesystem::path& text) {
+  const std::string command = std::string("/usr/bin/python3 '") + PROOFMASS_READ_HDF5 + "' '" +
+                              file.string() + "' > '" + text.string() + "' 2>&1";
+  const int status = std::system(command.c_str());
+  EXPECT_EQ(status, 0) << test::content_of(text);
+  return status == 0 ? nlohmann::json::parse(test::content_of(text)) : nlohmann::json();
+}
+
+TEST_F(Export, OfHdf5HasHealthAndWhereARunWasLost) {
+  const Store store = store_with_health(directory() / "lost.db");
+  export_hdf5(store, output(), test::never_stopped);
+  const auto read = read_by_h5py(output(), directory() / "read");
+  EXPECT_EQ(read["status"], nlohmann::json({"lost", "completed", "completed"}));
+  EXPECT_EQ(read["loss_cause"], nlohmann::json({"saturation", "none", "none"}));
+  EXPECT_EQ(read["loss_session"], nlohmann::json({"k2_sensor_1", "none", "none"}));
+  EXPECT_EQ(read["units"]["health/residual_m_s2"], "m/s²");
+  EXPECT_EQ(read["bits"]["health/attitude_rad"][0], test::bits_of(1.0 / 3.0));
+  EXPECT_TRUE(read["bits"]["health/attitude_rad"][2].is_null());
+}
+
 TEST_F(Export, OfHdf5IsReadByAnotherProgram) {
   export_hdf5(store_, output(), test::never_stopped);
-  const std::string command = std::string("/usr/bin/python3 '") + PROOFMASS_READ_HDF5 + "' '" +
-                              output().string() + "' > '" + (directory() / "read").string() +
-                              "' 2>&1";
-  ASSERT_EQ(std::system(command.c_str()), 0) << test::content_of(directory() / "read");
-  const auto read = nlohmann::json::parse(test::content_of(directory() / "read"));
+  const auto read = read_by_h5py(output(), directory() / "read");
   EXPECT_EQ(read["attributes"]["name"], "hardy2013");
   EXPECT_EQ(read["attributes"]["seed"], 1);
   EXPECT_EQ(read["attributes"]["num_runs"], 5);
@@ -193,7 +252,7 @@ TEST_F(Export, OfHdf5IsReadByAnotherProgram) {
   EXPECT_TRUE(read["bits"]["estimate/a_c12_rad"][2].is_null());
   EXPECT_FALSE(read["bits"]["truth/a_c12_rad"][2].is_null());
   EXPECT_TRUE(read["bits"]["truth/a_c12_rad"][3].is_null());
-  EXPECT_EQ(read["bits"].size(), 30U);
+  EXPECT_EQ(read["bits"].size(), 35U);
 }
 
 // More rows than are written at a time.

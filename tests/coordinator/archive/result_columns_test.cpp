@@ -28,10 +28,12 @@ TEST_F(ResultColumns, AreThoseOfTheTable) {
 
 TEST(ValueColumns, HaveTheUnitOfTheirParameter) {
   EXPECT_EQ(value_columns()[3].name, "truth_a_c12_rad");
-  EXPECT_EQ(value_columns()[3].parameter_name, "a_c12_rad");
+  EXPECT_EQ(value_columns()[3].own_name, "a_c12_rad");
   EXPECT_EQ(value_columns()[3].unit, "rad");
   EXPECT_EQ(value_columns()[29].name, "error_k2c_s2_m");
   EXPECT_EQ(value_columns()[29].unit, "s²/m");
+  EXPECT_EQ(value_columns()[31].name, "health_attitude_rad");
+  EXPECT_EQ(value_columns()[31].unit, "rad");
 }
 
 TEST(RunStatusName, IsKnownForEach) {

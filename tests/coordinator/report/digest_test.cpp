@@ -12,6 +12,10 @@ constexpr const char* digest_of_first =
     "1c67be44c7551128152e0805d20a1b8dfd788b49043e0db4763ad2a348fb1a01";
 constexpr const char* digest_of_both =
     "d5f80df1d4e2a241fce93f8e659cbee48dd74c1d43ddd97d80854098cfedd596";
+constexpr const char* health_of_first =
+    "00e4d422c3e49483ec1334fd153b0c663b97d722ed65b8628b80958fdf708ae1";
+constexpr const char* health_with_lost =
+    "662fe94c7831e505adef1b9b28de61e22a86d931d155a97445bdb6716a4ea92c";
 
 RunResult first_result() {
   RunResult result{.run = {7}, .status = RunStatus::not_converged, .num_draws = 3, .num_rounds = 5};
@@ -30,19 +34,39 @@ RunResult second_result() {
   return result;
 }
 
-TEST(Digest, OfNothingIsThatOfNoBytes) { EXPECT_EQ(Digest().finish(), digest_of_nothing); }
+TEST(Digest, OfNothingIsThatOfNoBytes) {
+  EXPECT_EQ(Digest().finish(), (ResultDigests{.results = digest_of_nothing, .health = ""}));
+}
 
 TEST(Digest, IsThatOfTheDocumentedBytes) {
   Digest digest;
   digest.add(first_result());
-  EXPECT_EQ(digest.finish(), digest_of_first);
+  EXPECT_EQ(digest.finish().results, digest_of_first);
 }
 
 TEST(Digest, LeavesOutWhatMeansNothing) {
   Digest digest;
   digest.add(first_result());
   digest.add(second_result());
-  EXPECT_EQ(digest.finish(), digest_of_both);
+  EXPECT_EQ(digest.finish(), (ResultDigests{.results = digest_of_both, .health = ""}));
+}
+
+TEST(Digest, OfHealthIsThatOfTheDocumentedBytesAndStandsAlone) {
+  RunResult first = first_result();
+  first.health = LoopHealth{1e-7, 2e-5, -0.0, 0.25, 3e-4};
+  first.loss.session = SessionTarget::k2d;  // Means nothing: the run is not lost.
+  Digest digest;
+  digest.add(first);
+  digest.add(second_result());
+  EXPECT_EQ(digest.finish(), (ResultDigests{.results = digest_of_both, .health = health_of_first}));
+
+  RunResult lost{.run = {9}, .status = RunStatus::lost};
+  lost.health = LoopHealth{1e-5, 2e-5, 1e-12, 0.25, 3e-4};
+  lost.loss = {LossCause::saturation, SessionTarget::a_d11_prime};
+  Digest with_lost;
+  with_lost.add(first);
+  with_lost.add(lost);
+  EXPECT_EQ(with_lost.finish().health, health_with_lost);
 }
 
 }  // namespace

@@ -241,6 +241,13 @@ TEST(Summary, TellsHowTheRunsEnded) {
             "Digest    0f3a\n"
             "Runs      90 finished of 100, 84 completed\n"
             "          3 not converged, 2 not finite, 1 without draw\n");
+  statistics.num_lost = 4;
+  EXPECT_EQ(summary_text("hardy2013", 1, 100, statistics, "0f3a"),
+            "Campaign  hardy2013\n"
+            "Seed      1\n"
+            "Digest    0f3a\n"
+            "Runs      90 finished of 100, 80 completed\n"
+            "          3 not converged, 2 not finite, 1 without draw, 4 lost\n");
 }
 
 // The largest counts, the longest name and errors of any size.
@@ -349,7 +356,7 @@ TEST_F(StoredReport, IsTheSameBitsInWhateverOrderResultsCome) {
     for (const Delivery& delivery : deliveries) store.commit({&delivery, 1});
     update_statistics(store, Scenario{});
     const detail::Database database(file().replace_filename(name), detail::Access::read_only);
-    std::string numbers = store.summary()->digest;
+    std::string numbers = store.summary()->digests.results;
     for (const char* const table : {"statistic", "budget_entry"}) {
       const std::string columns =
           database.text(fmt::format("SELECT group_concat(printf('quote(%s)', name), '||') FROM "
@@ -372,7 +379,7 @@ TEST_F(StoredReport, IsStoredAgainAfterMoreRuns) {
   store.commit(test::deliveries_of(5, 9));
   update_statistics(store, Scenario{});
   EXPECT_EQ(store.summary()->num_finished, 9U);
-  EXPECT_EQ(store.summary()->digest, digest_of(store));
+  EXPECT_EQ(store.summary()->digests.results, digest_of(store));
 
   const Entry given_up = GivenUpRun{.run = {9}};
   store.write({&given_up, 1});

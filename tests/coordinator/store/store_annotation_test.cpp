@@ -139,7 +139,7 @@ TEST_F(StoreAnnotation, RefusesFilesThatAreNotUpToDate) {
   }
   EXPECT_EQ(error_of(AddTag{"a"}),
             "campaign file = " + file().string() +
-                " (is older than this program: its user_version is 4, not 6; resuming the "
+                " (is older than this program: its user_version is 4, not 7; resuming the "
                 "campaign brings it up to date)");
   std::filesystem::create_hard_link(file(), directory() / "other.db");
   EXPECT_EQ(error_of(AddTag{"a"}),

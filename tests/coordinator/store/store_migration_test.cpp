@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/parameter.hpp"
@@ -15,6 +16,7 @@ namespace proofmass::coordinator {
 namespace {
 
 using detail::Access;
+using detail::are_equal;
 using detail::Database;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
@@ -132,6 +134,57 @@ TEST_F(StoreMigration, FromVersion5HasNoOwnerAndNoDigestOfTables) {
   EXPECT_EQ(store.owner(), "");
   EXPECT_EQ(store.table_digest(), "");
   EXPECT_EQ(Database(file(), Access::read_only).integer("SELECT is_log_needed FROM campaign"), 0);
+}
+
+/// What a file of version 6 says of its results and of who has them.
+constexpr const char* rows_of_version_6 =
+    "SELECT group_concat(quote(run_index) || quote(status) || quote(num_draws) || quote(num_rounds)"
+    " || quote(truth_k2c_s2_m) || quote(estimate_a_c12_rad) || quote(error_a_c12_rad)"
+    " || quote(attempt) || quote(compute_s), ';') FROM run_result JOIN delivery USING (run_index)";
+
+// The table of results is made anew, and other tables refer to its rows.
+TEST_F(StoreMigration, FromVersion6KeepsResultsThatHaveNoHealth) {
+  std::string before;
+  {
+    const std::filesystem::path newer = directory() / "newer.db";
+    std::vector<Delivery> deliveries;
+    for (const auto status : {RunStatus::completed, RunStatus::not_converged, RunStatus::not_finite,
+                              RunStatus::no_draw}) {
+      const std::uint64_t run = deliveries.size();
+      deliveries.push_back({test::result_of(run, status), test::session_1, {1}, 0.25});
+    }
+    const std::vector<Entry> entries{SecondDelivery{deliveries[1]}};
+    Store store = Store::create(newer, test::campaign_of(5), "");
+    store.commit(deliveries);
+    store.write(entries);
+    store.write_statistics({.num_runs = 4, .num_estimated = 2}, {}, {}, {},
+                           {.results = std::string(64, 'a'), .health = ""});
+    Database old(file(), Access::create);
+    for (std::size_t i = 0; i < 6; ++i) old.execute(std::string(detail::migrations()[i]));
+    old.execute("ATTACH '" + newer.string() + "' AS newer");
+    for (const std::string table : {"campaign", "parameter", "run_result", "worker", "delivery",
+                                    "audit", "overrun", "worst_run", "statistic", "summary"}) {
+      const std::string columns =
+          old.text("SELECT group_concat(name) FROM pragma_table_info('" + table + "')");
+      old.execute("INSERT INTO main." + table + " (" + columns + ") SELECT " + columns +
+                  " FROM newer." + table);
+    }
+    before = old.text(rows_of_version_6);
+  }
+  const Store store = Store::open(file());
+  store.check_integrity();
+  const Database database(file(), Access::read_only);
+  EXPECT_EQ(database.text(rows_of_version_6), before);
+  EXPECT_EQ(database.integer("SELECT count(*) FROM pragma_foreign_key_check"), 0);
+  EXPECT_EQ(database.text("PRAGMA integrity_check"), "ok");
+  for (const RunResult& result : test::results_in(store)) {
+    EXPECT_EQ(result.health, std::nullopt);
+    EXPECT_TRUE(are_equal(result, test::result_of(result.run.value, result.status)));
+  }
+  EXPECT_EQ(store.summary()->digests,
+            (ResultDigests{.results = std::string(64, 'a'), .health = ""}));
+  EXPECT_EQ(database.integer("SELECT count(*) FROM loop_health WHERE acceleration_m_s2 IS NULL"),
+            3);
 }
 
 // It is a copy that is brought up to date.

@@ -121,7 +121,7 @@ TEST_F(StoreRefusal, OfANewerFile) {
   create();
   Database(file(), Access::read_write).execute("PRAGMA user_version = 99");
   const std::string expected =
-      message("is newer than this program: its user_version is 99, the newest known one 6");
+      message("is newer than this program: its user_version is 99, the newest known one 7");
   EXPECT_EQ(error_of_open(), expected);
   EXPECT_EQ(error_of_open_read_only(), expected);
 }
@@ -134,7 +134,7 @@ TEST_F(StoreRefusal, ToAnnotateAnOlderFile) {
   }
   EXPECT_EQ(
       store_error_of([&] { Store::annotate(file(), {AddTag{"tag"}}); }),
-      message("is older than this program: its user_version is 2, not 6; resuming the campaign "
+      message("is older than this program: its user_version is 2, not 7; resuming the campaign "
               "brings it up to date"));
 }
 
@@ -277,10 +277,31 @@ TEST_F(StoreRefusal, OfAnAttemptAtRunsThatThereAreNot) {
 TEST_F(StoreRefusal, OfAResultWithAStatusThatThereIsNot) {
   Store::create(file(), campaign_of(1), "").commit(deliveries_of(0, 1));
   Database(file(), Access::read_write)
-      .execute("PRAGMA ignore_check_constraints = ON; UPDATE run_result SET status = 5");
+      .execute("PRAGMA ignore_check_constraints = ON; UPDATE run_result SET status = 6");
   const Store store = Store::open_read_only(file());
   EXPECT_EQ(store_error_of([&] { store.for_each_result([](const RunResult&) {}); }),
-            message("is damaged: status = 5 of run 0; restore it from a copy"));
+            message("is damaged: status = 6 of run 0; restore it from a copy"));
+}
+
+TEST_F(StoreRefusal, OfAResultWithHealthThatThereIsNot) {
+  std::vector<Delivery> deliveries = deliveries_of(0, 1);
+  deliveries[0].result.health = LoopHealth{1e-7, 2e-5, 1e-12, 0.25, 3e-4};
+  Store::create(file(), campaign_of(1), "").commit(deliveries);
+  const auto refusal_after = [&](const std::string& change) {
+    Database(file(), Access::read_write).execute("UPDATE run_result SET " + change);
+    const Store store = Store::open_read_only(file());
+    return store_error_of([&] { store.for_each_result([](const RunResult&) {}); });
+  };
+  EXPECT_EQ(refusal_after("health_attitude_rad = -1"),
+            message("is damaged: health_attitude_rad of run 0 (must be in [0, 1e+90]); restore it "
+                    "from a copy"));
+  EXPECT_EQ(refusal_after("health_attitude_rad = 1, health_square_noise = NULL"),
+            message("is damaged: health_square_noise of run 0 (must be in [0, 1e+90]); restore it "
+                    "from a copy"));
+  EXPECT_EQ(
+      refusal_after("health_square_noise = 0; PRAGMA ignore_check_constraints = ON;"
+                    " UPDATE run_result SET loss_session = 3"),
+      message("is damaged: loss_session of run 0, which is not lost; restore it from a copy"));
 }
 
 TEST_F(StoreRefusal, ToMakeAFileWithoutAName) {

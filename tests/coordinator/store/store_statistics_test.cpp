@@ -45,7 +45,7 @@ CampaignStatistics distinct_statistics() {
   return statistics;
 }
 
-const std::string digest(64, '5');
+const ResultDigests digest{.results = std::string(64, '5'), .health = std::string(64, '6')};
 
 Budget constant_budget(double entry) {
   Budget budget;
@@ -137,8 +137,10 @@ TEST_F(StoreStatistics, ComeWithASummary) {
   statistics.num_not_converged = 3;
   statistics.num_not_finite = 1;
   statistics.num_no_draw = 2;
+  statistics.num_lost = 4;
   const Budget budget = constant_budget(1);
-  store.write_statistics(statistics, budget, budget, budget, std::string(64, 'a'));
+  store.write_statistics(statistics, budget, budget, budget,
+                         {.results = std::string(64, 'a'), .health = ""});
   store.write_statistics(statistics, budget, budget, budget, digest);
   const std::optional<Summary> summary = Store::open_read_only(file()).summary();
   ASSERT_TRUE(summary);
@@ -148,8 +150,9 @@ TEST_F(StoreStatistics, ComeWithASummary) {
                                .num_not_converged = 3,
                                .num_not_finite = 1,
                                .num_no_draw = 2,
+                               .num_lost = 4,
                                .num_given_up = 1,
-                               .digest = digest,
+                               .digests = digest,
                                .computed_utc = summary->computed_utc}));
 }
 

@@ -115,6 +115,30 @@ TEST_F(StoreTest, KeepsNoSignOfAZero) {
   EXPECT_EQ(store.commit({&delivery, 1}).num_contradicting, 0u);
 }
 
+TEST_F(StoreTest, KeepsHealthAndWhereARunWasLost) {
+  std::vector<Delivery> deliveries;
+  for (const auto status : {RunStatus::completed, RunStatus::lost, RunStatus::no_draw}) {
+    RunResult result = result_of(deliveries.size(), status);
+    if (result.has_truth())
+      result.health = LoopHealth{1e-7, 1.0 / 3.0, 1.1e-12, 3e-4, magnitude_max};
+    if (status == RunStatus::lost) result.loss = {LossCause::residual, SessionTarget::a_c12};
+    deliveries.push_back({result, session_1, {1}, 1.0});
+  }
+  EXPECT_EQ(Store::create(file(), campaign_of(3), "").commit(deliveries).num_new, 3u);
+
+  const std::vector<RunResult> results = results_in(Store::open(file()));
+  for (std::size_t i = 0; i < deliveries.size(); ++i) {
+    EXPECT_EQ(results[i].health, deliveries[i].result.health);
+    EXPECT_EQ(results[i].loss, deliveries[i].result.loss);
+  }
+  const Database database(file(), Access::read_only);
+  EXPECT_EQ(database.text("SELECT status || ' ' || loss_cause || ' ' || loss_session FROM"
+                          " loop_health WHERE run_index = 1"),
+            "lost residual a_c12");
+  EXPECT_EQ(database.integer("SELECT count(*) FROM loop_health"), 2);
+  EXPECT_EQ(database.integer("SELECT num_lost FROM campaign_progress"), 1);
+}
+
 TEST_F(StoreTest, HasNullWhereAResultHasNoMeaning) {
   std::vector<Delivery> deliveries;
   for (const auto status : {RunStatus::completed, RunStatus::not_converged, RunStatus::not_finite,

@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cstdint>
+#include <functional>
 
 #include "core/estimation/signals.hpp"
 
@@ -82,18 +83,88 @@ TEST(RunPlan, SaysWhenNoDrawIsAccepted) {
   EXPECT_EQ(result.num_draws, 1000U);
 }
 
-// A drag-free loop beyond its stability limit grows without bound.
-TEST(RunPlan, SaysWhenTheSimulationDiverges) {
+/// Every session of one orbit, with fifty times the loop gain along X.
+Campaign unstable_campaign() {
   Campaign campaign = short_campaign(1);
   for (std::size_t i = 0; i < num_drawn; ++i) {
     if (drawn_names()[i] != "thruster_scale_error.x") continue;
     campaign.dispersions[i].law = Law::fixed;
     campaign.dispersions[i].value = 50.0;  // Loop gain fifty times too high.
   }
+  return campaign;
+}
+
+// A drag-free loop beyond its stability limit grows without bound, unless a sensor's range ends it.
+TEST(RunPlan, SaysWhenTheSimulationDiverges) {
+  Campaign campaign = unstable_campaign();
+  campaign.scenario.sensor.range_m_s2 = 1e80;
   const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
-  EXPECT_EQ(result.status, RunStatus::not_finite);
+  EXPECT_EQ(result.status, RunStatus::lost);
+  EXPECT_EQ(result.loss.cause, LossCause::saturation);
+  EXPECT_EQ(result.health->acceleration_m_s2, magnitude_max);
   EXPECT_FALSE(result.has_estimate());
   EXPECT_TRUE(result.has_truth());
+}
+
+TEST(RunPlan, SaysWhenASensorReachesTheEndOfItsRange) {
+  const RunResult result = RunPlan(unstable_campaign()).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::lost);
+  EXPECT_EQ(result.loss, (Loss{LossCause::saturation, SessionTarget::a_c11_delta_x}));
+  EXPECT_GT(result.health->acceleration_m_s2, 1e-5);
+  EXPECT_FALSE(result.has_estimate());
+  EXPECT_TRUE(result.has_truth());
+}
+
+// What the loops reach in the nominal campaign, by magnitude: millimetres from the centre of mass
+// and mass motion make 1e-7 m/s², biases of 10 arcsec some 5e-5 rad, the environment 1e-12 m/s².
+TEST(RunPlan, ReportsTheHealthOfItsLoops) {
+  const RunResult result = RunPlan(short_campaign(2)).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::completed);
+  EXPECT_EQ(result.loss.cause, LossCause::none);
+  EXPECT_GT(result.health->acceleration_m_s2, 2e-8);
+  EXPECT_LT(result.health->acceleration_m_s2, 2e-7);
+  EXPECT_GT(result.health->attitude_rad, 1e-6);
+  EXPECT_LT(result.health->attitude_rad, 2e-4);
+  EXPECT_GT(result.health->residual_m_s2, 3e-13);
+  EXPECT_LT(result.health->residual_m_s2, 3e-12);
+  EXPECT_GT(result.health->quadratic_noise, 0.0);
+  EXPECT_LT(result.health->quadratic_noise, 0.01);
+  EXPECT_GT(result.health->square_noise, 0.0);
+  EXPECT_LT(result.health->square_noise, 1e-4);
+}
+
+/// The cause that the first run gives with one limit lowered until it is beyond it.
+Loss loss_with(const std::function<void(Scenario&)>& lower) {
+  Campaign campaign = short_campaign(1);
+  lower(campaign.scenario);
+  const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::lost);
+  return result.loss;
+}
+
+TEST(RunPlan, SaysWhichLimitARunLeftAndInWhichSession) {
+  using enum SessionTarget;
+  EXPECT_EQ(loss_with([](Scenario& s) { s.health.attitude_max_rad = 1e-9; }),
+            (Loss{LossCause::attitude, a_c11_delta_x}));
+  EXPECT_EQ(loss_with([](Scenario& s) { s.health.residual_max_m_s2 = 1e-14; }),
+            (Loss{LossCause::residual, a_c11_delta_x}));
+  EXPECT_EQ(loss_with([](Scenario& s) { s.health.quadratic_noise_max = 1e-9; }),
+            (Loss{LossCause::quadratic_noise, a_c11_delta_x}));
+  EXPECT_EQ(loss_with([](Scenario& s) { s.health.square_noise_max = 1e-12; }),
+            (Loss{LossCause::square_noise, k2d}));
+}
+
+// In a frame that spins the environment meets the loops at f_spin and f_EP, where they leave more
+// of it than at f_orb.
+TEST(RunPlan, LooksAtTheResidualOfEachSpin) {
+  EXPECT_EQ(loss_with([](Scenario& s) {
+              s.health.residual_max_m_s2 = 5e-12;
+              for (Session& session : s.sessions) {
+                if (session.target == SessionTarget::a_c11_delta_z)
+                  session.spin_rate_rad_s = 4.75e-3;
+              }
+            }),
+            (Loss{LossCause::residual, SessionTarget::a_c11_delta_z}));
 }
 
 // Estimates are linear in the measured difference.

@@ -44,6 +44,8 @@ RunResult some_result(RunIndex run, RunStatus status) {
     if (result.has_truth()) result.truth[i] = hard_numbers[i % hard_numbers.size()];
     if (result.has_estimate()) result.estimate[i] = 1.0 / (3.0 + static_cast<double>(i));
   }
+  if (result.has_truth()) result.health = LoopHealth{1e-7, 2e-5, 1.1e-12, 3e-4, 1e90};
+  if (status == RunStatus::lost) result.loss = {LossCause::residual, SessionTarget::k2_sensor_2};
   return result;
 }
 
@@ -197,7 +199,7 @@ TEST(Codec, KeepsALeaseWithItsTableValues) {
 TEST(Codec, KeepsEveryBitOfResultsOfEachStatus) {
   ResultBatch sent{.campaign = {3}, .attempt = {1}, .results = {}};
   for (const RunStatus status : {RunStatus::completed, RunStatus::not_converged,
-                                 RunStatus::not_finite, RunStatus::no_draw}) {
+                                 RunStatus::not_finite, RunStatus::no_draw, RunStatus::lost}) {
     sent.results.push_back({.result = some_result({sent.results.size()}, status),
                             .compute_s = 2.5,
                             .elapsed_s = 40.0});
@@ -205,12 +207,14 @@ TEST(Codec, KeepsEveryBitOfResultsOfEachStatus) {
   const ResultBatch got = round_trip(sent);
   EXPECT_EQ(got.campaign, sent.campaign);
   EXPECT_EQ(got.attempt, sent.attempt);
-  ASSERT_EQ(got.results.size(), 4U);
-  for (std::size_t run = 0; run < 4; ++run) {
+  ASSERT_EQ(got.results.size(), 5U);
+  for (std::size_t run = 0; run < 5; ++run) {
     const RunResult& a = got.results[run].result;
     const RunResult& b = sent.results[run].result;
     EXPECT_EQ(a.run, b.run);
     EXPECT_EQ(a.status, b.status);
+    EXPECT_EQ(a.health, b.health);
+    EXPECT_EQ(a.loss, b.loss);
     EXPECT_EQ(a.num_draws, 3U);
     EXPECT_EQ(a.num_rounds, 7U);
     EXPECT_EQ(got.results[run].compute_s, 2.5);

@@ -91,7 +91,7 @@ TEST(MalformedEnvelope, OfAnotherVersionIsRefused) {
   envelope.mutable_bye();
   const DecodeError error = refusal_of(envelope.SerializeAsString());
   EXPECT_EQ(error.fault, DecodeFault::wrong_version);
-  EXPECT_EQ(error.text, "protocol_version = 1 (must be 4)");
+  EXPECT_EQ(error.text, "protocol_version = 1 (must be 5)");
 }
 
 TEST(MalformedEnvelope, WithoutAMessageIsRefused) {
@@ -343,9 +343,30 @@ TEST(MalformedResultBatch, HasAttemptAndResults) {
             "results = 0 entries (must be in [1, 4096])");
 }
 
+TEST(MalformedComputedRun, HasHealthInRangeAndACauseIfLost) {
+  EXPECT_EQ(refusal_of_run([](auto& run) { run.clear_health(); }),
+            "health = none (must be there unless the status is no_draw)");
+  EXPECT_EQ(refusal_of_run([](auto& run) { run.mutable_health()->set_attitude_rad(nan); }),
+            "health.attitude_rad = nan (must be in [0, 1e+90])");
+  EXPECT_EQ(refusal_of_run([](auto& run) { run.mutable_health()->set_residual_m_s2(-1.0); }),
+            "health.residual_m_s2 = -1 (must be in [0, 1e+90])");
+  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_loss_cause(proto::LOSS_CAUSE_ATTITUDE); }),
+            "loss_cause = 2 (must be in [0, 0])");
+  const auto lose = [](auto& run) {
+    run.set_status(proto::RUN_STATUS_LOST);
+    run.clear_estimate();
+  };
+  EXPECT_EQ(refusal_of_run(lose), "loss_cause = 0 (must be in [1, 5])");
+  EXPECT_EQ(refusal_of_run([&](auto& run) {
+              lose(run);
+              run.set_loss_cause(proto::LOSS_CAUSE_SATURATION);
+            }),
+            "loss_session = 0 (must be in [1, 11])");
+}
+
 TEST(MalformedComputedRun, HasAStatusAndARunIndex) {
   EXPECT_EQ(refusal_of_run([](auto& run) { run.clear_status(); }),
-            "status = 0 (must be in [1, 4])");
+            "status = 0 (must be in [1, 5])");
   EXPECT_EQ(refusal_of_run([](auto& run) { run.set_run(1'000'000'000); }),
             "run = 1000000000 (must be in [0, 999999999])");
 }

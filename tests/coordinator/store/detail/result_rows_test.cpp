@@ -24,6 +24,16 @@ TEST(ResultDigest, IsFnv1aOfAllThatMeansSomething) {
   EXPECT_EQ(digest(known_result(RunStatus::no_draw)), 0x560ac63e54f38b87u);
 }
 
+TEST(ResultDigest, HasHealthAndLossAtItsEnd) {
+  RunResult completed = known_result(RunStatus::completed);
+  completed.health = LoopHealth{1e-7, 2e-5, 1e-12, 0.25, 3e-4};
+  EXPECT_EQ(digest(completed), 0xeec8560525c74118u);
+  RunResult lost = known_result(RunStatus::lost);
+  lost.health = completed.health;
+  lost.loss = {LossCause::residual, SessionTarget::k2d};
+  EXPECT_EQ(digest(lost), 0xcc77843cddfcfc4eu);
+}
+
 TEST(ResultDigest, DoesNotDependOnTheSignOfAZeroOrOnWhatMeansNothing) {
   RunResult result = known_result(RunStatus::not_finite);
   result.truth[3] = -0.0;
@@ -50,6 +60,16 @@ TEST(ResultDigest, DependsOnEveryNumber) {
     EXPECT_FALSE(are_equal(result, known));
   }
   EXPECT_EQ(digests.size(), 1 + changed.size());
+}
+
+TEST(AreEqual, ComparesHealthAndLoss) {
+  const RunResult known = known_result(RunStatus::lost);
+  RunResult other = known;
+  other.health.emplace().square_noise = 1e-9;
+  EXPECT_FALSE(are_equal(other, known));
+  other = known;
+  other.loss = {LossCause::attitude, SessionTarget::k2d};
+  EXPECT_FALSE(are_equal(other, known));
 }
 
 }  // namespace

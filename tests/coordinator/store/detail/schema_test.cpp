@@ -57,7 +57,7 @@ TEST_F(SchemaTest, MarksTheFileAsACampaign) {
 }
 
 // The schema is text that no program made: each parameter must stand in it with its unit.
-TEST_F(SchemaTest, HasThreeColumnsForEachParameterAndNoneElse) {
+TEST_F(SchemaTest, HasThreeColumnsForEachParameterAndThoseOfHealth) {
   Database database(file(), Access::create);
   for (const std::string_view migration : migrations()) database.execute(std::string(migration));
   std::string expected = "run_index,status,num_draws,num_rounds";
@@ -66,6 +66,10 @@ TEST_F(SchemaTest, HasThreeColumnsForEachParameterAndNoneElse) {
       expected += "," + kind + "_" + std::string(info.name) + std::string(info.unit_suffix);
     }
   }
+  for (const HealthValue& value : health_values()) {
+    expected += ",health_" + std::string(value.name) + std::string(value.unit_suffix);
+  }
+  expected += ",loss_cause,loss_session";
   EXPECT_EQ(database.text("SELECT group_concat(name) FROM pragma_table_xinfo('run_result')"),
             expected);
 }
