@@ -39,7 +39,7 @@ ErrorStatistic error_statistic(const Moments& about) {
           .bias_interval = mean_interval(about, default_confidence),
           .rms = about.rms,
           .standard_deviation = about.standard_deviation,
-          .deviation_interval = normal_deviation_interval(about, default_confidence),
+          .deviation_interval = deviation_interval(about, default_confidence),
           .skewness = about.skewness};
 }
 
