@@ -224,6 +224,22 @@ void ask_about_special_functions(Questions& questions) {
   }
 }
 
+// No hits, some, all, and a hundred hits in a billion runs; both bounds at 0 and 1 are exact.
+void ask_about_probabilities(Questions& questions) {
+  for (const double shown_with : {0.5, 0.9, 0.95, 0.999}) {
+    for (const double num_runs : {1.0, 17.0, 100.0, 30'000.0, 1e9}) {
+      for (const double hits : {0.0, 1.0, 2.0, 16.0, 100.0, num_runs - 1.0, num_runs}) {
+        if (hits > num_runs) continue;
+        const std::string arguments = fmt::format(" {:.0f} {:.0f} {}", hits, num_runs, shown_with);
+        questions.ask("probability_interval" + arguments,
+                      ends(probability_interval(hits, num_runs, shown_with)));
+        questions.ask("probability_bounds" + arguments,
+                      ends(probability_bounds(hits, num_runs, shown_with)));
+      }
+    }
+  }
+}
+
 void ask_about_tolerances(Questions& questions) {
   for (const double coverage : {0.5, 0.9, 0.95, 0.99}) {
     for (const double shown_with : {0.6, 0.9, 0.95, 0.999}) {
@@ -249,6 +265,7 @@ TEST(StatisticsOracle, ConfirmsEveryStatistic) {
   ask_about_two_columns(questions);
   ask_about_laws(questions);
   ask_about_special_functions(questions);
+  ask_about_probabilities(questions);
   ask_about_tolerances(questions);
 
   const std::string path = testing::TempDir() + "proofmass_statistics_questions.txt";
