@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cstdint>
+#include <utility>
 
 #include "coordinator/campaign_file/definition_text.hpp"
 #include "coordinator/campaign_file/dispersion_keys.hpp"
@@ -11,18 +12,32 @@
 namespace proofmass::coordinator::detail {
 namespace {
 
-template <typename Choice>
-std::string choice_text(Choice choice) {
-  return quoted_text(names_of(choice)[static_cast<std::size_t>(choice) - 1]);
+Entry text_entry(std::string_view path, std::string_view text, std::string comment = {}) {
+  return {std::string(path), quoted_text(text), std::move(comment), std::string(text)};
 }
 
-std::string lines_text(const std::vector<LineMultiple>& lines) {
+Entry real_entry(std::string_view path, double value, std::string comment = {}) {
+  return {std::string(path), number_text(value), std::move(comment), value};
+}
+
+Entry whole_entry(std::string_view path, std::int64_t value, std::string comment = {}) {
+  return {std::string(path), fmt::format("{}", value), std::move(comment), value};
+}
+
+template <typename Choice>
+Entry choice_entry(std::string_view path, Choice choice, std::string comment = {}) {
+  return text_entry(path, names_of(choice)[static_cast<std::size_t>(choice) - 1],
+                    std::move(comment));
+}
+
+Entry lines_entry(std::string_view path, const std::vector<LineMultiple>& lines) {
   std::string text = "[";
   for (const LineMultiple& line : lines) {
     if (text.size() > 1) text += ", ";
     text += text_of(line);
   }
-  return text + "]";
+  text += "]";
+  return {std::string(path), text, "", text};
 }
 
 std::string inline_table(const std::vector<Entry>& entries) {
@@ -48,19 +63,14 @@ struct FieldWriter {
   std::vector<Entry>& entries;
 
   void operator()(const FieldInfo& field, const double& value) const {
-    add(field, number_text(value), comment_of(field));
+    entries.push_back(real_entry(field.path, value, comment_of(field)));
   }
   void operator()(const FieldInfo& field, const std::int64_t& value) const {
-    add(field, fmt::format("{}", value), comment_of(field));
+    entries.push_back(whole_entry(field.path, value, comment_of(field)));
   }
   template <typename Choice>
   void operator()(const FieldInfo& field, const Choice& value) const {
-    add(field, choice_text(value), std::string(field.comment));
-  }
-
- private:
-  void add(const FieldInfo& field, std::string text, std::string comment) const {
-    entries.push_back({std::string(field.path), std::move(text), std::move(comment)});
+    entries.push_back(choice_entry(field.path, value, std::string(field.comment)));
   }
 };
 
@@ -68,13 +78,14 @@ struct FieldWriter {
 
 std::vector<Entry> scenario_entries(const Campaign& campaign) {
   std::vector<Entry> entries{
-      {"campaign.name", quoted_text(campaign.name), "Letters, digits, _, - or ."},
-      {"campaign.seed", fmt::format("{}", campaign.seed), "All randomness follows from it."},
-      {"campaign.runs", fmt::format("{}", campaign.num_runs), "May grow later."},
+      text_entry("campaign.name", campaign.name, "Letters, digits, _, - or ."),
+      whole_entry("campaign.seed", static_cast<std::int64_t>(campaign.seed),
+                  "All randomness follows from it."),
+      whole_entry("campaign.runs", static_cast<std::int64_t>(campaign.num_runs), "May grow later."),
   };
   if (!campaign.environment_file.empty()) {
-    entries.push_back({"environment.file", quoted_text(campaign.environment_file),
-                       "External accelerations, relative to this file."});
+    entries.push_back(text_entry("environment.file", campaign.environment_file,
+                                 "External accelerations, relative to this file."));
   }
   for_each_field(campaign.scenario, FieldWriter{entries});
   return entries;
@@ -82,36 +93,38 @@ std::vector<Entry> scenario_entries(const Campaign& campaign) {
 
 std::vector<Entry> session_entries(const Session& session) {
   return {
-      {"name", quoted_text(session.name), ""},
-      {"target", choice_text(session.target), ""},
-      {"orbits", fmt::format("{}", session.num_orbits), ""},
-      {"spin_rate_rad_s", number_text(session.spin_rate_rad_s), ""},
-      {"drag_free", choice_text(session.drag_free), ""},
-      {"fit_lines", lines_text(session.fit_lines), ""},
-      {"known_lines", lines_text(session.known_lines), ""},
+      text_entry("name", session.name),
+      choice_entry("target", session.target),
+      whole_entry("orbits", session.num_orbits),
+      real_entry("spin_rate_rad_s", session.spin_rate_rad_s),
+      choice_entry("drag_free", session.drag_free),
+      lines_entry("fit_lines", session.fit_lines),
+      lines_entry("known_lines", session.known_lines),
   };
 }
 
-std::string excitation_text(const Excitation& excitation) {
-  std::vector<Entry> entries{{"kind", choice_text(excitation.kind), ""},
-                             {"axis", choice_text(excitation.axis), ""}};
+std::vector<Entry> excitation_entries(const Excitation& excitation) {
+  std::vector<Entry> entries{choice_entry("kind", excitation.kind),
+                             choice_entry("axis", excitation.axis)};
   if (excitation.kind == ExcitationKind::test_mass) {
-    entries.push_back({"moves", choice_text(excitation.motion), ""});
+    entries.push_back(choice_entry("moves", excitation.motion));
   }
-  entries.push_back(
-      {std::string(amplitude_key(excitation.kind)), number_text(excitation.amplitude), ""});
-  entries.push_back({"frequency_hz", number_text(excitation.frequency_hz), ""});
-  return inline_table(entries);
+  entries.push_back(real_entry(amplitude_key(excitation.kind), excitation.amplitude));
+  entries.push_back(real_entry("frequency_hz", excitation.frequency_hz));
+  return entries;
+}
+
+std::string excitation_text(const Excitation& excitation) {
+  return inline_table(excitation_entries(excitation));
 }
 
 std::vector<Entry> dispersion_entries(const Dispersion& dispersion) {
   Dispersion fields = dispersion;
-  std::vector<Entry> entries{{"law", choice_text(dispersion.law), ""}};
+  std::vector<Entry> entries{choice_entry("law", dispersion.law)};
   for (const std::string_view key : keys_of(dispersion.law)) {
     const double* const number = number_at(fields, key);
-    entries.push_back(
-        {std::string(key),
-         number != nullptr ? number_text(*number) : quoted_text(*text_at(fields, key)), ""});
+    entries.push_back(number != nullptr ? real_entry(key, *number)
+                                        : text_entry(key, *text_at(fields, key)));
   }
   return entries;
 }

@@ -4,15 +4,17 @@
 #include <string_view>
 #include <vector>
 
+#include "coordinator/campaign_file/definition_items.hpp"
 #include "core/campaign/campaign.hpp"
 
 namespace proofmass::coordinator::detail {
 
 /// A key of a campaign file, with its value as TOML.
 struct Entry {
-  std::string path;     ///< `estimation.transient_s`; for a session or a law the key alone.
-  std::string text;     ///< `1000`.
-  std::string comment;  ///< Meaning and rule; may be empty.
+  std::string path;            ///< `estimation.transient_s`; for a session or a law the key alone.
+  std::string text;            ///< `1000`.
+  std::string comment;         ///< Meaning and rule; may be empty.
+  DefinitionValue value = {};  ///< What the text says.
 };
 
 /// Everything outside sessions and dispersions, in file order.
@@ -20,6 +22,9 @@ struct Entry {
 
 /// All keys of one session but its excitations.
 [[nodiscard]] std::vector<Entry> session_entries(const Session& session);
+
+/// All keys of one excitation.
+[[nodiscard]] std::vector<Entry> excitation_entries(const Excitation& excitation);
 
 /// `{ kind = "drag_free", axis = "x", ... }`.
 [[nodiscard]] std::string excitation_text(const Excitation& excitation);

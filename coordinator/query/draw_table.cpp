@@ -1,22 +1,19 @@
 #include "coordinator/query/draw_table.hpp"
 
-#include <fmt/format.h>
 #include <sqlite3ext.h>
 
 #include <algorithm>
 #include <array>
-#include <exception>
-#include <map>
 #include <memory>
 #include <new>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "coordinator/query/draw_scan.hpp"
 #include "coordinator/query/drawn_campaign.hpp"
+#include "coordinator/query/virtual_table.hpp"
 #include "core/error.hpp"
 
 SQLITE_EXTENSION_INIT3
@@ -26,21 +23,15 @@ namespace {
 
 enum Column : int { run_index_column, quantity_column, unit_column, value_column, campaign_column };
 
+constexpr const char* table_name = "draw";
 constexpr const char* declaration =
     "CREATE TABLE draw(run_index INTEGER, quantity TEXT, unit TEXT, value REAL, "
     "campaign TEXT HIDDEN)";
 
-/// A campaign that was read, and the state of its database then.
-struct DrawnDatabase {
-  DatabaseState state;
-  // Cursors own it too: each stays with what it began with.
-  std::shared_ptr<DrawnCampaign> runs;
-};
-
 /// One for a connection.
 struct DrawTable : sqlite3_vtab {
   sqlite3* connection = nullptr;
-  std::map<std::string, DrawnDatabase> databases;  // Those that were asked for, by their names.
+  MadeOfDatabases<DrawnCampaign> databases;
 };
 
 /// One for a place in a statement that names the table.
@@ -54,21 +45,6 @@ struct DrawCursor : sqlite3_vtab_cursor {
 
 DrawTable& table_of(sqlite3_vtab* table) { return *static_cast<DrawTable*>(table); }
 DrawCursor& cursor_of(sqlite3_vtab_cursor* cursor) { return *static_cast<DrawCursor*>(cursor); }
-
-// What goes wrong becomes the error of the statement: no exception passes SQLite.
-template <typename Work>
-int guarded(sqlite3_vtab& table, const Work& work) noexcept {
-  try {
-    work();
-    return SQLITE_OK;
-  } catch (const std::bad_alloc&) {
-    return SQLITE_NOMEM;
-  } catch (const std::exception& error) {
-    sqlite3_free(table.zErrMsg);
-    table.zErrMsg = sqlite3_mprintf("draw: %s", error.what());
-    return SQLITE_ERROR;
-  }
-}
 
 int connect(sqlite3* connection, void*, int, const char* const*, sqlite3_vtab** table, char**) {
   const int code = sqlite3_declare_vtab(connection, declaration);
@@ -129,15 +105,6 @@ std::optional<int> constraint_for(const Offer& offer, sqlite3_index_info* plan) 
   return std::nullopt;
 }
 
-// A plan without the name of the campaign, though the statement gives one, would ignore it.
-bool ignores_the_campaign(const sqlite3_index_info& plan) {
-  const std::span constraints(plan.aConstraint, static_cast<std::size_t>(plan.nConstraint));
-  return std::ranges::any_of(constraints, [](const auto& constraint) {
-    return constraint.iColumn == campaign_column && constraint.op == SQLITE_INDEX_CONSTRAINT_EQ &&
-           constraint.usable == 0;
-  });
-}
-
 // A campaign of medium size; a draw costs as much as a dozen rows.
 void estimate_cost(sqlite3_index_info& plan) {
   const bool has_range = (plan.idxNum & range_bits) != 0;
@@ -150,7 +117,7 @@ void estimate_cost(sqlite3_index_info& plan) {
 }
 
 int choose_plan(sqlite3_vtab*, sqlite3_index_info* plan) {
-  if (ignores_the_campaign(*plan)) return SQLITE_CONSTRAINT;
+  if (ignores_the_argument(*plan, campaign_column)) return SQLITE_CONSTRAINT;
   int num_arguments = 0;
   for (std::size_t i = 0; i < offers.size(); ++i) {
     const std::optional<int> constraint = constraint_for(offers[i], plan);
@@ -165,19 +132,8 @@ int choose_plan(sqlite3_vtab*, sqlite3_index_info* plan) {
   return SQLITE_OK;
 }
 
-// Reads the campaign when it is first needed and when the database has changed since.
-std::shared_ptr<DrawnCampaign> current_runs(DrawTable& table, const std::string& database) {
-  const DatabaseState state = state_of(table.connection, database);
-  DrawnDatabase& known = table.databases[database];
-  if (!known.runs || !(known.state == state)) {
-    known.runs = std::make_shared<DrawnCampaign>(read_campaign_of(table.connection, database));
-    known.state = state;
-  }
-  return known.runs;
-}
-
 int open(sqlite3_vtab* table, sqlite3_vtab_cursor** cursor) {
-  return guarded(*table, [&] { *cursor = std::make_unique<DrawCursor>().release(); });
+  return guarded(*table, table_name, [&] { *cursor = std::make_unique<DrawCursor>().release(); });
 }
 
 int close(sqlite3_vtab_cursor* cursor) {
@@ -185,16 +141,9 @@ int close(sqlite3_vtab_cursor* cursor) {
   return SQLITE_OK;
 }
 
-std::string text_of(sqlite3_value* value) {
-  const auto* text = reinterpret_cast<const char*>(sqlite3_value_text(value));
-  return text == nullptr ? std::string()
-                         : std::string(text, static_cast<std::size_t>(sqlite3_value_bytes(value)));
-}
-
 // The database whose runs a plan asks for: the main one unless it names another.
-std::string database_of(DrawTable& table, int plan, sqlite3_value** values) {
-  if ((plan & campaign_bit) == 0 || sqlite3_value_type(values[0]) == SQLITE_NULL) return "main";
-  return database_meant_by(table.connection, text_of(values[0]));
+std::string database_in(DrawTable& table, int plan, sqlite3_value** values) {
+  return (plan & campaign_bit) == 0 ? "main" : database_of(table.connection, values[0]);
 }
 
 // Other types than these compare by rules of SQLite's own, and narrow nothing.
@@ -221,9 +170,11 @@ void go_to_run(DrawCursor& cursor, std::uint64_t run) {
 
 int filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value** values) {
   DrawCursor& cursor = cursor_of(base);
-  return guarded(*base->pVtab, [&] {
+  return guarded(*base->pVtab, table_name, [&] {
     DrawTable& table = table_of(base->pVtab);
-    cursor.runs = current_runs(table, database_of(table, plan, values));
+    cursor.runs = table.databases.current(
+        table.connection, database_in(table, plan, values),
+        [](Campaign campaign) { return std::make_shared<DrawnCampaign>(std::move(campaign)); });
     cursor.scan = {.first_run = 0, .end_run = cursor.runs->num_runs(), .quantity = {}};
     for (std::size_t i = 0; i < offers.size(); ++i) {
       if ((plan & (1 << i)) == 0) continue;
@@ -236,7 +187,7 @@ int filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value*
 
 int next(sqlite3_vtab_cursor* base) {
   DrawCursor& cursor = cursor_of(base);
-  return guarded(*base->pVtab, [&] {
+  return guarded(*base->pVtab, table_name, [&] {
     ++cursor.quantity;
     if (cursor.scan.quantity || cursor.quantity == num_drawn) go_to_run(cursor, cursor.run + 1);
   });

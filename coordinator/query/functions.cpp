@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "coordinator/query/aggregates.hpp"
+#include "coordinator/query/definition_table.hpp"
 #include "coordinator/query/draw_table.hpp"
 #include "coordinator/query/interval_functions.hpp"
 #include "core/error.hpp"
@@ -149,7 +150,8 @@ int register_functions(sqlite3* connection) {
     const int code = register_interval(connection, function);
     if (code != SQLITE_OK) return code;
   }
-  return register_draw_table(connection);
+  const int code = register_draw_table(connection);
+  return code == SQLITE_OK ? register_definition_table(connection) : code;
 }
 
 }  // namespace proofmass::coordinator

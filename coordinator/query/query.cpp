@@ -54,14 +54,19 @@ std::string place_text(std::string_view sql, std::size_t position) {
       fmt::format("sql = {} ({})", shown_sql(sql, sql.find_first_not_of(" \t\r\n")), reason));
 }
 
-// The table that is computed belongs to no database: `b.draw` would be that of another one.
+// Tables that are computed belong to no database: `b.draw` would be that of another one.
 std::string with_remedy(std::string text) {
-  const std::string_view missing = "no such table: ";
-  const std::string_view end = ".draw";
-  if (!text.starts_with(missing) || !text.ends_with(end)) return text;
-  const std::string database =
-      text.substr(missing.size(), text.size() - missing.size() - end.size());
-  return text + fmt::format("; name the database in the argument, as in draw('{}')", database);
+  constexpr std::string_view missing = "no such table: ";
+  if (!text.starts_with(missing)) return text;
+  for (const std::string_view table : {"draw", "definition_entry"}) {
+    const std::string end = fmt::format(".{}", table);
+    if (!text.ends_with(end)) continue;
+    const std::string database =
+        text.substr(missing.size(), text.size() - missing.size() - end.size());
+    return text +
+           fmt::format("; name the database in the argument, as in {}('{}')", table, database);
+  }
+  return text;
 }
 
 /// A read-only connection on which nothing but reading is possible, for some time.

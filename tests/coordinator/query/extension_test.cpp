@@ -68,6 +68,16 @@ TEST_F(Extension, SeesThatACampaignGrew) {
   EXPECT_EQ(shell, "1\n8\n");
 }
 
+TEST_F(Extension, SeesThatADefinitionChanged) {
+  make_file(campaign_of(2));
+  const std::string question = "'SELECT value FROM definition_entry WHERE key = \"noise.scale\"'";
+  const std::string shell =
+      output_of(fmt::format("sqlite3 '{}' \".load '{}'\" {} \"UPDATE campaign SET definition = "
+                            "replace(definition, '\nscale = 1\n', '\nscale = 0.5\n')\" {}",
+                            file().string(), PROOFMASS_EXTENSION, question, question));
+  EXPECT_EQ(shell, "1.0\n0.5\n");
+}
+
 TEST_F(Extension, ExportsItsInitFunctionAndNothingElse) {
   EXPECT_EQ(
       output_of(fmt::format("nm -D --defined-only '{}' | cut -d' ' -f2-", PROOFMASS_EXTENSION)),
