@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cstddef>
 #include <iterator>
 #include <optional>
 
@@ -12,11 +13,38 @@ namespace {
 // No cell has a comma, a quotation mark or a line break, so that none needs quotation marks.
 constexpr std::string_view line_end = "\r\n";
 
-std::string heading() {
+std::string heading(const DrawnColumns& draws) {
   std::string line = "run_index,status,num_draws,num_rounds";
-  for (const ValueColumn& column : value_columns()) line += "," + column.name;
+  for (const ValueColumn& column : value_columns()) line.append(",").append(column.name);
   line += ",loss_cause,loss_session";
+  for (std::size_t i = 0; i < draws.count(); ++i) line.append(",").append(draw_column_name(i));
   return line.append(line_end);
+}
+
+void append_draws(const DrawnColumns& draws, RunIndex run, fmt::memory_buffer& line) {
+  const std::optional<DrawnValues> values = draws.values_of(run);
+  for (std::size_t i = 0; i < draws.count(); ++i) {
+    line.push_back(',');
+    if (values) fmt::format_to(std::back_inserter(line), "{}", (*values)[i]);
+  }
+}
+
+void append_line(const RunResult& result, const DrawnColumns& draws, fmt::memory_buffer& line) {
+  const auto end = std::back_inserter(line);
+  fmt::format_to(end, "{},{},{},{}", result.run.value, name_of(result.status), result.num_draws,
+                 result.num_rounds);
+  for (const ValueColumn& column : value_columns()) {
+    const std::optional<double> value = column.value_in(result);
+    line.push_back(',');
+    if (value) fmt::format_to(end, "{}", *value);
+  }
+  if (result.status == RunStatus::lost) {
+    fmt::format_to(end, ",{},{}", name_of(result.loss.cause), name_of(result.loss.session));
+  } else {
+    fmt::format_to(end, ",,");
+  }
+  append_draws(draws, result.run, line);
+  line.append(line_end);
 }
 
 }  // namespace
@@ -31,27 +59,18 @@ WalkedResults walk_results(const Store& store, const IsStopped& is_stopped,
   });
 }
 
-void export_csv(const Store& store, TextOutput& output, const IsStopped& is_stopped) {
-  check_definition_digest(store);
-  output.write(heading());
-  fmt::memory_buffer line;
-  (void)walk_results(store, is_stopped, [&](const RunResult& result) {
-    line.clear();
-    const auto end = std::back_inserter(line);
-    fmt::format_to(end, "{},{},{},{}", result.run.value, name_of(result.status), result.num_draws,
-                   result.num_rounds);
-    for (const ValueColumn& column : value_columns()) {
-      const std::optional<double> value = column.value_in(result);
-      line.push_back(',');
-      if (value) fmt::format_to(end, "{}", *value);
-    }
-    if (result.status == RunStatus::lost) {
-      fmt::format_to(end, ",{},{}", name_of(result.loss.cause), name_of(result.loss.session));
-    } else {
-      fmt::format_to(end, ",,");
-    }
-    line.append(line_end);
-    output.write({line.data(), line.size()});
+void export_csv(const Store& store, TextOutput& output, const IsStopped& is_stopped,
+                DrawColumns draws) {
+  store.read_one_state([&] {
+    check_definition_digest(store);
+    const DrawnColumns drawn(store, draws);
+    output.write(heading(drawn));
+    fmt::memory_buffer line;
+    (void)walk_results(store, is_stopped, [&](const RunResult& result) {
+      line.clear();
+      append_line(result, drawn, line);
+      output.write({line.data(), line.size()});
+    });
   });
   output.finish();
 }

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "coordinator/archive/archive_error.hpp"
+#include "coordinator/archive/drawn_columns.hpp"
 #include "coordinator/archive/text_output.hpp"
 #include "coordinator/report/digest_check.hpp"
 #include "coordinator/store/store.hpp"
@@ -16,21 +17,27 @@ namespace proofmass::coordinator {
 // Memory does not grow with the runs, and a coordinator may write meanwhile: what is exported are
 // the runs that were stored at one instant.
 //
+// With DrawColumns::included a column for each drawn quantity follows, named and in the unit of
+// the table `draw` of `proofmass query`.
+//
 // All throw ArchiveError if the output cannot be written, StoreError if the file cannot be read or
-// if its results or its definition are not those that were stored, see check_digest(), and
-// Interrupted; then no file appears. Standard output has the results by then.
+// if its results or its definition are not those that were stored, see check_digest(),
+// CampaignFileError if draws are wanted of a definition that is no campaign, and Interrupted; then
+// no file appears. Standard output has the results by then.
 
 /// One line a run after a line of headings, as of RFC 4180; cells without a meaning are empty.
-void export_csv(const Store& store, TextOutput& output, const IsStopped& is_stopped);
+void export_csv(const Store& store, TextOutput& output, const IsStopped& is_stopped,
+                DrawColumns draws = DrawColumns::left_out);
 
 /// One object with campaign, columns, runs and digest; each run is an object on a line of its own,
 /// with null where there is no meaning.
-void export_json(const Store& store, TextOutput& output, const IsStopped& is_stopped);
+void export_json(const Store& store, TextOutput& output, const IsStopped& is_stopped,
+                 DrawColumns draws = DrawColumns::left_out);
 
 /// A dataset a column, the unit an attribute, NaN where there is no meaning; what defines the
 /// campaign are attributes of the root. A file of this name is replaced.
-void export_hdf5(const Store& store, const std::filesystem::path& file,
-                 const IsStopped& is_stopped);
+void export_hdf5(const Store& store, const std::filesystem::path& file, const IsStopped& is_stopped,
+                 DrawColumns draws = DrawColumns::left_out);
 
 /// walk_checked() with an end.
 /// @throws Interrupted soon after `is_stopped` says so.

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "coordinator/archive/draft_file.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
+#include "core/campaign/drawn_quantities.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -192,8 +194,9 @@ Handle loss_session_type(const Writer& writer) {
 /// All datasets of an export.
 class Columns {
  public:
-  explicit Columns(const Writer& writer)
-      : status_type_(enumeration_type(writer, RunStatus::completed, RunStatus::lost)),
+  Columns(const Writer& writer, const DrawnColumns& draws)
+      : draws_(draws),
+        status_type_(enumeration_type(writer, RunStatus::completed, RunStatus::lost)),
         loss_cause_type_(enumeration_type(writer, LossCause::none, LossCause::square_noise)),
         loss_session_type_(loss_session_type(writer)),
         run_index_(writer, writer.root(), "run_index", H5T_STD_U64LE, H5T_NATIVE_UINT64),
@@ -213,6 +216,7 @@ class Columns {
       values_.emplace_back(writer, group, column.own_name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE);
       writer.set_text(values_.back().dataset(), "unit", std::string(column.unit));
     }
+    add_draw_columns(writer);
   }
 
   void add(const RunResult& result) {
@@ -224,8 +228,11 @@ class Columns {
     loss_cause_.add(static_cast<std::uint8_t>(result.loss.cause));
     loss_session_.add(is_lost ? static_cast<std::uint8_t>(result.loss.session) : std::uint8_t{0});
     for (std::size_t i = 0; i < num_value_columns; ++i) {
-      constexpr double no_meaning = std::numeric_limits<double>::quiet_NaN();
       values_[i].add(value_columns()[i].value_in(result).value_or(no_meaning));
+    }
+    const std::optional<DrawnValues> drawn = draws_.values_of(result.run);
+    for (std::size_t i = 0; i < draws_.count(); ++i) {
+      drawn_values_[i].add(drawn ? (*drawn)[i] : no_meaning);
     }
   }
 
@@ -237,9 +244,23 @@ class Columns {
     loss_cause_.flush();
     loss_session_.flush();
     for (Column<double>& column : values_) column.flush();
+    for (Column<double>& column : drawn_values_) column.flush();
   }
 
  private:
+  static constexpr double no_meaning = std::numeric_limits<double>::quiet_NaN();
+
+  void add_draw_columns(const Writer& writer) {
+    if (draws_.count() == 0) return;
+    const Handle group = writer.make_group("draw");
+    for (std::size_t i = 0; i < draws_.count(); ++i) {
+      drawn_values_.emplace_back(writer, group, drawn_names()[i], H5T_IEEE_F64LE,
+                                 H5T_NATIVE_DOUBLE);
+      writer.set_text(drawn_values_.back().dataset(), "unit", std::string(drawn_unit(i)));
+    }
+  }
+
+  const DrawnColumns& draws_;
   Handle status_type_;
   Handle loss_cause_type_;
   Handle loss_session_type_;
@@ -250,6 +271,7 @@ class Columns {
   Column<std::uint8_t> loss_cause_;
   Column<std::uint8_t> loss_session_;
   std::vector<Column<double>> values_;
+  std::vector<Column<double>> drawn_values_;
 };
 
 void describe_campaign(const Writer& writer, const Store& store) {
@@ -261,8 +283,10 @@ void describe_campaign(const Writer& writer, const Store& store) {
   writer.set_text(writer.root(), "definition", store.definition());
 }
 
-void write_results(const Writer& writer, const Store& store, const IsStopped& is_stopped) {
-  Columns columns(writer);
+void write_results(const Writer& writer, const Store& store, const IsStopped& is_stopped,
+                   DrawColumns draws) {
+  const DrawnColumns drawn(store, draws);
+  Columns columns(writer, drawn);
   const WalkedResults walked =
       walk_results(store, is_stopped, [&](const RunResult& result) { columns.add(result); });
   columns.flush();
@@ -272,13 +296,15 @@ void write_results(const Writer& writer, const Store& store, const IsStopped& is
 
 }  // namespace
 
-void export_hdf5(const Store& store, const std::filesystem::path& file,
-                 const IsStopped& is_stopped) {
-  check_definition_digest(store);
+void export_hdf5(const Store& store, const std::filesystem::path& file, const IsStopped& is_stopped,
+                 DrawColumns draws) {
   DraftFile draft(file);
   Writer writer(draft);
-  describe_campaign(writer, store);
-  write_results(writer, store, is_stopped);
+  store.read_one_state([&] {
+    check_definition_digest(store);
+    describe_campaign(writer, store);
+    write_results(writer, store, is_stopped, draws);
+  });
   writer.close();
   draft.publish();
 }

@@ -10,6 +10,7 @@
 
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
+#include "core/campaign/drawn_quantities.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -27,17 +28,20 @@ Json campaign_json(const Store& store) {
           {"build", store.build()},       {"definition", store.definition()}};
 }
 
-Json columns_json() {
+Json columns_json(const DrawnColumns& draws) {
   Json columns = Json::array();
   for (const ValueColumn& column : value_columns()) {
     columns.push_back({{"name", column.name}, {"unit", column.unit}});
+  }
+  for (std::size_t i = 0; i < draws.count(); ++i) {
+    columns.push_back({{"name", draw_column_name(i)}, {"unit", drawn_unit(i)}});
   }
   return columns;
 }
 
 class RunLines {
  public:
-  explicit RunLines(TextOutput& output) : output_(output) {}
+  RunLines(TextOutput& output, const DrawnColumns& draws) : output_(output), draws_(draws) {}
 
   void add(const RunResult& result) {
     line_.clear();
@@ -46,41 +50,59 @@ class RunLines {
                    is_first_ ? "\n" : ",\n", result.run.value, name_of(result.status),
                    result.num_draws, result.num_rounds);
     for (const ValueColumn& column : value_columns()) {
-      const std::optional<double> value = column.value_in(result);
-      fmt::format_to(end, R"(,"{}":)", column.name);
-      if (value) {
-        fmt::format_to(end, "{}", *value);
-      } else {
-        fmt::format_to(end, "null");
-      }
+      add_number(column.name, column.value_in(result));
     }
     if (result.status == RunStatus::lost) {
-      fmt::format_to(end, R"(,"loss_cause":"{}","loss_session":"{}"}})", name_of(result.loss.cause),
+      fmt::format_to(end, R"(,"loss_cause":"{}","loss_session":"{}")", name_of(result.loss.cause),
                      name_of(result.loss.session));
     } else {
-      fmt::format_to(end, R"(,"loss_cause":null,"loss_session":null}})");
+      fmt::format_to(end, R"(,"loss_cause":null,"loss_session":null)");
     }
+    add_draws(result.run);
+    line_.push_back('}');
     output_.write({line_.data(), line_.size()});
     is_first_ = false;
   }
 
  private:
+  void add_number(const std::string& name, std::optional<double> value) {
+    const auto end = std::back_inserter(line_);
+    fmt::format_to(end, R"(,"{}":)", name);
+    if (value) {
+      fmt::format_to(end, "{}", *value);
+    } else {
+      fmt::format_to(end, "null");
+    }
+  }
+
+  void add_draws(RunIndex run) {
+    const std::optional<DrawnValues> values = draws_.values_of(run);
+    for (std::size_t i = 0; i < draws_.count(); ++i) {
+      add_number(draw_column_name(i), values ? std::optional((*values)[i]) : std::nullopt);
+    }
+  }
+
   TextOutput& output_;
+  const DrawnColumns& draws_;
   fmt::memory_buffer line_;
   bool is_first_ = true;
 };
 
 }  // namespace
 
-void export_json(const Store& store, TextOutput& output, const IsStopped& is_stopped) {
-  check_definition_digest(store);
-  output.write(fmt::format("{{\"campaign\":{},\n\"columns\":{},\n\"runs\":[",
-                           text_of(campaign_json(store)), text_of(columns_json())));
-  RunLines lines(output);
-  const WalkedResults walked =
-      walk_results(store, is_stopped, [&](const RunResult& result) { lines.add(result); });
-  output.write(fmt::format("\n],\n\"num_finished\":{},\n\"digest\":\"{}\"}}\n", walked.num_results,
-                           walked.digest));
+void export_json(const Store& store, TextOutput& output, const IsStopped& is_stopped,
+                 DrawColumns draws) {
+  store.read_one_state([&] {
+    check_definition_digest(store);
+    const DrawnColumns drawn(store, draws);
+    output.write(fmt::format("{{\"campaign\":{},\n\"columns\":{},\n\"runs\":[",
+                             text_of(campaign_json(store)), text_of(columns_json(drawn))));
+    RunLines lines(output, drawn);
+    const WalkedResults walked =
+        walk_results(store, is_stopped, [&](const RunResult& result) { lines.add(result); });
+    output.write(fmt::format("\n],\n\"num_finished\":{},\n\"digest\":\"{}\"}}\n",
+                             walked.num_results, walked.digest));
+  });
   output.finish();
 }
 

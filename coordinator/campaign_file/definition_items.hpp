@@ -14,7 +14,7 @@ namespace proofmass::coordinator {
 using DefinitionValue = std::variant<std::int64_t, double, std::string>;
 
 struct DefinitionItem {
-  std::string key;  ///< `estimation.transient_s`, `session[0].excitations[1].axis`,
+  std::string key;  ///< `estimation.transient_s`, `session[3].excitations[0].axis`,
                     ///< `dispersion.offcentring_m.x.law`.
   DefinitionValue value;
 };

@@ -42,6 +42,9 @@ void add_export(CLI::App& app, Command& chosen) {
                    "csv (the default), json or hdf5");
   command.add_option("--output", options->output, "File; standard output by default");
   command.add_flag("--force", options->is_forced, "Replace an existing file");
+  command.add_flag_callback(
+      "--draws", [options] { options->draws = DrawColumns::included; },
+      "Add columns draw_... with what each run drew");
   command.callback([options, &chosen] { chosen = [options] { return export_results(*options); }; });
 }
 

@@ -42,16 +42,16 @@ void check(const ExportOptions& options) {
 void write_text(const ExportOptions& options, const Store& store, TextOutput& output,
                 const IsStopped& is_stopped) {
   if (options.format == ExportFormat::csv) {
-    export_csv(store, output, is_stopped);
+    export_csv(store, output, is_stopped, options.draws);
   } else {
-    export_json(store, output, is_stopped);
+    export_json(store, output, is_stopped, options.draws);
   }
 }
 
 void write(const ExportOptions& options, const IsStopped& is_stopped) {
   const Store store = Store::open_read_only(options.database);
   if (options.format == ExportFormat::hdf5) {
-    export_hdf5(store, options.output, is_stopped);
+    export_hdf5(store, options.output, is_stopped, options.draws);
   } else if (is_standard_output(options.output)) {
     TextOutput output;
     write_text(options, store, output, is_stopped);

@@ -14,7 +14,7 @@
 #include "coordinator/query/draw_scan.hpp"
 #include "coordinator/query/drawn_campaign.hpp"
 #include "coordinator/query/virtual_table.hpp"
-#include "core/error.hpp"
+#include "core/campaign/drawn_quantities.hpp"
 
 SQLITE_EXTENSION_INIT3
 

@@ -4,14 +4,13 @@
 #include <sqlite3ext.h>
 
 #include <algorithm>
-#include <array>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "core/campaign/draw.hpp"
+#include "core/campaign/drawn_quantities.hpp"
 #include "core/error.hpp"
 
 SQLITE_EXTENSION_INIT3
@@ -166,28 +165,10 @@ DatabaseState state_of(sqlite3* connection, const std::string& database) {
 DrawnCampaign::DrawnCampaign(Campaign campaign) : campaign_(std::move(campaign)) {}
 
 const std::optional<DrawnValues>& DrawnCampaign::values_of(RunIndex run) {
-  PROOFMASS_EXPECT(run.value < campaign_.num_runs);
   if (last_run_ == run) return last_values_;
-  const std::vector<double> table_values = campaign_.table_values(run);
-  const AcceptedDraw draw = draw_instrument(campaign_, run, table_values);
-  last_values_.reset();
-  if (draw.instrument) {
-    last_values_ =
-        draw_values(campaign_.dispersions, campaign_.seed, run, draw.num_draws - 1, table_values);
-  }
+  last_values_ = accepted_values(campaign_, run);
   last_run_ = run;
   return last_values_;
-}
-
-std::string_view drawn_unit(std::size_t quantity) {
-  // A name ends in its unit; `_s2_m` ends in `_m` too, so that the longer come first.
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 5> units{
-      {{"_rad_s2", "rad/s²"}, {"_m_s2", "m/s²"}, {"_s2_m", "s²/m"}, {"_rad", "rad"}, {"_m", "m"}}};
-  const std::string_view name = drawn_names()[quantity];
-  const std::string_view group = name.substr(0, name.find('.'));
-  const auto found =
-      std::ranges::find_if(units, [&](const auto& unit) { return group.ends_with(unit.first); });
-  return found == units.end() ? "1" : found->second;
 }
 
 }  // namespace proofmass::coordinator

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -52,9 +51,5 @@ class DrawnCampaign {
   std::optional<RunIndex> last_run_;  ///< A join asks for the quantities of a run one by one.
   std::optional<DrawnValues> last_values_;
 };
-
-/// Unit of a drawn quantity, for people.
-/// @param quantity  Index into drawn_names().
-[[nodiscard]] std::string_view drawn_unit(std::size_t quantity);
 
 }  // namespace proofmass::coordinator

@@ -21,7 +21,9 @@ with h5py.File(sys.argv[1], "r") as file:
     for name in ("loss_cause", "loss_session"):
         names = {value: key for key, value in h5py.check_enum_dtype(file[name].dtype).items()}
         answer[name] = [names[value] for value in file[name][:]]
-    for group in ("truth", "estimate", "error", "health"):
+    for group in ("truth", "estimate", "error", "health", "draw"):
+        if group not in file:
+            continue
         for name, column in file[group].items():
             values = column[:]
             answer["units"][f"{group}/{name}"] = column.attrs["unit"]
