@@ -62,6 +62,8 @@ std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy,
                      right_aligned(measured_figure(100.0 * beyond.upper), to_width));
 }
 
+static_assert(num_parameters == 10);  // The text says it in a word.
+
 std::string joint_text(const ExceedanceCount& missing_any) {
   const std::uint64_t num_holding = missing_any.num_runs - missing_any.num_exceedances;
   const Interval holding =
@@ -69,7 +71,7 @@ std::string joint_text(const ExceedanceCount& missing_any) {
                            static_cast<double>(missing_any.num_runs), default_confidence);
   constexpr std::size_t margin = 2;
   return line_of(
-      fmt::format("all objectives together: {} of {} runs,", num_holding, missing_any.num_runs),
+      fmt::format("all ten objectives together: {} of {} runs,", num_holding, missing_any.num_runs),
       interval_percent(holding) + " of all draws", margin);
 }
 

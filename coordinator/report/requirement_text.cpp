@@ -44,7 +44,7 @@ std::string missing_lines(const RequirementAnswer& answer) {
                      num_missing, reasons_text(answer.missing));
 }
 
-/// How many exceed it, and the bound that decides.
+/// How many runs exceed the limit, and the bound that decides.
 std::string exceedance_lines(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
   const double allowed = 1.0 - answer.requirement.tolerance.coverage;
@@ -93,15 +93,18 @@ std::string bound_line(const RequirementAnswer& answer) {
                      given_percent(tolerance.confidence));
 }
 
-std::string needed_line(const RequirementCheck& check) {
+std::string needed_line(const RequirementAnswer& answer) {
+  const RequirementCheck& check = answer.check;
   if (check.verdict != Verdict::undecided) return "";
+  const bool is_joint = answer.requirement.subject == Requirement::Subject::all_objectives;
   const auto count = [](const std::optional<std::uint64_t>& num_runs) {
     return num_runs ? std::to_string(*num_runs) : "none";
   };
   return fmt::format(
-      "Draws        {} meet it if no further one exceeds it,\n"
-      "             {} decide if they go on to exceed it as often\n",
-      count(check.num_runs_at_best), count(check.num_runs_at_this_rate));
+      "Draws        {} meet the requirement if no further one exceeds {},\n"
+      "             {} decide if they go on to exceed {} as often\n",
+      count(check.num_runs_at_best), is_joint ? "an objective" : "the limit",
+      count(check.num_runs_at_this_rate), is_joint ? "one" : "it");
 }
 
 }  // namespace
@@ -125,7 +128,7 @@ std::string requirement_text(const RequirementAnswer& answer) {
   return fmt::format("Requirement  {}\nAnswer       {}\n{}{}{}", answer.text,
                      name_of(answer.check.verdict),
                      is_joint ? holding_lines(answer) : exceedance_lines(answer),
-                     bound_line(answer), needed_line(answer.check));
+                     bound_line(answer), needed_line(answer));
 }
 
 }  // namespace proofmass::coordinator

@@ -170,10 +170,16 @@ std::string verdict_text(const StopRule& rule, const StoredStopCheck& check) {
   Interval bounds = check.interval.value_or(Interval{.lower = 0.0, .upper = 1.0});
   bounds.confidence = tolerance.confidence;  // Stored with the rule and not with the bounds.
   const Verdict verdict = verdict_of(rule, check);
-  return fmt::format("          {} after {} runs; exceeding: {:.0f}\n          {}\n",
-                     name_of(verdict), check.num_runs,
-                     check.estimate * static_cast<double>(check.num_runs),
-                     bounds_text(bounds, 1.0 - tolerance.coverage, verdict));
+  // As report --requirement has it: runs in which all objectives hold, or those beyond the limit.
+  const bool is_joint = rule.requirement.subject == Requirement::Subject::all_objectives;
+  const double fraction = is_joint ? 1.0 - check.estimate : check.estimate;
+  const Interval holding{
+      .lower = 1.0 - bounds.upper, .upper = 1.0 - bounds.lower, .confidence = bounds.confidence};
+  return fmt::format("          {} after {} runs; {}: {:.0f}\n          {}\n", name_of(verdict),
+                     check.num_runs, is_joint ? "holding" : "exceeding",
+                     fraction * static_cast<double>(check.num_runs),
+                     is_joint ? success_text(holding, tolerance.coverage, verdict)
+                              : bounds_text(bounds, 1.0 - tolerance.coverage, verdict));
 }
 
 std::string width_text(const StopRule& rule, const StoredStopCheck& check) {

@@ -184,7 +184,8 @@ TEST(ErrorTable, ShowsBiasPercentilesAndHowOftenObjectivesHold) {
                               "  0.243    7.04"));
   EXPECT_THAT(lines, Contains("K2d/K1c²          -        - │       0       0       0       0 │"
                               "      0    3.62"));
-  EXPECT_EQ(lines.back(), "all objectives together: 97 of 100 runs, 91.5 to 99.4 % of all draws");
+  EXPECT_EQ(lines.back(),
+            "all ten objectives together: 97 of 100 runs, 91.5 to 99.4 % of all draws");
 }
 
 // Run 1 has the worst total of all, and no run has the worst error of both parameters.

@@ -36,8 +36,10 @@ TEST(RequirementText, SaysHowManyDrawsItTakes) {
   EXPECT_THAT(text, testing::HasSubstr("Answer       undecided\n"));
   EXPECT_THAT(text,
               testing::HasSubstr("Bound        none: 299 draws at least, for 99 % with 95 %\n"));
-  EXPECT_THAT(text, testing::HasSubstr("Draws        299 meet it if no further one exceeds it,\n"
-                                       "             299 decide if"));
+  EXPECT_THAT(text, testing::HasSubstr("Draws        299 meet the requirement if no further one "
+                                       "exceeds the limit,\n"
+                                       "             299 decide if they go on to exceed it as "
+                                       "often\n"));
 }
 
 TEST(RequirementText, BreaksALineOfManyRuns) {
@@ -56,7 +58,8 @@ TEST(RequirementText, SaysThatNoNumberOfDrawsGivesABound) {
 // One in a hundred, as often as allowed: with 473 draws one may exceed it [Wilks1941].
 TEST(RequirementText, SaysThatNoNumberOfDrawsDecides) {
   EXPECT_THAT(answer_to("a_c12 < 9e-4 for 99% with 95%", 100, 1),
-              testing::HasSubstr("Draws        473 meet it if no further one exceeds it,\n"
+              testing::HasSubstr("Draws        473 meet the requirement if no further one "
+                                 "exceeds the limit,\n"
                                  "             none decide if"));
 }
 
@@ -110,6 +113,11 @@ TEST(RequirementText, TellsOfAllObjectives) {
                                   "each with 90 %\n"
                                   "Required     95 % of all draws\n"
                                   "Draws        "));
+  EXPECT_THAT(
+      answer_to_count(3, 0.95),
+      testing::HasSubstr(" meet the requirement if no further one exceeds an objective,\n"));
+  EXPECT_THAT(answer_to_count(3, 0.95),
+              testing::EndsWith(" decide if they go on to exceed one as often\n"));
   EXPECT_THAT(answer_to_count(3, 0.90),
               testing::HasSubstr("Answer       met\n"
                                  "Holding      97 of 100 runs; at least 93.44 % of all draws, with "

@@ -75,6 +75,18 @@ TEST_F(Summarise, DecidesARequirement) {
   EXPECT_TRUE(stop_check_differences(store, Scenario{}.objectives).empty());
 }
 
+// The same of all objectives, which hold in all runs but run 3: 1 − 5.0833 %.
+TEST_F(Summarise, DecidesARequirementOnAllObjectives) {
+  const std::string rule = "all objectives for 90% with 95% decided";
+  Store store = finished(128, {.stop_rule = rule, .num_runs_max = 1000, .failures_max = {}}, 0, 0);
+  EXPECT_EQ(next_runs(store), std::nullopt);
+  EXPECT_FALSE(is_rule_missed(store));
+  EXPECT_EQ(stop_text(store),
+            "Stopping  all objectives for 90% with 95% decided\n"
+            "          met after 128 runs; holding: 127\n"
+            "          at least 94.92 % of all draws, with 95 %\n");
+}
+
 // A requirement that is decided and not met is missed; the campaign ends all the same.
 TEST_F(Summarise, EndsWhenARequirementCannotBeMet) {
   const std::string rule = "k2c < 2 for 90% with 95% decided";
