@@ -66,7 +66,8 @@ class BitFlips : public test::StoreTest {
     return printed([&] {
       const Store store = Store::open_read_only(path);
       TextOutput output(directory() / "export");
-      (is_json ? export_json : export_csv)(store, output, test::never_stopped);
+      (is_json ? export_json : export_csv)(store, output, test::never_stopped,
+                                           DrawColumns::left_out);
       return test::content_of(directory() / "export");
     });
   }
