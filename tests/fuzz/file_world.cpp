@@ -133,7 +133,8 @@ void query(const fs::path& file) {
       "SELECT * FROM error_long",
       "SELECT * FROM worker_throughput",
       "SELECT * FROM attempt_history",
-      "SELECT quantity, stdev(value) FROM draw WHERE run_index < 3 GROUP BY quantity"};
+      "SELECT quantity, stdev(value) FROM draw WHERE run_index < 3 GROUP BY quantity",
+      "SELECT key, value FROM definition_entry"};
   NullWriter writer;
   for (const std::string& sql : questions) {
     try {
@@ -147,7 +148,7 @@ void export_text(const fs::path& file) {
   const Store store = Store::open_read_only(file);
   for (const auto write : {export_csv, export_json}) {
     TextOutput output(file.parent_path() / "export.out");
-    write(store, output, never);
+    write(store, output, never, DrawColumns::included);
   }
 }
 
@@ -248,7 +249,8 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
     case FileUse::export_text:
       return export_text(file);
     case FileUse::export_hdf5:
-      return export_hdf5(Store::open_read_only(file), file.parent_path() / "export.out", never);
+      return export_hdf5(Store::open_read_only(file), file.parent_path() / "export.out", never,
+                         DrawColumns::included);
     case FileUse::compare:
       return compare(file, pristine);
     case FileUse::query:
