@@ -125,7 +125,7 @@ class NullWriter final : public RowWriter {
 };
 
 void query(const fs::path& file) {
-  static const std::array<std::string, 8> questions{
+  static const std::array<std::string, 9> questions{
       "SELECT * FROM parameter_accuracy",
       "SELECT * FROM worst_runs",
       "SELECT * FROM campaign_progress",
