@@ -123,9 +123,10 @@ class CommentedWriter {
         "whole\n"
         "# orbits. Lines are [i, j] or [i, j, k]: the frequency i f_orb + j f + k f_spin, f being "
         "that\n"
-        "# of the excitation; i, j and k need not be whole. Those of fit_lines give the estimate, "
-        "those\n"
-        "# of known_lines are fitted beside them. Every target must be there once. Further keys:\n"
+        "# of the excitation; i, j and k need not be whole, and j is a list where the session has\n"
+        "# several excitations. Those of fit_lines give the estimate, those of known_lines are "
+        "fitted\n"
+        "# beside them. Every target needs a session; several share it. Further keys:\n"
         "# spin_rate_rad_s = 0 (2π f_spin, of the frame that the attitude loop holds, about Y) "
         "and\n"
         "# drag_free = \"common\" (\"sensor_1\", \"sensor_2\").\n";

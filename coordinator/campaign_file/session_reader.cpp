@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <array>
 #include <optional>
 
 #include "coordinator/campaign_file/readers.hpp"
@@ -19,16 +18,32 @@ bool read_needed(Document& document, const std::string& path, Value& value) {
   return !is_absent && document.read(path, value);
 }
 
+bool read_multiple(const toml::node& entry, double& multiple) {
+  const std::optional<double> value = entry.value<double>();
+  if (!value || !entry.is_number()) return false;
+  multiple = *value;
+  return true;
+}
+
+// Of one excitation, or of each in a list.
+bool read_excitation_multiples(const toml::node& entry, LineMultiple& line) {
+  const toml::array* const list = entry.as_array();
+  if (list == nullptr) return read_multiple(entry, line.excitation);
+  if (list->empty() || list->size() > num_excitations_max) return false;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    if (!read_multiple((*list)[i], i == 0 ? line.excitation : line.further[i - 1])) return false;
+  }
+  return true;
+}
+
 std::optional<LineMultiple> line_of(const toml::node& entry) {
   const toml::array* const multiples = entry.as_array();
   if (multiples == nullptr || multiples->size() < 2 || multiples->size() > 3) return std::nullopt;
   LineMultiple line;
-  const std::array<double*, 3> values{&line.orbital, &line.excitation, &line.spin};
-  for (std::size_t i = 0; i < multiples->size(); ++i) {
-    const std::optional<double> value = (*multiples)[i].value<double>();
-    if (!value || !(*multiples)[i].is_number()) return std::nullopt;
-    *values[i] = *value;
-  }
+  const bool is_read = read_multiple((*multiples)[0], line.orbital) &&
+                       read_excitation_multiples((*multiples)[1], line) &&
+                       (multiples->size() < 3 || read_multiple((*multiples)[2], line.spin));
+  if (!is_read) return std::nullopt;
   return line;
 }
 

@@ -75,13 +75,13 @@ struct Bench {
 double sums_ns(Bench& bench) {
   const SharedSample shared = bench.signals.next();
   const Observation<double> observation = bench.advance(shared);
-  const RegressorKind kind = regressor_kind(bench.session.target);
+  const TargetInfo& target = target_info(bench.session.target);
   const std::array<double, 2> weights{0.5, -0.5};
   SignalSums<double> sums{};
   return ns_per_call([&] {
     keep(observation);
-    add_sample(ground_signals(observation, shared, kind), weights.data(), weights.size(),
-               num_signals_used(bench.session.target), sums);
+    add_sample(ground_signals(observation, shared, target.product), weights.data(), weights.size(),
+               target.signals, sums);
     keep(sums);
   });
 }

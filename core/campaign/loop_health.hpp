@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "core/session/session.hpp"
+#include "core/session/target.hpp"
 
 namespace proofmass {
 

@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "core/error.hpp"
+#include "core/estimation/methods.hpp"
 #include "core/session/session_names.hpp"
 
 namespace proofmass {
@@ -18,11 +19,6 @@ std::span<const std::string_view> names_of(EnvironmentKind) {
 
 std::span<const std::string_view> names_of(NoisePreset) {
   static constexpr std::array<std::string_view, 2> names{"design_2013", "flight_suref"};
-  return names;
-}
-
-std::span<const std::string_view> names_of(EstimationMethod) {
-  static constexpr std::array<std::string_view, 1> names{"hardy2013"};
   return names;
 }
 
@@ -154,6 +150,7 @@ void Scenario::validate() const {
              simulation.sample_period_s);
   check_loop("attitude", attitude.bandwidth_hz, attitude.integral_hz, simulation.sample_period_s);
   validate_sessions(sessions, orbit.period_s, simulation.sample_period_s);
+  estimation_method(estimation.method).check(sessions);
   check_transient(*this);
   check_band(*this);
 }

@@ -15,11 +15,13 @@ namespace proofmass {
 
 enum class EnvironmentKind : std::uint8_t { harmonic = 1, file = 2 };
 enum class NoisePreset : std::uint8_t { design_2013 = 1, flight_suref = 2 };
-enum class EstimationMethod : std::uint8_t { hardy2013 = 1 };
-/// What an estimation round subtracts of what the round before found, see calibrate_hardy2013().
+/// Position in the list of core/estimation/methods.cpp, from 1; `hardy2013` is the first.
+enum class EstimationMethod : std::uint8_t {};
+/// What an estimation round subtracts of what the round before found, see estimate_hardy2013().
 enum class Correction : std::uint8_t { first_order = 1, second_order = 2, hardy2013 = 3 };
 
 /// Spelling of an enumerator in campaign files; the list of all of them, in value order from 1.
+/// That of the methods stands in core/estimation.
 [[nodiscard]] std::span<const std::string_view> names_of(EnvironmentKind);
 [[nodiscard]] std::span<const std::string_view> names_of(NoisePreset);
 [[nodiscard]] std::span<const std::string_view> names_of(EstimationMethod);
@@ -99,7 +101,7 @@ struct AttitudeConfig {
 };
 
 struct EstimationConfig {
-  EstimationMethod method = EstimationMethod::hardy2013;
+  EstimationMethod method{1};  ///< `hardy2013`.
   Correction correction = Correction::second_order;
   double transient_s = 1000.0;  ///< Filtered record dropped at a session's start.
   double band_ratio = 3.0;      ///< Band-pass from f/ratio to f·ratio.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -32,15 +33,6 @@ std::span<const std::string_view> names_of(DragFreeSource) {
   return names;
 }
 
-std::span<const std::string_view> names_of(SessionTarget) {
-  static constexpr std::array<std::string_view, num_session_targets> names{
-      "a_c11_delta_x", "a_c11_delta_z", "a_c11_delta_y", "a_c12",       "a_c13",      "a_d11_prime",
-      "a_d12",         "a_d13",         "k2d",           "k2_sensor_1", "k2_sensor_2"};
-  return names;
-}
-
-const char* name_of(SessionTarget target) { return names_of(target)[index(target)].data(); }
-
 std::string_view amplitude_key(ExcitationKind kind) {
   static constexpr std::array<std::string_view, 3> keys{"amplitude_rad", "amplitude_m_s2",
                                                         "amplitude_m"};
@@ -50,8 +42,17 @@ std::string_view amplitude_key(ExcitationKind kind) {
 }
 
 std::string text_of(const LineMultiple& line) {
-  if (line.spin == 0.0) return fmt::format("[{}, {}]", line.orbital, line.excitation);
-  return fmt::format("[{}, {}, {}]", line.orbital, line.excitation, line.spin);
+  std::size_t num_further = line.further.size();
+  while (num_further > 0 && line.further[num_further - 1] == 0.0) --num_further;
+  std::string excitations = fmt::format("{}", line.excitation);
+  if (num_further > 0) {
+    for (std::size_t i = 0; i < num_further; ++i) {
+      excitations += fmt::format(", {}", line.further[i]);
+    }
+    excitations = "[" + excitations + "]";
+  }
+  if (line.spin == 0.0) return fmt::format("[{}, {}]", line.orbital, excitations);
+  return fmt::format("[{}, {}, {}]", line.orbital, excitations, line.spin);
 }
 
 double line_frequency_hz(const Session& session, const LineMultiple& line, double orbit_period_s) {
@@ -59,7 +60,20 @@ double line_frequency_hz(const Session& session, const LineMultiple& line, doubl
   const double excitation_hz =
       line.excitation == 0.0 ? 0.0 : session.excitations.front().frequency_hz;
   const double spin_hz = session.spin_rate_rad_s / (2.0 * std::numbers::pi);
-  return line.orbital / orbit_period_s + line.excitation * excitation_hz + line.spin * spin_hz;
+  double frequency_hz =
+      line.orbital / orbit_period_s + line.excitation * excitation_hz + line.spin * spin_hz;
+  for (std::size_t i = 0; i < line.further.size(); ++i) {
+    if (line.further[i] == 0.0) continue;
+    PROOFMASS_EXPECT(i + 1 < session.excitations.size());
+    frequency_hz += line.further[i] * session.excitations[i + 1].frequency_hz;
+  }
+  return frequency_hz;
+}
+
+const Excitation* mass_excitation(const Session& session) {
+  const auto found =
+      std::ranges::find(session.excitations, ExcitationKind::test_mass, &Excitation::kind);
+  return found == session.excitations.end() ? nullptr : &*found;
 }
 
 double test_frequency_hz(const Session& session, double orbit_period_s) {

@@ -1,53 +1,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/campaign/field.hpp"
 #include "core/error.hpp"
 #include "core/session/session.hpp"
 #include "core/session/session_names.hpp"
-#include "core/signal/line_weights.hpp"
 
 namespace proofmass {
 namespace {
 
 constexpr std::size_t name_length_max = 64;
-constexpr std::size_t num_lines_max = LineWeights::num_lines_max;
-constexpr std::size_t fit_lines_max = 2;
 constexpr double multiple_max = 1000.0;
-
-// What must be shaken, and which measurement nulled, for a session to determine its target.
-struct Stimulus {
-  std::optional<ExcitationKind> kind;
-  Axis axis = Axis::x;
-  MassMotion motion = MassMotion::opposition;
-  DragFreeSource drag_free = DragFreeSource::common;
-};
-
-// [Hardy2013] section 4.2, in the order of SessionTarget.
-const Stimulus& stimulus_of(SessionTarget target) {
-  using enum ExcitationKind;
-  using enum MassMotion;
-  using enum DragFreeSource;
-  static constexpr std::array<Stimulus, num_session_targets> stimuli{{
-      {},
-      {},
-      {attitude, Axis::z, opposition, common},
-      {test_mass, Axis::y, opposition, common},
-      {test_mass, Axis::z, opposition, common},
-      {drag_free, Axis::x, opposition, common},
-      {drag_free, Axis::y, opposition, common},
-      {drag_free, Axis::z, opposition, common},
-      {drag_free, Axis::x, opposition, common},
-      {test_mass, Axis::x, mass_1, sensor_2},
-      {test_mass, Axis::x, mass_2, sensor_1},
-  }};
-  return stimuli[index(target)];
-}
 
 template <typename Choice>
 std::string spelling(Choice choice) {
@@ -111,7 +79,8 @@ class SessionCheck {
   }
 
   void check_excitations() const;
-  void check_excitation(const Excitation& excitation, const Stimulus& needed) const;
+  void check_stimulus(const Excitation& excitation, const Stimulus& needed) const;
+  void check_excitation(std::size_t i) const;
   void check_lines() const;
   void check_multiple(const std::string& key, const LineMultiple& line) const;
   void check_frequency(const std::string& key, const LineMultiple& line) const;
@@ -123,38 +92,52 @@ class SessionCheck {
 };
 
 void SessionCheck::check_excitations() const {
-  const Stimulus& needed = stimulus_of(session_.target);
-  check_choice("drag_free", session_.drag_free, needed.drag_free);
-  const std::size_t num_needed = needed.kind ? 1 : 0;
-  if (session_.excitations.size() != num_needed) {
-    refuse("excitations", fmt::format("{} of them", session_.excitations.size()),
-           fmt::format("target {} needs {}", name_of(session_.target),
-                       needed.kind ? "exactly one" : "none"));
+  const TargetInfo& target = target_info(session_.target);
+  check_choice("drag_free", session_.drag_free, target.drag_free);
+  const std::vector<Excitation>& excitations = session_.excitations;
+  const auto refuse_number = [&](std::string_view rule) {
+    refuse("excitations", fmt::format("{} of them", excitations.size()), rule);
+  };
+  if (target.stimulus ? excitations.empty() : !excitations.empty()) {
+    refuse_number(
+        fmt::format("target {} needs {}", target.name, target.stimulus ? "one or more" : "none"));
   }
-  if (needed.kind) check_excitation(session_.excitations.front(), needed);
+  if (excitations.size() > num_excitations_max) {
+    refuse_number(fmt::format("must be at most {}", num_excitations_max));
+  }
+  if (target.stimulus) check_stimulus(excitations.front(), *target.stimulus);
+  for (std::size_t i = 0; i < excitations.size(); ++i) check_excitation(i);
 }
 
-void SessionCheck::check_excitation(const Excitation& excitation, const Stimulus& needed) const {
+void SessionCheck::check_stimulus(const Excitation& excitation, const Stimulus& needed) const {
   const std::string key = "excitations[0].";
-  check_choice(key + "kind", excitation.kind, *needed.kind);
+  check_choice(key + "kind", excitation.kind, needed.kind);
   check_choice(key + "axis", excitation.axis, needed.axis);
   check_choice(key + "moves", excitation.motion, needed.motion);
+}
+
+void SessionCheck::check_excitation(std::size_t i) const {
+  const Excitation& excitation = session_.excitations[i];
+  const std::string key = fmt::format("excitations[{}].", i);
   check_number(key + std::string(amplitude_key(excitation.kind)), excitation.amplitude,
                range::positive);
   // The quadratic factors show at twice the excitation's frequency, which must be seen too.
   check_number(key + "frequency_hz", excitation.frequency_hz,
                Range{.minimum = 0.0, .maximum = nyquist_hz_ / 2, .minimum_open = true});
+  if (excitation.kind == ExcitationKind::test_mass && &excitation != mass_excitation(session_)) {
+    refuse(key + "kind", spelling(excitation.kind), "one excitation may move test masses");
+  }
 }
 
 void SessionCheck::check_lines() const {
   if (session_.fit_lines.empty()) refuse("fit_lines", "[]", "must name one line or more");
-  if (session_.fit_lines.size() > fit_lines_max) {
+  if (session_.fit_lines.size() > num_fit_lines_max) {
     refuse("fit_lines", fmt::format("{} lines", session_.fit_lines.size()), "must be one or two");
   }
   const std::size_t num_lines = session_.fit_lines.size() + session_.known_lines.size();
-  if (num_lines > num_lines_max) {
+  if (num_lines > num_session_lines_max) {
     refuse("known_lines", fmt::format("{} lines with fit_lines", num_lines),
-           fmt::format("must be at most {}", num_lines_max));
+           fmt::format("must be at most {}", num_session_lines_max));
   }
   // Closer lines cannot be told apart in the session's time. A part in 10⁹ absorbs rounding where
   // they are exactly that close: neighbouring multiples of f_orb in a session of one orbit.
@@ -181,9 +164,16 @@ void SessionCheck::check_lines() const {
 
 void SessionCheck::check_multiple(const std::string& key, const LineMultiple& line) const {
   const Range multiples = range::between(-multiple_max, multiple_max);
-  for (const double multiple : {line.orbital, line.excitation, line.spin}) {
-    if (multiples.contains(multiple)) continue;
+  const auto check = [&](double multiple) {
+    if (multiples.contains(multiple)) return;
     refuse(key, text_of(line), fmt::format("must be multiples from -{0} to {0}", multiple_max));
+  };
+  for (const double multiple : {line.orbital, line.excitation, line.spin}) check(multiple);
+  for (std::size_t i = 0; i < line.further.size(); ++i) {
+    check(line.further[i]);
+    if (line.further[i] == 0.0 || i + 1 < session_.excitations.size()) continue;
+    refuse(key, text_of(line),
+           fmt::format("the session has no excitations[{}] to take a multiple of", i + 1));
   }
   if (line.excitation != 0.0 && session_.excitations.empty()) {
     refuse(key, text_of(line), "the session has no excitation to take a multiple of");
@@ -211,23 +201,6 @@ void check_unique_names(const std::vector<Session>& sessions) {
   }
 }
 
-void check_targets_once(const std::vector<Session>& sessions) {
-  std::array<std::optional<std::size_t>, num_session_targets> session_of;
-  for (std::size_t i = 0; i < sessions.size(); ++i) {
-    auto& position = session_of[index(sessions[i].target)];
-    if (position) {
-      throw ConfigError(fmt::format("session[{}].target", i), spelling(sessions[i].target),
-                        fmt::format("is the target of session[{}] already", *position));
-    }
-    position = i;
-  }
-  for (std::size_t i = 0; i < num_session_targets; ++i) {
-    if (session_of[i]) continue;
-    throw ConfigError("session", fmt::format("{} sessions", sessions.size()),
-                      fmt::format("none has the target {}", names_of(SessionTarget{})[i]));
-  }
-}
-
 }  // namespace
 
 void validate_sessions(const std::vector<Session>& sessions, double orbit_period_s,
@@ -235,7 +208,6 @@ void validate_sessions(const std::vector<Session>& sessions, double orbit_period
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     SessionCheck(sessions[i], i, orbit_period_s, sample_period_s).run();
   }
-  check_targets_once(sessions);
   check_unique_names(sessions);
 }
 

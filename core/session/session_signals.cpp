@@ -1,7 +1,10 @@
 #include "core/session/session_signals.hpp"
 
+#include <array>
 #include <cmath>
 #include <numbers>
+
+#include "core/error.hpp"
 
 namespace proofmass {
 
@@ -35,10 +38,9 @@ SessionSignals::SessionSignals(const Scenario& scenario, const Session& session,
       num_record_(num_record_samples(scenario, session)),
       next_(-num_settling_) {
   environment_.begin_session(static_cast<double>(num_record_) * sample_period_s_);
-  if (!session.excitations.empty()) {
-    has_excitation_ = true;
-    excitation_ = session.excitations.front();
-  }
+  num_excitations_ = session.excitations.size();
+  PROOFMASS_EXPECT(num_excitations_ <= num_excitations_max);
+  for (std::size_t i = 0; i < num_excitations_; ++i) excitations_[i] = session.excitations[i];
 }
 
 SessionSignals::Reference SessionSignals::reference_at_start() const {
@@ -53,7 +55,9 @@ SessionSignals::Reference SessionSignals::reference_from(const SineCosine& phase
 SharedSample SessionSignals::next() {
   const double time = time_s(0);
   SharedSample sample;
-  advance({orbit_->at(time), reference_phase(time), excitation_phase(time)}, sample);
+  SamplePhases phases{orbit_->at(time), reference_phase(time), {}};
+  set_excitation_phases(time, phases);
+  advance(phases, sample);
   return sample;
 }
 
@@ -72,27 +76,39 @@ void SessionSignals::advance(const SamplePhases& phases, SharedSample& sample) {
   sample.external = environment_.at(time_s(0), point);
   if (turns_environment_) [[unlikely]]
     turn(reference.attitude_IR, sample.external);
-  if (has_excitation_) excite(phases.excitation, sample);
+  if (num_excitations_ > 0) excite(phases, sample);
   commanded_.correct(gains_, sample.attitude_command_rad);
   sample.commanded = commanded_;
   commanded_.predict(gains_, {}, sample.reference_rate);
   ++next_;
 }
 
-void SessionSignals::excite(const SineCosine& phase, SharedSample& sample) const {
-  const double value = excitation_.amplitude * phase.sine;
-  switch (excitation_.kind) {
-    case ExcitationKind::attitude:
-      sample.attitude_command_rad[index(excitation_.axis)] = value;
-      break;
-    case ExcitationKind::drag_free:
-      sample.drag_free_command_m_s2[index(excitation_.axis)] = value;
-      break;
-    case ExcitationKind::test_mass: {
-      const double omega = 2.0 * std::numbers::pi * excitation_.frequency_hz;
-      sample.mass_motion = {value, omega * excitation_.amplitude * phase.cosine,
-                            -omega * omega * value};
-      break;
+void SessionSignals::excite(const SamplePhases& phases, SharedSample& sample) const {
+  // A sample may still hold the values of an earlier one. The first excitation of an axis replaces
+  // them, a further one is added.
+  std::array<bool, 3> is_turned{}, is_pushed{};
+  const auto put = [](double& value, bool& is_set, double excitation) {
+    value = is_set ? value + excitation : excitation;
+    is_set = true;
+  };
+  for (std::size_t i = 0; i < num_excitations_; ++i) {
+    const Excitation& excitation = excitations_[i];
+    const SineCosine& phase = phases.excitation[i];
+    const std::size_t axis = index(excitation.axis);
+    const double value = excitation.amplitude * phase.sine;
+    switch (excitation.kind) {
+      case ExcitationKind::attitude:
+        put(sample.attitude_command_rad[axis], is_turned[axis], value);
+        break;
+      case ExcitationKind::drag_free:
+        put(sample.drag_free_command_m_s2[axis], is_pushed[axis], value);
+        break;
+      case ExcitationKind::test_mass: {
+        const double omega = 2.0 * std::numbers::pi * excitation.frequency_hz;
+        sample.mass_motion = {value, omega * excitation.amplitude * phase.cosine,
+                              -omega * omega * value};
+        break;
+      }
     }
   }
 }

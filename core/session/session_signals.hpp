@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
@@ -36,8 +37,9 @@ struct SharedSample {
 template <typename T>
 struct SamplePhasesOf {
   OrbitPointOf<T> orbit;
-  SineCosineOf<T> reference;   ///< Of half the angle that the rotating frame has turned.
-  SineCosineOf<T> excitation;  ///< Of the phase of the excitation.
+  SineCosineOf<T> reference;  ///< Of half the angle that the rotating frame has turned.
+  /// Of the phase of each excitation; nothing beyond the session's own.
+  std::array<SineCosineOf<T>, num_excitations_max> excitation;
 };
 using SamplePhases = SamplePhasesOf<double>;
 
@@ -46,6 +48,8 @@ class SessionSignals {
  public:
   SessionSignals(const Scenario& scenario, const Session& session, const KeplerOrbit& orbit,
                  const Environment& environment);
+
+  [[nodiscard]] std::size_t num_excitations() const { return num_excitations_; }
 
   /// Samples before the record: the first record sample has t = 0.
   [[nodiscard]] std::int64_t num_settling() const { return num_settling_; }
@@ -76,7 +80,9 @@ class SessionSignals {
   [[nodiscard]] PROOFMASS_INLINE std::optional<SamplePhasesOf<T>> phases_at(const T& time_s) const {
     const std::optional<OrbitPointOf<T>> orbit = orbit_->at_lanes(time_s);
     if (!orbit) return std::nullopt;
-    return SamplePhasesOf<T>{*orbit, reference_phase(time_s), excitation_phase(time_s)};
+    SamplePhasesOf<T> phases{*orbit, reference_phase(time_s), {}};
+    set_excitation_phases(time_s, phases);
+    return phases;
   }
 
  private:
@@ -86,14 +92,15 @@ class SessionSignals {
     return sincos_turns(T(0.5 * spin_rate_rad_s_) * time_s / T(2.0 * std::numbers::pi));
   }
   template <typename T>
-  PROOFMASS_INLINE SineCosineOf<T> excitation_phase(const T& time_s) const {
-    if (!has_excitation_) return {T(0.0), T(1.0)};
-    return sincos_turns(T(excitation_.frequency_hz) * time_s);
+  PROOFMASS_INLINE void set_excitation_phases(const T& time_s, SamplePhasesOf<T>& phases) const {
+    for (std::size_t i = 0; i < num_excitations_; ++i) {
+      phases.excitation[i] = sincos_turns(T(excitations_[i].frequency_hz) * time_s);
+    }
   }
 
   void advance(const SamplePhases& phases, SharedSample& sample);
   [[nodiscard]] Reference reference_from(const SineCosine& phase) const;
-  void excite(const SineCosine& phase, SharedSample& sample) const;
+  void excite(const SamplePhases& phases, SharedSample& sample) const;
 
   const KeplerOrbit* orbit_;
   Environment environment_;
@@ -104,8 +111,8 @@ class SessionSignals {
   std::int64_t num_settling_;
   std::int64_t num_record_;
   std::int64_t next_;
-  bool has_excitation_ = false;
-  Excitation excitation_;
+  std::size_t num_excitations_ = 0;
+  std::array<Excitation, num_excitations_max> excitations_{};
   AttitudeEstimator<double> commanded_;
 };
 

@@ -136,12 +136,26 @@ HWY_INLINE void scatter_health(const Group& group, OutcomesOfLanes outcomes) {
   }
 }
 
-HWY_INLINE void scatter(const Group& group, OutcomesOfLanes outcomes) {
+/// @param sums_of  Where an outcome keeps these sums.
+template <typename SumsOf>
+HWY_INLINE void scatter_sums(const SignalSums<Batch>& sums, OutcomesOfLanes outcomes,
+                             const SumsOf& sums_of) {
   for (std::size_t s = 0; s < num_signals; ++s) {
     for (std::size_t i = 0; i < 2 * num_fit_lines_max; ++i) {
-      scatter_number(group.sums[s][i], outcomes,
-                     [=](SessionOutcome& outcome) -> double& { return outcome.sums[s][i]; });
+      scatter_number(sums[s][i], outcomes,
+                     [&](SessionOutcome& outcome) -> double& { return sums_of(outcome)[s][i]; });
     }
+  }
+}
+
+HWY_INLINE void scatter(const Group& group, std::size_t num_known_readers,
+                        OutcomesOfLanes outcomes) {
+  scatter_sums(group.sums, outcomes,
+               [](SessionOutcome& outcome) -> SignalSums<double>& { return outcome.sums; });
+  for (std::size_t k = 0; k < num_known_readers; ++k) {
+    scatter_sums(
+        group.known_sums[k], outcomes,
+        [k](SessionOutcome& outcome) -> SignalSums<double>& { return outcome.known_sums[k]; });
   }
   scatter_health(group, outcomes);
 }
@@ -161,9 +175,9 @@ void PROOFMASS_NAME(record_batch_,
   };
   const std::size_t num_used = (session.num_runs + num_lanes - 1) / num_lanes;
   const auto used = std::span(groups).first(num_used);
-  record_session(signals, session.setup, used, session.weights_buffer, progress);
+  record_session(signals, session.setup, used, session.weights_buffer, progress, NoObserver{});
   for (std::size_t g = 0; g < num_used; ++g) {
-    scatter(groups[g], lanes_of(outcomes, g * num_lanes));
+    scatter(groups[g], session.setup.known_readers.size(), lanes_of(outcomes, g * num_lanes));
   }
 }
 

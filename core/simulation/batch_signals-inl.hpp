@@ -74,13 +74,17 @@ class BatchSignals {
     const Lanes x(phases.orbit.direction_x), z(phases.orbit.direction_z),
         gradient(phases.orbit.gradient_s2), mean_sine(phases.orbit.mean_anomaly.sine),
         mean_cosine(phases.orbit.mean_anomaly.cosine), reference_sine(phases.reference.sine),
-        reference_cosine(phases.reference.cosine), sine(phases.excitation.sine),
-        cosine(phases.excitation.cosine);
+        reference_cosine(phases.reference.cosine);
     std::array<SamplePhases, num_lanes> of_samples;
     for (std::size_t i = 0; i < num_lanes; ++i) {
-      of_samples[i] = {{x[i], z[i], gradient[i], {mean_sine[i], mean_cosine[i]}},
-                       {reference_sine[i], reference_cosine[i]},
-                       {sine[i], cosine[i]}};
+      of_samples[i].orbit = {x[i], z[i], gradient[i], {mean_sine[i], mean_cosine[i]}};
+      of_samples[i].reference = {reference_sine[i], reference_cosine[i]};
+    }
+    for (std::size_t e = 0; e < signals_.num_excitations(); ++e) {
+      const Lanes sine(phases.excitation[e].sine), cosine(phases.excitation[e].cosine);
+      for (std::size_t i = 0; i < num_lanes; ++i) {
+        of_samples[i].excitation[e] = {sine[i], cosine[i]};
+      }
     }
     signals_.next(of_samples, samples_);
   }

@@ -13,10 +13,9 @@ Matrix3<double> matrix(const Eigen::Matrix3d& m) {
 
 /// s of q(t) = [θ]ᵀ e_a s Δ_TM sin(2π f t) for each mass.
 std::array<double, 2> motion_factors(const Session& session) {
-  if (session.excitations.empty()) return {0.0, 0.0};
-  const Excitation& excitation = session.excitations.front();
-  if (excitation.kind != ExcitationKind::test_mass) return {0.0, 0.0};
-  switch (excitation.motion) {
+  const Excitation* const excitation = mass_excitation(session);
+  if (excitation == nullptr) return {0.0, 0.0};
+  switch (excitation->motion) {
     case MassMotion::opposition:
       return {-0.5, 0.5};
     case MassMotion::mass_1:
@@ -69,7 +68,7 @@ LoopConstants<double> make_loop_constants(const Instrument& instrument, const Sc
     const double side = k == 0 ? -0.5 : 0.5;
     Eigen::Vector3d direction = Eigen::Vector3d::Zero();
     if (factors[k] != 0.0) {
-      const auto axis = static_cast<Eigen::Index>(index(session.excitations.front().axis));
+      const auto axis = static_cast<Eigen::Index>(index(mass_excitation(session)->axis));
       direction = factors[k] * sensor.alignment().transpose().col(axis);
     }
     constants.sensors[k] = make_sensor_model(

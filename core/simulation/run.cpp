@@ -7,7 +7,7 @@
 
 #include "core/campaign/draw.hpp"
 #include "core/error.hpp"
-#include "core/estimation/calibration.hpp"
+#include "core/estimation/methods.hpp"
 #include "core/simulation/batch_kernel.hpp"
 #include "core/simulation/run_health.hpp"
 #include "core/simulation/session_record.hpp"
@@ -34,15 +34,31 @@ LineFit line_fit(const Scenario& scenario, const Session& session) {
   return fit;
 }
 
-SessionPhasors to_phasors(const SignalSums<double>& sums, std::size_t num_lines) {
-  SessionPhasors phasors;
-  phasors.num_lines = num_lines;
+/// The same fit with one or two of the known lines as those whose phasors are wanted, for all of
+/// them in turn.
+std::vector<LineFit> known_line_fits(const LineFit& of_session) {
+  std::vector<LineFit> fits;
+  const std::vector<double>& known_hz = of_session.known_hz;
+  for (std::size_t first = 0; first < known_hz.size(); first += num_fit_lines_max) {
+    LineFit fit = of_session;
+    fit.fit_hz.clear();
+    fit.known_hz = of_session.fit_hz;
+    for (std::size_t i = 0; i < known_hz.size(); ++i) {
+      const bool is_wanted = i >= first && i < first + num_fit_lines_max;
+      (is_wanted ? fit.fit_hz : fit.known_hz).push_back(known_hz[i]);
+    }
+    fits.push_back(std::move(fit));
+  }
+  return fits;
+}
+
+void append_lines(const SignalSums<double>& sums, std::size_t num_lines, SessionPhasors& phasors) {
   for (std::size_t s = 0; s < num_signals; ++s) {
     for (std::size_t i = 0; i < num_lines; ++i) {
-      phasors.amplitude[s][i] = {sums[s][2 * i], sums[s][2 * i + 1]};
+      phasors.amplitude[s][phasors.num_lines + i] = {sums[s][2 * i], sums[s][2 * i + 1]};
     }
   }
-  return phasors;
+  phasors.num_lines += num_lines;
 }
 
 SessionHealth to_health(const LaneGroup<double, SessionNoise>& run) {
@@ -59,6 +75,8 @@ SessionHealth to_health(const LaneGroup<double, SessionNoise>& run) {
 RunRecord drawn_record(const Scenario& scenario, RunIndex run, const AcceptedDraw& draw) {
   RunRecord record{
       .run = run, .num_draws = draw.num_draws, .has_draw = draw.instrument.has_value()};
+  record.phasors.resize(scenario.sessions.size());
+  record.health.resize(scenario.sessions.size());
   if (draw.instrument) {
     record.truth =
         true_parameters(*draw.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
@@ -101,8 +119,9 @@ bool are_in_range(const ParameterArray& values) { return std::ranges::all_of(val
 }  // namespace
 
 struct RunPlan::Parts {
-  explicit Parts(const Campaign& c)
+  Parts(const Campaign& c, const EstimationMethodInfo& m)
       : campaign(c),
+        method(m),
         orbit(c.scenario.orbit),
         environment(campaign.scenario.environment, campaign.environment_table,
                     c.scenario.orbit.period_s),
@@ -110,10 +129,15 @@ struct RunPlan::Parts {
         drag_free(drag_free_gains(c.scenario.drag_free, c.scenario.simulation.sample_period_s)),
         attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)) {
     weights.reserve(campaign.scenario.sessions.size());
+    known_weights.resize(campaign.scenario.sessions.size());
     residual_weights.resize(campaign.scenario.sessions.size());
     for (std::size_t i = 0; i < campaign.scenario.sessions.size(); ++i) {
       const Session& session = campaign.scenario.sessions[i];
-      weights.emplace_back(line_fit(campaign.scenario, session));
+      const LineFit fit = line_fit(campaign.scenario, session);
+      weights.emplace_back(fit);
+      if (method.needs(session).lines == RecordedLines::all) {
+        for (const LineFit& known : known_line_fits(fit)) known_weights[i].emplace_back(known);
+      }
       if (!session.excitations.empty() || is_monitored_before(i)) continue;
       residual_weights[i].emplace(residual_fit(campaign.scenario, session));
     }
@@ -136,42 +160,65 @@ struct RunPlan::Parts {
 
   /// Makes the weights of a session, block by block.
   struct Readers {
-    explicit Readers(const Parts& parts, std::size_t i) : lines(parts.weights[i]) {
+    explicit Readers(const Parts& parts, std::size_t i)
+        : lines(parts.weights[i]),
+          known(parts.known_weights[i].begin(), parts.known_weights[i].end()),
+          buffer(weights_buffer_size(lines.weights().num_fit_lines(), known.size())) {
       if (parts.is_quiet(i)) residual.emplace(*parts.residual_weights[i]);
     }
     WeightReader lines;
+    std::vector<WeightReader> known;  ///< Of the known lines, if the method wants them.
+    std::vector<double> buffer;
     std::optional<WeightReader> residual;  ///< Of a session that is monitored.
   };
 
   [[nodiscard]] SessionSetup setup(std::size_t i, Readers& readers) const {
+    const Session& session = campaign.scenario.sessions[i];
     return {.reader = &readers.lines,
             .drag_free = drag_free,
             .attitude = attitude,
-            .regressor = regressor_kind(campaign.scenario.sessions[i].target),
-            .num_signals_used = num_signals_used(campaign.scenario.sessions[i].target),
+            .product = target_info(session.target).product,
+            .signals = method.needs(session).signals,
+            .known_readers = readers.known,
             .residual_reader = readers.residual ? &*readers.residual : nullptr};
   }
 
+  /// @param observer  Null if nobody observes the run.
   void record_session_of_run(std::size_t i, const Instrument& instrument,
-                             const SessionProgress& progress, RunRecord& record) const {
+                             const SampleObserver* observer, const SessionProgress& progress,
+                             RunRecord& record) const {
     const Scenario& scenario = campaign.scenario;
     const Session& session = scenario.sessions[i];
     SessionSignals signals(scenario, session, orbit, environment);
     LaneGroup<double, SessionNoise> alone{
         .constants = make_loop_constants(instrument, scenario, session),
         .noise = SessionNoise(noise, campaign.seed, record.run, session.name)};
-    std::vector<double> buffer(weights_buffer_size(weights[i].num_fit_lines()));
     Readers readers(*this, i);
-    record_session(signals, setup(i, readers), std::span(&alone, 1), buffer, progress);
-    keep(i, {alone.sums, to_health(alone)}, record);
+    const auto record_with = [&](const auto& session_observer) {
+      record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
+                     session_observer);
+    };
+    if (observer == nullptr) {
+      record_with(NoObserver{});
+    } else {
+      record_with(SessionObserver{.observe = *observer,
+                                  .session = i,
+                                  .next = -signals.num_settling(),
+                                  .sample_period_s = scenario.simulation.sample_period_s});
+    }
+    keep(i, {alone.sums, to_health(alone), alone.known_sums}, record);
   }
 
   /// Keeps what a session left of a run.
   void keep(std::size_t i, const SessionOutcome& outcome, RunRecord& record) const {
-    const std::size_t target = index(campaign.scenario.sessions[i].target);
-    record.phasors[target] = to_phasors(outcome.sums, weights[i].num_fit_lines());
-    record.health[target] = outcome.health;
-    record.health[target].is_quiet = is_quiet(i);
+    SessionPhasors& phasors = record.phasors[i];
+    append_lines(outcome.sums, weights[i].num_fit_lines(), phasors);
+    phasors.num_fit_lines = phasors.num_lines;
+    for (std::size_t k = 0; k < known_weights[i].size(); ++k) {
+      append_lines(outcome.known_sums[k], known_weights[i][k].num_fit_lines(), phasors);
+    }
+    record.health[i] = outcome.health;
+    record.health[i].is_quiet = is_quiet(i);
   }
 
   void record_session_batch(std::size_t i, std::span<const Lane> lanes, BatchKernel kernel,
@@ -181,7 +228,6 @@ struct RunPlan::Parts {
     const Session& session = scenario.sessions[i];
     SessionSignals signals(scenario, session, orbit, environment);
     const NoiseStreams streams = noise_streams(session.name);
-    std::vector<double> buffer(weights_buffer_size(weights[i].num_fit_lines()));
     Readers readers(*this, i);
     BatchSession batch{.signals = &signals,
                        .setup = setup(i, readers),
@@ -189,7 +235,7 @@ struct RunPlan::Parts {
                        .streams = &streams,
                        .seed = campaign.seed,
                        .num_runs = lanes.size(),
-                       .weights_buffer = buffer,
+                       .weights_buffer = readers.buffer,
                        .progress = SessionProgress::report_to,
                        .progress_context = &progress};
     for (std::size_t l = 0; l < batch_lanes; ++l) {
@@ -204,16 +250,21 @@ struct RunPlan::Parts {
   }
 
   Campaign campaign;
+  EstimationMethodInfo method;
   KeplerOrbit orbit;
   Environment environment;
   NoiseModel noise;
   DragFreeGains drag_free;
   AttitudeGains attitude;
-  std::vector<LineWeights> weights;                          ///< Of each session.
+  std::vector<LineWeights> weights;                     ///< Of each session.
+  std::vector<std::vector<LineWeights>> known_weights;  ///< Empty unless the method wants them.
   std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
 };
 
-RunPlan::RunPlan(const Campaign& campaign) : parts_(std::make_unique<Parts>(campaign)) {}
+RunPlan::RunPlan(const Campaign& campaign)
+    : RunPlan(campaign, estimation_method(campaign.scenario.estimation.method)) {}
+RunPlan::RunPlan(const Campaign& campaign, const EstimationMethodInfo& method)
+    : parts_(std::make_unique<Parts>(campaign, method)) {}
 RunPlan::~RunPlan() = default;
 RunPlan::RunPlan(RunPlan&&) noexcept = default;
 RunPlan& RunPlan::operator=(RunPlan&&) noexcept = default;
@@ -226,13 +277,25 @@ int RunPlan::num_orbits() const {
 
 RunRecord RunPlan::record(RunIndex run, std::span<const double> table_values,
                           const std::function<void(int)>& progress) const {
+  return record_alone(run, table_values, nullptr, progress);
+}
+
+RunRecord RunPlan::observe(RunIndex run, std::span<const double> table_values,
+                           const SampleObserver& observer,
+                           const std::function<void(int)>& progress) const {
+  return record_alone(run, table_values, &observer, progress);
+}
+
+RunRecord RunPlan::record_alone(RunIndex run, std::span<const double> table_values,
+                                const SampleObserver* observer,
+                                const std::function<void(int)>& progress) const {
   const Scenario& scenario = parts_->campaign.scenario;
   const AcceptedDraw draw = draw_instrument(parts_->campaign, run, table_values);
   RunRecord recorded = drawn_record(scenario, run, draw);
   if (!draw.instrument) return recorded;
   SessionProgress sessions(scenario, progress);
   for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
-    parts_->record_session_of_run(i, *draw.instrument, sessions, recorded);
+    parts_->record_session_of_run(i, *draw.instrument, observer, sessions, recorded);
     sessions.end_session(i);
   }
   return recorded;
@@ -275,6 +338,10 @@ std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> request
   return records;
 }
 
+Estimation RunPlan::estimation(const RunRecord& record) const {
+  return parts_->method.estimate(record.phasors, parts_->campaign.scenario);
+}
+
 RunResult RunPlan::estimate(const RunRecord& record) const {
   const Scenario& scenario = parts_->campaign.scenario;
   RunResult result{.run = record.run, .num_draws = record.num_draws, .truth = record.truth};
@@ -282,9 +349,8 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
     result.status = RunStatus::no_draw;
     return result;
   }
-  const CalibrationResult calibration =
-      calibrate_hardy2013(record.phasors, scenario.estimation, scenario.objectives);
-  result.num_rounds = calibration.num_rounds;
+  const Estimation found = estimation(record);
+  result.num_rounds = found.num_rounds;
   const HealthFinding finding = judge_health(scenario, record.health, record.phasors);
   result.health = finding.health;
   result.loss = finding.loss;
@@ -292,12 +358,12 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
     result.status = RunStatus::lost;
     return result;
   }
-  if (!are_in_range(calibration.estimate)) {
+  if (!are_in_range(found.values)) {
     result.status = RunStatus::not_finite;
     return result;
   }
-  result.status = calibration.converged ? RunStatus::completed : RunStatus::not_converged;
-  result.estimate = calibration.estimate;
+  result.status = found.converged ? RunStatus::completed : RunStatus::not_converged;
+  result.estimate = found.values;
   return result;
 }
 

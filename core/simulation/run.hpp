@@ -9,8 +9,9 @@
 
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
-#include "core/estimation/calibration.hpp"
+#include "core/estimation/method.hpp"
 #include "core/simulation/instruction_set.hpp"
+#include "core/simulation/observer.hpp"
 #include "core/simulation/run_health.hpp"
 
 namespace proofmass {
@@ -28,13 +29,14 @@ struct RunRequest {
   std::vector<double> table_values;
 };
 
-/// What a run's simulation leaves for the estimation, and the truth to compare with.
+/// What a run's simulation leaves for the estimation, and the truth to compare with. Lists are of
+/// the scenario's sessions, in their order.
 struct RunRecord {
   RunIndex run;
   std::uint32_t num_draws = 0;
   bool has_draw = false;  ///< False if no draw was accepted; then the rest means nothing.
   ParameterArray truth{};
-  CalibrationRecord phasors{};
+  RunPhasors phasors{};
   HealthRecord health{};
 };
 
@@ -44,6 +46,10 @@ class RunPlan {
  public:
   /// @pre campaign.validate() passed.
   explicit RunPlan(const Campaign& campaign);
+
+  /// A plan that estimates by another method than the campaign's.
+  /// @pre method.check() passed for the campaign's sessions.
+  RunPlan(const Campaign& campaign, const EstimationMethodInfo& method);
   ~RunPlan();
   RunPlan(RunPlan&&) noexcept;
   RunPlan& operator=(RunPlan&&) noexcept;
@@ -56,12 +62,22 @@ class RunPlan {
   [[nodiscard]] RunRecord record(RunIndex run, std::span<const double> table_values,
                                  const std::function<void(int)>& progress = {}) const;
 
+  /// record(), bit for bit, with an observer that gets every sample of every session. It makes no
+  /// other call any slower.
+  [[nodiscard]] RunRecord observe(RunIndex run, std::span<const double> table_values,
+                                  const SampleObserver& observer,
+                                  const std::function<void(int)>& progress = {}) const;
+
   /// record() for several runs at once; arguments as for simulate_batch(), `set` not `scalar`.
   [[nodiscard]] std::vector<RunRecord> record_batch(
       std::span<const RunRequest> requests, InstructionSet set,
       const std::function<void(int)>& progress = {}) const;
 
-  /// Estimates the ten parameters from a record, unless its loops left their limits.
+  /// All that the method makes of a record.
+  /// @pre record.has_draw.
+  [[nodiscard]] Estimation estimation(const RunRecord& record) const;
+
+  /// The result of a record: its estimation, unless its loops left their limits.
   [[nodiscard]] RunResult estimate(const RunRecord& record) const;
 
   /// record(), then estimate(): all of a run.
@@ -84,6 +100,9 @@ class RunPlan {
 
  private:
   struct Parts;
+  [[nodiscard]] RunRecord record_alone(RunIndex run, std::span<const double> table_values,
+                                       const SampleObserver* observer,
+                                       const std::function<void(int)>& progress) const;
   std::unique_ptr<Parts> parts_;
 };
 

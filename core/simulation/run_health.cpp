@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/campaign/run_result.hpp"
+#include "core/error.hpp"
 #include "core/session/session_signals.hpp"
 #include "core/signal/band_pass.hpp"
 #include "core/signal/noise_shape.hpp"
@@ -69,14 +70,14 @@ double residual_amplitude(const Scenario& scenario, const SessionHealth& session
 double square_noise_of(const Scenario& scenario, const Session& session,
                        const SessionPhasors& phasors, const QuietSums& quiet) {
   double squares = 0.0;
-  switch (session.target) {
-    case SessionTarget::k2d:
+  switch (target_info(session.target).product) {
+    case Product::common_squared:
       squares = quiet.common_squares;
       break;
-    case SessionTarget::k2_sensor_1:
+    case Product::sensor_1_squared:
       squares = quiet.sensor_squares[0];
       break;
-    case SessionTarget::k2_sensor_2:
+    case Product::sensor_2_squared:
       squares = quiet.sensor_squares[1];
       break;
     default:
@@ -86,12 +87,12 @@ double square_noise_of(const Scenario& scenario, const Session& session,
   const double duration_s =
       session.num_orbits * scenario.orbit.period_s - scenario.estimation.transient_s;
   double signal = 0.0;
-  for (std::size_t i = 0; i < phasors.num_lines; ++i) {
-    signal += std::norm(phasors.amplitude[index(Signal::regressor)][i]);
+  for (std::size_t i = 0; i < phasors.num_fit_lines; ++i) {
+    signal += std::norm(phasors.amplitude[index(Signal::product)][i]);
   }
   const double noise = 2.0 *
                        density(squares, quiet.num_steps, scenario.simulation.sample_period_s) /
-                       duration_s * static_cast<double>(phasors.num_lines);
+                       duration_s * static_cast<double>(phasors.num_fit_lines);
   return noise / signal;
 }
 
@@ -160,21 +161,21 @@ LineFit residual_fit(const Scenario& scenario, const Session& session) {
 }
 
 HealthFinding judge_health(const Scenario& scenario, const HealthRecord& record,
-                           const CalibrationRecord& phasors) {
+                           const RunPhasors& phasors) {
+  PROOFMASS_EXPECT(record.size() == scenario.sessions.size() && phasors.size() == record.size());
   QuietSums quiet;
-  for (const Session& session : scenario.sessions) {
-    const SessionHealth& of_session = record[index(session.target)];
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const SessionHealth& of_session = record[i];
     if (!of_session.is_quiet) continue;
     quiet.common_squares += of_session.common_squares;
     quiet.sensor_squares[0] += of_session.sensor_squares[0];
     quiet.sensor_squares[1] += of_session.sensor_squares[1];
-    quiet.num_steps += num_steps(scenario, session);
+    quiet.num_steps += num_steps(scenario, scenario.sessions[i]);
   }
   HealthFinding finding;
-  for (const Session& session : scenario.sessions) {
-    const std::size_t target = index(session.target);
-    const LoopHealth health =
-        session_health(scenario, session, record[target], phasors[target], quiet);
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const Session& session = scenario.sessions[i];
+    const LoopHealth health = session_health(scenario, session, record[i], phasors[i], quiet);
     take_larger(finding.health, health);
     if (finding.loss.cause != LossCause::none) continue;
     finding.loss = {.cause = cause_of(scenario, health), .session = session.target};

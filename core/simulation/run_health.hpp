@@ -1,18 +1,18 @@
 #pragma once
 
-#include <array>
+#include <vector>
 
 #include "core/campaign/loop_health.hpp"
 #include "core/campaign/scenario.hpp"
-#include "core/estimation/calibration.hpp"
+#include "core/estimation/method.hpp"
 #include "core/session/session.hpp"
 #include "core/signal/line_weights.hpp"
 #include "core/simulation/loop_monitor.hpp"
 
 namespace proofmass {
 
-/// What is kept of the sessions of a run, by target.
-using HealthRecord = std::array<SessionHealth, num_session_targets>;
+/// What is kept of the sessions of a run, in the scenario's order.
+using HealthRecord = std::vector<SessionHealth>;
 
 /// The line at f_EP in a session without excitation, with that session's own lines beside it. Where
 /// the frame turns with the Earth's direction, so that f_EP is 0, the line is f_orb.
@@ -27,6 +27,6 @@ struct HealthFinding {
 ///
 /// @param phasors  Of the same run: the squared signals that the quadratic factors are found from.
 [[nodiscard]] HealthFinding judge_health(const Scenario& scenario, const HealthRecord& record,
-                                         const CalibrationRecord& phasors);
+                                         const RunPhasors& phasors);
 
 }  // namespace proofmass

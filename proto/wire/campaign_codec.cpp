@@ -117,14 +117,25 @@ void encode_line(const LineMultiple& line, proto::LineMultiple& message) {
   message.set_orbital(line.orbital);
   message.set_excitation(line.excitation);
   message.set_spin(line.spin);
+  if (line.further == decltype(line.further){}) return;
+  for (const double multiple : line.further) message.add_further(multiple);
 }
 
 LineMultiple decode_line(const proto::LineMultiple& message) {
-  for (const double multiple : {message.orbital(), message.excitation(), message.spin()}) {
+  const auto checked = [](double multiple) {
     require(multiple >= -line_multiple_max && multiple <= line_multiple_max, "session.line",
             fmt::format("{}", multiple), fmt::format("must be within ±{}", line_multiple_max));
+    return multiple;
+  };
+  LineMultiple line{.orbital = checked(message.orbital()),
+                    .excitation = checked(message.excitation()),
+                    .spin = checked(message.spin())};
+  require_count(message.further_size(), static_cast<int>(line.further.size()),
+                "session.line.further");
+  for (int i = 0; i < message.further_size(); ++i) {
+    line.further[static_cast<std::size_t>(i)] = checked(message.further(i));
   }
-  return {.orbital = message.orbital(), .excitation = message.excitation(), .spin = message.spin()};
+  return line;
 }
 
 void encode_excitation(const Excitation& excitation, proto::Excitation& message) {

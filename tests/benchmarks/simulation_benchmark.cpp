@@ -104,7 +104,7 @@ void ground_signals_of_a_step(benchmark::State& state) {
       loop.advance(bench.constants, bench.drag_free, bench.attitude, shared, {});
   for (auto _ : state) {
     benchmark::DoNotOptimize(observation);
-    benchmark::DoNotOptimize(ground_signals(observation, shared, RegressorKind::modulated_zz));
+    benchmark::DoNotOptimize(ground_signals(observation, shared, Product::modulated_zz));
   }
   count_steps(state, 1.0);
 }

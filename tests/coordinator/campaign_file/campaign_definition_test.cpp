@@ -31,6 +31,9 @@ Campaign unusual_campaign() {
   campaign.scenario.sessions[1].num_orbits = 12;
   campaign.scenario.sessions[5].excitations[0].amplitude = 1.0 / 3e7;
   std::swap(campaign.scenario.sessions[0], campaign.scenario.sessions[10]);
+  Session& shaken_twice = campaign.scenario.sessions[7];
+  shaken_twice.excitations.push_back({ExcitationKind::attitude, Axis::z, 1e-3, 7e-4});
+  shaken_twice.known_lines.push_back({.orbital = 1.0, .further = {2.5, 0.0, 0.0}});
   campaign.environment_file = "air \"thin\".csv";
   campaign.environment_table = {{0.0, {1, 2, 3}, {4, 5, 6}}, {6000.0, {1, 2, 3}, {4, 5, 6}}};
   const auto law = [](Law kind) {

@@ -119,6 +119,10 @@ TEST(SessionErrors, NameAWrongLine) {
             "campaign.toml:5: session[0].fit_lines[1] = [1]" + rule);
   EXPECT_EQ(refusal_of(with_session(head + "fit_lines = [[2, 0, 1, 0]]")),
             "campaign.toml:4: session[0].fit_lines[0] = [2, 0, 1, 0]" + rule);
+  EXPECT_EQ(refusal_of(with_session(head + "fit_lines = [[2, []]]")),
+            "campaign.toml:4: session[0].fit_lines[0] = [2, ...]" + rule);
+  EXPECT_EQ(refusal_of(with_session(head + "fit_lines = [[2, [1, \"1\"]]]")),
+            "campaign.toml:4: session[0].fit_lines[0] = [2, ...]" + rule);
   EXPECT_EQ(refusal_of(with_session(head + "fit_lines = [[2, true]]")),
             "campaign.toml:4: session[0].fit_lines[0] = [2, true]" + rule);
   EXPECT_EQ(refusal_of(with_session(head + "orbits = 3000000000")),

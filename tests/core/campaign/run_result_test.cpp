@@ -18,7 +18,7 @@ std::string broken(RunStatus status, std::uint32_t num_draws, std::uint32_t num_
   return rules.empty() ? "" : rules.front();
 }
 
-// What draw_instrument() and calibrate_hardy2013() can count.
+// What draw_instrument() and estimate_hardy2013() can count.
 TEST(RunResult, HasTheCountsThatItsStatusAllows) {
   EXPECT_EQ(broken(RunStatus::completed, 1, 3), "");
   EXPECT_EQ(broken(RunStatus::completed, 1000, 10), "");

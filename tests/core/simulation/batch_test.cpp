@@ -102,6 +102,15 @@ TEST(Batch, EqualsTheScalarReferenceInARotatingFrame) {
   expect_batch_equals_scalar(campaign, requests_from(0, 3));
 }
 
+TEST(Batch, EqualsTheScalarReferenceWithSeveralExcitations) {
+  Campaign campaign = short_campaign();
+  std::vector<Excitation>& excitations = campaign.scenario.sessions[6].excitations;
+  excitations.push_back({ExcitationKind::test_mass, Axis::z, 1e-6, 9.88e-3});
+  excitations.push_back({ExcitationKind::attitude, Axis::y, 1e-4, 7e-4});
+  excitations.push_back({ExcitationKind::drag_free, Axis::y, 1e-8, 2.9e-3});
+  expect_batch_equals_scalar(campaign, requests_from(0, 3));
+}
+
 // Here the orbit is computed time by time.
 TEST(Batch, EqualsTheScalarReferenceOnAnEccentricOrbit) {
   Campaign campaign = short_campaign();

@@ -187,7 +187,7 @@ TEST(Loop, SpinsAsTheClosedFormSays) {
     // Attitude errors of the settled loop are rounding; 1e-9 of the largest gradient.
     ASSERT_NEAR(measured, expected, 1e-9 * 0.5 * (2.0 * n2 + spin2) * 20e-6) << t;
     // The ground's gradient comes from the estimated attitude and is the true one here.
-    const auto values = ground_signals(observation, shared, RegressorKind::none);
+    const auto values = ground_signals(observation, shared, Product::none);
     ASSERT_NEAR(values[index(Signal::gradient_xx)], t_xx + spin2, 1e-9 * (2.0 * n2 + spin2)) << t;
   }
 }
@@ -219,7 +219,7 @@ TEST(GroundSignals, SeeTheTrueAttitudeUnderACommandedSwing) {
         loop.advance(constants, drag_free, attitude, shared, SampleNoise<double>{});
     if (i < 0) continue;
     const double expected = 3.0 * shared.gradient_s2 * u.x * u.y + observation.measured_angular.z;
-    const auto values = ground_signals(observation, shared, RegressorKind::none);
+    const auto values = ground_signals(observation, shared, Product::none);
     largest = std::max(largest, std::abs(expected));
     // Rates of the swing, 2e-5 rad/s, would enter squared; settling leaves e^(−4000 s/53 s).
     ASSERT_NEAR(values[index(Signal::gradient_xy)], expected, 1e-6 * 1e-7) << i;

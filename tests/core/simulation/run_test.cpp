@@ -2,11 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <functional>
 
-#include "core/estimation/signals.hpp"
+#include "core/session/signals.hpp"
 
 namespace proofmass {
 namespace {
@@ -61,6 +62,64 @@ TEST(RunPlan, DoesNotDependOnTheOrderOfSessions) {
   const RunResult before = RunPlan(campaign).simulate(RunIndex{3}, {});
   std::swap(campaign.scenario.sessions.front(), campaign.scenario.sessions.back());
   expect_same_bits(RunPlan(campaign).simulate(RunIndex{3}, {}), before);
+}
+
+RecordNeeds needs_of_test(const Session& /*session*/) { return {}; }
+void refuse_nothing(const std::vector<Session>& /*sessions*/) {}
+
+/// What a method was given, as its estimates; its rounds and convergence are its own.
+Estimation first_phasors(const RunPhasors& records, const Scenario& scenario) {
+  Estimation estimation{.num_rounds = 3, .converged = scenario.estimation.convergence < 0.5};
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    estimation.values[i] = records[i].amplitude[index(Signal::differential_x)][0].real();
+  }
+  estimation.standard_errors = estimation.values;
+  estimation.diagnostics = {{"sessions", static_cast<double>(records.size())}};
+  return estimation;
+}
+
+// A run is what the method makes of its records, one for each session in the scenario's order.
+TEST(RunPlan, EstimatesByTheMethodThatItIsGiven) {
+  constexpr EstimationMethodInfo method{"first_phasors", needs_of_test, refuse_nothing,
+                                        first_phasors};
+  Campaign campaign = short_campaign(1);
+  std::swap(campaign.scenario.sessions[0], campaign.scenario.sessions[7]);
+  const RunPlan plan(campaign, method);
+  const RunRecord record = plan.record(RunIndex{0}, {});
+  ASSERT_EQ(record.phasors.size(), 11U);
+  const RunResult result = plan.estimate(record);
+  EXPECT_EQ(result.status, RunStatus::completed);
+  EXPECT_EQ(result.num_rounds, 3U);
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    EXPECT_EQ(result.estimate[i],
+              record.phasors[i].amplitude[index(Signal::differential_x)][0].real());
+  }
+  // Each session's stream bears its name: a swap of two moves their records and nothing else.
+  std::swap(campaign.scenario.sessions[0], campaign.scenario.sessions[7]);
+  const RunRecord other = RunPlan(campaign, method).record(RunIndex{0}, {});
+  EXPECT_EQ(other.phasors[7].amplitude, record.phasors[0].amplitude);
+  EXPECT_EQ(other.phasors[3].amplitude, record.phasors[3].amplitude);
+  const Estimation estimation = plan.estimation(record);
+  EXPECT_EQ(estimation.standard_errors, estimation.values);
+  EXPECT_EQ(estimation.diagnostics.at(0).value, 11.0);
+  campaign.scenario.estimation.convergence = 0.7;
+  EXPECT_EQ(RunPlan(campaign, method).simulate(RunIndex{0}, {}).status, RunStatus::not_converged);
+}
+
+// Two sessions of a target, each with noise of its own, give an estimate between those of each.
+TEST(RunPlan, EstimatesATargetFromSeveralSessions) {
+  constexpr std::size_t at_a_d12 = index(SessionTarget::a_d12), i = index(Parameter::a_d12);
+  Campaign campaign = short_campaign(2);
+  const double of_first = RunPlan(campaign).simulate(RunIndex{0}, {}).estimate[i];
+  const Session first = campaign.scenario.sessions[at_a_d12];
+  campaign.scenario.sessions[at_a_d12].name = "again";
+  const double of_second = RunPlan(campaign).simulate(RunIndex{0}, {}).estimate[i];
+  campaign.scenario.sessions.insert(campaign.scenario.sessions.begin(), first);
+  campaign.validate();
+  const RunResult of_both = RunPlan(campaign).simulate(RunIndex{0}, {});
+  EXPECT_EQ(of_both.status, RunStatus::completed);
+  EXPECT_GT(of_both.estimate[i], std::min(of_first, of_second));
+  EXPECT_LT(of_both.estimate[i], std::max(of_first, of_second));
 }
 
 TEST(RunPlan, ReportsItsOrbitsInOrder) {

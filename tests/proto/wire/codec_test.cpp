@@ -127,7 +127,10 @@ Campaign definition_round_trip(const Campaign& campaign) {
 }
 
 TEST(Codec, KeepsEveryBitOfACampaign) {
-  const Campaign sent = unusual_campaign();
+  Campaign sent = unusual_campaign();
+  Session& shaken_twice = sent.scenario.sessions[7];
+  shaken_twice.excitations.push_back({ExcitationKind::attitude, Axis::z, 1e-3, 7e-4});
+  shaken_twice.known_lines.push_back({.orbital = 1.0, .further = {2.5, 0.0, 0.0}});
   const Campaign got = definition_round_trip(sent);
   EXPECT_EQ(got.name, sent.name);
   EXPECT_EQ(got.seed, sent.seed);

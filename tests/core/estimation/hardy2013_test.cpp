@@ -1,7 +1,8 @@
-#include "core/estimation/calibration.hpp"
+#include "core/estimation/hardy2013/hardy2013.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <limits>
@@ -9,7 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/error.hpp"
 #include "core/random/stream.hpp"
+#include "tests/message_of.hpp"
 
 namespace proofmass {
 namespace {
@@ -26,7 +29,7 @@ double at(const ParameterArray& values, Parameter parameter) { return values[ind
 /// Arbitrary phasors of natural size for every signal except the differential measurement.
 SessionPhasors random_phasors(std::uint32_t session, std::size_t num_lines) {
   SessionPhasors phasors;
-  phasors.num_lines = num_lines;
+  phasors.num_fit_lines = phasors.num_lines = num_lines;
   for (std::size_t s = 1; s < num_signals; ++s) {
     for (std::size_t line = 0; line < num_lines; ++line) {
       const auto number = [&](std::uint32_t part) {
@@ -35,7 +38,7 @@ SessionPhasors random_phasors(std::uint32_t session, std::size_t num_lines) {
                                     1)) -
                1.0;
       };
-      const double size = s <= 3 ? 1e-10 : (s == index(Signal::regressor) ? 1e-16 : 1e-8);
+      const double size = s <= 3 ? 1e-10 : (s == index(Signal::product) ? 1e-16 : 1e-8);
       phasors.amplitude[s][line] = size * Complex(number(0), number(1));
     }
   }
@@ -70,9 +73,9 @@ Complex product_model(const SessionPhasors& phasors, std::size_t line,
 
 /// What each session makes large.
 constexpr std::array<Signal, num_session_targets> own_signals{
-    Signal::gradient_xx, Signal::gradient_xz, Signal::gradient_xy, Signal::regressor,
-    Signal::regressor,   Signal::common_x,    Signal::common_y,    Signal::common_z,
-    Signal::regressor,   Signal::regressor,   Signal::regressor};
+    Signal::gradient_xx, Signal::gradient_xz, Signal::gradient_xy, Signal::product,
+    Signal::product,     Signal::common_x,    Signal::common_y,    Signal::common_z,
+    Signal::product,     Signal::product,     Signal::product};
 
 /// Γ_mes,dx per unit of that signal.
 double own_factor(SessionTarget target, const ParameterArray& truth) {
@@ -99,8 +102,8 @@ struct ModelRecord {
   double k2d_slope = 0.0;
   std::array<double, 2> k2_slopes{};
 
-  [[nodiscard]] CalibrationRecord make() const {
-    CalibrationRecord record;
+  [[nodiscard]] RunPhasors make() const {
+    RunPhasors record(num_session_targets);
     for (std::size_t i = 0; i < num_session_targets; ++i) {
       const auto target = static_cast<SessionTarget>(i + 1);
       const bool sidebands = target == SessionTarget::a_c12 || target == SessionTarget::a_c13;
@@ -108,7 +111,7 @@ struct ModelRecord {
       dominate(target, phasors);
       for (std::size_t line = 0; line < phasors.num_lines; ++line) {
         Complex& differential = phasors.amplitude[index(Signal::differential_x)][line];
-        const Complex regressor = phasors.amplitude[index(Signal::regressor)][line];
+        const Complex regressor = phasors.amplitude[index(Signal::product)][line];
         differential = linear_model(phasors, line, truth);
         if (with_products && i < 3) differential += product_model(phasors, line, truth);
         if (target == SessionTarget::a_c12) differential += at(truth, Parameter::a_c12) * regressor;
@@ -126,10 +129,10 @@ struct ModelRecord {
   static void dominate(SessionTarget target, SessionPhasors& phasors) {
     for (Complex& amplitude : phasors.amplitude[index(own_signals[index(target)])])
       amplitude *= 100.0;
-    if (own_signals[index(target)] != Signal::regressor) return;
+    if (own_signals[index(target)] != Signal::product) return;
     // The gradients of these sessions lie elsewhere in frequency.
     for (std::size_t s = 1; s < num_signals; ++s) {
-      if (s == index(Signal::regressor)) continue;
+      if (s == index(Signal::product)) continue;
       for (Complex& amplitude : phasors.amplitude[s]) amplitude *= 1e-3;
     }
   }
@@ -143,34 +146,39 @@ EstimationConfig precise(Correction correction) {
   return config;
 }
 
+/// The paper's sessions are in the order of their targets, as ModelRecord makes its records.
+Estimation calibrate(const RunPhasors& record, const EstimationConfig& config) {
+  Scenario scenario;
+  scenario.estimation = config;
+  return estimate_hardy2013(record, scenario);
+}
+
 const ParameterArray& objectives() {
   static const ParameterArray values = Scenario().objectives;
   return values;
 }
 
-void expect_estimates(const CalibrationResult& result, const ParameterArray& truth) {
+void expect_estimates(const Estimation& result, const ParameterArray& truth) {
   EXPECT_TRUE(result.converged);
   for (const ParameterInfo& info : parameter_infos()) {
-    EXPECT_NEAR(result.estimate[index(info.parameter)], truth[index(info.parameter)],
+    EXPECT_NEAR(result.values[index(info.parameter)], truth[index(info.parameter)],
                 1e-9 * objectives()[index(info.parameter)])
         << info.name;
   }
 }
 
 // The iteration's fixed point is the truth where the measurement obeys the first-order model.
-TEST(CalibrateHardy2013, FirstOrderInvertsTheFirstOrderModel) {
+TEST(EstimateHardy2013, FirstOrderInvertsTheFirstOrderModel) {
   ModelRecord model;
   model.k2d_slope = at(model.truth, Parameter::k2d);
   const double k2c = at(model.truth, Parameter::k2c);
   model.k2_slopes = {k2c + 700.0, k2c - 700.0};
-  expect_estimates(
-      calibrate_hardy2013(model.make(), precise(Correction::first_order), objectives()),
-      model.truth);
+  expect_estimates(calibrate(model.make(), precise(Correction::first_order)), model.truth);
 }
 
 // Second order: products of misalignment and off-centring in the three Δ sessions; the K2d slope is
 // (K2d − a K2c)/K1c²; the slopes of the two sensors are (1 ∓ a)/(1 ± a)² of K2k/K1c².
-TEST(CalibrateHardy2013, SecondOrderInvertsTheModelWithProducts) {
+TEST(EstimateHardy2013, SecondOrderInvertsTheModelWithProducts) {
   ModelRecord model;
   model.with_products = true;
   const double a = at(model.truth, Parameter::a_d11_prime);
@@ -181,13 +189,11 @@ TEST(CalibrateHardy2013, SecondOrderInvertsTheModelWithProducts) {
   const double k22 = k2c - k2d;
   model.k2_slopes = {k21 * (1.0 - a) / ((1.0 + a) * (1.0 + a)),
                      k22 * (1.0 + a) / ((1.0 - a) * (1.0 - a))};
-  const CalibrationRecord record = model.make();
-  expect_estimates(calibrate_hardy2013(record, precise(Correction::second_order), objectives()),
-                   model.truth);
+  const RunPhasors record = model.make();
+  expect_estimates(calibrate(record, precise(Correction::second_order)), model.truth);
   // First order leaves those terms: a K2c/K1c² is 54 s²/m here.
-  const CalibrationResult first =
-      calibrate_hardy2013(record, precise(Correction::first_order), objectives());
-  EXPECT_NEAR(first.estimate[index(Parameter::k2d)] - k2d, -a * k2c, 1e-6);
+  const Estimation first = calibrate(record, precise(Correction::first_order));
+  EXPECT_NEAR(first.values[index(Parameter::k2d)] - k2d, -a * k2c, 1e-6);
 }
 
 /// What Γ_calib,2 takes off 2Γ_mes,dx for Δx as printed.
@@ -206,21 +212,20 @@ double in_phase(Complex signal, Complex regressor) {
 }
 
 // [Hardy2013] 5.2 to the letter: Γ_calib,2 / T̂_xx is the estimate, with the other estimates in it.
-TEST(CalibrateHardy2013, EstimatesDeltaXFromThePrintedEquation) {
-  const CalibrationRecord record = ModelRecord{.with_products = true}.make();
-  const CalibrationResult result =
-      calibrate_hardy2013(record, precise(Correction::hardy2013), objectives());
+TEST(EstimateHardy2013, EstimatesDeltaXFromThePrintedEquation) {
+  const RunPhasors record = ModelRecord{.with_products = true}.make();
+  const Estimation result = calibrate(record, precise(Correction::hardy2013));
   ASSERT_TRUE(result.converged);
   const SessionPhasors& session = record[index(SessionTarget::a_c11_delta_x)];
   // The paper separates Δx from Δz by phase, here both have both phases: the other is taken off.
-  const Complex other_phase = at(result.estimate, Parameter::a_c11_delta_z) *
+  const Complex other_phase = at(result.values, Parameter::a_c11_delta_z) *
                                   session.amplitude[index(Signal::gradient_xz)][0] +
-                              at(result.estimate, Parameter::a_c11_delta_y) *
+                              at(result.values, Parameter::a_c11_delta_y) *
                                   session.amplitude[index(Signal::gradient_xy)][0];
   const Complex calibrated = 2.0 * session.amplitude[index(Signal::differential_x)][0] -
-                             printed_terms(session, result.estimate) - other_phase;
+                             printed_terms(session, result.values) - other_phase;
   const double expected = in_phase(calibrated, session.amplitude[index(Signal::gradient_xx)][0]);
-  EXPECT_NEAR(at(result.estimate, Parameter::a_c11_delta_x), expected, 1e-9 * objectives()[0]);
+  EXPECT_NEAR(at(result.values, Parameter::a_c11_delta_x), expected, 1e-9 * objectives()[0]);
 }
 
 /// A signal that the Δ session of `target` may hold, and the parameters that multiply it.
@@ -243,12 +248,12 @@ std::pair<Signal, Parameter> own_term(SessionTarget target) {
 }
 
 /// A record in which each session has no signal but the one that it is fitted against.
-CalibrationRecord lone_terms(const ParameterArray& truth) {
+RunPhasors lone_terms(const ParameterArray& truth) {
   ModelRecord model;
   model.truth = truth;
   model.k2d_slope = at(truth, Parameter::k2d);
   model.k2_slopes = {at(truth, Parameter::k2c), at(truth, Parameter::k2c)};
-  CalibrationRecord record = model.make();
+  RunPhasors record = model.make();
   for (std::size_t i = 0; i < num_session_targets; ++i) {
     const Signal own = own_signals[i];
     for (std::size_t line = 0; line < record[i].num_lines; ++line) {
@@ -269,7 +274,7 @@ class TermOfHardy2013 : public testing::TestWithParam<SessionTerm> {};
 TEST_P(TermOfHardy2013, IsSubtractedIfListedAndOnlyThen) {
   const SessionTerm& term = GetParam();
   const ParameterArray truth = example_truth();
-  CalibrationRecord record = lone_terms(truth);
+  RunPhasors record = lone_terms(truth);
   const auto& [own, parameter] = own_term(term.target);
   SessionPhasors& session = record[index(term.target)];
   const Complex regressor = session.amplitude[index(own)][0];
@@ -278,10 +283,9 @@ TEST_P(TermOfHardy2013, IsSubtractedIfListedAndOnlyThen) {
   const double size =
       term.factor * at(truth, term.first) * (term.second ? at(truth, *term.second) : 1.0);
   session.amplitude[0][0] += size * other;
-  const CalibrationResult result =
-      calibrate_hardy2013(record, precise(Correction::hardy2013), objectives());
+  const Estimation result = calibrate(record, precise(Correction::hardy2013));
   const double left = term.is_subtracted ? 0.0 : 2.0 * size * 0.6;
-  EXPECT_NEAR(at(result.estimate, parameter) - at(truth, parameter), left,
+  EXPECT_NEAR(at(result.values, parameter) - at(truth, parameter), left,
               1e-6 * std::abs(2.0 * size));
 }
 
@@ -322,37 +326,86 @@ INSTANTIATE_TEST_SUITE_P(
     }()));
 
 // Only the part of the signal in phase with the regressor counts.
-TEST(CalibrateHardy2013, IgnoresWhatIsInQuadratureWithTheRegressor) {
+TEST(EstimateHardy2013, IgnoresWhatIsInQuadratureWithTheRegressor) {
   ModelRecord model;
-  CalibrationRecord record = model.make();
+  RunPhasors record = model.make();
   SessionPhasors& session = record[index(SessionTarget::a_d12)];
   session.amplitude[index(Signal::differential_x)][0] +=
       Complex(0.0, 0.3) * session.amplitude[index(Signal::common_y)][0];
-  const CalibrationResult result =
-      calibrate_hardy2013(record, precise(Correction::first_order), objectives());
-  EXPECT_NEAR(result.estimate[index(Parameter::a_d12)], at(model.truth, Parameter::a_d12), 1e-12);
+  const Estimation result = calibrate(record, precise(Correction::first_order));
+  EXPECT_NEAR(result.values[index(Parameter::a_d12)], at(model.truth, Parameter::a_d12), 1e-12);
 }
 
-TEST(CalibrateHardy2013, CountsItsRoundsAndSaysWhenTheyDoNotSuffice) {
-  const CalibrationRecord record = ModelRecord{}.make();
+/// Least squares over the samples of two records of 10 and 30 orbits counts the second three times.
+TEST(EstimateHardy2013, WeightsTheSessionsOfATargetByTheirLengths) {
+  const ParameterArray truth = example_truth();
+  RunPhasors record = lone_terms(truth);
+  Scenario scenario;
+  scenario.estimation = precise(Correction::first_order);
+  Session second = scenario.sessions[index(SessionTarget::a_d12)];
+  second.name = "second";
+  second.num_orbits = 30;
+  scenario.sessions.push_back(second);
+  record.push_back(record[index(SessionTarget::a_d12)]);
+  // The second record has half of the regressor and a slope that is larger by 1e-5.
+  const double slope = at(truth, Parameter::a_d12);
+  Complex& regressor = record.back().amplitude[index(Signal::common_y)][0];
+  regressor *= 0.5;
+  record.back().amplitude[index(Signal::differential_x)][0] = (slope + 1e-5) * regressor;
+  const Estimation result = estimate_hardy2013(record, scenario);
+  EXPECT_TRUE(result.converged);
+  const double share = 3.0 * 0.25 / (1.0 + 3.0 * 0.25);
+  EXPECT_NEAR(at(result.values, Parameter::a_d12), slope + share * 1e-5, 1e-12);
+  EXPECT_FALSE(result.standard_errors.has_value());
+}
+
+TEST(EstimateHardy2013, SaysHowFarTheLastRoundMoved) {
+  const RunPhasors record = ModelRecord{}.make();
   EstimationConfig config;
   config.num_rounds_max = 1;
-  const CalibrationResult one = calibrate_hardy2013(record, config, objectives());
+  const Estimation one = calibrate(record, config);
+  ASSERT_EQ(one.diagnostics.size(), 1U);
+  EXPECT_EQ(one.diagnostics[0].name, "last_move");
+  double largest = 0.0;  // The first round moves from nothing.
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    largest = std::max(largest, std::abs(one.values[i]) / objectives()[i]);
+  }
+  EXPECT_DOUBLE_EQ(one.diagnostics[0].value, largest);
+  config.num_rounds_max = 50;
+  EXPECT_LE(calibrate(record, config).diagnostics[0].value, config.convergence);
+}
+
+TEST(CheckHardy2013, WantsASessionForEveryTarget) {
+  std::vector<Session> sessions = hardy2013_sessions();
+  EXPECT_NO_THROW(check_hardy2013(sessions));
+  sessions.push_back(sessions[3]);
+  EXPECT_NO_THROW(check_hardy2013(sessions));
+  sessions.pop_back();
+  sessions.erase(sessions.begin() + 3);
+  EXPECT_EQ(test::message_of<ConfigError>([&] { check_hardy2013(sessions); }),
+            "session = 10 sessions (none has the target a_c12)");
+}
+
+TEST(EstimateHardy2013, CountsItsRoundsAndSaysWhenTheyDoNotSuffice) {
+  const RunPhasors record = ModelRecord{}.make();
+  EstimationConfig config;
+  config.num_rounds_max = 1;
+  const Estimation one = calibrate(record, config);
   EXPECT_FALSE(one.converged);
   EXPECT_EQ(one.num_rounds, 1U);
   config.num_rounds_max = 50;
-  const CalibrationResult many = calibrate_hardy2013(record, config, objectives());
+  const Estimation many = calibrate(record, config);
   EXPECT_TRUE(many.converged);
   EXPECT_GT(many.num_rounds, 1U);
   EXPECT_LT(many.num_rounds, 50U);
 }
 
-TEST(CalibrateHardy2013, NeverConvergesOnNumbersThatAreNotFinite) {
-  CalibrationRecord record = ModelRecord{}.make();
+TEST(EstimateHardy2013, NeverConvergesOnNumbersThatAreNotFinite) {
+  RunPhasors record = ModelRecord{}.make();
   record[0].amplitude[0][0] = std::numeric_limits<double>::quiet_NaN();
-  const CalibrationResult result = calibrate_hardy2013(record, EstimationConfig{}, objectives());
+  const Estimation result = calibrate(record, EstimationConfig{});
   EXPECT_FALSE(result.converged);
-  EXPECT_FALSE(std::isfinite(result.estimate[0]));
+  EXPECT_FALSE(std::isfinite(result.values[0]));
 }
 
 }  // namespace
