@@ -185,7 +185,7 @@ Handle enumeration_type(const Writer& writer, Enumeration first, Enumeration las
 
 /// The sessions by their targets; 0 is none.
 Handle loss_session_type(const Writer& writer) {
-  Handle type = enumeration_type(writer, SessionTarget::a_c11_delta_x, SessionTarget::k2_sensor_2);
+  Handle type = enumeration_type(writer, SessionTarget::a_c11_delta_x, SessionTarget::no_target);
   constexpr std::uint8_t none = 0;
   writer.check(H5Tenum_insert(type, "none", &none));
   return type;

@@ -93,19 +93,22 @@ class SessionCheck {
 
 void SessionCheck::check_excitations() const {
   const TargetInfo& target = target_info(session_.target);
-  check_choice("drag_free", session_.drag_free, target.drag_free);
+  if (target.drag_free) check_choice("drag_free", session_.drag_free, *target.drag_free);
   const std::vector<Excitation>& excitations = session_.excitations;
   const auto refuse_number = [&](std::string_view rule) {
     refuse("excitations", fmt::format("{} of them", excitations.size()), rule);
   };
-  if (target.stimulus ? excitations.empty() : !excitations.empty()) {
-    refuse_number(
-        fmt::format("target {} needs {}", target.name, target.stimulus ? "one or more" : "none"));
+  const bool needs_stimulus = target.excitations == ExcitationRule::stimulus;
+  if (needs_stimulus && excitations.empty()) {
+    refuse_number(fmt::format("target {} needs one or more", target.name));
+  }
+  if (target.excitations == ExcitationRule::none && !excitations.empty()) {
+    refuse_number(fmt::format("target {} needs none", target.name));
   }
   if (excitations.size() > num_excitations_max) {
     refuse_number(fmt::format("must be at most {}", num_excitations_max));
   }
-  if (target.stimulus) check_stimulus(excitations.front(), *target.stimulus);
+  if (needs_stimulus) check_stimulus(excitations.front(), target.stimulus);
   for (std::size_t i = 0; i < excitations.size(); ++i) check_excitation(i);
 }
 

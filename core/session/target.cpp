@@ -15,8 +15,13 @@ using enum MassMotion;
 
 constexpr auto no_product = Product::none;
 constexpr auto common_drag_free = DragFreeSource::common;
+constexpr std::optional<DragFreeSource> any_drag_free;
 
-constexpr Stimulus shaken_attitude{attitude, Axis::z};
+constexpr auto quiet = ExcitationRule::none;
+constexpr auto shaken = ExcitationRule::stimulus;
+
+constexpr Stimulus no_stimulus{};
+constexpr Stimulus turned_about_z{attitude, Axis::z};
 constexpr Stimulus moved_along(Axis axis) { return {test_mass, axis}; }
 constexpr Stimulus pushed_along(Axis axis) { return {drag_free, axis}; }
 
@@ -24,40 +29,30 @@ constexpr Stimulus pushed_along(Axis axis) { return {drag_free, axis}; }
 // as the masses move along sensor axes; a_d1j Γ_mes,cj; K2d/K1c² Γ_mes,cx²; and
 // 2 Γ_mes,dx = ±K2k/K1k² Γ_mes,kx² for the mass that moves.
 constexpr std::array<TargetInfo, num_session_targets> targets{{
-    {a_c11_delta_x,
-     "a_c11_delta_x",
-     {},
-     common_drag_free,
-     Signal::gradient_xx,
-     no_product,
-     2.0,
-     SignalSet::all},
-    {a_c11_delta_z,
-     "a_c11_delta_z",
-     {},
-     common_drag_free,
-     Signal::gradient_xz,
-     no_product,
-     2.0,
-     SignalSet::all},
-    {a_c11_delta_y, "a_c11_delta_y", shaken_attitude, common_drag_free, Signal::gradient_xy,
+    {a_c11_delta_x, "a_c11_delta_x", quiet, no_stimulus, common_drag_free, Signal::gradient_xx,
      no_product, 2.0, SignalSet::all},
-    {a_c12, "a_c12", moved_along(Axis::y), common_drag_free, Signal::product, Product::modulated_yy,
-     1.0, SignalSet::common},
-    {a_c13, "a_c13", moved_along(Axis::z), common_drag_free, Signal::product, Product::modulated_zz,
-     1.0, SignalSet::common},
-    {a_d11_prime, "a_d11_prime", pushed_along(Axis::x), common_drag_free, Signal::common_x,
+    {a_c11_delta_z, "a_c11_delta_z", quiet, no_stimulus, common_drag_free, Signal::gradient_xz,
+     no_product, 2.0, SignalSet::all},
+    {a_c11_delta_y, "a_c11_delta_y", shaken, turned_about_z, common_drag_free, Signal::gradient_xy,
+     no_product, 2.0, SignalSet::all},
+    {a_c12, "a_c12", shaken, moved_along(Axis::y), common_drag_free, Signal::product,
+     Product::modulated_yy, 1.0, SignalSet::common},
+    {a_c13, "a_c13", shaken, moved_along(Axis::z), common_drag_free, Signal::product,
+     Product::modulated_zz, 1.0, SignalSet::common},
+    {a_d11_prime, "a_d11_prime", shaken, pushed_along(Axis::x), common_drag_free, Signal::common_x,
      no_product, 1.0, SignalSet::common},
-    {a_d12, "a_d12", pushed_along(Axis::y), common_drag_free, Signal::common_y, no_product, 1.0,
-     SignalSet::common},
-    {a_d13, "a_d13", pushed_along(Axis::z), common_drag_free, Signal::common_z, no_product, 1.0,
-     SignalSet::common},
-    {k2d, "k2d", pushed_along(Axis::x), common_drag_free, Signal::product, Product::common_squared,
+    {a_d12, "a_d12", shaken, pushed_along(Axis::y), common_drag_free, Signal::common_y, no_product,
      1.0, SignalSet::common},
-    {k2_sensor_1, "k2_sensor_1", Stimulus{test_mass, Axis::x, mass_1}, DragFreeSource::sensor_2,
-     Signal::product, Product::sensor_1_squared, 2.0, SignalSet::common},
-    {k2_sensor_2, "k2_sensor_2", Stimulus{test_mass, Axis::x, mass_2}, DragFreeSource::sensor_1,
-     Signal::product, Product::sensor_2_squared, -2.0, SignalSet::common},
+    {a_d13, "a_d13", shaken, pushed_along(Axis::z), common_drag_free, Signal::common_z, no_product,
+     1.0, SignalSet::common},
+    {k2d, "k2d", shaken, pushed_along(Axis::x), common_drag_free, Signal::product,
+     Product::common_squared, 1.0, SignalSet::common},
+    {k2_sensor_1, "k2_sensor_1", shaken, Stimulus{test_mass, Axis::x, mass_1},
+     DragFreeSource::sensor_2, Signal::product, Product::sensor_1_squared, 2.0, SignalSet::common},
+    {k2_sensor_2, "k2_sensor_2", shaken, Stimulus{test_mass, Axis::x, mass_2},
+     DragFreeSource::sensor_1, Signal::product, Product::sensor_2_squared, -2.0, SignalSet::common},
+    {no_target, "no_target", ExcitationRule::any, no_stimulus, any_drag_free, Signal::product,
+     no_product, 0.0, SignalSet::common},
 }};
 
 constexpr bool are_in_order() {

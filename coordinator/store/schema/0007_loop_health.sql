@@ -71,9 +71,9 @@ CREATE TABLE run_result (
   -- 1 saturation, 2 attitude, 3 residual, 4 quadratic noise, 5 square noise
   loss_cause    INTEGER CHECK (loss_cause BETWEEN 1 AND 5)
                         CHECK ((loss_cause IS NULL) = (status <> 5)),
-  -- 1 to 11: a_c11_delta_x, a_c11_delta_z, a_c11_delta_y, a_c12, a_c13, a_d11_prime, a_d12, a_d13,
-  -- k2d, k2_sensor_1, k2_sensor_2
-  loss_session  INTEGER CHECK (loss_session BETWEEN 1 AND 11)
+  -- 1 to 12: a_c11_delta_x, a_c11_delta_z, a_c11_delta_y, a_c12, a_c13, a_d11_prime, a_d12, a_d13,
+  -- k2d, k2_sensor_1, k2_sensor_2, no_target
+  loss_session  INTEGER CHECK (loss_session BETWEEN 1 AND 12)
                         CHECK ((loss_session IS NULL) = (status <> 5))
 ) STRICT;
 
@@ -138,7 +138,8 @@ SELECT run_index,
        CASE loss_session WHEN 1 THEN 'a_c11_delta_x' WHEN 2 THEN 'a_c11_delta_z'
          WHEN 3 THEN 'a_c11_delta_y' WHEN 4 THEN 'a_c12' WHEN 5 THEN 'a_c13'
          WHEN 6 THEN 'a_d11_prime' WHEN 7 THEN 'a_d12' WHEN 8 THEN 'a_d13' WHEN 9 THEN 'k2d'
-         WHEN 10 THEN 'k2_sensor_1' WHEN 11 THEN 'k2_sensor_2' END AS loss_session
+         WHEN 10 THEN 'k2_sensor_1' WHEN 11 THEN 'k2_sensor_2'
+         WHEN 12 THEN 'no_target' END AS loss_session
 FROM run_result
 WHERE status <> 4
 ORDER BY run_index;

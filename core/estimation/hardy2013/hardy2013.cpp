@@ -239,6 +239,7 @@ RecordNeeds hardy2013_needs(const Session& session) {
 
 void check_hardy2013(const std::vector<Session>& sessions) {
   for (const std::string_view name : names_of(SessionTarget{})) {
+    if (name == target_info(SessionTarget::no_target).name) continue;
     const auto serves = [&](const Session& session) {
       return target_info(session.target).name == name;
     };

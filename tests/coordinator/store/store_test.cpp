@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 #include <limits>
+#include <string>
 
 #include "coordinator/store/detail/database.hpp"
 #include "core/campaign/dispersion.hpp"
@@ -137,6 +138,24 @@ TEST_F(StoreTest, KeepsHealthAndWhereARunWasLost) {
             "lost residual a_c12");
   EXPECT_EQ(database.integer("SELECT count(*) FROM loop_health"), 2);
   EXPECT_EQ(database.integer("SELECT num_lost FROM campaign_progress"), 1);
+}
+
+TEST_F(StoreTest, KeepsThatARunWasLostInAnySession) {
+  std::vector<Delivery> deliveries;
+  for (std::size_t i = 0; i < num_session_targets; ++i) {
+    RunResult result = result_of(i, RunStatus::lost);
+    result.loss = {LossCause::attitude, static_cast<SessionTarget>(i + 1)};
+    deliveries.push_back({result, session_1, {1}, 1.0});
+  }
+  Store store = Store::create(file(), campaign_of(num_session_targets), "");
+  EXPECT_EQ(store.commit(deliveries).num_new, num_session_targets);
+  const Database database(file(), Access::read_only);
+  for (std::size_t i = 0; i < num_session_targets; ++i) {
+    EXPECT_EQ(results_in(store)[i].loss, deliveries[i].result.loss);
+    EXPECT_EQ(database.text("SELECT loss_session FROM loop_health WHERE run_index = " +
+                            std::to_string(i)),
+              name_of(static_cast<SessionTarget>(i + 1)));
+  }
 }
 
 TEST_F(StoreTest, HasNullWhereAResultHasNoMeaning) {

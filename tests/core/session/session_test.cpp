@@ -7,6 +7,8 @@
 #include <limits>
 #include <numbers>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/error.hpp"
 #include "core/session/session_names.hpp"
@@ -255,6 +257,22 @@ TEST(ValidateSessions, RefusesFurtherExcitationsThatAreWrong) {
               s[at_a_c12].excitations.push_back({ExcitationKind::test_mass, Axis::z, 1e-6, 5e-3});
             }),
             "session[3].excitations[1].kind = test_mass (one excitation may move test masses)");
+}
+
+TEST(ValidateSessions, LetsASessionWithoutTargetShakeWhatItLikes) {
+  const auto after = [](std::vector<Excitation> excitations) {
+    return refusal_after([&](Sessions& s) {
+      s[6].target = SessionTarget::no_target;
+      s[6].drag_free = DragFreeSource::sensor_1;
+      s[6].excitations = std::move(excitations);
+      s[6].fit_lines = {{1, 0}};
+      s[6].known_lines = {{2, 0}};
+    });
+  };
+  EXPECT_EQ(after({}), "");
+  EXPECT_EQ(after({{ExcitationKind::attitude, Axis::y, 1e-3, 1e-3}}), "");
+  EXPECT_EQ(after({{ExcitationKind::attitude, Axis::y, -1e-3, 1e-3}}),
+            "session[6].excitations[0].amplitude_rad = -0.001 (must be > 0)");
 }
 
 TEST(ValidateSessions, AcceptsSessionsOfOneOrbit) {

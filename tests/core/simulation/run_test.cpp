@@ -122,6 +122,26 @@ TEST(RunPlan, EstimatesATargetFromSeveralSessions) {
   EXPECT_LT(of_both.estimate[i], std::max(of_first, of_second));
 }
 
+// A session without target is recorded and its loops are watched, but no estimate hangs on it.
+TEST(RunPlan, RecordsASessionWithoutTargetBesideTheOthers) {
+  Campaign campaign = short_campaign(1);
+  const RunResult before = RunPlan(campaign).simulate(RunIndex{0}, {});
+  Session spun = campaign.scenario.sessions[0];
+  spun.name = "spun";
+  spun.target = SessionTarget::no_target;
+  spun.spin_rate_rad_s = 4.75e-3;
+  campaign.scenario.sessions.push_back(spun);
+  campaign.validate();
+  const RunPlan plan(campaign);
+  const RunRecord record = plan.record(RunIndex{0}, {});
+  ASSERT_EQ(record.phasors.size(), 12U);
+  EXPECT_NE(record.phasors[11].amplitude[index(Signal::gradient_xx)][0], 0.0);
+  EXPECT_EQ(plan.estimate(record).estimate, before.estimate);
+  campaign.scenario.health.residual_max_m_s2 = 5e-12;
+  EXPECT_EQ(RunPlan(campaign).estimate(record).loss,
+            (Loss{LossCause::residual, SessionTarget::no_target}));
+}
+
 TEST(RunPlan, ReportsItsOrbitsInOrder) {
   const Campaign campaign = short_campaign(1);
   const RunPlan plan(campaign);

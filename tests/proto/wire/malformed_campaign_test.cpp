@@ -99,7 +99,7 @@ TEST(MalformedCampaign, HasABoundedNumberOfEverything) {
 
 TEST(MalformedCampaign, HasSessionsOfKnownKinds) {
   EXPECT_EQ(refusal_of_session([](auto& session) { session.clear_target(); }),
-            "session.target = 0 (must be an enumerator, 1 to 11)");
+            "session.target = 0 (must be an enumerator, 1 to 12)");
   EXPECT_EQ(refusal_of_session([](auto& session) { session.clear_drag_free(); }),
             "session.drag_free = 0 (must be an enumerator, 1 to 3)");
   EXPECT_EQ(refusal_of_session([](auto& session) { session.set_num_orbits(0); }),

@@ -361,7 +361,7 @@ TEST(MalformedComputedRun, HasHealthInRangeAndACauseIfLost) {
               lose(run);
               run.set_loss_cause(proto::LOSS_CAUSE_SATURATION);
             }),
-            "loss_session = 0 (must be in [1, 11])");
+            "loss_session = 0 (must be in [1, 12])");
 }
 
 TEST(MalformedComputedRun, HasAStatusAndARunIndex) {
