@@ -38,7 +38,7 @@ struct ComparedCampaign {
 /// the stored digest at its end, so that no further pass is needed for that; compare_campaigns()
 /// reads it to its end before anything else. The Store outlives what is returned, and one state of
 /// the file is read meanwhile (Store::read_one_state()).
-/// @throws StoreError or CampaignFileError if the file cannot be read; Interrupted. So do the
+/// @throws StoreError or DefinitionError if the file cannot be read; Interrupted. So do the
 ///         streams, and StoreError if the file holds other results than were stored, see
 ///         check_digest().
 [[nodiscard]] ComparedCampaign read_compared(const Store& store, const IsStopped& is_stopped);

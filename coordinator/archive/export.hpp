@@ -22,7 +22,7 @@ namespace proofmass::coordinator {
 //
 // All throw ArchiveError if the output cannot be written, StoreError if the file cannot be read or
 // if its results or its definition are not those that were stored, see check_digest(),
-// CampaignFileError if draws are wanted of a definition that is no campaign, and Interrupted; then
+// DefinitionError if draws are wanted of a definition that is no campaign, and Interrupted; then
 // no file appears. Standard output has the results by then.
 
 /// One line a run after a line of headings, as of RFC 4180; cells without a meaning are empty.

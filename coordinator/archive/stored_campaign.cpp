@@ -29,8 +29,8 @@ Campaign stored_campaign_unchecked(const Store& store) {
     std::vector<double> column = std::move(store.table_columns(elements).front());
     if (!column.empty()) columns.push_back(std::move(column));
   }
-  Campaign campaign =
-      parse_stored_campaign(store.definition(), store.environment_table(), std::move(columns));
+  Campaign campaign = parse_campaign("stored definition", store.definition(),
+                                     store.environment_table(), std::move(columns));
   require_identity(campaign, {.name = store.name(),
                               .seed = fmt::to_string(store.seed()),
                               .num_runs = fmt::to_string(store.num_runs())});

@@ -6,7 +6,7 @@
 namespace proofmass::coordinator {
 
 /// The campaign that a campaign file holds.
-/// @throws CampaignFileError if its definition is not one or another one's, StoreError if it cannot
+/// @throws DefinitionError if its definition is not one or another one's, StoreError if it cannot
 /// be read or is not the one that was stored, see check_definition_digest().
 [[nodiscard]] Campaign stored_campaign(const Store& store);
 

@@ -7,20 +7,16 @@
 #include <utility>
 
 #include "coordinator/campaign_file/data_file.hpp"
-#include "coordinator/campaign_file/document.hpp"
-#include "coordinator/campaign_file/readers.hpp"
+#include "core/definition/document.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-using detail::Assignment;
-using detail::Document;
-
 Assignment count_assignment(std::string_view option, std::string_view path, std::uint64_t count) {
   const std::string origin = fmt::format("{} {}", option, count);
   if (count > std::numeric_limits<std::int64_t>::max()) {
-    throw CampaignFileError(
+    throw DefinitionError(
         fmt::format("{}: must be in [0, {}]", origin, std::numeric_limits<std::int64_t>::max()));
   }
   return {origin, std::string(path), toml::table{{"value", static_cast<std::int64_t>(count)}}};
@@ -29,7 +25,7 @@ Assignment count_assignment(std::string_view option, std::string_view path, std:
 std::vector<Assignment> assignments_of(const Overrides& overrides) {
   std::vector<Assignment> assignments;
   for (const std::string& text : overrides.assignments) {
-    assignments.push_back(detail::parse_assignment(text));
+    assignments.push_back(parse_assignment(text));
   }
   if (overrides.num_runs) {
     assignments.push_back(count_assignment("--runs", "campaign.runs", *overrides.num_runs));
@@ -95,7 +91,7 @@ std::string read_campaign_text(const std::filesystem::path& file) {
   try {
     return detail::read_text_file(file, campaign_file_size_max);
   } catch (const detail::UnreadableFile& error) {
-    throw CampaignFileError(fmt::format("{}: {}", file.string(), error.what()));
+    throw DefinitionError(fmt::format("{}: {}", file.string(), error.what()));
   }
 }
 
@@ -103,7 +99,7 @@ std::string read_campaign_text(const std::filesystem::path& file) {
 
 Campaign read_campaign(const std::filesystem::path& file, const Overrides& overrides) {
   Document document(file.string(), read_campaign_text(file), assignments_of(overrides));
-  Campaign campaign = detail::read_definition(document);
+  Campaign campaign = read_definition(document);
   document.check();
   DataFiles data(document, file.parent_path());
   data.read_environment(campaign);
@@ -112,37 +108,24 @@ Campaign read_campaign(const std::filesystem::path& file, const Overrides& overr
   return campaign;
 }
 
-Campaign parse_stored_campaign(std::string_view definition, EnvironmentTable environment_table,
-                               std::vector<std::vector<double>> table_columns) {
-  Document document("stored definition", definition, {});
-  Campaign campaign = detail::read_definition(document);
-  document.check();
-  campaign.environment_table = std::move(environment_table);
-  campaign.table_columns = std::move(table_columns);
-  validate(campaign, document);
-  return campaign;
-}
-
 void require_identity(const Campaign& defined, const StoredIdentity& stored) {
   const auto require_same = [](std::string_view field, const std::string& value,
                                const std::string& expected) {
     if (value == expected) return;
-    throw CampaignFileError(fmt::format("campaign.{} = {} (must be {}, as in the definition)",
-                                        field, wire::visible_text(value),
-                                        wire::visible_text(expected)));
+    throw DefinitionError(fmt::format("campaign.{} = {} (must be {}, as in the definition)", field,
+                                      wire::visible_text(value), wire::visible_text(expected)));
   };
   require_same("name", stored.name, defined.name);
   require_same("seed", stored.seed, fmt::to_string(defined.seed));
   require_same("num_runs", stored.num_runs, fmt::to_string(defined.num_runs));
 }
 
-Campaign hardy2013_campaign() {
-  Campaign campaign;
-  campaign.name = "hardy2013";
-  campaign.seed = 1;
-  campaign.num_runs = 100;
-  campaign.scenario.estimation.correction = Correction::hardy2013;
-  return campaign;
+std::vector<std::string> definition_differences(const Campaign& stored, const Campaign& wanted) {
+  std::vector<std::string> texts;
+  for (const auto& [field, first, second] : compare_definitions(stored, wanted)) {
+    texts.push_back(fmt::format("{}: {} in the database, {} asked for", field, first, second));
+  }
+  return texts;
 }
 
 }  // namespace proofmass::coordinator

@@ -12,7 +12,7 @@
 #include <set>
 #include <system_error>
 
-#include "coordinator/campaign_file/nearest_name.hpp"
+#include "core/definition/nearest_name.hpp"
 
 namespace proofmass::coordinator::detail {
 
@@ -84,8 +84,7 @@ class CsvReader {
   }
 
   [[noreturn]] void refuse(std::string_view reason) const {
-    throw CampaignFileError(
-        fmt::format("{}:{}: {}", name_, std::max<std::size_t>(line_, 1), reason));
+    throw DefinitionError(fmt::format("{}:{}: {}", name_, std::max<std::size_t>(line_, 1), reason));
   }
 
  private:
@@ -106,14 +105,14 @@ class CsvReader {
 };
 
 // Row i of an environment table stands in line i + 1, below the headings.
-CampaignFileError located_in_table(const ConfigError& error, const std::string& name) {
+DefinitionError located_in_table(const ConfigError& error, const std::string& name) {
   constexpr std::string_view row_prefix = "environment.file row ";
   std::size_t row = 0;
   if (error.field().starts_with(row_prefix)) {
     const char* const digits = error.field().data() + row_prefix.size();
     std::from_chars(digits, error.field().data() + error.field().size(), row);
   }
-  return CampaignFileError(fmt::format("{}:{}: {}", name, row + 1, error.what()));
+  return DefinitionError(fmt::format("{}:{}: {}", name, row + 1, error.what()));
 }
 
 std::size_t find_heading(const CsvReader& reader, std::string_view heading) {

@@ -25,12 +25,12 @@ class UnreadableFile : public Error {
 /// Rows of an environment file, checked for an orbit of that period.
 ///
 /// @param name  For messages: path of the file that has the text.
-/// @throws CampaignFileError naming file, line and reason.
+/// @throws DefinitionError naming file, line and reason.
 [[nodiscard]] EnvironmentTable parse_environment(std::string_view text, const std::string& name,
                                                  double orbit_period_s);
 
 /// One column, by its heading, of comma-separated text whose first line holds the headings.
-/// @throws CampaignFileError naming file, line and reason.
+/// @throws DefinitionError naming file, line and reason.
 [[nodiscard]] std::vector<double> parse_column(std::string_view text, const std::string& name,
                                                std::string_view heading);
 

@@ -21,7 +21,7 @@ struct ExportOptions {
 /// Writes all results of a database to a file or to standard output.
 /// @return An ExitCode.
 /// @throws UsageError if the file exists and must not be replaced, or if a format needs one;
-///         StoreError, ArchiveError, CampaignFileError.
+///         StoreError, ArchiveError, DefinitionError.
 [[nodiscard]] int export_results(const ExportOptions& options);
 
 }  // namespace proofmass::coordinator

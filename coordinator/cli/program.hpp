@@ -43,7 +43,7 @@ inline int run_program(CLI::App& app, int argc, char** argv, const std::function
     return fail("standard output: cannot be written", exit_cannot_be_done);
   } catch (const CLI::ParseError& error) {
     return fail(wire::refusal_of(app, error), exit_wrong_usage);
-  } catch (const CampaignFileError& error) {
+  } catch (const DefinitionError& error) {
     return fail(error.what(), exit_wrong_usage);
   } catch (const UsageError& error) {
     return fail(error.what(), exit_wrong_usage);

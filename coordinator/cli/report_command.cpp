@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/campaign_file/nearest_name.hpp"
 #include "coordinator/cli/campaign_start.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
@@ -14,6 +13,7 @@
 #include "coordinator/report/requirement_text.hpp"
 #include "coordinator/report/sensitivity_text.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/definition/nearest_name.hpp"
 #include "core/statistics/sensitivity.hpp"
 
 namespace proofmass::coordinator {

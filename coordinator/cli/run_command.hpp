@@ -24,7 +24,7 @@ struct RunOptions {
 /// its workers is given up, and tried again the next time.
 ///
 /// @return An ExitCode; exit_not_met if all runs together do not reach the stop rule.
-/// @throws CampaignFileError, UsageError, StoreError, Error.
+/// @throws DefinitionError, UsageError, StoreError, Error.
 [[nodiscard]] int run_campaign(const RunOptions& options);
 
 }  // namespace proofmass::coordinator

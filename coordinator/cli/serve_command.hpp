@@ -31,7 +31,7 @@ struct ServeOptions {
 
 /// Serves all campaigns of a directory to the workers that connect.
 /// @return An ExitCode.
-/// @throws CampaignFileError, UsageError, InvalidArgument, StoreError, Error.
+/// @throws DefinitionError, UsageError, InvalidArgument, StoreError, Error.
 [[nodiscard]] int serve_campaigns(const ServeOptions& options);
 
 }  // namespace proofmass::coordinator

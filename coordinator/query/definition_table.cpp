@@ -10,8 +10,8 @@
 #include <variant>
 #include <vector>
 
-#include "coordinator/campaign_file/definition_items.hpp"
 #include "coordinator/query/virtual_table.hpp"
+#include "core/definition/definition_items.hpp"
 
 SQLITE_EXTENSION_INIT3
 

@@ -125,8 +125,9 @@ Campaign read_campaign_of(sqlite3* connection, const std::string& database) {
   Selection row(connection, fmt::format("SELECT definition, name, seed, num_runs FROM {}.campaign",
                                         quoted_name(database)));
   row.require_row();
-  Campaign campaign = parse_stored_campaign(row.text(0), environment_table_of(connection, database),
-                                            table_columns_of(connection, database));
+  Campaign campaign =
+      parse_campaign("stored definition", row.text(0), environment_table_of(connection, database),
+                     table_columns_of(connection, database));
   require_identity(campaign, {.name = row.text(1), .seed = row.text(2), .num_runs = row.text(3)});
   campaign.validate();
   return campaign;

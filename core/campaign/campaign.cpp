@@ -18,7 +18,7 @@ void check_name(const std::string& name) {
            c == '-' || c == '.';
   };
   if (!name.empty() && name.size() <= name_length_max && std::ranges::all_of(name, allowed)) return;
-  throw ConfigError("campaign.name", fmt::format("\"{}\"", name),
+  throw ConfigError("campaign.name", fmt::format("\"{:.100}\"", name),
                     fmt::format("must be 1 to {} letters, digits, _, - or .", name_length_max));
 }
 
@@ -36,6 +36,10 @@ void check_counts(const Campaign& campaign) {
 void check_environment(const Campaign& campaign) {
   const bool wants_file = campaign.scenario.environment.kind == EnvironmentKind::file;
   const std::string value = fmt::format("\"{}\"", campaign.environment_file);
+  if (campaign.environment_file.size() > data_name_size_max) {
+    throw ConfigError("environment.file", fmt::format("{} bytes", campaign.environment_file.size()),
+                      fmt::format("must be at most {}", data_name_size_max));
+  }
   if (wants_file && campaign.environment_file.empty()) {
     throw ConfigError("environment.file", value, "environment.kind = \"file\" needs one");
   }
@@ -61,9 +65,9 @@ void check_table_column(const std::vector<double>& column, const Dispersion& dis
   }
 }
 
-void check_dispersions(const Campaign& campaign) {
-  const auto path = [](std::size_t i) { return "dispersion." + drawn_names()[i]; };
-  for (std::size_t i = 0; i < num_drawn; ++i) campaign.dispersions[i].validate(path(i));
+std::string path_of(std::size_t drawn) { return "dispersion." + drawn_names()[drawn]; }
+
+void check_table_columns(const Campaign& campaign) {
   const std::vector<std::size_t> elements = table_elements(campaign.dispersions);
   if (campaign.table_columns.size() != elements.size()) {
     throw ConfigError("dispersion", fmt::format("{} columns", campaign.table_columns.size()),
@@ -71,18 +75,23 @@ void check_dispersions(const Campaign& campaign) {
   }
   for (std::size_t i = 0; i < elements.size(); ++i) {
     check_table_column(campaign.table_columns[i], campaign.dispersions[elements[i]],
-                       path(elements[i]), campaign.num_runs);
+                       path_of(elements[i]), campaign.num_runs);
   }
 }
 
 }  // namespace
 
 void Campaign::validate() const {
+  validate_without_columns();
+  check_table_columns(*this);
+}
+
+void Campaign::validate_without_columns() const {
   check_name(name);
   check_counts(*this);
   scenario.validate();
   check_environment(*this);
-  check_dispersions(*this);
+  for (std::size_t i = 0; i < num_drawn; ++i) dispersions[i].validate(path_of(i));
 }
 
 std::vector<double> Campaign::table_values(RunIndex run) const {
@@ -93,6 +102,15 @@ std::vector<double> Campaign::table_values(RunIndex run) const {
     values.push_back(column[run.value]);
   }
   return values;
+}
+
+Campaign hardy2013_campaign() {
+  Campaign campaign;
+  campaign.name = "hardy2013";
+  campaign.seed = 1;
+  campaign.num_runs = 100;
+  campaign.scenario.estimation.correction = Correction::hardy2013;
+  return campaign;
 }
 
 }  // namespace proofmass

@@ -26,9 +26,15 @@ struct Campaign {
 
   /// @throws ConfigError naming the field, its value and the rule.
   void validate() const;
+  /// The same but for `table_columns`, which may be absent.
+  /// @throws ConfigError naming the field, its value and the rule.
+  void validate_without_columns() const;
 
   /// Values of the `table` quantities for one run, in the order of table_elements().
   [[nodiscard]] std::vector<double> table_values(RunIndex run) const;
 };
+
+/// The campaign of [Hardy2013] section 5: 100 draws, the corrections of the paper.
+[[nodiscard]] Campaign hardy2013_campaign();
 
 }  // namespace proofmass

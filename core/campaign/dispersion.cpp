@@ -165,6 +165,14 @@ class DispersionCheck {
   void check_source() const {
     if (dispersion_.file.empty()) refuse("file", "\"\"", "must name a file");
     if (dispersion_.column.empty()) refuse("column", "\"\"", "must name a column");
+    check_length("file", dispersion_.file);
+    check_length("column", dispersion_.column);
+  }
+
+  void check_length(std::string_view key, const std::string& name) const {
+    if (name.size() <= data_name_size_max) return;
+    refuse(key, fmt::format("{} bytes", name.size()),
+           fmt::format("must be at most {}", data_name_size_max));
   }
 
   const Dispersion& dispersion_;

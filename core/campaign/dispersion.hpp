@@ -12,7 +12,7 @@
 
 namespace proofmass {
 
-/// Shape of a drawn quantity's distribution. The values are sent: never renumber.
+/// Shape of a drawn quantity's distribution.
 enum class Law : std::uint8_t {
   uniform = 1,           ///< On [minimum, maximum].
   normal = 2,            ///< mean, standard_deviation.
@@ -22,6 +22,9 @@ enum class Law : std::uint8_t {
 };
 
 [[nodiscard]] std::span<const std::string_view> names_of(Law);
+
+/// Most bytes of the name of a data file or of a column.
+inline constexpr std::size_t data_name_size_max = 1024;
 
 /// The law of one drawn quantity; only the fields of its law mean something, the others are 0.
 struct Dispersion {

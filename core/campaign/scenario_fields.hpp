@@ -1,7 +1,7 @@
 #pragma once
 
-// The one list of a scenario's fields: campaign files, messages, the database and the comparison of
-// two campaigns all walk it. Included by core/campaign/scenario.hpp, which documents it.
+// The one list of a scenario's fields: campaign files, definitions and the comparison of two
+// campaigns all walk it. Included by core/campaign/scenario.hpp, which documents it.
 
 #include "core/campaign/scenario.hpp"
 

@@ -69,7 +69,7 @@ class SessionCheck {
     if (!name.empty() && name.size() <= name_length_max && std::ranges::all_of(name, allowed)) {
       return;
     }
-    refuse("name", fmt::format("\"{}\"", name),
+    refuse("name", fmt::format("\"{:.100}\"", name),
            fmt::format("must be 1 to {} letters, digits or _", name_length_max));
   }
 

@@ -78,20 +78,19 @@ class MutatedTexts : public testing::Test {
 
 TEST_F(MutatedTexts, AreDefinitionsOrRefused) {
   const auto file = directory_ / "campaign.toml";
-  mutate(coordinator::canonical_definition(coordinator::hardy2013_campaign()),
-         [&](const std::string& text) {
-           std::ofstream(file, std::ios::binary) << text;
-           coordinator::read_campaign(file).validate();
-         });
+  mutate(canonical_definition(hardy2013_campaign()), [&](const std::string& text) {
+    std::ofstream(file, std::ios::binary) << text;
+    coordinator::read_campaign(file).validate();
+  });
 }
 
 /// What a campaign of one orbit a session and one sample a second is stored as.
 std::string short_definition() {
-  Campaign campaign = coordinator::hardy2013_campaign();
+  Campaign campaign = hardy2013_campaign();
   campaign.scenario.simulation.sample_period_s = 1.0;
   campaign.scenario.simulation.settling_s = 0.0;
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
-  return coordinator::canonical_definition(campaign);
+  return canonical_definition(campaign);
 }
 
 // A worker that gets a definition which was accepted must be able to compute its runs: it may
@@ -111,7 +110,7 @@ TEST_F(MutatedTexts, WithExtremeNumbersAreDefinitionsThatCanBeSimulatedOrRefused
                                     static_cast<std::size_t>(match->length(1)), value);
       SCOPED_TRACE(match->str() + " becomes " + value);
       try {
-        const Campaign campaign = coordinator::parse_stored_campaign(changed, {}, {});
+        const Campaign campaign = parse_campaign("stored definition", changed, {}, {});
         const RunPlan plan(campaign);
         (void)plan.simulate_batch(std::array{RunRequest{}}, best_instruction_set());
         ++num_simulated;

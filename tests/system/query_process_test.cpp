@@ -22,7 +22,7 @@ class QueryProcess : public StoreTest {
   QueryProcess() {
     const Campaign campaign = campaign_of(4);
     coordinator::Store store =
-        coordinator::Store::create(file(), campaign, coordinator::canonical_definition(campaign));
+        coordinator::Store::create(file(), campaign, canonical_definition(campaign));
     const coordinator::Entry worker = worker_1();
     store.write({&worker, 1});
     store.commit(deliveries_of(0, 3));

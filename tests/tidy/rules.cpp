@@ -39,6 +39,14 @@ std::string broken_layer(const SourceFile& file, const std::string& include) {
   if (matches(include, "\\.pb\\.h$|^google/protobuf") && !(file.is_in("proto/wire") && is_source)) {
     return "Protobuf types stay in proto/wire/*.cpp";
   }
+  if (matches(include, "^toml") &&
+      !matches(file.path, "^(core/definition|coordinator/campaign_file)/")) {
+    return "TOML stays in core/definition and coordinator/campaign_file";
+  }
+  if (file.is_in("core") && !file.is_in("core/definition") &&
+      matches(include, "^core/definition/")) {
+    return "numerics depend on no text: core/definition stands above the rest of core";
+  }
   if (file.is_in("core") && matches(include, "^(proto|coordinator|worker|tests)/")) {
     return "core depends on nothing above it";
   }

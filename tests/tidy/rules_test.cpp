@@ -28,6 +28,9 @@ TEST(CheckLayers, CatchesEachForbiddenInclude) {
                           "device"));
   EXPECT_THAT(layers("core/a.cpp", "\"coordinator/store/store.hpp\""), SizeIs(1));
   EXPECT_THAT(layers("core/a.hpp", "<sqlite3.h>"), SizeIs(1));
+  EXPECT_THAT(layers("core/campaign/a.cpp", "\"core/definition/document.hpp\""), SizeIs(1));
+  EXPECT_THAT(layers("core/campaign/a.cpp", "<toml++/toml.h>"), SizeIs(1));
+  EXPECT_THAT(layers("proto/wire/a.cpp", "<toml++/toml.h>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/store/store.hpp", "<sqlite3.h>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/cli/query_command.cpp", "<sqlite3ext.h>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/dispatch/a.cpp", "<zmq.hpp>"), SizeIs(1));
@@ -46,6 +49,8 @@ TEST(CheckLayers, AllowsWhatTheLayersAreFor) {
   EXPECT_THAT(layers("proto/wire/a.cpp", "\"proofmass.pb.h\""), IsEmpty());
   EXPECT_THAT(layers("worker/a.cpp", "\"core/simulation/run.hpp\""), IsEmpty());
   EXPECT_THAT(layers("core/a.cpp", "<cmath>"), IsEmpty());
+  EXPECT_THAT(layers("core/definition/a.hpp", "<toml++/toml.h>"), IsEmpty());
+  EXPECT_THAT(layers("worker/net/a.cpp", "\"core/definition/campaign_definition.hpp\""), IsEmpty());
   EXPECT_THAT(layers("tests/system/a.cpp", "<sqlite3.h>"), IsEmpty());
 }
 

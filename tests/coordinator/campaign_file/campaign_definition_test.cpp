@@ -74,8 +74,8 @@ void expect_same(const Campaign& read, const Campaign& written) {
 TEST(CanonicalDefinition, ReadsBackToTheSameCampaign) {
   for (const Campaign& campaign : {Campaign{}, hardy2013_campaign(), unusual_campaign()}) {
     const std::string definition = canonical_definition(campaign);
-    const Campaign read =
-        parse_stored_campaign(definition, campaign.environment_table, campaign.table_columns);
+    const Campaign read = parse_campaign("stored definition", definition,
+                                         campaign.environment_table, campaign.table_columns);
     expect_same(read, campaign);
     EXPECT_EQ(canonical_definition(read), definition);
   }
@@ -97,8 +97,8 @@ TEST(CommentedCampaign, ReadsBackToTheSameCampaign) {
     expect_same(read_campaign(folder.write("c.toml", commented_campaign(campaign))), campaign);
   }
   const Campaign unusual = unusual_campaign();
-  expect_same(parse_stored_campaign(commented_campaign(unusual), unusual.environment_table,
-                                    unusual.table_columns),
+  expect_same(parse_campaign("stored definition", commented_campaign(unusual),
+                             unusual.environment_table, unusual.table_columns),
               unusual);
 }
 
@@ -126,8 +126,8 @@ TEST(Hardy2013File, IsThePapersCampaign) {
 TEST(ParseStoredCampaign, RefusesWhatIsNoValidCampaign) {
   const auto refusal = [](std::string_view definition, std::vector<std::vector<double>> columns) {
     try {
-      (void)parse_stored_campaign(definition, {}, std::move(columns));
-    } catch (const CampaignFileError& error) {
+      (void)parse_campaign("stored definition", definition, {}, std::move(columns));
+    } catch (const DefinitionError& error) {
       return std::string(error.what());
     }
     return std::string();

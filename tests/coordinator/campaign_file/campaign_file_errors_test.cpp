@@ -79,7 +79,7 @@ TEST(CampaignFileErrors, NameAFileThatCannotBeRead) {
   const auto refusal = [&](const std::filesystem::path& file) {
     try {
       (void)read_campaign(file);
-    } catch (const CampaignFileError& error) {
+    } catch (const DefinitionError& error) {
       return std::string(error.what());
     }
     return std::string();

@@ -44,7 +44,7 @@ inline std::string refusal_of(std::string_view text, const ScratchFolder& folder
   try {
     (void)coordinator::read_campaign(folder.write("campaign.toml", text), overrides);
     return "";
-  } catch (const coordinator::CampaignFileError& error) {
+  } catch (const DefinitionError& error) {
     std::string message = error.what();
     const std::string prefix = folder.path().string() + "/";
     if (message.starts_with(prefix)) message.erase(0, prefix.size());

@@ -40,7 +40,7 @@ class Attach : public QueryTest {
 
   static void make(const std::filesystem::path& path, const Campaign& campaign,
                    std::uint64_t num_results) {
-    Store store = Store::create(path, campaign, coordinator::canonical_definition(campaign));
+    Store store = Store::create(path, campaign, canonical_definition(campaign));
     const coordinator::Entry worker = worker_1();
     store.write({&worker, 1});
     store.commit(deliveries_of(0, num_results));

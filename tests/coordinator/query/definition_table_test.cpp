@@ -109,7 +109,7 @@ void expect_same(const OwnCell& cell, const std::string& text, const std::string
 TEST_F(DefinitionTable, HasTheKeysAndValuesOfTheCampaignFile) {
   const Campaign campaign = varied_campaign();
   make_file(campaign);
-  Pairs pairs = pairs_of(coordinator::canonical_definition(campaign));
+  Pairs pairs = pairs_of(canonical_definition(campaign));
   const auto rows = rows_of("SELECT key, value FROM definition_entry ORDER BY key");
   // Excitations stand behind the other keys of their session in the text, before them in the table.
   std::ranges::sort(pairs);
@@ -155,7 +155,7 @@ TEST_F(DefinitionTable, IsThatOfTheAttachedFile) {
   Campaign other = campaign_of(2);
   other.scenario.noise.scale = 0.5;
   const auto path = directory() / "other.db";
-  (void)coordinator::Store::create(path, other, coordinator::canonical_definition(other));
+  (void)coordinator::Store::create(path, other, canonical_definition(other));
   const coordinator::QueryFiles both(file(), {{"b", path}});
   const auto answer = [&](const std::string& sql) {
     RecordingWriter writer;

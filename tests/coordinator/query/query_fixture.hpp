@@ -57,7 +57,7 @@ class QueryTest : public StoreTest {
   /// Makes the file, with results of the first runs.
   void make_file(const Campaign& campaign, std::uint64_t num_results = 0) {
     coordinator::Store store =
-        coordinator::Store::create(file(), campaign, coordinator::canonical_definition(campaign));
+        coordinator::Store::create(file(), campaign, canonical_definition(campaign));
     const coordinator::Entry worker = worker_1();
     store.write({&worker, 1});
     store.commit(deliveries_of(0, num_results));

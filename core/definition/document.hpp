@@ -11,10 +11,10 @@
 #include <string_view>
 #include <vector>
 
-#include "coordinator/campaign_file/campaign_file.hpp"
 #include "core/campaign/field.hpp"
+#include "core/definition/campaign_definition.hpp"
 
-namespace proofmass::coordinator::detail {
+namespace proofmass {
 
 /// A value given on the command line; it hides the file's value at the same path.
 struct Assignment {
@@ -24,7 +24,7 @@ struct Assignment {
 };
 
 /// The assignment of `key=value`; the value is TOML, or else a text without quotes.
-/// @throws CampaignFileError if there is no key or no `=`.
+/// @throws DefinitionError if there is no key or no `=`.
 [[nodiscard]] Assignment parse_assignment(const std::string& text);
 
 /// A parsed campaign file that remembers which paths were asked for and what was refused, so that
@@ -34,14 +34,16 @@ struct Assignment {
 class Document {
  public:
   /// @param name  For messages: the path of the file.
-  /// @throws CampaignFileError at the first place that is not TOML.
+  /// @throws DefinitionError at the first place that is not TOML.
   Document(std::string name, std::string_view text, std::vector<Assignment> assignments);
 
   /// The value at a path, null if absent; the path is a key from now on.
   [[nodiscard]] const toml::node* find(const std::string& path);
 
-  /// Entries of a list of tables such as `session`; nothing if absent.
-  [[nodiscard]] std::optional<std::size_t> num_tables(const std::string& path);
+  /// Entries of a list of tables such as `session`; nothing if absent, or if there are more than
+  /// `count_max`, which is refused.
+  [[nodiscard]] std::optional<std::size_t> num_tables(const std::string& path,
+                                                      std::size_t count_max);
 
   // Each leaves the value alone and returns false if the path is absent, or if what stands there is
   // refused: then the refusal is remembered.
@@ -64,11 +66,11 @@ class Document {
   /// Remembers that a key is absent although it is needed.
   void refuse_absence(const std::string& path, std::string_view rule);
 
-  /// @throws CampaignFileError for the first refused value or key that nobody asked for.
+  /// @throws DefinitionError for the first refused value or key that nobody asked for.
   void check() const;
 
   /// The error with the place of its field in front.
-  [[nodiscard]] CampaignFileError located(const ConfigError& error) const;
+  [[nodiscard]] DefinitionError located(const ConfigError& error) const;
 
  private:
   // Where a path stands: in an assignment, or in the file.
@@ -90,10 +92,12 @@ class Document {
   [[nodiscard]] const toml::node* value_at(const std::string& path) const;
   [[nodiscard]] Place place_of(std::string path) const;
   [[nodiscard]] std::string prefix(const Place& place) const;
-  [[nodiscard]] CampaignFileError error_of(const Refusal& refusal) const;
+  [[nodiscard]] DefinitionError error_of(const Refusal& refusal) const;
   [[nodiscard]] bool leads_to_keys(const std::string& path) const;
   void find_unknown_keys(const toml::node& content, const std::string& path,
-                         std::vector<Refusal>& unknown) const;
+                         std::optional<Refusal>& first) const;
+  void refuse_unknown(const toml::node& content, const std::string& path,
+                      std::optional<Refusal>& first) const;
 
   std::string name_;
   toml::table root_;
@@ -102,4 +106,4 @@ class Document {
   std::vector<Refusal> refusals_;
 };
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass

@@ -7,7 +7,7 @@
 
 #include "core/campaign/campaign.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass {
 
 /// A value of a campaign file: a whole number, another number, or a text. A list is a text too, as
 /// it stands in the file.
@@ -23,4 +23,4 @@ struct DefinitionItem {
 /// same as one text. The rows of data files are not in it.
 [[nodiscard]] std::vector<DefinitionItem> definition_items(const Campaign& campaign);
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace proofmass::coordinator::detail {
+namespace proofmass {
 
 /// Fewest insertions, deletions, replacements and swaps of neighbours that turn one text into the
 /// other, no part being changed twice (optimal string alignment).
@@ -17,4 +17,4 @@ namespace proofmass::coordinator::detail {
 [[nodiscard]] std::optional<std::string> nearest_name(std::string_view name,
                                                       const std::set<std::string>& candidates);
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass

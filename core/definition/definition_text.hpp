@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::detail {
 
 /// Shortest decimal that reads back to the same bits; valid TOML. The value is finite.
 [[nodiscard]] std::string number_text(double value);
@@ -15,4 +15,4 @@ namespace proofmass::coordinator::detail {
 /// `"a", "b" or "c"`.
 [[nodiscard]] std::string alternatives(std::span<const std::string_view> names);
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass::detail

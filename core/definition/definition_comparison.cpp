@@ -6,10 +6,10 @@
 #include <string>
 #include <utility>
 
-#include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/campaign_file/definition_entries.hpp"
+#include "core/definition/campaign_definition.hpp"
+#include "core/definition/definition_entries.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass {
 namespace {
 
 using detail::Entry;
@@ -142,12 +142,4 @@ std::vector<DefinitionDifference> compare_definitions(const Campaign& first,
   return Comparison(first, second).run();
 }
 
-std::vector<std::string> definition_differences(const Campaign& stored, const Campaign& wanted) {
-  std::vector<std::string> texts;
-  for (const auto& [field, first, second] : compare_definitions(stored, wanted)) {
-    texts.push_back(fmt::format("{}: {} in the database, {} asked for", field, first, second));
-  }
-  return texts;
-}
-
-}  // namespace proofmass::coordinator
+}  // namespace proofmass

@@ -5,10 +5,10 @@
 #include <string>
 #include <utility>
 
-#include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/campaign_file/definition_entries.hpp"
+#include "core/definition/campaign_definition.hpp"
+#include "core/definition/definition_entries.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass {
 namespace {
 
 using detail::Entry;
@@ -238,4 +238,4 @@ std::string commented_campaign(const Campaign& campaign) {
   return CommentedWriter(campaign).write();
 }
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass

@@ -1,9 +1,9 @@
-#include "coordinator/campaign_file/nearest_name.hpp"
+#include "core/definition/nearest_name.hpp"
 
 #include <algorithm>
 #include <vector>
 
-namespace proofmass::coordinator::detail {
+namespace proofmass {
 
 std::size_t edit_distance(std::string_view from, std::string_view to) {
   using Row = std::vector<std::size_t>;
@@ -28,6 +28,8 @@ std::optional<std::string> nearest_name(std::string_view name,
   std::optional<std::string> nearest;
   std::size_t distance_min = std::max<std::size_t>(2, name.size() / 3) + 1;
   for (const std::string& candidate : candidates) {
+    // Hostile names may be long: to compare them letter by letter would take minutes.
+    if (name.size() >= candidate.size() + distance_min) continue;
     const std::size_t distance = edit_distance(name, candidate);
     if (distance >= distance_min) continue;
     distance_min = distance;
@@ -36,4 +38,4 @@ std::optional<std::string> nearest_name(std::string_view name,
   return nearest;
 }
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass

@@ -1,13 +1,13 @@
-#include "coordinator/campaign_file/definition_items.hpp"
+#include "core/definition/definition_items.hpp"
 
 #include <fmt/format.h>
 
 #include <cstddef>
 #include <utility>
 
-#include "coordinator/campaign_file/definition_entries.hpp"
+#include "core/definition/definition_entries.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass {
 namespace {
 
 void append(std::vector<DefinitionItem>& items, const std::string& prefix,
@@ -37,4 +37,4 @@ std::vector<DefinitionItem> definition_items(const Campaign& campaign) {
   return items;
 }
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass

@@ -4,10 +4,10 @@
 #include <string_view>
 #include <vector>
 
-#include "coordinator/campaign_file/definition_items.hpp"
 #include "core/campaign/campaign.hpp"
+#include "core/definition/definition_items.hpp"
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::detail {
 
 /// A key of a campaign file, with its value as TOML.
 struct Entry {
@@ -35,4 +35,4 @@ struct Entry {
 /// `{ law = "uniform", minimum = -0.01, maximum = 0.01 }`.
 [[nodiscard]] std::string dispersion_text(const Dispersion& dispersion);
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass::detail

@@ -4,10 +4,10 @@
 #include <array>
 #include <span>
 
-#include "coordinator/campaign_file/dispersion_keys.hpp"
-#include "coordinator/campaign_file/readers.hpp"
+#include "core/definition/dispersion_keys.hpp"
+#include "core/definition/readers.hpp"
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::detail {
 namespace {
 
 constexpr std::array<std::string_view, 7> all_keys{
@@ -71,4 +71,4 @@ DispersionSet read_dispersions(Document& document) {
   return dispersions;
 }
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass::detail

@@ -1,11 +1,11 @@
-#include "coordinator/campaign_file/definition_text.hpp"
+#include "core/definition/definition_text.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <cstddef>
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::detail {
 
 std::string number_text(double value) {
   // Without a point TOML reads an integer, which has no negative zero.
@@ -46,4 +46,4 @@ std::string alternatives(std::span<const std::string_view> names) {
   return result;
 }
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass::detail

@@ -1,11 +1,11 @@
-#include "coordinator/campaign_file/dispersion_keys.hpp"
+#include "core/definition/dispersion_keys.hpp"
 
 #include <array>
 #include <cstddef>
 
 #include "core/error.hpp"
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::detail {
 
 std::span<const std::string_view> keys_of(Law law) {
   static constexpr std::array<std::string_view, 2> interval{"minimum", "maximum"};
@@ -47,4 +47,4 @@ std::string* text_at(Dispersion& dispersion, std::string_view key) {
   return nullptr;
 }
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass::detail

@@ -1,4 +1,4 @@
-#include "coordinator/campaign_file/definition_text.hpp"
+#include "core/definition/definition_text.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -11,9 +11,9 @@
 #include <random>
 #include <string>
 
-#include "coordinator/campaign_file/campaign_file.hpp"
+#include "core/definition/campaign_definition.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass {
 namespace {
 
 using detail::number_text;
@@ -25,7 +25,7 @@ std::uint64_t bits_through_file(double value) {
   campaign.dispersions[0] = Dispersion{};
   campaign.dispersions[0].law = Law::fixed;
   campaign.dispersions[0].value = value;
-  const Campaign read = parse_stored_campaign(canonical_definition(campaign), {}, {});
+  const Campaign read = parse_campaign("stored definition", canonical_definition(campaign), {}, {});
   return std::bit_cast<std::uint64_t>(read.dispersions[0].value);
 }
 
@@ -79,4 +79,4 @@ TEST(Alternatives, AreJoinedForPeople) {
 }
 
 }  // namespace
-}  // namespace proofmass::coordinator
+}  // namespace proofmass

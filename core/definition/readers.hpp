@@ -3,16 +3,13 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/campaign_file/document.hpp"
 #include "core/campaign/campaign.hpp"
+#include "core/definition/document.hpp"
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::detail {
 
 // Each asks the document for the keys of its part and completes what is absent with the nominal
 // values. What is wrong is remembered by the document, and found by Document::check().
-
-/// The whole definition; `environment_table` and `table_columns` stay empty.
-[[nodiscard]] Campaign read_definition(Document& document);
 
 /// Numbers and choices of the scenario, all but its sessions.
 void read_scenario(Document& document, Scenario& scenario);
@@ -23,4 +20,4 @@ void read_scenario(Document& document, Scenario& scenario);
 /// Laws of `[dispersion.<group>]` and, over them, of `[dispersion.<group>.<element>]`.
 [[nodiscard]] DispersionSet read_dispersions(Document& document);
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass::detail

@@ -6,7 +6,7 @@
 
 #include "core/campaign/dispersion.hpp"
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::detail {
 
 /// Keys that a law has in a campaign file beside `law`, each named like its field of Dispersion.
 [[nodiscard]] std::span<const std::string_view> keys_of(Law law);
@@ -18,4 +18,4 @@ namespace proofmass::coordinator::detail {
 /// The field of a key, null if the key has a number.
 [[nodiscard]] std::string* text_at(Dispersion& dispersion, std::string_view key);
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass::detail

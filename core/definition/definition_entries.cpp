@@ -1,15 +1,15 @@
-#include "coordinator/campaign_file/definition_entries.hpp"
+#include "core/definition/definition_entries.hpp"
 
 #include <fmt/format.h>
 
 #include <cstdint>
 #include <utility>
 
-#include "coordinator/campaign_file/definition_text.hpp"
-#include "coordinator/campaign_file/dispersion_keys.hpp"
+#include "core/definition/definition_text.hpp"
+#include "core/definition/dispersion_keys.hpp"
 #include "core/session/session_names.hpp"
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::detail {
 namespace {
 
 Entry text_entry(std::string_view path, std::string_view text, std::string comment = {}) {
@@ -133,4 +133,4 @@ std::string dispersion_text(const Dispersion& dispersion) {
   return inline_table(dispersion_entries(dispersion));
 }
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass::detail

@@ -2,11 +2,16 @@
 
 #include <optional>
 
-#include "coordinator/campaign_file/readers.hpp"
+#include "core/definition/readers.hpp"
 #include "core/session/session_names.hpp"
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::detail {
 namespace {
+
+// Far more than the sessions of a valid campaign have: they bound what hostile texts cost.
+constexpr std::size_t sessions_max = 64;
+constexpr std::size_t excitations_max = 16;
+constexpr std::size_t lines_max = 64;
 
 constexpr ExcitationKind excitation_kinds[] = {ExcitationKind::attitude, ExcitationKind::drag_free,
                                                ExcitationKind::test_mass};
@@ -21,7 +26,7 @@ bool read_needed(Document& document, const std::string& path, Value& value) {
 bool read_multiple(const toml::node& entry, double& multiple) {
   const std::optional<double> value = entry.value<double>();
   if (!value || !entry.is_number()) return false;
-  multiple = *value;
+  multiple = *value + 0.0;  // The canonical text has no -0 here, which would mean the same.
   return true;
 }
 
@@ -52,6 +57,9 @@ void read_lines(Document& document, const std::string& path, std::vector<LineMul
   if (found == nullptr) return;
   const toml::array* const list = found->as_array();
   if (list == nullptr) return document.refuse(path, "must be a list such as [[2, 0], [0, 1]]");
+  if (list->size() > lines_max) {
+    return document.refuse(path, fmt::format("must have at most {} entries", lines_max));
+  }
   for (std::size_t i = 0; i < list->size(); ++i) {
     const std::optional<LineMultiple> line = line_of((*list)[i]);
     if (!line) {
@@ -103,7 +111,8 @@ Session read_session(Document& document, const std::string& path) {
   document.read(path + ".orbits", session.num_orbits);
   document.read(path + ".spin_rate_rad_s", session.spin_rate_rad_s);
   document.read(path + ".drag_free", session.drag_free);
-  const std::size_t num_excitations = document.num_tables(path + ".excitations").value_or(0);
+  const std::size_t num_excitations =
+      document.num_tables(path + ".excitations", excitations_max).value_or(0);
   for (std::size_t i = 0; i < num_excitations; ++i) {
     session.excitations.push_back(
         read_excitation(document, fmt::format("{}.excitations[{}]", path, i)));
@@ -116,7 +125,7 @@ Session read_session(Document& document, const std::string& path) {
 }  // namespace
 
 std::vector<Session> read_sessions(Document& document) {
-  const std::optional<std::size_t> num_sessions = document.num_tables("session");
+  const std::optional<std::size_t> num_sessions = document.num_tables("session", sessions_max);
   if (!num_sessions) return hardy2013_sessions();
   std::vector<Session> sessions;
   for (std::size_t i = 0; i < *num_sessions; ++i) {
@@ -125,4 +134,4 @@ std::vector<Session> read_sessions(Document& document) {
   return sessions;
 }
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass::detail

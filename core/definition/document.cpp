@@ -1,4 +1,4 @@
-#include "coordinator/campaign_file/document.hpp"
+#include "core/definition/document.hpp"
 
 #include <fmt/format.h>
 
@@ -6,14 +6,25 @@
 #include <limits>
 #include <utility>
 
-#include "coordinator/campaign_file/definition_text.hpp"
-#include "coordinator/campaign_file/nearest_name.hpp"
+#include "core/definition/definition_text.hpp"
+#include "core/definition/nearest_name.hpp"
+#include "core/definition/nesting.hpp"
 #include "core/error.hpp"
 
-namespace proofmass::coordinator::detail {
+namespace proofmass {
 namespace {
 
+using detail::alternatives;
+using detail::number_text;
+using detail::quoted_text;
+
 constexpr std::size_t shown_text_length_max = 60;
+constexpr std::size_t shown_path_length_max = 200;  // No key of a campaign file is as long.
+
+std::string shortened(const std::string& path) {
+  return path.size() <= shown_path_length_max ? path
+                                              : path.substr(0, shown_path_length_max) + "...";
+}
 
 bool is_bare_key(std::string_view key) {
   return !key.empty() && std::ranges::all_of(key, [](char c) {
@@ -56,10 +67,16 @@ std::string parent_of(const std::string& path) {
 }
 
 toml::table parse_text(std::string_view text, const std::string& name) {
+  if (const std::optional<std::size_t> line = detail::line_of_deep_nesting(text)) {
+    throw DefinitionError(fmt::format(
+        "{0}:{1}: nesting = over {2} (parts of a key, and lists and tables in one another, must be "
+        "at most {2})",
+        name, *line, detail::nesting_max));
+  }
   try {
     return toml::parse(text);
   } catch (const toml::parse_error& error) {
-    throw CampaignFileError(
+    throw DefinitionError(
         fmt::format("{}:{}: {}", name, error.source().begin.line, error.description()));
   }
 }
@@ -69,12 +86,12 @@ toml::table parse_text(std::string_view text, const std::string& name) {
 Assignment parse_assignment(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {
-    throw CampaignFileError(fmt::format("--set {}: must be key=value", text));
+    throw DefinitionError(fmt::format("--set {}: must be key=value", text));
   }
   Assignment assignment{"--set " + text, text.substr(0, equals), {}};
   const std::string value = text.substr(equals + 1);
   try {
-    assignment.holder = toml::parse("value = " + value);
+    if (!detail::line_of_deep_nesting(value)) assignment.holder = toml::parse("value = " + value);
   } catch (const toml::parse_error&) {
     assignment.holder.clear();
   }
@@ -100,14 +117,19 @@ const toml::node* Document::find(const std::string& path) {
   return value_at(path);
 }
 
-std::optional<std::size_t> Document::num_tables(const std::string& path) {
+std::optional<std::size_t> Document::num_tables(const std::string& path, std::size_t count_max) {
   const toml::node* const found = value_at(path);
   const toml::array* const list = found == nullptr ? nullptr : found->as_array();
   const auto is_table = [](const toml::node& entry) { return entry.is_table(); };
   const bool are_tables = list != nullptr && std::ranges::all_of(*list, is_table);
   // The keys are those of the tables; where there is none, the list itself is one.
-  if (are_tables && !list->empty()) return list->size();
+  if (are_tables && !list->empty() && list->size() <= count_max) return list->size();
   keys_.insert(path);
+  if (are_tables && list->size() > count_max) {
+    refusals_.push_back({place_of(path), fmt::format("{} = {} tables", path, list->size()), path,
+                         fmt::format("must be at most {}", count_max)});
+    return std::nullopt;
+  }
   if (are_tables) return 0;
   if (found != nullptr) refuse(path, "must be a list of tables");
   return std::nullopt;
@@ -214,31 +236,39 @@ bool Document::leads_to_keys(const std::string& path) const {
   return path.empty() || has_prefix(path + ".") || has_prefix(path + "[");
 }
 
+void Document::refuse_unknown(const toml::node& content, const std::string& path,
+                              std::optional<Refusal>& first) const {
+  const toml::source_position& begin = content.source().begin;
+  const Place place{.assignment = 0, .line = begin.line, .column = begin.column};
+  // Only the first is kept: hostile texts may have very many.
+  if (first && first->place <= place) return;
+  first = {place, fmt::format("{} = {}", shortened(path), text_of(content)), path,
+           leads_to_keys(path) ? "must be a table" : ""};
+}
+
 void Document::find_unknown_keys(const toml::node& content, const std::string& path,
-                                 std::vector<Refusal>& unknown) const {
+                                 std::optional<Refusal>& first) const {
   if (keys_.contains(path)) return;
+  // Below a path that is longer than any key there is nothing to be found.
+  if (path.size() > shown_path_length_max) return refuse_unknown(content, path, first);
   const toml::table* const table = content.as_table();
   if (table != nullptr && (!table->empty() || leads_to_keys(path))) {
     for (const auto& [key, child] : *table) {
-      find_unknown_keys(child, path_of(path, key.str()), unknown);
+      find_unknown_keys(child, path_of(path, key.str()), first);
     }
     return;
   }
   const toml::array* const list = content.as_array();
   if (list != nullptr && leads_to_keys(path)) {
     for (std::size_t i = 0; i < list->size(); ++i) {
-      find_unknown_keys((*list)[i], fmt::format("{}[{}]", path, i), unknown);
+      find_unknown_keys((*list)[i], fmt::format("{}[{}]", path, i), first);
     }
     return;
   }
-  const toml::source_position& begin = content.source().begin;
-  unknown.push_back({{.assignment = 0, .line = begin.line, .column = begin.column},
-                     fmt::format("{} = {}", path, text_of(content)),
-                     path,
-                     leads_to_keys(path) ? "must be a table" : ""});
+  refuse_unknown(content, path, first);
 }
 
-CampaignFileError Document::error_of(const Refusal& refusal) const {
+DefinitionError Document::error_of(const Refusal& refusal) const {
   std::string rule = refusal.rule;
   if (rule.empty()) {
     const std::optional<std::string> nearest = nearest_name(refusal.path, keys_);
@@ -248,22 +278,24 @@ CampaignFileError Document::error_of(const Refusal& refusal) const {
   const bool is_assigned = refusal.place.assignment != 0 &&
                            assignments_[refusal.place.assignment - 1].path == refusal.path;
   const std::string text = is_assigned ? rule : fmt::format("{} ({})", refusal.subject, rule);
-  return CampaignFileError(prefix(refusal.place) + text);
+  return DefinitionError(prefix(refusal.place) + text);
 }
 
 void Document::check() const {
-  std::vector<Refusal> refusals = refusals_;
-  find_unknown_keys(root_, "", refusals);
+  std::optional<Refusal> first;
+  const auto earliest = std::ranges::min_element(refusals_, {}, &Refusal::place);
+  if (earliest != refusals_.end()) first = *earliest;
+  find_unknown_keys(root_, "", first);
   for (std::size_t i = 0; i < assignments_.size(); ++i) {
-    if (keys_.contains(assignments_[i].path)) continue;
-    refusals.push_back({{.assignment = i + 1}, assignments_[i].path, assignments_[i].path, ""});
+    const Place place{.assignment = i + 1};
+    if (keys_.contains(assignments_[i].path) || (first && first->place <= place)) continue;
+    first = {place, assignments_[i].path, assignments_[i].path, ""};
   }
-  const auto first = std::ranges::min_element(refusals, {}, &Refusal::place);
-  if (first != refusals.end()) throw error_of(*first);
+  if (first) throw error_of(*first);
 }
 
-CampaignFileError Document::located(const ConfigError& error) const {
-  return CampaignFileError(prefix(place_of(error.field())) + error.what());
+DefinitionError Document::located(const ConfigError& error) const {
+  return DefinitionError(prefix(place_of(error.field())) + error.what());
 }
 
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass

@@ -1,8 +1,8 @@
-#include "coordinator/campaign_file/nearest_name.hpp"
+#include "core/definition/nearest_name.hpp"
 
 #include <gtest/gtest.h>
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::detail {
 namespace {
 
 TEST(EditDistance, CountsInsertionsDeletionsReplacementsAndSwaps) {
@@ -25,4 +25,4 @@ TEST(NearestName, IsNothingIfNoCandidateIsNear) {
 }
 
 }  // namespace
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass::detail
