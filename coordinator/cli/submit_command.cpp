@@ -1,7 +1,5 @@
 #include "coordinator/cli/submit_command.hpp"
 
-#include <utility>
-
 #include "coordinator/cli/client_json.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
@@ -9,7 +7,7 @@
 
 namespace proofmass::coordinator {
 
-wire::SubmitRequest submit_request(const SubmitOptions& options) {
+Campaign campaign_to_submit(const SubmitOptions& options) {
   Campaign campaign = read_campaign(options.campaign_file, options.overrides);
   if (options.name) {
     campaign.name = *options.name;
@@ -19,7 +17,11 @@ wire::SubmitRequest submit_request(const SubmitOptions& options) {
       throw UsageError(error.what());
     }
   }
-  return {.campaign = std::move(campaign),
+  return campaign;
+}
+
+wire::SubmitRequest submit_request(const SubmitOptions& options, const Campaign& campaign) {
+  return {.definition = definition_of(campaign),
           .priority = options.priority,
           .audit_fraction = options.audit_fraction,
           .stop_rule = options.stop.rule,
@@ -27,11 +29,12 @@ wire::SubmitRequest submit_request(const SubmitOptions& options) {
 }
 
 int submit_campaign(const SubmitOptions& options) {
-  const wire::SubmitRequest request = submit_request(options);
+  const Campaign campaign = campaign_to_submit(options);
+  const wire::SubmitRequest request = submit_request(options, campaign);
   return with_connection(options.client, [&](const Ask& ask) {
     const auto done = reply_of<wire::DoneReply>(ask, request);
     const bool is_json = options.client.format == OutputFormat::json;
-    print_lines(is_json ? done_json("submit", request.campaign.name, done) : done.text + "\n");
+    print_lines(is_json ? done_json("submit", campaign.name, done) : done.text + "\n");
     return exit_done;
   });
 }

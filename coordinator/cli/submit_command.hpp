@@ -21,13 +21,17 @@ struct SubmitOptions {
   StopOptions stop;
 };
 
+/// The campaign that the arguments name.
+/// @throws DefinitionError if the file cannot be used; UsageError if the name cannot.
+[[nodiscard]] Campaign campaign_to_submit(const SubmitOptions& options);
+
 /// The request that the arguments ask for.
-/// @throws CampaignFileError if the file cannot be used; UsageError if the name cannot.
-[[nodiscard]] wire::SubmitRequest submit_request(const SubmitOptions& options);
+[[nodiscard]] wire::SubmitRequest submit_request(const SubmitOptions& options,
+                                                 const Campaign& campaign);
 
 /// Hands a campaign to a coordinator: a new one, or one that is there and has more runs now.
 /// @return An ExitCode.
-/// @throws As submit_request() and ClientConnection do; Error if the coordinator refuses.
+/// @throws As campaign_to_submit() and ClientConnection do; Error if the coordinator refuses.
 [[nodiscard]] int submit_campaign(const SubmitOptions& options);
 
 }  // namespace proofmass::coordinator

@@ -16,12 +16,21 @@ constexpr std::chrono::seconds told_every(1);
 
 wire::ErrorReply refusal(std::string text) { return {.text = std::move(text)}; }
 
-using Decoded = std::variant<wire::RequestPacket, wire::DecodeError>;
+/// A request that has been read, with the number that its reply has.
+struct Received {
+  std::uint64_t id = 0;
+  Request request;
+};
+
+using Decoded = std::variant<Received, wire::DecodeError>;
 
 /// Never throws: memory may be short for what a request would become.
 Decoded decode(std::string_view bytes) {
   try {
-    return wire::decode_request(bytes);
+    auto decoded = wire::decode_request(bytes);
+    if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) return *error;
+    auto& [id, request] = std::get<wire::RequestPacket>(decoded);
+    return Received{.id = id, .request = request_of(std::move(request))};
   } catch (const std::exception& error) {
     return wire::DecodeError{.fault = wire::DecodeFault::invalid, .text = error.what()};
   }
@@ -60,7 +69,7 @@ void ClientDesk::take(const Incoming& message) {
   if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
     return send(unknown, refusal(error->text));
   }
-  auto& [id, request] = std::get<wire::RequestPacket>(decoded);
+  auto& [id, request] = std::get<Received>(decoded);
   if (const auto* const part = std::get_if<wire::RequestPart>(&request)) {
     return take_part(message.from, id, *part);
   }
@@ -95,7 +104,7 @@ void ClientDesk::take_whole(const Address& from, std::uint64_t request, std::str
           if (const auto* const error = std::get_if<wire::DecodeError>(decoded.get())) {
             return respond(ticket, refusal(error->text));
           }
-          carry_out(ticket, key, std::move(std::get<wire::RequestPacket>(*decoded).request));
+          carry_out(ticket, key, std::move(std::get<Received>(*decoded).request));
         };
       });
   if (is_posted) return;
@@ -105,8 +114,7 @@ void ClientDesk::take_whole(const Address& from, std::uint64_t request, std::str
                                       Background::num_pending_max)));
 }
 
-void ClientDesk::carry_out(std::uint64_t ticket, const std::string& key,
-                           wire::ClientRequest request) {
+void ClientDesk::carry_out(std::uint64_t ticket, const std::string& key, Request request) {
   try {
     const std::optional<Asker> asker = surroundings_.asker_of(key);
     if (!asker) throw Error(fmt::format("key = {} (is not authorized any more)", key));

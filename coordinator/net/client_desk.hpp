@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "coordinator/net/background.hpp"
+#include "coordinator/net/request.hpp"
 #include "coordinator/net/request_parts.hpp"
 #include "coordinator/net/rights.hpp"
 #include "coordinator/net/worker_desk.hpp"
@@ -32,8 +33,8 @@ class ClientDesk {
     std::function<void(const std::string& routing_id, const std::string& bytes)> transmit;
     /// Who has the key; nothing if it may not speak (any more).
     std::function<std::optional<Asker>(const std::string& key)> asker_of;
-    /// Carries out a request whose form has been checked. May throw instead of responding.
-    std::function<void(wire::ClientRequest request, const Asker& asker, Respond respond)> carry_out;
+    /// Carries out a request that has been checked. May throw instead of responding.
+    std::function<void(Request request, const Asker& asker, Respond respond)> carry_out;
     std::function<TimePoint()> now;
   };
 
@@ -69,7 +70,7 @@ class ClientDesk {
   void take(const Incoming& message);
   void take_part(const Address& from, std::uint64_t request, const wire::RequestPart& part);
   void take_whole(const Address& from, std::uint64_t request, std::string bytes);
-  void carry_out(std::uint64_t ticket, const std::string& key, wire::ClientRequest request);
+  void carry_out(std::uint64_t ticket, const std::string& key, Request request);
   /// Lets a waiter join those of a request that is being carried out already.
   /// @return The ticket of a request that is not; nothing otherwise.
   std::optional<std::uint64_t> begin(const Address& from, std::uint64_t request,

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/definition/campaign_definition.hpp"
+
 namespace proofmass::coordinator {
 
 wire::DefinitionPart DefinitionCache::part(const wire::CampaignRequest& request,
@@ -15,7 +17,9 @@ wire::DefinitionPart DefinitionCache::part(const wire::CampaignRequest& request,
   }
   if (found == entries_.end()) {
     make_room();
-    Entry entry{.definition = definition, .encoded = wire::EncodedDefinition(*definition)};
+    Entry entry{
+        .definition = definition,
+        .encoded = wire::EncodedDefinition(definition_of(*definition, TableColumns::left_out))};
     size_ += entry.encoded.size();
     ++num_encoded_;
     found = entries_.emplace(request.campaign, std::move(entry)).first;

@@ -29,13 +29,13 @@ std::set<std::string> quarantined_hosts(const State& state) {
 RequestDesk::RequestDesk(Surroundings surroundings)
     : surroundings_(std::move(surroundings)), began_at_(surroundings_.now()) {}
 
-void RequestDesk::carry_out(wire::ClientRequest request, const Asker& asker, Respond respond) {
+void RequestDesk::carry_out(Request request, const Asker& asker, Respond respond) {
   std::visit([&](auto& content) { take(std::move(content), asker, respond); }, request);
 }
 
-void RequestDesk::take(wire::SubmitRequest request, const Asker& asker, Respond respond) {
-  surroundings_.submissions.submit(std::make_shared<const wire::SubmitRequest>(std::move(request)),
-                                   asker, std::move(respond));
+void RequestDesk::take(Submission submission, const Asker& asker, Respond respond) {
+  surroundings_.submissions.submit(std::make_shared<const Submission>(std::move(submission)), asker,
+                                   std::move(respond));
 }
 
 void RequestDesk::take(const wire::ControlRequest& request, const Asker& asker,

@@ -32,10 +32,10 @@ class RequestDesk {
 
   /// Responds at once, or later if a file must be opened or made.
   /// @throws Error, std::exception with the reason if it is not carried out.
-  void carry_out(wire::ClientRequest request, const Asker& asker, Respond respond);
+  void carry_out(Request request, const Asker& asker, Respond respond);
 
  private:
-  void take(wire::SubmitRequest request, const Asker& asker, Respond respond);
+  void take(Submission submission, const Asker& asker, Respond respond);
   void take(const wire::ControlRequest& request, const Asker& asker, const Respond& respond);
   void take(const wire::StatusRequest& request, const Asker& asker, const Respond& respond);
   void take(const wire::WorkersRequest& request, const Asker& asker, const Respond& respond);

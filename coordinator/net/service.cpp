@@ -224,7 +224,7 @@ class Service::Parts final : public Outbox {
               return authenticator == nullptr ? Asker{} : authenticator->client(key, now());
             },
             .carry_out =
-                [this](wire::ClientRequest request, const Asker& asker, Respond respond) {
+                [this](Request request, const Asker& asker, Respond respond) {
                   request_desk_.carry_out(std::move(request), asker, std::move(respond));
                 },
             .now = [this] { return now(); }};

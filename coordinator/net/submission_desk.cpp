@@ -11,16 +11,16 @@
 namespace proofmass::coordinator {
 namespace {
 
-using Submission = std::shared_ptr<const wire::SubmitRequest>;
+using Submitted = std::shared_ptr<const Submission>;
 
-StopPlan plan_of(const wire::SubmitRequest& request) {
+StopPlan plan_of(const Submission& request) {
   StopPlan plan{
       .stop_rule = request.stop_rule, .num_runs_max = {}, .failures_max = request.failures_max};
   if (!plan.stop_rule.empty()) plan.num_runs_max = request.campaign.num_runs;
   return plan;
 }
 
-CampaignControl control_of(const wire::SubmitRequest& request) {
+CampaignControl control_of(const Submission& request) {
   return {.phase = Phase::active,
           .priority = request.priority,
           .audit_fraction = request.audit_fraction};
@@ -36,7 +36,7 @@ CampaignControl control_of(const wire::SubmitRequest& request) {
 SubmissionDesk::SubmissionDesk(Surroundings surroundings)
     : surroundings_(std::move(surroundings)), campaigns_(surroundings_.campaigns) {}
 
-void SubmissionDesk::submit(const Submission& request, const Asker& asker, Respond respond) {
+void SubmissionDesk::submit(const Submitted& request, const Asker& asker, Respond respond) {
   const std::string& name = request->campaign.name;
   if (surroundings_.files == nullptr) {
     throw Error(fmt::format(
@@ -101,7 +101,7 @@ void SubmissionDesk::check_limits(const std::string& owner, std::uint64_t size, 
   }
 }
 
-void SubmissionDesk::open_file(const Submission& request, const Asker& asker,
+void SubmissionDesk::open_file(const Submitted& request, const Asker& asker,
                                const std::string& owner, Respond respond) {
   CampaignFiles& files = *surroundings_.files;
   serve_opened(
@@ -154,7 +154,7 @@ void SubmissionDesk::serve_opened(const std::string& name, UnderWay under_way,
   under_way_.emplace(name, std::move(under_way));
 }
 
-void SubmissionDesk::change_served(CampaignId id, const Submission& request, Respond respond) {
+void SubmissionDesk::change_served(CampaignId id, const Submitted& request, Respond respond) {
   const StopPlan plan = plan_of(*request);
   const std::uint64_t num_runs =
       horizon_of(plan, request->campaign.num_runs, campaigns_.num_runs_of(id));

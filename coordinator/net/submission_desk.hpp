@@ -12,10 +12,10 @@
 #include "coordinator/net/campaign_desk.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/client_desk.hpp"
+#include "coordinator/net/request.hpp"
 #include "coordinator/net/rights.hpp"
 #include "coordinator/net/submission_limits.hpp"
 #include "coordinator/store/store_writer.hpp"
-#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
@@ -39,7 +39,7 @@ class SubmissionDesk {
   /// Takes a new campaign, or more runs of one that is there. Waits while the campaign is being
   /// changed, opened or closed.
   /// @throws Error if the asker may not, has submitted too much, or if too much is under way.
-  void submit(const std::shared_ptr<const wire::SubmitRequest>& request, const Asker& asker,
+  void submit(const std::shared_ptr<const Submission>& request, const Asker& asker,
               Respond respond);
 
   /// Opens the file of a campaign that has ended and goes on with it.
@@ -58,16 +58,16 @@ class SubmissionDesk {
 
   /// A submission that waits.
   struct Deferred {
-    std::shared_ptr<const wire::SubmitRequest> request;
+    std::shared_ptr<const Submission> request;
     Asker asker;
     Respond respond;
   };
 
   [[nodiscard]] bool is_busy(const std::string& name) const;
   void check_limits(const std::string& owner, std::uint64_t size, bool is_new) const;
-  void open_file(const std::shared_ptr<const wire::SubmitRequest>& request, const Asker& asker,
+  void open_file(const std::shared_ptr<const Submission>& request, const Asker& asker,
                  const std::string& owner, Respond respond);
-  void change_served(CampaignId id, const std::shared_ptr<const wire::SubmitRequest>& request,
+  void change_served(CampaignId id, const std::shared_ptr<const Submission>& request,
                      Respond respond);
   /// Opens or makes a file with `open` in the background, and serves it.
   /// @param control  Nothing if it is to be what the file has, but active.

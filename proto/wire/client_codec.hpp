@@ -48,8 +48,8 @@ struct ReplyPacket {
 [[nodiscard]] std::string encode(const RequestPacket& packet);
 [[nodiscard]] std::string encode(const ReplyPacket& packet);
 
-/// Checks everything, like decode(): what they return needs no further check of form. The campaign
-/// of a SubmitRequest has its table columns and has passed Campaign::validate().
+/// Checks everything, like decode(): what they return needs no further check of form. What the
+/// definition of a SubmitRequest says is not looked at.
 ///
 /// @param bytes  Anything at all, from anybody.
 [[nodiscard]] std::variant<RequestPacket, DecodeError> decode_request(std::string_view bytes);

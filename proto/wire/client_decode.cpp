@@ -7,9 +7,9 @@
 #include "core/error.hpp"
 #include "core/statistics/stop_rule.hpp"
 #include "proto/client.pb.h"
-#include "proto/wire/campaign_codec.hpp"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/client_codec.hpp"
+#include "proto/wire/definition_message.hpp"
 #include "proto/wire/field_count.hpp"
 
 namespace proofmass::wire {
@@ -21,8 +21,7 @@ using detail::require;
 using detail::require_count;
 using detail::require_in;
 
-/// A campaign with all the sessions, excitations and lines that it may have, has 34,000; a reply
-/// with 4096 workers 37,000.
+/// A reply with 4096 workers has 37,000.
 constexpr std::size_t fields_max = std::size_t{1} << 16;
 
 int checked_priority(int priority) {
@@ -51,7 +50,7 @@ ClientRequest read(const proto::SubmitRequest& message) {
   const double fraction = message.audit_fraction();
   require(fraction >= 0.0 && fraction <= 1.0, "audit", fmt::format("{}", fraction),
           "must be in [0, 1]");
-  SubmitRequest submit{.campaign = detail::decode_campaign(message.campaign()),
+  SubmitRequest submit{.definition = detail::read_definition(message.definition()),
                        .priority = checked_priority(message.priority()),
                        .audit_fraction = fraction,
                        .stop_rule = checked_stop_rule(message.stop_rule())};
@@ -59,10 +58,6 @@ ClientRequest read(const proto::SubmitRequest& message) {
     require_in(message.failures_max(), 0, num_runs_max, "failures");
     submit.failures_max = message.failures_max();
   }
-  for (const proto::TableColumn& column : message.table_columns()) {
-    submit.campaign.table_columns.emplace_back(column.values().begin(), column.values().end());
-  }
-  submit.campaign.validate();
   return submit;
 }
 

@@ -4,18 +4,15 @@
 
 #include "core/error.hpp"
 #include "proto/client.pb.h"
-#include "proto/wire/campaign_codec.hpp"
 #include "proto/wire/client_codec.hpp"
+#include "proto/wire/definition_message.hpp"
 
 namespace proofmass::wire {
 namespace {
 
 void write(const SubmitRequest& submit, proto::RequestEnvelope& envelope) {
   proto::SubmitRequest& message = *envelope.mutable_submit();
-  detail::encode_campaign(submit.campaign, *message.mutable_campaign());
-  for (const std::vector<double>& column : submit.campaign.table_columns) {
-    message.add_table_columns()->mutable_values()->Assign(column.begin(), column.end());
-  }
+  detail::write_definition(submit.definition, *message.mutable_definition());
   message.set_priority(submit.priority);
   message.set_audit_fraction(submit.audit_fraction);
   message.set_stop_rule(submit.stop_rule);

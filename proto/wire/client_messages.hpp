@@ -6,7 +6,6 @@
 #include <variant>
 #include <vector>
 
-#include "core/campaign/campaign.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::wire {
@@ -16,7 +15,7 @@ namespace proofmass::wire {
 
 /// Asks for a campaign to be computed: a new one, or more runs of one that is there.
 struct SubmitRequest {
-  Campaign campaign;            ///< Its name is the campaign's; is_name() holds.
+  Definition definition;        ///< With its columns; what it says has not been looked at.
   int priority = 0;             ///< -100 to 100; runs of a higher one are lent first.
   double audit_fraction = 0.0;  ///< 0 to 1.
   /// See parse_stop_rule(): the campaign's runs are as many as it may take. Empty: all of them.

@@ -10,7 +10,7 @@
 
 namespace proofmass::wire {
 
-/// Size limits of an encoded campaign and of an encoded message, bytes. A definition travels in
+/// Size limits of an encoded definition and of an encoded message, bytes. A definition travels in
 /// parts.
 inline constexpr std::size_t definition_size_max = std::size_t{64} << 20;
 inline constexpr std::size_t message_size_max = std::size_t{4} << 20;
@@ -37,8 +37,8 @@ struct DecodeError {
 /// @throws InvalidArgument if they are more than the message may have.
 [[nodiscard]] std::string encode(const Packet& packet);
 
-/// Checks everything: sizes, counts, enumerators, that numbers are finite, that a campaign is
-/// complete and valid. What it returns can be used without further checks of form.
+/// Checks everything: sizes, counts, enumerators, that numbers are finite. What it returns can be
+/// used without further checks of form.
 ///
 /// @param bytes  Anything at all, from anybody.
 [[nodiscard]] std::variant<Packet, DecodeError> decode(std::string_view bytes);

@@ -7,16 +7,16 @@
 
 #include "core/error.hpp"
 #include "proto/proofmass.pb.h"
-#include "proto/wire/campaign_codec.hpp"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/checksum.hpp"
+#include "proto/wire/definition_message.hpp"
 #include "proto/wire/field_count.hpp"
 
 namespace proofmass::wire {
 namespace {
 
-/// All fields of a campaign, its sessions and dispersions are some thousands.
-constexpr std::size_t fields_max = 65536;
+/// Tables and columns have at most some thousands; an array of numbers is one.
+constexpr std::size_t fields_max = 4096;
 
 std::string size_text(std::size_t size) {
   return fmt::format("definition size = {} bytes (must be at most {})", size, definition_size_max);
@@ -24,32 +24,31 @@ std::string size_text(std::size_t size) {
 
 }  // namespace
 
-std::string encode_definition(const Campaign& campaign) {
-  proto::Campaign message;
-  detail::encode_campaign(campaign, message);
+std::string encode_definition(const Definition& definition) {
+  proto::Definition message;
+  detail::write_definition(definition, message);
   const std::size_t size = message.ByteSizeLong();
   if (size > definition_size_max) throw InvalidArgument(size_text(size));
   return message.SerializeAsString();
 }
 
-std::variant<std::shared_ptr<const Campaign>, DecodeError> decode_definition(
-    std::string_view bytes) {
+std::variant<Definition, DecodeError> decode_definition(std::string_view bytes) {
   detail::silence_protobuf();
   if (bytes.size() > definition_size_max) {
     return DecodeError{DecodeFault::too_large, size_text(bytes.size())};
   }
-  proto::Campaign message;
+  proto::Definition message;
   const bool is_parsed =
-      detail::has_fields_at_most(bytes, *proto::Campaign::descriptor(), fields_max) &&
+      detail::has_fields_at_most(bytes, *proto::Definition::descriptor(), fields_max) &&
       message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
   if (!is_parsed) {
     return DecodeError{
         DecodeFault::unparsable,
-        fmt::format("definition = {} bytes (must be a campaign of at most {} fields)", bytes.size(),
-                    fields_max)};
+        fmt::format("definition = {} bytes (must be a definition of at most {} fields)",
+                    bytes.size(), fields_max)};
   }
   try {
-    return std::make_shared<const Campaign>(detail::decode_campaign(message));
+    return detail::read_definition(message);
   } catch (const Error& error) {
     return DecodeError{DecodeFault::invalid, detail::printable(error.what())};
   }
@@ -79,7 +78,7 @@ IncomingDefinition::Progress IncomingDefinition::add(const DefinitionPart& part)
   return bytes_.size() == total_size_ ? Progress::complete : Progress::advanced;
 }
 
-std::variant<std::shared_ptr<const Campaign>, DecodeError> IncomingDefinition::take() {
+std::variant<Definition, DecodeError> IncomingDefinition::take() {
   PROOFMASS_EXPECT(bytes_.size() == total_size_);
   const std::string bytes = std::exchange(bytes_, {});
   total_size_ = 0;

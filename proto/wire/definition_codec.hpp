@@ -1,34 +1,31 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
 
-#include "core/campaign/campaign.hpp"
+#include "core/campaign/definition.hpp"
 #include "proto/wire/codec.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::wire {
 
-/// The bytes of a campaign's definition, without the values of its tables, which come with each
-/// lease.
+/// The bytes of a definition.
 /// @throws InvalidArgument if there are more than definition_size_max.
-[[nodiscard]] std::string encode_definition(const Campaign& campaign);
+[[nodiscard]] std::string encode_definition(const Definition& definition);
 
-/// Checks everything, as decode() does.
+/// Checks all but what the text says: sizes, counts, that rows are whole and numbers finite.
 /// @param bytes  Anything at all.
-[[nodiscard]] std::variant<std::shared_ptr<const Campaign>, DecodeError> decode_definition(
-    std::string_view bytes);
+[[nodiscard]] std::variant<Definition, DecodeError> decode_definition(std::string_view bytes);
 
-/// The encoded definition of a campaign, from which parts are taken. It is made once and shared by
+/// An encoded definition, from which parts are taken. It is made once and shared by
 /// all answers.
 class EncodedDefinition {
  public:
-  explicit EncodedDefinition(const Campaign& campaign)
-      : EncodedDefinition(encode_definition(campaign)) {}
+  explicit EncodedDefinition(const Definition& definition)
+      : EncodedDefinition(encode_definition(definition)) {}
 
   /// The part that starts at the offset of the request, or at 0 if that is beyond the end.
   [[nodiscard]] DefinitionPart part(const CampaignRequest& request) const;
@@ -56,7 +53,7 @@ class IncomingDefinition {
   /// What has arrived: the offset of the next part.
   [[nodiscard]] std::uint64_t num_bytes() const { return bytes_.size(); }
   /// The definition, or why the bytes are none; all parts are dropped. @pre It is complete.
-  [[nodiscard]] std::variant<std::shared_ptr<const Campaign>, DecodeError> take();
+  [[nodiscard]] std::variant<Definition, DecodeError> take();
 
  private:
   std::uint64_t total_size_ = 0;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <initializer_list>
 
+#include "core/campaign/dispersion.hpp"
 #include "core/error.hpp"
 #include "proto/proofmass.pb.h"
 #include "proto/wire/checks.hpp"

@@ -8,6 +8,7 @@
 
 #include "coordinator/dispatch/dispatch.hpp"
 #include "coordinator/net/worker_desk.hpp"
+#include "core/definition/campaign_definition.hpp"
 #include "core/error.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/codec.hpp"
@@ -170,6 +171,9 @@ class World final : public coordinator::Outbox {
     const std::string once = wire::encode(*packet);
     PROOFMASS_EXPECT(wire::encode(std::get<wire::RequestPacket>(wire::decode_request(once))) ==
                      once);
+    if (const auto* const submit = std::get_if<wire::SubmitRequest>(&packet->request)) {
+      return read_definition(submit->definition);
+    }
     const auto* const control = std::get_if<wire::ControlRequest>(&packet->request);
     if (control == nullptr) return;
     control_campaign(control->campaign == "table" ? fuzz_table_campaign : fuzz_campaign,
@@ -177,6 +181,14 @@ class World final : public coordinator::Outbox {
   }
 
   /// As the service does it.
+  /// A definition is refused, or that of the campaign that is read from it.
+  static void read_definition(const Definition& definition) {
+    try {
+      PROOFMASS_EXPECT(definition_of(campaign_of(definition)) == definition);
+    } catch (const DefinitionError&) {
+    }
+  }
+
   void control_campaign(CampaignId id, wire::ControlAction action) {
     const coordinator::Phase phase = state_.campaigns.at(id).phase;
     if (phase == coordinator::Phase::finished) return;

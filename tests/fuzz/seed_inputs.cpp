@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/definition/campaign_definition.hpp"
 #include "core/simulation/run.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/codec.hpp"
@@ -306,8 +307,10 @@ std::string client_messages() {
 }
 
 std::string submission() {
-  return to_bytes({from_client(wire::SubmitRequest{
-      .campaign = campaign_with_table(), .priority = -5, .audit_fraction = 0.25})});
+  return to_bytes(
+      {from_client(wire::SubmitRequest{.definition = definition_of(campaign_with_table()),
+                                       .priority = -5,
+                                       .audit_fraction = 0.25})});
 }
 
 std::string coordinator_messages() {

@@ -8,6 +8,8 @@
 #include <utility>
 #include <variant>
 
+#include "core/definition/campaign_definition.hpp"
+
 namespace proofmass::test {
 namespace {
 
@@ -303,7 +305,7 @@ void PlayedCoordinator::send_definition(wire::WorkerId worker, const wire::Campa
   ++num_events_["definition_sent"];
   auto known = definitions_.find(definition.get());
   if (known == definitions_.end()) {
-    const wire::EncodedDefinition encoded(*definition);
+    const wire::EncodedDefinition encoded(definition_of(*definition, TableColumns::left_out));
     known = definitions_.emplace(definition.get(), std::pair(definition, encoded)).first;
   }
   send(worker, known->second.second.part(request));

@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "core/definition/campaign_definition.hpp"
 #include "core/error.hpp"
 #include "worker/execution/run_ranges.hpp"
 #include "worker/net/held_runs.hpp"
@@ -37,6 +38,18 @@ std::vector<double> values_of(const wire::RunLease& lease, RunRange runs, std::s
       lease.table_values.begin() +
       static_cast<std::ptrdiff_t>((runs.first.value - lease.runs.first.value) * width);
   return {first, first + static_cast<std::ptrdiff_t>(runs.count * width)};
+}
+
+/// The campaign that was received, or why it is none.
+std::variant<std::shared_ptr<const Campaign>, std::string> read_definition(
+    std::variant<Definition, wire::DecodeError> taken) {
+  if (auto* const error = std::get_if<wire::DecodeError>(&taken)) return std::move(error->text);
+  try {
+    return std::make_shared<const Campaign>(
+        campaign_of(std::get<Definition>(std::move(taken)), TableColumns::left_out));
+  } catch (const DefinitionError& error) {
+    return error.what();
+  }
 }
 
 }  // namespace
@@ -338,13 +351,14 @@ void Conversation::request_definitions(TimePoint now) {
 /// coordinator's program. It is asked for again in a while, as the program may be exchanged.
 void Conversation::define(wire::CampaignId campaign, TimePoint now) {
   WantedDefinition& wanted = wanted_.at(campaign);
-  const auto taken = wanted.incoming.take();
-  if (const auto* const error = std::get_if<wire::DecodeError>(&taken)) {
+  const auto read = read_definition(wanted.incoming.take());
+  if (const auto* const refusal = std::get_if<std::string>(&read)) {
     wanted.request_due_at = now + config_.request_again_after;
-    return note(Notice::Severity::error, fmt::format("malformed_definition campaign={:016x} {}",
-                                                     campaign.value, error->text));
+    return note(
+        Notice::Severity::error,
+        fmt::format("malformed_definition campaign={:016x} {:.400}", campaign.value, *refusal));
   }
-  const auto& definition = std::get<std::shared_ptr<const Campaign>>(taken);
+  const auto& definition = std::get<std::shared_ptr<const Campaign>>(read);
   wanted_.erase(campaign);
   if (agrees_on_table(campaign, table_elements(definition->dispersions).size())) {
     execution_.define(campaign, definition);

@@ -11,6 +11,7 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/keygen_command.hpp"
 #include "coordinator/cli/submit_command.hpp"
+#include "core/definition/campaign_definition.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -51,8 +52,9 @@ class ClientCommands : public test::ServiceTest {
         const auto status = reply_of<wire::StatusReply>(ask, wire::StatusRequest{});
         return status.campaigns.at(0).phase;
       };
-      const wire::SubmitRequest submit{
-          .campaign = test::campaign_of("new", 5), .priority = 3, .audit_fraction = 0.5};
+      const wire::SubmitRequest submit{.definition = definition_of(test::campaign_of("new", 5)),
+                                       .priority = 3,
+                                       .audit_fraction = 0.5};
       EXPECT_THAT(reply_of<wire::DoneReply>(ask, submit).text, HasSubstr("campaign new"));
       EXPECT_EQ(phase(), CampaignPhase::active);
       EXPECT_THAT(control(ControlAction::pause), HasSubstr("campaign new"));

@@ -22,9 +22,10 @@ class SubmitRequestOfAFile : public testing::Test {
 };
 
 TEST_F(SubmitRequestOfAFile, HasItsCampaign) {
-  const wire::SubmitRequest request = submit_request(options_);
-  EXPECT_EQ(request.campaign.name, "mine");
-  EXPECT_EQ(request.campaign.num_runs, 7U);
+  const wire::SubmitRequest request = submit_request(options_, campaign_to_submit(options_));
+  const Campaign campaign = campaign_of(request.definition);
+  EXPECT_EQ(campaign.name, "mine");
+  EXPECT_EQ(campaign.num_runs, 7U);
   EXPECT_EQ(request.priority, 0);
   EXPECT_EQ(request.audit_fraction, 0.0);
 }
@@ -36,11 +37,12 @@ TEST_F(SubmitRequestOfAFile, HasWhatTheArgumentsReplace) {
   options_.overrides.num_runs = 9;
   options_.overrides.seed = 5;
   options_.overrides.assignments = {"noise.scale=0.5"};
-  const wire::SubmitRequest request = submit_request(options_);
-  EXPECT_EQ(request.campaign.name, "other");
-  EXPECT_EQ(request.campaign.num_runs, 9U);
-  EXPECT_EQ(request.campaign.seed, 5U);
-  EXPECT_EQ(request.campaign.scenario.noise.scale, 0.5);
+  const wire::SubmitRequest request = submit_request(options_, campaign_to_submit(options_));
+  const Campaign campaign = campaign_of(request.definition);
+  EXPECT_EQ(campaign.name, "other");
+  EXPECT_EQ(campaign.num_runs, 9U);
+  EXPECT_EQ(campaign.seed, 5U);
+  EXPECT_EQ(campaign.scenario.noise.scale, 0.5);
   EXPECT_EQ(request.priority, 3);
   EXPECT_EQ(request.audit_fraction, 0.25);
 }
@@ -48,7 +50,7 @@ TEST_F(SubmitRequestOfAFile, HasWhatTheArgumentsReplace) {
 TEST_F(SubmitRequestOfAFile, HasANameThatMayBeAFilesName) {
   options_.name = "../other";
   try {
-    (void)submit_request(options_);
+    (void)campaign_to_submit(options_);
     FAIL();
   } catch (const UsageError& error) {
     EXPECT_STREQ(error.what(),

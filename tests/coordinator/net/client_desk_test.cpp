@@ -42,7 +42,7 @@ class ClientDeskTest : public testing::Test {
                   return Asker{};
                 },
             .carry_out =
-                [this](const wire::ClientRequest&, const Asker&, Respond respond) {
+                [this](const Request&, const Asker&, Respond respond) {
                   before_carrying_out();
                   carried_out.push_back(std::move(respond));
                 },

@@ -4,6 +4,8 @@
 
 #include <memory>
 
+#include "core/definition/campaign_definition.hpp"
+
 namespace proofmass::coordinator {
 namespace {
 
@@ -13,12 +15,16 @@ std::shared_ptr<const Campaign> definition(std::uint64_t num_runs) {
   return std::make_shared<const Campaign>(campaign);
 }
 
+std::size_t encoded_size(const Campaign& campaign) {
+  return wire::encode_definition(definition_of(campaign)).size();
+}
+
 TEST(DefinitionCache, EncodesADefinitionOnceForAllWorkers) {
   DefinitionCache cache;
   const auto one = definition(10);
   for (int i = 0; i < 300; ++i) (void)cache.part({.campaign = {1}, .offset = 0}, one);
   EXPECT_EQ(cache.num_encoded(), 1U);
-  EXPECT_EQ(cache.size(), wire::encode_definition(*one).size());
+  EXPECT_EQ(cache.size(), encoded_size(*one));
 }
 
 TEST(DefinitionCache, EncodesAnExtendedCampaignAgain) {
@@ -30,9 +36,24 @@ TEST(DefinitionCache, EncodesAnExtendedCampaignAgain) {
   EXPECT_EQ(cache.size(), after.total_size);
 }
 
+// Workers get the values of the tables with each lease.
+TEST(DefinitionCache, LeavesOutTheColumns) {
+  Campaign campaign;
+  campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
+  campaign.table_columns = {std::vector<double>(campaign.num_runs, 1e-3)};
+  DefinitionCache cache;
+  const wire::DefinitionPart part =
+      cache.part({.campaign = {1}}, std::make_shared<const Campaign>(campaign));
+  wire::IncomingDefinition incoming;
+  ASSERT_EQ(incoming.add(part), wire::IncomingDefinition::Progress::complete);
+  const auto taken = std::get<Definition>(incoming.take());
+  EXPECT_TRUE(taken.table_columns.empty());
+  EXPECT_EQ(taken, definition_of(campaign, TableColumns::left_out));
+}
+
 TEST(DefinitionCache, KeepsThoseThatWereUsedLast) {
   const auto one = definition(10);
-  const std::size_t size = wire::encode_definition(*one).size();
+  const std::size_t size = encoded_size(*one);
   DefinitionCache cache(2 * size - 1);
   const auto ask = [&](std::uint64_t id) {
     (void)cache.part({.campaign = {id}, .offset = 0}, one);

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "core/definition/campaign_definition.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "tests/coordinator/net/playing_client.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
@@ -29,9 +30,11 @@ class ServiceClients : public test::ServiceTest {
 
 TEST_F(ServiceClients, SubmitACampaignThatIsThenComputed) {
   start_with({});
-  EXPECT_EQ(client->done(wire::SubmitRequest{
-                .campaign = test::campaign_of("new", 5), .priority = 3, .audit_fraction = 0.5}),
-            "campaign new: active, 5 runs, 0 of them done");
+  EXPECT_EQ(
+      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("new", 5)),
+                                       .priority = 3,
+                                       .audit_fraction = 0.5}),
+      "campaign new: active, 5 runs, 0 of them done");
   const wire::StatusReply status = client->status();
   ASSERT_EQ(status.campaigns.size(), 1U);
   EXPECT_EQ(status.version, "0.0");
@@ -59,15 +62,16 @@ TEST_F(ServiceClients, ExtendACampaignThatIsServed) {
   worker.deliver(worker.borrow());
   (void)worker.receive<wire::ResultAck>();
   EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::finished);
-  EXPECT_EQ(client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 3)}),
-            "campaign a: active, 3 runs, 1 of them done");
+  EXPECT_EQ(
+      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))}),
+      "campaign a: active, 3 runs, 1 of them done");
   worker.want(1);
   EXPECT_EQ(worker.receive<wire::RunLease>().runs.first, RunIndex{1});
 }
 
 TEST_F(ServiceClients, GiveACampaignThatIsServedAnotherPriorityAndPlan) {
   start_with({test::campaign_of("a", 3)});
-  (void)client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 300),
+  (void)client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 300)),
                                          .priority = -2,
                                          .audit_fraction = 0.25,
                                          .stop_rule = "mean(k2c) within 5%",
@@ -85,15 +89,17 @@ TEST_F(ServiceClients, GiveACampaignThatIsServedAnotherPriorityAndPlan) {
 
 TEST_F(ServiceClients, AreToldWhyACampaignCannotBeExtended) {
   start_with({test::campaign_of("a", 3)});
-  EXPECT_EQ(client->error(wire::SubmitRequest{.campaign = test::campaign_of("a", 2)}),
-            "runs = fewer (must be more)");
+  EXPECT_EQ(
+      client->error(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 2))}),
+      "runs = fewer (must be more)");
 }
 
 TEST_F(ServiceClients, CannotSubmitWhereOneCampaignIsServed) {
   config.files = nullptr;
   start_with({});
-  EXPECT_EQ(client->error(wire::SubmitRequest{.campaign = test::campaign_of("a", 2)}),
-            "submit = a (this coordinator serves the campaigns that it began with)");
+  EXPECT_EQ(
+      client->error(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 2))}),
+      "submit = a (this coordinator serves the campaigns that it began with)");
 }
 
 TEST_F(ServiceClients, PauseAndResumeACampaign) {
@@ -130,7 +136,8 @@ TEST_F(ServiceClients, LearnThatAPausedCampaignFailsTooOften) {
 
 TEST_F(ServiceClients, GiveACampaignABudgetOfFailuresThatHoldsAtOnce) {
   start_with({test::campaign_of("a", 3)});
-  (void)client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 3), .failures_max = 0});
+  (void)client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3)),
+                                         .failures_max = 0});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow(1), RunStatus::no_draw);
   EXPECT_EQ(wait_for_event("too_many_failures"),
@@ -140,8 +147,9 @@ TEST_F(ServiceClients, GiveACampaignABudgetOfFailuresThatHoldsAtOnce) {
 TEST_F(ServiceClients, SubmitACancelledCampaignAgain) {
   start_with({test::campaign_of("a", 3)});
   (void)client->done(wire::ControlRequest{ControlAction::cancel, "a"});
-  EXPECT_EQ(client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 3)}),
-            "campaign a: active, 3 runs, 0 of them done");
+  EXPECT_EQ(
+      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))}),
+      "campaign a: active, 3 runs, 0 of them done");
 }
 
 // The runs are there already: what is open again is whether they are enough.
@@ -151,8 +159,8 @@ TEST_F(ServiceClients, GiveAFinishedCampaignAnotherRule) {
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
   (void)wait_for_event("campaign_summarised runs=1");
-  const std::string reply = client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 1),
-                                                             .stop_rule = "mean(k2c) within 1%"});
+  const std::string reply = client->done(wire::SubmitRequest{
+      .definition = definition_of(test::campaign_of("a", 1)), .stop_rule = "mean(k2c) within 1%"});
   EXPECT_EQ(reply, "campaign a: active, 1 runs, 1 of them done");
 }
 
@@ -204,7 +212,8 @@ std::string large_submission(std::uint64_t id, const std::string& name, std::siz
   Campaign campaign = test::campaign_of(name, num_runs);
   campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
   campaign.table_columns = {std::vector<double>(num_runs, 1e-3)};
-  return wire::encode(wire::RequestPacket{id, wire::SubmitRequest{.campaign = campaign}});
+  return wire::encode(
+      wire::RequestPacket{id, wire::SubmitRequest{.definition = definition_of(campaign)}});
 }
 
 wire::RequestPart part_of(const std::string& bytes, std::size_t offset) {
@@ -279,14 +288,17 @@ TEST_F(ServiceClients, GetAnErrorForPartsThatAreNoRequest) {
 TEST_F(ServiceClients, OutliveAFileSystemThatThrows) {
   files.before_open = [] { throw std::filesystem::filesystem_error("rename", std::error_code()); };
   start_with({});
-  EXPECT_THAT(client->error(wire::SubmitRequest{.campaign = test::campaign_of("a", 2)}),
-              StartsWith("filesystem error: rename"));
+  EXPECT_THAT(
+      client->error(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 2))}),
+      StartsWith("filesystem error: rename"));
   files.before_open = [] { throw std::bad_alloc(); };
-  EXPECT_EQ(client->error(wire::SubmitRequest{.campaign = test::campaign_of("a", 2)}),
-            "std::bad_alloc");
+  EXPECT_EQ(
+      client->error(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 2))}),
+      "std::bad_alloc");
   files.before_open = [] {};
-  EXPECT_THAT(client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 2)}),
-              StartsWith("campaign a: active"));
+  EXPECT_THAT(
+      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 2))}),
+      StartsWith("campaign a: active"));
 }
 
 TEST_F(ServiceClients, SeeAllCampaignsInPages) {
@@ -340,7 +352,8 @@ TEST_F(ServiceClients, HaveStatisticsMadeForNewResultsOnly) {
   worker.deliver(worker.borrow());
   (void)worker.receive<wire::ResultAck>();
   (void)wait_for_event("campaign_summarised");
-  (void)client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 1), .priority = 5});
+  (void)client->done(
+      wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 1)), .priority = 5});
   end(StopRequest::now);
   EXPECT_EQ(Store::open_read_only(directory / "a.db").control().priority, 5);
   EXPECT_EQ(num_summaries, 1);

@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "coordinator/store/store_error.hpp"
+#include "core/definition/campaign_definition.hpp"
 #include "tests/coordinator/net/playing_client.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 
@@ -208,8 +209,9 @@ TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
   EXPECT_EQ(client->status().campaigns.at(0).num_done, 1U);
   EXPECT_EQ(client->error(wire::ControlRequest{wire::ControlAction::pause, "a"}),
             "campaign = a (is finished)");
-  EXPECT_EQ(client->done(wire::SubmitRequest{.campaign = test::campaign_of("a", 3)}),
-            "campaign a: active, 3 runs, 1 of them done");
+  EXPECT_EQ(
+      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))}),
+      "campaign a: active, 3 runs, 1 of them done");
   PlayingWorker worker(endpoint.address(), 1002);
   EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{1});
   EXPECT_THAT(served(), ElementsAre("a"));

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "core/error.hpp"
@@ -27,21 +28,16 @@ Content round_trip_reply(const Content& content) {
   return std::get<Content>(std::get<ReplyPacket>(decoded).reply);
 }
 
-Campaign campaign_with_tables() {
-  Campaign campaign;
-  campaign.name = "tables";
-  campaign.seed = 7;
-  campaign.num_runs = 2;
-  campaign.scenario.noise.scale = 0.1;
-  campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
-  campaign.dispersions[9] = {.law = Law::table, .file = "f.csv", .column = "b"};
-  campaign.table_columns = {{0.1, -2.0 / 3.0}, {1e-3, std::numeric_limits<double>::denorm_min()}};
-  return campaign;
+Definition some_definition() {
+  return {.text = "[campaign]\nname = \"Δ\"\n",
+          .tables = {{.key = "environment.file",
+                      .num_columns = 2,
+                      .values = {0.1, -0.0, 1e-300, std::numeric_limits<double>::max()}}},
+          .table_columns = {{0.1, -2.0 / 3.0}, {1e-3, std::numeric_limits<double>::denorm_min()}}};
 }
 
-TEST(SubmitRequest, KeepsTheCampaignAndItsTables) {
-  const Campaign campaign = campaign_with_tables();
-  const SubmitRequest submit = round_trip_request(SubmitRequest{.campaign = campaign,
+TEST(SubmitRequest, KeepsTheDefinition) {
+  const SubmitRequest submit = round_trip_request(SubmitRequest{.definition = some_definition(),
                                                                 .priority = -100,
                                                                 .audit_fraction = 0.1,
                                                                 .stop_rule = "std(a_c13) within 5%",
@@ -50,16 +46,12 @@ TEST(SubmitRequest, KeepsTheCampaignAndItsTables) {
   EXPECT_EQ(submit.audit_fraction, 0.1);
   EXPECT_EQ(submit.stop_rule, "std(a_c13) within 5%");
   EXPECT_EQ(submit.failures_max, 0U);
-  EXPECT_EQ(submit.campaign.name, "tables");
-  EXPECT_EQ(submit.campaign.seed, 7U);
-  EXPECT_EQ(submit.campaign.num_runs, 2U);
-  EXPECT_EQ(submit.campaign.scenario.noise.scale, 0.1);
-  EXPECT_EQ(submit.campaign.dispersions, campaign.dispersions);
-  EXPECT_EQ(submit.campaign.table_columns, campaign.table_columns);
+  EXPECT_EQ(submit.definition, some_definition());
+  EXPECT_TRUE(std::signbit(submit.definition.tables[0].values[1]));
 }
 
 TEST(SubmitRequest, NeedsNeitherRuleNorBudget) {
-  const SubmitRequest submit = round_trip_request(SubmitRequest{});
+  const SubmitRequest submit = round_trip_request(SubmitRequest{.definition = some_definition()});
   EXPECT_EQ(submit.stop_rule, "");
   EXPECT_EQ(submit.failures_max, std::nullopt);
 }
@@ -250,10 +242,10 @@ TEST(ReplyPacket, MayAnswerARequestThatCouldNotBeRead) {
 }
 
 TEST(RequestPacket, OfTooManyBytesIsNotMade) {
-  Campaign campaign = campaign_with_tables();
-  campaign.table_columns = {std::vector<double>(std::size_t{1} << 23), {}};
+  Definition definition = some_definition();
+  definition.table_columns = {std::vector<double>(std::size_t{1} << 23), {}};
   try {
-    (void)encode(RequestPacket{1, SubmitRequest{.campaign = campaign}});
+    (void)encode(RequestPacket{1, SubmitRequest{.definition = definition}});
     FAIL();
   } catch (const InvalidArgument& error) {
     const std::string text = error.what();

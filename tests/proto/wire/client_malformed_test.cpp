@@ -52,7 +52,8 @@ std::string refusal(const ClientReply& good,
 }
 
 std::string refusal_of_submit(const std::function<void(proto::SubmitRequest&)>& change) {
-  return refusal(SubmitRequest{}, [&](auto& envelope) { change(*envelope.mutable_submit()); });
+  return refusal(SubmitRequest{.definition = {.text = "a"}},
+                 [&](auto& envelope) { change(*envelope.mutable_submit()); });
 }
 
 std::string refusal_of_control(const std::function<void(proto::ControlRequest&)>& change) {
@@ -166,7 +167,7 @@ TEST(MalformedRequest, OfAnotherVersionIsRefused) {
   envelope.set_protocol_version(protocol_version + 1);
   const DecodeError error = refusal_of_request(envelope.SerializeAsString());
   EXPECT_EQ(error.fault, DecodeFault::wrong_version);
-  EXPECT_EQ(error.text, "protocol_version = 6 (must be 5)");
+  EXPECT_EQ(error.text, "protocol_version = 7 (must be 6)");
 }
 
 TEST(MalformedRequest, WithoutContentIsRefused) {
@@ -205,9 +206,9 @@ TEST(MalformedReply, OfAnotherVersionOrWithoutContentIsRefused) {
 }
 
 // Two bytes may stand for a message that takes more than a hundred bytes of memory.
-TEST(MalformedRequest, OfManyEmptySessionsIsRefusedBeforeItIsParsed) {
+TEST(MalformedRequest, OfManyEmptyTablesIsRefusedBeforeItIsParsed) {
   proto::RequestEnvelope envelope = status_request();
-  for (int i = 0; i < 65536; ++i) envelope.mutable_submit()->mutable_campaign()->add_sessions();
+  for (int i = 0; i < 65536; ++i) envelope.mutable_submit()->mutable_definition()->add_tables();
   const DecodeError error = refusal_of_request(envelope.SerializeAsString());
   EXPECT_EQ(error.fault, DecodeFault::unparsable);
 }
@@ -248,16 +249,14 @@ TEST(MalformedSubmitRequest, HasAStopRuleAndABudget) {
             "failures = 1000000001 (must be in [0, 1000000000])");
 }
 
-TEST(MalformedSubmitRequest, HasACampaignThatPassesItsRules) {
-  EXPECT_EQ(refusal_of_submit([](auto& submit) { submit.clear_campaign(); }),
-            "num_runs = 0 (must be in [1, 1000000000])");
-  EXPECT_EQ(refusal_of_submit([](auto& submit) { submit.mutable_campaign()->set_name("../a"); }),
-            "campaign.name = \"../a\" (must be 1 to 64 letters, digits, _, - or .)");
-}
-
-TEST(MalformedSubmitRequest, HasTheTableColumnsThatItsLawsNeed) {
-  EXPECT_EQ(refusal_of_submit([](auto& submit) { submit.add_table_columns(); }),
-            "dispersion = 1 columns (laws of kind table are 0)");
+// The other rules of definitions are tested with those that workers get: one function checks both.
+TEST(MalformedSubmitRequest, HasADefinition) {
+  EXPECT_EQ(refusal_of_submit([](auto& submit) { submit.clear_definition(); }),
+            "definition.text size = 0 (must be in [1, 1048576])");
+  EXPECT_EQ(refusal_of_submit([](auto& submit) {
+              submit.mutable_definition()->add_table_columns()->add_values(nan);
+            }),
+            "definition.table_columns.values = nan (must be finite)");
 }
 
 TEST(MalformedControlRequest, HasAnActionAndACampaign) {

@@ -8,6 +8,7 @@
 #include <random>
 #include <variant>
 
+#include "core/definition/campaign_definition.hpp"
 #include "core/error.hpp"
 #include "proto/wire/definition_codec.hpp"
 
@@ -66,7 +67,7 @@ std::vector<std::uint64_t> field_bits(const Scenario& scenario) {
 Campaign unusual_campaign() {
   Campaign campaign;
   campaign.name = "unusual";
-  campaign.seed = 0xffff'ffff'ffff'fffe;
+  campaign.seed = seed_max - 1;
   campaign.num_runs = 12345;
   campaign.scenario.noise.scale = 0.1;
   campaign.scenario.estimation.correction = Correction::first_order;
@@ -122,8 +123,9 @@ TEST(Codec, KeepsAWelcome) {
 }
 
 Campaign definition_round_trip(const Campaign& campaign) {
-  const auto decoded = decode_definition(encode_definition(campaign));
-  return *std::get<std::shared_ptr<const Campaign>>(decoded);
+  const Definition sent = definition_of(campaign, TableColumns::left_out);
+  return campaign_of(std::get<Definition>(decode_definition(encode_definition(sent))),
+                     TableColumns::left_out);
 }
 
 TEST(Codec, KeepsEveryBitOfACampaign) {
@@ -302,20 +304,23 @@ TEST(Codec, HasRoomForTheLargestLeaseAndBatch) {
 }
 
 std::string encoded_part() {
-  const EncodedDefinition definition(unusual_campaign());
+  const EncodedDefinition definition(definition_of(unusual_campaign()));
   return encode({.header = some_header, .message = definition.part({.campaign = {6}})});
 }
 
 TEST(Codec, SurvivesAnyTruncation) {
   const std::string bytes = encoded_part();
-  const std::string definition = encode_definition(unusual_campaign());
+  const std::string definition = encode_definition(definition_of(unusual_campaign()));
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     const auto decoded = decode(std::string_view(bytes).substr(0, size));
     ASSERT_TRUE(std::holds_alternative<DecodeError>(decoded)) << size;
   }
   for (std::size_t size = 0; size < definition.size(); ++size) {
     const auto decoded = decode_definition(std::string_view(definition).substr(0, size));
-    ASSERT_TRUE(std::holds_alternative<DecodeError>(decoded)) << size;
+    const auto* const part = std::get_if<Definition>(&decoded);
+    // Where a table is missing, what is left has the form of a definition.
+    if (part == nullptr) continue;
+    EXPECT_THROW((void)campaign_of(*part, TableColumns::left_out), DefinitionError) << size;
   }
 }
 
@@ -326,7 +331,7 @@ TEST(Codec, SurvivesRandomBytesAndRandomDamage) {
       .campaign = {3},
       .attempt = {1},
       .results = {{.result = some_result({1}, RunStatus::completed), .compute_s = 1.0}}};
-  const std::array<std::string, 4> good{encode_definition(unusual_campaign()),
+  const std::array<std::string, 4> good{encode_definition(definition_of(unusual_campaign())),
                                         encode({.header = some_header, .message = batch}),
                                         encode({.header = some_header,
                                                 .message = Heartbeat{.num_runs_max = 1,

@@ -12,20 +12,18 @@ namespace {
 using Progress = IncomingDefinition::Progress;
 
 /// One that needs three parts.
-Campaign large_campaign(double first_value = 1e-9) {
-  Campaign campaign;
-  campaign.environment_table.resize(10'000);
-  double time_s = 0.0;
-  for (auto& row : campaign.environment_table) row.time_s = time_s++;
-  campaign.environment_table[0].linear_m_s2[0] = first_value;
-  campaign.scenario.environment.kind = EnvironmentKind::file;
-  campaign.environment_file = "e.csv";
-  return campaign;
+Definition large_definition(double first_value = 1e-9) {
+  Definition definition{.text = "a = 1", .tables = {{.key = "t", .num_columns = 7}}};
+  definition.tables[0].values.assign(70'000, 1.0);
+  definition.tables[0].values[0] = first_value;
+  return definition;
 }
 
+const Definition small_definition{.text = "a = 1"};
+
 TEST(EncodedDefinition, GivesPartsThatMakeTheWhole) {
-  const Campaign campaign = large_campaign(1e-8);
-  const EncodedDefinition encoded(campaign);
+  const Definition definition = large_definition(1e-8);
+  const EncodedDefinition encoded(definition);
   IncomingDefinition incoming;
   std::size_t num_parts = 0;
   Progress progress = Progress::advanced;
@@ -40,17 +38,16 @@ TEST(EncodedDefinition, GivesPartsThatMakeTheWhole) {
   EXPECT_EQ(num_parts, 3U);
   ASSERT_EQ(progress, Progress::complete);
   const auto taken = incoming.take();
-  const auto& definition = std::get<std::shared_ptr<const Campaign>>(taken);
-  EXPECT_EQ(definition->environment_table, campaign.environment_table);
+  EXPECT_EQ(std::get<Definition>(taken), definition);
 }
 
 TEST(EncodedDefinition, GivesItsFirstPartToAWorkerThatHasMoreThanThereIs) {
-  const EncodedDefinition encoded(Campaign{});
+  const EncodedDefinition encoded(small_definition);
   EXPECT_EQ(encoded.part({.campaign = {5}, .offset = encoded.size()}).offset, 0U);
 }
 
 TEST(IncomingDefinition, IgnoresWhatItHas) {
-  const EncodedDefinition encoded(large_campaign());
+  const EncodedDefinition encoded(large_definition());
   IncomingDefinition incoming;
   const DefinitionPart first = encoded.part({.campaign = {5}, .offset = 0});
   EXPECT_EQ(incoming.add(first), Progress::advanced);
@@ -60,8 +57,8 @@ TEST(IncomingDefinition, IgnoresWhatItHas) {
 
 // The part of the old version is as long as that of the new one: only the checksum differs.
 TEST(IncomingDefinition, DoesNotMixTwoVersions) {
-  const EncodedDefinition old_version(large_campaign(1e-8));
-  const EncodedDefinition new_version(large_campaign(2e-8));
+  const EncodedDefinition old_version(large_definition(1e-8));
+  const EncodedDefinition new_version(large_definition(2e-8));
   ASSERT_EQ(old_version.size(), new_version.size());
   IncomingDefinition incoming;
   EXPECT_EQ(incoming.add(old_version.part({.campaign = {5}, .offset = 0})), Progress::advanced);
@@ -71,7 +68,7 @@ TEST(IncomingDefinition, DoesNotMixTwoVersions) {
 }
 
 TEST(IncomingDefinition, RefusesDamagedBytes) {
-  DefinitionPart part = EncodedDefinition(Campaign{}).part({.campaign = {5}, .offset = 0});
+  DefinitionPart part = EncodedDefinition(small_definition).part({.campaign = {5}, .offset = 0});
   part.content.back() ^= 1;
   IncomingDefinition incoming;
   ASSERT_EQ(incoming.add(part), Progress::complete);
@@ -92,11 +89,13 @@ TEST(DecodeDefinition, BoundsSizeAndFields) {
   EXPECT_EQ(error_of(std::string(definition_size_max + 1, 'x')),
             "definition size = 67108865 bytes (must be at most 67108864)");
   EXPECT_EQ(error_of("GET / HTTP/1.1"),
-            "definition = 14 bytes (must be a campaign of at most 65536 fields)");
-  std::string sessions;
-  for (int i = 0; i < 65537; ++i) sessions += std::string("\x2a\0", 2);  // Field 5, empty.
-  EXPECT_EQ(error_of(sessions),
-            "definition = 131074 bytes (must be a campaign of at most 65536 fields)");
+            "definition = 14 bytes (must be a definition of at most 4096 fields)");
+  std::string tables;
+  for (int i = 0; i < 4097; ++i) tables += std::string("\x12\0", 2);  // Field 2, empty.
+  EXPECT_EQ(error_of(tables),
+            "definition = 8194 bytes (must be a definition of at most 4096 fields)");
+  EXPECT_EQ(error_of("\x0a\x01\xff"),  // A text that is not UTF-8.
+            "definition = 3 bytes (must be a definition of at most 4096 fields)");
 }
 
 }  // namespace

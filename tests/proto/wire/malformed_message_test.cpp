@@ -91,7 +91,7 @@ TEST(MalformedEnvelope, OfAnotherVersionIsRefused) {
   envelope.mutable_bye();
   const DecodeError error = refusal_of(envelope.SerializeAsString());
   EXPECT_EQ(error.fault, DecodeFault::wrong_version);
-  EXPECT_EQ(error.text, "protocol_version = 1 (must be 5)");
+  EXPECT_EQ(error.text, "protocol_version = 1 (must be 6)");
 }
 
 TEST(MalformedEnvelope, WithoutAMessageIsRefused) {

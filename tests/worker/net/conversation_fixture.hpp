@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/definition/campaign_definition.hpp"
 #include "worker/execution/run_ranges.hpp"
 #include "worker/net/conversation.hpp"
 
@@ -111,7 +112,8 @@ inline wire::RunLease lease(std::uint64_t first, std::uint64_t count, std::uint3
 
 /// A definition of one part.
 inline wire::DefinitionPart definition(wire::CampaignId campaign, const Campaign& content = {}) {
-  return wire::EncodedDefinition(content).part({.campaign = campaign});
+  return wire::EncodedDefinition(definition_of(content, TableColumns::left_out))
+      .part({.campaign = campaign});
 }
 
 inline std::vector<wire::HeldRuns> held(std::uint64_t first, std::uint64_t count,

@@ -8,6 +8,7 @@
 #include <thread>
 #include <zmq.hpp>
 
+#include "core/definition/campaign_definition.hpp"
 #include "core/error.hpp"
 #include "proto/wire/codec.hpp"
 #include "proto/wire/definition_codec.hpp"
@@ -62,7 +63,7 @@ class Coordinator {
     send(
         wire::RunLease{.campaign = campaign, .runs = {{0}, 2}, .attempt = {1}, .table_values = {}});
     (void)receive<wire::CampaignRequest>();
-    send(wire::EncodedDefinition(Campaign{}).part({.campaign = campaign}));
+    send(wire::EncodedDefinition(definition_of(Campaign{})).part({.campaign = campaign}));
     return receive<wire::ResultBatch>();
   }
 
@@ -247,7 +248,8 @@ TEST_F(ServeTest, DeliversAlthoughMessagesAreLost) {
   }
   (void)coordinator.receive<wire::CampaignRequest>();
   for (int i = 0; i < 20; ++i) {
-    coordinator.send(wire::EncodedDefinition(Campaign{}).part({.campaign = campaign}));
+    coordinator.send(
+        wire::EncodedDefinition(definition_of(Campaign{})).part({.campaign = campaign}));
   }
   EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 1U);
   for (int i = 0; i < 20; ++i) coordinator.send(wire::Stop{});

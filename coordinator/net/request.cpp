@@ -1,0 +1,29 @@
+#include "coordinator/net/request.hpp"
+
+#include <utility>
+
+#include "core/definition/campaign_definition.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+Request read(wire::SubmitRequest&& sent) {
+  return Submission{.campaign = campaign_of(std::move(sent.definition)),
+                    .priority = sent.priority,
+                    .audit_fraction = sent.audit_fraction,
+                    .stop_rule = std::move(sent.stop_rule),
+                    .failures_max = sent.failures_max};
+}
+
+template <typename Other>
+Request read(Other&& sent) {
+  return std::forward<Other>(sent);
+}
+
+}  // namespace
+
+Request request_of(wire::ClientRequest sent) {
+  return std::visit([](auto&& content) { return read(std::move(content)); }, std::move(sent));
+}
+
+}  // namespace proofmass::coordinator

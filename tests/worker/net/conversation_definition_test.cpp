@@ -1,0 +1,185 @@
+// How a worker gets the definitions of campaigns of which it was lent runs.
+
+#include "core/definition/campaign_definition.hpp"
+#include "tests/worker/net/conversation_fixture.hpp"
+
+namespace proofmass::worker {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST_F(ConversationTest, AsksForACampaignUntilItComes) {
+  start();
+  register_here();
+  receive(lease(0, 1, 1, campaign_2));
+  EXPECT_EQ(execution.waiting.size(), 1U) << "they wait for the definition";
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().campaign, campaign_2);
+  receive(lease(1, 1, 1, campaign_2));
+  tick_after(900ms);
+  EXPECT_TRUE(sent.empty());
+  tick_after(100ms);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().campaign, campaign_2);
+
+  const wire::DefinitionPart answer = definition(campaign_2);
+  receive(answer);
+  EXPECT_TRUE(execution.is_defined(campaign_2));
+  receive(answer);  // To the other request.
+  receive(lease(2, 1, 1, campaign_2));
+  tick_after(900ms);
+}
+
+TEST_F(ConversationTest, AsksNoMoreForACampaignWithoutRuns) {
+  start();
+  register_here();
+  receive(lease(0, 1));
+  (void)take_sent<wire::CampaignRequest>();
+  receive(wire::Retract{campaign_1, {{{0}, 1}}});
+  (void)take_sent<wire::GiveBack>();
+  tick_after(1500ms);
+  receive(definition(campaign_1));
+  EXPECT_FALSE(execution.is_defined(campaign_1));
+}
+
+TEST_F(ConversationTest, ForgetsACampaign) {
+  register_with_campaign();
+  (void)compute(lease(10, 1));
+  receive(lease(11, 1));
+  receive(lease(5, 1, 1, campaign_2));
+  (void)take_sent<wire::CampaignRequest>();
+  receive(wire::Forget{campaign_1});
+  EXPECT_EQ(execution.forgotten, std::vector{campaign_1});
+  EXPECT_EQ(conversation->num_unacknowledged(), 0U);
+  EXPECT_EQ(conversation->num_unfinished(), 1U);
+}
+
+/// Of more than one part, as far as the conversation is concerned.
+std::vector<wire::DefinitionPart> split(const wire::DefinitionPart& whole) {
+  wire::DefinitionPart first = whole;
+  wire::DefinitionPart second = whole;
+  first.content.resize(100);
+  second.content.erase(0, 100);
+  second.offset = 100;
+  return {first, second};
+}
+
+TEST_F(ConversationTest, AsksForADefinitionPartByPart) {
+  start();
+  register_here();
+  receive(lease(0, 1));
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  const auto parts = split(definition(campaign_1));
+  receive(parts[1]);  // Not asked for: what comes before it is missing.
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  receive(parts[0]);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 100U);
+  receive(parts[0]);  // Repeated by the network.
+  tick_after(999ms);
+  EXPECT_TRUE(sent.empty());
+  tick_after(1ms);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 100U) << "it was lost";
+  EXPECT_FALSE(execution.is_defined(campaign_1));
+  receive(parts[1]);
+  EXPECT_TRUE(execution.is_defined(campaign_1));
+}
+
+TEST_F(ConversationTest, BeginsADefinitionAnewThatHasChanged) {
+  start();
+  register_here();
+  receive(lease(0, 1));
+  (void)take_sent<wire::CampaignRequest>();
+  Campaign extended;
+  extended.num_runs += 1;
+  const auto old_parts = split(definition(campaign_1));
+  const auto new_parts = split(definition(campaign_1, extended));
+  receive(old_parts[0]);
+  (void)take_sent<wire::CampaignRequest>();
+  receive(new_parts[1]);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  receive(new_parts[0]);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 100U);
+  receive(new_parts[1]);
+  EXPECT_TRUE(execution.is_defined(campaign_1));
+}
+
+TEST_F(ConversationTest, AsksAgainForADefinitionThatMakesNoSense) {
+  start();
+  register_here();
+  receive(lease(0, 1));
+  (void)take_sent<wire::CampaignRequest>();
+  wire::DefinitionPart damaged = definition(campaign_1);
+  damaged.content.front() ^= 1;
+  receive(damaged);
+  EXPECT_FALSE(execution.is_defined(campaign_1));
+  for (int i = 0; i < 59; ++i) {
+    tick_after(1s);
+    std::erase_if(sent, [](const wire::Packet& packet) {
+      return std::holds_alternative<wire::Heartbeat>(packet.message);
+    });
+    EXPECT_TRUE(sent.empty()) << i;
+  }
+  tick_after(1s);
+  EXPECT_EQ(take_sent<wire::CampaignRequest>().offset, 0U);
+  sent.clear();
+  receive(definition(campaign_1));
+  EXPECT_TRUE(execution.is_defined(campaign_1));
+}
+
+std::vector<std::string> take_notices(Conversation& conversation) {
+  std::vector<std::string> texts;
+  for (const Notice& notice : conversation.take_notices()) texts.push_back(notice.text);
+  return texts;
+}
+
+// Whole as it was sent, but not what a coordinator of this program says.
+TEST_F(ConversationTest, RefusesADefinitionThatIsNotCanonical) {
+  start();
+  register_here();
+  receive(lease(0, 1));
+  (void)take_sent<wire::CampaignRequest>();
+  Definition other = definition_of(Campaign{});
+  other.text.insert(0, "# \u00e9\n");
+  receive(wire::EncodedDefinition(other).part({.campaign = campaign_1}));
+  EXPECT_FALSE(execution.is_defined(campaign_1));
+  EXPECT_EQ(take_notices(*conversation),
+            std::vector<std::string>{"malformed_definition campaign=0000000000000001 definition:1: "
+                                     "line = \"# \u00e9\" (must be \"[campaign]\", as the "
+                                     "definition has one spelling)"});
+  other.text = "a = \"" + std::string(10'000, 'x');
+  tick_after(60s);
+  sent.clear();  // It has asked again.
+  receive(wire::EncodedDefinition(other).part({.campaign = campaign_1}));
+  EXPECT_LT(take_notices(*conversation).at(0).size(), 500U);
+  receive(definition(campaign_1));
+  EXPECT_TRUE(execution.is_defined(campaign_1));
+}
+
+Campaign definition_with_table() {
+  Campaign campaign;
+  campaign.dispersions[0] = {.law = Law::table, .file = "f", .column = "c"};
+  return campaign;
+}
+
+TEST_F(ConversationTest, EndsIfALeaseLacksTableValues) {
+  start();
+  register_here();
+  receive(lease(0, 2));
+  (void)take_sent<wire::CampaignRequest>();
+  receive(definition(campaign_1, definition_with_table()));
+  expect_ending(Ending::Kind::failed, "table_values = 1 for each run (must be 0)");
+}
+
+TEST_F(ConversationTest, EndsIfALeaseHasOtherTableValuesThanTheOneBefore) {
+  start();
+  register_here();
+  wire::RunLease two = lease(0, 2);
+  two.table_values = {1.5, 2.5};
+  receive(two);
+  (void)take_sent<wire::CampaignRequest>();
+  receive(definition(campaign_1, definition_with_table()));
+  EXPECT_FALSE(conversation->ending().has_value());
+  receive(lease(2, 1));
+  expect_ending(Ending::Kind::failed, "table_values = 0 for each run (must be 1)");
+}
+
+}  // namespace
+}  // namespace proofmass::worker
