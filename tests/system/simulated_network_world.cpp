@@ -68,7 +68,7 @@ void World::add_campaigns() {
        {std::tuple(other, 24U, 0), std::tuple(urgent, 12U, 5)}) {
     Campaign campaign;
     campaign.num_runs = num_runs;
-    campaign.seed = random_.number() & seed_max;
+    campaign.seed = random_.number();
     coordinator::StoredCampaign stored{.definition = std::make_shared<const Campaign>(campaign),
                                        .priority = priority,
                                        .finished = {},

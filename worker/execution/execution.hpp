@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/campaign/campaign.hpp"
+#include "core/campaign/definition.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::worker {
@@ -47,6 +48,9 @@ class Execution {
   /// True from define() on; false again after forget(), or once the campaign has had no runs here
   /// and room was needed for others.
   [[nodiscard]] virtual bool is_defined(wire::CampaignId campaign) const = 0;
+  /// The campaign of a definition that was received; it has no table columns.
+  /// @throws DefinitionError if it is none.
+  [[nodiscard]] virtual std::shared_ptr<const Campaign> read(Definition definition) const;
   /// What the runs of a campaign compute. @pre It is not defined.
   virtual void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) = 0;
 

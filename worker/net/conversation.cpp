@@ -7,7 +7,6 @@
 #include <utility>
 #include <variant>
 
-#include "core/definition/campaign_definition.hpp"
 #include "core/error.hpp"
 #include "worker/execution/run_ranges.hpp"
 #include "worker/net/held_runs.hpp"
@@ -42,12 +41,11 @@ std::vector<double> values_of(const wire::RunLease& lease, RunRange runs, std::s
 
 /// The campaign that was received, or why it is none.
 std::variant<std::shared_ptr<const Campaign>, std::string> read_definition(
-    std::variant<Definition, wire::DecodeError> taken) {
+    const Execution& execution, std::variant<Definition, wire::DecodeError> taken) {
   if (auto* const error = std::get_if<wire::DecodeError>(&taken)) return std::move(error->text);
   try {
-    return std::make_shared<const Campaign>(
-        campaign_of(std::get<Definition>(std::move(taken)), TableColumns::left_out));
-  } catch (const DefinitionError& error) {
+    return execution.read(std::get<Definition>(std::move(taken)));
+  } catch (const Error& error) {
     return error.what();
   }
 }
@@ -351,7 +349,7 @@ void Conversation::request_definitions(TimePoint now) {
 /// coordinator's program. It is asked for again in a while, as the program may be exchanged.
 void Conversation::define(wire::CampaignId campaign, TimePoint now) {
   WantedDefinition& wanted = wanted_.at(campaign);
-  const auto read = read_definition(wanted.incoming.take());
+  const auto read = read_definition(execution_, wanted.incoming.take());
   if (const auto* const refusal = std::get_if<std::string>(&read)) {
     wanted.request_due_at = now + config_.request_again_after;
     return note(
