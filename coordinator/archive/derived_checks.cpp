@@ -40,6 +40,11 @@ Lines count_differences(const Summary& stored, const CampaignStatistics& now) {
   require_same("num_not_finite", stored.num_not_finite, now.num_not_finite);
   require_same("num_no_draw", stored.num_no_draw, now.num_no_draw);
   require_same("num_lost", stored.num_lost, now.num_lost);
+  require_same("num_within_objectives", stored.num_within_objectives, now.num_within_objectives);
+  if (stored.within_objectives != now.within_objectives(stored.num_given_up)) {
+    lines.emplace_back(
+        "summary.within_objectives_lower and _upper (must be those of num_within_objectives)");
+  }
   return lines;
 }
 
@@ -64,11 +69,9 @@ Check check_current(const Store& store, const Scenario& scenario, const Summary&
 
 // Without a summary nothing was ever stored but the budget before calibration.
 Check check_first(const Store& store, const Scenario& scenario) {
-  const bool is_old = store.has_older_statistics() || store.build().empty();
-  Lines lines = is_old ? Lines() : statistic_differences(store, scenario, {});
+  Lines lines = statistic_differences(store, scenario, {});
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
-  return Check::not_checked(is_old ? "no summary tells of which results those of an older file are"
-                                   : "none are stored: a coordinator has the file, or was killed");
+  return Check::not_checked("none are stored: a coordinator has the file, or was killed");
 }
 
 }  // namespace

@@ -79,11 +79,10 @@ class Verification {
 
   Check check_definition() {
     campaign_ = stored_campaign_unchecked(*store_);
-    std::vector<std::string> details =
-        store_->parameter_differences(campaign_->scenario.objectives);
-    const std::string stored = store_->table_digest();  // Empty in a file from before version 6.
+    std::vector<std::string> details = store_->parameter_differences(campaign_->scenario);
+    const std::string stored = store_->table_digest();
     const std::string computed = store_->computed_table_digest();
-    if (!stored.empty() && computed != stored) {
+    if (computed != stored) {
       details.push_back(
           fmt::format("campaign.table_digest = {} (must be {}, that of definition and tables)",
                       stored, computed));

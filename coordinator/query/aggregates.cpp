@@ -11,7 +11,6 @@
 #include "coordinator/query/per_cent.hpp"
 #include "core/error.hpp"
 #include "core/statistics/correlation.hpp"
-#include "core/statistics/kurtosis.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
 #include "core/statistics/regression.hpp"
@@ -42,7 +41,8 @@ std::optional<double> skewness(const AggregateColumns& columns) {
 }
 
 std::optional<double> kurtosis(const AggregateColumns& columns) {
-  return excess_kurtosis(columns.x);
+  if (columns.x.size() < 4 || !varies(columns.x)) return std::nullopt;
+  return moments(columns.x).excess_kurtosis;
 }
 
 // As percentile(), but for values whose difference is no finite double too.

@@ -90,7 +90,7 @@ EnvironmentTable environment_table_of(sqlite3* connection, const std::string& da
 std::vector<std::vector<double>> table_columns_of(sqlite3* connection,
                                                   const std::string& database) {
   const std::string sql =
-      fmt::format("SELECT value FROM {}.dispersion_value WHERE name = ? ORDER BY run_index",
+      fmt::format("SELECT value FROM {}.dispersion_value WHERE quantity = ? ORDER BY run_index",
                   quoted_name(database));
   std::vector<std::vector<double>> columns;
   for (const std::string& name : drawn_names()) {

@@ -43,8 +43,7 @@ std::string heading() {
       horizontal_rule(rates_width));
 }
 
-std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy,
-                std::uint64_t num_runs) {
+std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy) {
   const double scale = info.display_scale;
   const std::optional<Interval>& bias = accuracy.error.bias_interval;
   const auto bias_cell = [&](double bound) {
@@ -54,8 +53,7 @@ std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy,
   for (const PercentileStatistic& percentile : accuracy.percentiles) {
     percentiles += right_aligned(measured_figure(percentile.value / scale), percentile_width);
   }
-  const Interval beyond = probability_interval(static_cast<double>(accuracy.num_beyond_objective),
-                                               static_cast<double>(num_runs), default_confidence);
+  const Interval& beyond = accuracy.beyond_objective;
   return fmt::format("{}{}{} │{} │{}{}\n", left_aligned(info.label, label_width),
                      bias_cell(bias ? bias->lower : 0.0), bias_cell(bias ? bias->upper : 0.0),
                      percentiles, right_aligned(measured_figure(100.0 * beyond.lower), from_width),
@@ -64,27 +62,24 @@ std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy,
 
 static_assert(num_parameters == 10);  // The text says it in a word.
 
-std::string joint_text(const ExceedanceCount& missing_any) {
-  const std::uint64_t num_holding = missing_any.num_runs - missing_any.num_exceedances;
-  const Interval holding =
-      probability_interval(static_cast<double>(num_holding),
-                           static_cast<double>(missing_any.num_runs), default_confidence);
+std::string joint_text(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
   constexpr std::size_t margin = 2;
-  return line_of(
-      fmt::format("all ten objectives together: {} of {} runs,", num_holding, missing_any.num_runs),
-      interval_percent(holding) + " of all draws", margin);
+  return line_of(fmt::format("all ten objectives together: {} of {} runs,",
+                             statistics.num_within_objectives, statistics.num_runs + num_given_up),
+                 interval_percent(*statistics.within_objectives(num_given_up)) + " of all draws",
+                 margin);
 }
 
 }  // namespace
 
-std::string error_table(const CampaignStatistics& statistics, const ExceedanceCount& missing_any) {
+std::string error_table(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
   if (statistics.num_estimated == 0) return "";
   std::string text =
       fmt::format("95 % intervals of bias and of draws beyond the objective\n\n{}", heading());
   for (const ParameterInfo& info : parameter_infos()) {
-    text += row(info, statistics.accuracy[index(info.parameter)], statistics.num_estimated);
+    text += row(info, statistics.accuracy[index(info.parameter)]);
   }
-  return text + joint_text(missing_any);
+  return text + joint_text(statistics, num_given_up);
 }
 
 }  // namespace proofmass::coordinator

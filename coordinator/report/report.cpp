@@ -38,7 +38,7 @@ std::string report_of_one_state(const Store& store, const Scenario& scenario) {
                      given_up_text(given_up) + stop_text(store);
   for (const std::string& table :
        {accuracy_table(scenario, statistics), interval_table(statistics, num_given_up),
-        error_table(statistics, results.exceedances.of(statistics.num_runs + num_given_up)),
+        error_table(statistics, num_given_up),
         budget_table(scenario, statistics, results.totals)}) {
     if (!table.empty()) text += "\n" + table;
   }
@@ -103,12 +103,7 @@ bool are_current(const Store& store) {
 ReadResults read_results(const Store& store, const Scenario& scenario) {
   StatisticsPasses passes(scenario.objectives);
   RunTotalPasses totals(scenario);
-  const Requirement all_objectives{.tolerance = {},
-                                   .subject = Requirement::Subject::all_objectives};
-  ReadResults results{.statistics = {},
-                      .digests = {},
-                      .totals = {},
-                      .exceedances = Exceedances(all_objectives, scenario.objectives)};
+  ReadResults results{.statistics = {}, .digests = {}, .totals = {}};
   // Both are asked each time: they may need different numbers of passes.
   const auto is_pass_needed = [&] {
     const bool is_for_statistics = passes.end_pass();
@@ -120,7 +115,6 @@ ReadResults read_results(const Store& store, const Scenario& scenario) {
       require_in_range(result);
       passes.add(result);
       totals.add(result);
-      results.exceedances.add(result);
       digest.add(result);
     });
     while (is_pass_needed()) {

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "coordinator/report/digest_check.hpp"
-#include "coordinator/report/exceedances.hpp"
 #include "coordinator/report/run_totals.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/scenario.hpp"
@@ -47,9 +46,9 @@ namespace proofmass::coordinator {
 
 /// Of the error with its sign the interval of its bias; percentiles of |error|; how often a
 /// parameter is beyond its objective; and how often all objectives hold together.
-/// @param missing_any  Runs in which an objective does not hold, or that lack an estimate.
+/// @param num_given_up  Runs that have no result, beside those in the statistics.
 [[nodiscard]] std::string error_table(const CampaignStatistics& statistics,
-                                      const ExceedanceCount& missing_any);
+                                      std::uint64_t num_given_up);
 
 /// Budget before and after calibration beside [Hardy2013] tab:Budget and tab:Budget_cali, and what
 /// single runs have.
@@ -62,7 +61,6 @@ struct ReadResults {
   CampaignStatistics statistics;
   ResultDigests digests;
   std::optional<RunTotals> totals;  ///< Empty if no run has an estimate.
-  Exceedances exceedances;          ///< Runs in which an objective does not hold.
 };
 
 /// Reads all results, of one state of the file, as often as StatisticsPasses needs them: twice if

@@ -14,10 +14,6 @@ namespace {
 
 using detail::Database;
 
-constexpr std::int64_t version_with_phases = 4;
-constexpr std::int64_t version_with_summaries = 5;
-constexpr std::int64_t version_with_owners = 6;
-
 /// Whether the campaign has ended, and its statistics are those of all of its results.
 bool is_complete(const Database& database, CampaignPeek& peek) {
   peek.num_given_up = database.count("SELECT count(*) FROM run_failure");
@@ -54,22 +50,14 @@ CampaignPeek peek_campaign(const std::filesystem::path& path, PeekDepth depth) {
   } else {
     detail::check_kind(database, path);
   }
-  const std::int64_t version = database.integer("PRAGMA user_version");
-  CampaignPeek peek{.id = {},
+  const CampaignControl control = detail::read_control(database);
+  CampaignPeek peek{.id = {database.count("SELECT campaign_uid FROM campaign")},
                     .name = database.text("SELECT name FROM campaign"),
                     .num_runs = database.count("SELECT num_runs FROM campaign"),
-                    .owner = {}};
-  if (version < version_with_phases) return peek;
-  peek.id = {database.count("SELECT campaign_uid FROM campaign")};
-  const CampaignControl control = detail::read_control(database);
+                    .owner = database.text("SELECT owner FROM campaign")};
   peek.phase = control.phase;
   peek.priority = control.priority;
-  bool is_log_needed = false;
-  if (version >= version_with_owners) {
-    peek.owner = database.text("SELECT owner FROM campaign");
-    is_log_needed = database.integer("SELECT is_log_needed FROM campaign") != 0;
-  }
-  if (version < version_with_summaries) return peek;
+  const bool is_log_needed = database.integer("SELECT is_log_needed FROM campaign") != 0;
   peek.is_at_rest = is_complete(database, peek) && !is_log_needed && !has_journal(path);
   return peek;
 }

@@ -176,6 +176,9 @@ struct Summary {
   std::uint64_t num_no_draw = 0;
   std::uint64_t num_lost = 0;
   std::uint64_t num_given_up = 0;  ///< Not among the finished ones.
+  std::uint64_t num_within_objectives = 0;
+  /// Their share, as CampaignStatistics::within_objectives() has it.
+  std::optional<Interval> within_objectives{};
   ResultDigests digests;
   std::string computed_utc;
 

@@ -191,10 +191,10 @@ class Store {
   /// That of the last write_statistics(); empty before the first.
   [[nodiscard]] std::optional<Summary> summary() const;
 
-  /// What `parameter` has other than a new file of a campaign with these objectives, a line each:
-  /// `parameter.unit of k2d = m (must be s²/m)`. Numbers are equal if their bits are.
-  [[nodiscard]] std::vector<std::string> parameter_differences(
-      const ParameterArray& objectives) const;
+  /// What `parameter` and `budget_coefficient` have other than a new file of a campaign with this
+  /// scenario, a line each: `parameter.unit of k2d = m (must be s²/m)`. Numbers are equal if their
+  /// bits are.
+  [[nodiscard]] std::vector<std::string> parameter_differences(const Scenario& scenario) const;
   /// What `statistic` and `budget_entry` have other than write_statistics() would store, likewise.
   [[nodiscard]] std::vector<std::string> statistic_differences(const CampaignStatistics& statistics,
                                                                const Budget& before,
@@ -205,12 +205,10 @@ class Store {
   /// What rows of `stop_check` have other than these; there may be more of them.
   [[nodiscard]] std::vector<std::string> stop_check_differences(
       std::span<const StopCheckRow> expected) const;
-  /// True if statistics of a program since version 5 are there: a summary was written with them.
+  /// True if statistics are there: a summary was written with them.
   [[nodiscard]] bool has_statistics() const;
   /// @throws StoreError `campaign file = path (is damaged: what; restore it from a copy)`.
   [[noreturn]] void refuse_as_damaged(std::string_view what) const;
-  /// True if the statistics are those of a program before version 5: seven numbers, no summary.
-  [[nodiscard]] bool has_older_statistics() const;
 
   /// Appends to the campaign's log, of which the newest 10,000 entries are kept.
   void record_event(std::string_view kind, std::string_view text);

@@ -39,11 +39,13 @@ void Store::write_statistics(const CampaignStatistics& statistics, const Budget&
 
 std::optional<Summary> Store::summary() const { return detail::read_summary(parts_->database); }
 
-std::vector<std::string> Store::parameter_differences(const ParameterArray& objectives) const {
-  constexpr std::array tables{ComparedTable{.name = "parameter", .row_name = "name"}};
+std::vector<std::string> Store::parameter_differences(const Scenario& scenario) const {
+  constexpr std::array tables{
+      ComparedTable{.name = "parameter", .row_name = "parameter"},
+      ComparedTable{.name = "budget_coefficient", .row_name = "parameter || ' in ' || term"}};
   return detail::table_differences(
-      parts_->database,
-      [&](Database& expected) { detail::insert_parameters(expected, objectives); }, tables);
+      parts_->database, [&](Database& expected) { detail::insert_parameters(expected, scenario); },
+      tables);
 }
 
 std::vector<std::string> Store::statistic_differences(const CampaignStatistics& statistics,
@@ -51,7 +53,7 @@ std::vector<std::string> Store::statistic_differences(const CampaignStatistics& 
                                                       const Budget& after_worst,
                                                       const Budget& after_mean) const {
   constexpr std::array tables{ComparedTable{.name = "statistic", .row_name = "parameter"},
-                              ComparedTable{.name = "budget_entry", .row_name = "name"}};
+                              ComparedTable{.name = "budget_entry", .row_name = "term"}};
   return detail::table_differences(
       parts_->database,
       [&](Database& expected) {
@@ -63,7 +65,7 @@ std::vector<std::string> Store::statistic_differences(const CampaignStatistics& 
 std::vector<std::string> Store::budget_differences(const Budget& before) const {
   constexpr std::array tables{ComparedTable{
       .name = "budget_entry",
-      .row_name = "name",
+      .row_name = "term",
       .columns = "position, label, before, paper_before, paper_after_worst, paper_after_mean"}};
   return detail::table_differences(
       parts_->database,
@@ -91,15 +93,7 @@ std::vector<std::string> Store::stop_check_differences(
 }
 
 bool Store::has_statistics() const {
-  return parts_->database.integer(
-             "SELECT EXISTS (SELECT 1 FROM statistic WHERE percentile_50 IS NOT NULL)") != 0;
-}
-
-bool Store::has_older_statistics() const {
-  return parts_->database.integer(
-             "SELECT EXISTS (SELECT 1 FROM statistic)"
-             " AND NOT EXISTS (SELECT 1 FROM statistic WHERE percentile_50 IS NOT NULL)"
-             " AND NOT EXISTS (SELECT 1 FROM summary)") != 0;
+  return parts_->database.integer("SELECT EXISTS (SELECT 1 FROM statistic)") != 0;
 }
 
 }  // namespace proofmass::coordinator

@@ -15,7 +15,6 @@ struct GradientLevels {
   double zz;
 };
 
-//
 // In an inertial frame f_EP = f_orb. In one that spins, the gradient has lines at f_orb, at 2 f_EP
 // and at 2 f_EP ± f_orb, none of which is at f_EP = f_orb + f_spin.
 GradientLevels gradient_levels(const Scenario& scenario, SessionTarget target) {
@@ -106,6 +105,19 @@ Budget budget_after_calibration(const Scenario& scenario, const ParameterArray& 
       4.0 * error(k2c) * k2,
       2.0 * error(k2d) * (2.0 * k2),
   });
+}
+
+std::array<ParameterArray, num_budget_entries> budget_coefficients(const Scenario& scenario) {
+  std::array<ParameterArray, num_budget_entries> coefficients{};
+  for (std::size_t parameter = 0; parameter < num_parameters; ++parameter) {
+    ParameterArray errors{};
+    errors[parameter] = 1.0;
+    const Budget budget = budget_after_calibration(scenario, errors);
+    for (std::size_t i = 0; i < num_budget_entries; ++i) {
+      coefficients[i][parameter] = budget.entries[i];
+    }
+  }
+  return coefficients;
 }
 
 }  // namespace proofmass

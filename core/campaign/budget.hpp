@@ -43,4 +43,9 @@ struct Budget {
 [[nodiscard]] Budget budget_after_calibration(const Scenario& scenario,
                                               const ParameterArray& errors);
 
+/// What an |error| of 1 (SI) of each parameter leaves in each entry, m/s²: the sum of coefficient
+/// times |error| over the parameters is that entry of budget_after_calibration(), but for rounding.
+[[nodiscard]] std::array<ParameterArray, num_budget_entries> budget_coefficients(
+    const Scenario& scenario);
+
 }  // namespace proofmass

@@ -34,12 +34,19 @@ std::array<PercentileStatistic, percentile_levels.size()> percentiles_of(
 
 }  // namespace
 
+std::optional<Interval> CampaignStatistics::within_objectives(std::uint64_t num_given_up) const {
+  const std::uint64_t num_draws = num_runs + num_given_up;
+  if (num_draws == 0) return std::nullopt;
+  return probability_interval(static_cast<double>(num_within_objectives),
+                              static_cast<double>(num_draws), default_confidence);
+}
+
 ErrorStatistic error_statistic(const Moments& about) {
   return {.bias = about.mean,
           .bias_interval = mean_interval(about, default_confidence),
           .rms = about.rms,
           .standard_deviation = about.standard_deviation,
-          .deviation_interval = normal_deviation_interval(about, default_confidence),
+          .deviation_interval = deviation_interval(about, default_confidence),
           .skewness = about.skewness};
 }
 
@@ -67,9 +74,13 @@ void StatisticsAccumulator::add(const RunResult& result) {
 
   ++counts_.num_estimated;
   estimated_runs_.push_back(result.run);
+  bool is_within = true;
   for (const ParameterInfo& info : parameter_infos()) {
-    errors_[index(info.parameter)].push_back(result.error(info.parameter));
+    const std::size_t i = index(info.parameter);
+    errors_[i].push_back(result.error(info.parameter));
+    if (std::abs(errors_[i].back()) > objectives_[i]) is_within = false;
   }
+  if (is_within) ++counts_.num_within_objectives;
 }
 
 CampaignStatistics StatisticsAccumulator::statistics() const {
@@ -93,6 +104,9 @@ AccuracyStatistic StatisticsAccumulator::accuracy(Parameter parameter) const {
           .mean = about.mean,
           .standard_deviation = about.standard_deviation,
           .num_beyond_objective = static_cast<std::uint64_t>(num_beyond),
+          .beyond_objective =
+              probability_interval(static_cast<double>(num_beyond),
+                                   static_cast<double>(magnitudes.size()), default_confidence),
           .mean_interval = mean_interval(about, default_confidence),
           .deviation_interval = bootstrap_deviation_interval(magnitudes, default_confidence),
           .percentiles = percentiles_of(magnitudes),

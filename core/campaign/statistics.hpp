@@ -30,7 +30,7 @@ struct ErrorStatistic {
   std::optional<Interval> bias_interval;  ///< Empty for a single run; so is the other.
   double rms = 0.0;
   double standard_deviation = 0.0;             ///< With n − 1; 0 for a single run.
-  std::optional<Interval> deviation_interval;  ///< By the chi-square law: for normal errors.
+  std::optional<Interval> deviation_interval;  ///< By the errors' kurtosis.
   double skewness = 0.0;                       ///< Adjusted, see Moments.
 };
 
@@ -44,6 +44,7 @@ struct AccuracyStatistic {
   double mean = 0.0;                           ///< SI.
   double standard_deviation = 0.0;             ///< SI, with n − 1; 0 for a single run.
   std::uint64_t num_beyond_objective = 0;      ///< Runs whose |error| is above the objective.
+  Interval beyond_objective;                   ///< Of the share of such runs among all draws.
   std::optional<Interval> mean_interval;       ///< Empty for a single run.
   std::optional<Interval> deviation_interval;  ///< By the bootstrap; empty below three runs.
   std::array<PercentileStatistic, percentile_levels.size()> percentiles{};
@@ -58,9 +59,15 @@ struct CampaignStatistics {
   std::uint64_t num_not_finite = 0;
   std::uint64_t num_no_draw = 0;
   std::uint64_t num_lost = 0;
+  /// Runs in which no |error| is above its objective; one without an estimate is none of them.
+  std::uint64_t num_within_objectives = 0;
   /// Indexed by `index(parameter)`; all zero if num_estimated = 0.
   std::array<AccuracyStatistic, num_parameters> accuracy{};
 
+  /// Of the share of runs within all objectives among all draws, 95 %.
+  /// @param num_given_up  Runs that have no result, beside num_runs; they count as beyond.
+  /// @return Nothing if there is no run.
+  [[nodiscard]] std::optional<Interval> within_objectives(std::uint64_t num_given_up) const;
   /// The worst |error| of each parameter, SI.
   [[nodiscard]] ParameterArray worst_errors() const;
   /// The mean |error| of each parameter, SI.

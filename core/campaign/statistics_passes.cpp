@@ -23,6 +23,7 @@ void StatisticsPasses::add(const RunResult& result) {
   last_run_ = result.run;
   if (is_first_pass_) count(result);
   if (!result.has_estimate()) return;
+  bool is_within = true;
   for (const ParameterInfo& info : parameter_infos()) {
     const std::size_t i = index(info.parameter);
     ParameterPasses& parameter = parameters_[i];
@@ -35,8 +36,11 @@ void StatisticsPasses::add(const RunResult& result) {
       parameter.worst = magnitude;
       parameter.worst_run = result.run;
     }
-    if (magnitude > objectives_[i]) ++parameter.num_beyond;
+    if (magnitude <= objectives_[i]) continue;
+    ++parameter.num_beyond;
+    is_within = false;
   }
+  if (is_first_pass_ && is_within) ++counts_.num_within_objectives;
 }
 
 void StatisticsPasses::count(const RunResult& result) {
@@ -75,6 +79,9 @@ AccuracyStatistic StatisticsPasses::accuracy(const ParameterPasses& parameter) c
                              .mean = about.mean,
                              .standard_deviation = about.standard_deviation,
                              .num_beyond_objective = parameter.num_beyond,
+                             .beyond_objective = probability_interval(
+                                 static_cast<double>(parameter.num_beyond),
+                                 static_cast<double>(counts_.num_estimated), default_confidence),
                              .mean_interval = mean_interval(about, default_confidence),
                              .deviation_interval = parameter.magnitudes.deviation_interval(),
                              .error = error_statistic(parameter.errors.moments())};

@@ -81,18 +81,6 @@ double student_quantile(double probability, double degrees) {
   return probability < 0.5 ? -t : t;
 }
 
-double chi_square_quantile(double probability, double degrees) {
-  expect_probability(probability);
-  const double shape = 0.5 * degrees;
-  const auto excess_at = [&](double x) {
-    const double density = shape * detail::gamma_power(shape, 0.5 * x) / x;
-    return Excess{excess_of(detail::regularised_gamma(shape, 0.5 * x), probability), density};
-  };
-  double upper = degrees;
-  while (excess_at(upper).probability < 0.0) upper *= 2.0;
-  return find_root(excess_at, {0.0, upper}, std::min(degrees, 0.5 * upper));
-}
-
 double beta_quantile(double probability, double a, double b) {
   expect_probability(probability);
   const auto excess_at = [&](double x) {

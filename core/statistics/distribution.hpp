@@ -16,9 +16,6 @@ namespace proofmass {
 /// t with P(T ≤ t) = probability in (0, 1).
 [[nodiscard]] double student_quantile(double probability, double degrees);
 
-/// x with P(χ² ≤ x) = probability in (0, 1).
-[[nodiscard]] double chi_square_quantile(double probability, double degrees);
-
 /// x with I_x(a, b) = probability in (0, 1); a, b > 0.
 [[nodiscard]] double beta_quantile(double probability, double a, double b);
 

@@ -1,8 +1,11 @@
 #include "core/statistics/interval.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.hpp"
+#include "core/math/elementary.hpp"
+#include "core/random/normal.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/distribution.hpp"
 
@@ -69,16 +72,18 @@ std::optional<Interval> mean_interval(const Moments& moments, double confidence)
   return Interval{moments.mean - half_width, moments.mean + half_width, confidence};
 }
 
-std::optional<Interval> normal_deviation_interval(const Moments& moments, double confidence) {
+std::optional<Interval> deviation_interval(const Moments& moments, double confidence) {
   detail::check_fraction("confidence", confidence);
-  if (moments.count < 2) return std::nullopt;
-  const double degrees = static_cast<double>(moments.count) - 1.0;
-  const double tail = 0.5 - 0.5 * confidence;
-  const auto bound = [&](double probability) {
-    return moments.standard_deviation *
-           std::sqrt(degrees / chi_square_quantile(probability, degrees));
-  };
-  return Interval{bound(1.0 - tail), bound(tail), confidence};
+  const double z = inverse_normal(0.5 + 0.5 * confidence);
+  const auto n = static_cast<double>(moments.count);
+  if (n < 5.0 || n <= z) return std::nullopt;
+  const double kurtosis = std::max(1.0, 3.0 + moments.excess_kurtosis);
+  const double correction = n / (n - z);
+  const double half_width =
+      z * correction * std::sqrt((kurtosis - (n - 3.0) / n) / (n - 1.0));  // Of ln σ².
+  const double centre = std::sqrt(correction) * moments.standard_deviation;
+  return Interval{centre * exponential(-0.5 * half_width), centre * exponential(0.5 * half_width),
+                  confidence};
 }
 
 std::optional<IntervalPlaces> percentile_interval_places(std::size_t n, double level,

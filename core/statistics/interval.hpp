@@ -14,6 +14,8 @@ struct Interval {
   double lower = 0.0;
   double upper = 0.0;
   double confidence = 0.0;  ///< In (0, 1).
+
+  bool operator==(const Interval&) const = default;
 };
 
 /// The confidence of every interval that a user did not choose.
@@ -24,10 +26,15 @@ inline constexpr double default_confidence = 0.95;
 /// @throws InvalidArgument unless 0 < confidence < 1; so do all below.
 [[nodiscard]] std::optional<Interval> mean_interval(const Moments& moments, double confidence);
 
-/// Of the standard deviation, by the chi-square law: exact for normal values and wrong for any
-/// others, at any count; bootstrap_deviation_interval() serves those. Empty below two values.
-[[nodiscard]] std::optional<Interval> normal_deviation_interval(const Moments& moments,
-                                                                double confidence);
+/// Of the standard deviation s, by the kurtosis that the values have [Bonett2006]: for any law with
+/// a fourth moment, the better the more values. With z the quantile of the normal law and γ₄ the
+/// kurtosis, at least 1,
+///
+///     ln σ² in ln c s² ± z c √((γ₄ − (n − 3)/n)/(n − 1)),      c = n/(n − z)
+///
+/// where γ₄ = 3 + G2 instead of Bonett's estimate about a trimmed mean; README.md gives the
+/// coverage. Empty below five values, and unless n > z.
+[[nodiscard]] std::optional<Interval> deviation_interval(const Moments& moments, double confidence);
 
 /// Of a percentile, by order statistics, for any continuous law. Neighbouring order statistics are
 /// interpolated [Nyblom1992], so that the coverage is near `confidence` and not above it by up to

@@ -30,7 +30,7 @@ class WorkerEnd : public ControlledCampaign {
   }
   [[nodiscard]] std::string end_of(const std::string& worker) const {
     return stored_text(file_of("null"),
-                       "SELECT end_reason FROM worker WHERE name = '" + worker + "'");
+                       "SELECT end_reason FROM worker WHERE worker = '" + worker + "'");
   }
 };
 
@@ -43,8 +43,9 @@ TEST_F(WorkerEnd, ComesBeforeTheWalltime) {
   EXPECT_LT(std::chrono::steady_clock::now(), walltime_end);
   ASSERT_LT(num_done("null"), num_null_runs);
   wait_until("end in the file", [&] { return end_of("limited") == "walltime"; });
-  EXPECT_EQ(stored_text(file_of("null"), "SELECT count(*) FROM delivery"),
-            stored_text(file_of("null"), "SELECT num_results FROM worker WHERE name = 'limited'"));
+  EXPECT_EQ(
+      stored_text(file_of("null"), "SELECT count(*) FROM delivery"),
+      stored_text(file_of("null"), "SELECT num_results FROM worker WHERE worker = 'limited'"));
   Process other = null_worker("other");
   EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
   EXPECT_EQ(other.wait(), 0) << errors_of("other");

@@ -70,7 +70,7 @@ class Keys : public FaultTest {
     EXPECT_EQ(num_done("null"), 0U);
     const Process worker = null_worker("right", {"--keys", "keys", "--run-time", "0"});
     wait_for_log("coordinator", "campaign_finished");
-    EXPECT_EQ(stored_text(file_of("null"), "SELECT group_concat(name) FROM worker"), "right");
+    EXPECT_EQ(stored_text(file_of("null"), "SELECT group_concat(worker) FROM worker"), "right");
     EXPECT_EQ(digest("null"), undisturbed_digest("null"));
   }
 
@@ -169,7 +169,8 @@ TEST_F(Keys, ThatAreRevokedEndTheWorkOfWhoHasThem) {
   const Process again = null_worker("again", {"--keys", "seconds"});
   wait_for_log("coordinator", "key=" + key + " reason=\"unknown key\"");
   wait_for_log("coordinator", "campaign_finished");
-  EXPECT_EQ(stored_text(file_of("null"), "SELECT count(*) FROM worker WHERE name = 'again'"), "0");
+  EXPECT_EQ(stored_text(file_of("null"), "SELECT count(*) FROM worker WHERE worker = 'again'"),
+            "0");
   EXPECT_EQ(digest("null"), undisturbed_digest("null"));
 }
 

@@ -40,15 +40,18 @@ def rational(numerator, denominator):
 def exact_moments(values):
     x, unit = integers(values)
     n = len(x)
-    s1, s2, s3 = sum(x), sum(v * v for v in x), sum(v * v * v for v in x)
+    s1, s2, s3, s4 = (sum(v**power for v in x) for power in range(1, 5))
     mean = rational(s1, n * unit)
-    # n² Σ(x − mean)² and n³ Σ(x − mean)³ / n are integers.
+    # n² Σ(x − mean)², n³ Σ(x − mean)³ / n and n⁴ Σ(x − mean)⁴ / n are integers.
     m2 = rational(n * s2 - s1 * s1, n * n * unit**2)
     m3 = rational(n * n * s3 - 3 * n * s1 * s2 + 2 * s1**3, n**3 * unit**3)
     deviation = mpmath.sqrt(m2 * n / (n - 1))
     rms = mpmath.sqrt(rational(s2, n * unit**2))
     skewness = mpmath.sqrt(n * (n - 1)) / (n - 2) * m3 / m2**1.5
-    return mean, deviation, rms, skewness
+    m4 = rational(n**3 * s4 - 4 * n * n * s1 * s3 + 6 * n * s1 * s1 * s2 - 3 * s1**4,
+                  n**4 * unit**4)
+    kurtosis = mpmath.mpf(n - 1) / ((n - 2) * (n - 3)) * ((n + 1) * (m4 / m2**2 - 3) + 6)
+    return mean, deviation, rms, skewness, kurtosis
 
 
 def exact_correlation(x, y):
@@ -80,26 +83,6 @@ def student_quantile(probability, degrees):
     return start
 
 
-def chi_square_quantile(probability, degrees):
-    """The same with scipy's, which is good to 5e-12; in the square root, without the pole at 0."""
-    probability, degrees = mpmath.mpf(probability), mpmath.mpf(degrees)
-    start = mpmath.sqrt(scipy.stats.chi2.ppf(float(probability), float(degrees)))
-    scale = (1 - degrees / 2) * mpmath.log(2) - mpmath.loggamma(degrees / 2)
-
-    def density(root):
-        return mpmath.exp(scale + (degrees - 1) * mpmath.log(root) - root * root / 2)
-
-    # A chi deviate scatters by less than 1 around its mode, wherever that is.
-    is_lower = probability < 0.5
-    tail = probability if is_lower else 1 - probability
-    for _ in range(3):
-        ends = [start + (-k if is_lower else k) for k in (0, 1, 2, 4, 8, 16, 32)]
-        ends = [end for end in ends if end > 0] + ([mpmath.mpf(0)] if min(ends) <= 0 else [])
-        excess = abs(mpmath.quad(density, ends)) - tail
-        start -= (1 if is_lower else -1) * excess / density(start)
-    return start * start
-
-
 # ---- functions of one column ----------------------------------------------------------------------
 
 
@@ -116,18 +99,19 @@ def ranks(name):
 
 
 def mean_interval(name, confidence):
-    mean, deviation, _, _ = exact_moments(columns[name])
+    mean, deviation, *_ = exact_moments(columns[name])
     n = len(columns[name])
     half = student_quantile(0.5 + 0.5 * float(confidence), n - 1) * deviation / math.sqrt(n)
     return mean - half, mean + half
 
 
-def normal_deviation_interval(name, confidence):
-    deviation = exact_moments(columns[name])[1]
-    degrees = len(columns[name]) - 1
-    tail = 0.5 - 0.5 * float(confidence)
-    upper, lower = chi_square_quantile(tail, degrees), chi_square_quantile(1 - tail, degrees)
-    return deviation * mpmath.sqrt(degrees / lower), deviation * mpmath.sqrt(degrees / upper)
+def deviation_interval(name, confidence):
+    _, deviation, _, _, kurtosis = exact_moments(columns[name])
+    n = mpmath.mpf(len(columns[name]))
+    z = mpmath.mpf(scipy.stats.norm.ppf(0.5 + 0.5 * float(confidence)))
+    c = n / (n - z)
+    half = z * c * mpmath.sqrt((3 + kurtosis - (n - 3) / n) / (n - 1))
+    return [deviation * mpmath.sqrt(c * mpmath.exp(sign * half)) for sign in (-1, 1)]
 
 
 def lower_bound(ascending, level, confidence):
@@ -256,7 +240,7 @@ def first_order_index(x, y, confidence):
 def compare_paired(a, b, confidence):
     difference = columns[b] - columns[a]
     n = len(difference)
-    mean, deviation, _, _ = exact_moments(difference)
+    mean, deviation, *_ = exact_moments(difference)
     half = student_quantile(0.5 + 0.5 * float(confidence), n - 1) * deviation / math.sqrt(n)
     larger, smaller = int((difference > 0).sum()), int((difference < 0).sum())
     sign = scipy.stats.binomtest(larger, larger + smaller).pvalue
@@ -409,7 +393,7 @@ CHECKS = {  # function: (values, relative tolerance)
     "ranks": (ranks, 0.0),
     "percentile": (percentile, TOLERANCE),
     "mean_interval": (mean_interval, TOLERANCE),
-    "normal_deviation_interval": (normal_deviation_interval, TOLERANCE),
+    "deviation_interval": (deviation_interval, TOLERANCE),
     "percentile_interval": (percentile_interval, TOLERANCE),
     "bootstrap_deviation_interval": (bootstrap_deviation_interval, TOLERANCE),
     "linear_correlation": (linear_correlation, TOLERANCE),
@@ -421,7 +405,6 @@ CHECKS = {  # function: (values, relative tolerance)
     "holm_adjusted": (holm_adjusted, TOLERANCE),
     "student_quantile": (of_numbers(student_quantile), TOLERANCE),
     "student_two_sided": (of_numbers(lambda t, n: 2 * scipy.stats.t.sf(abs(t), n)), TOLERANCE),
-    "chi_square_quantile": (of_numbers(chi_square_quantile), TOLERANCE),
     "fisher_quantile": (of_numbers(fisher_quantile), TOLERANCE),
     "beta_quantile": (of_numbers(scipy.stats.beta.ppf), TOLERANCE),
     "normal_cumulative": (of_numbers(scipy.special.ndtr), TOLERANCE),

@@ -96,12 +96,12 @@ void ask_about_single_columns(Questions& questions) {
   for (const auto& [name, values] : questions.columns()) {
     const Moments about = moments(values);
     const std::vector<double> ascending = sorted(values);
-    questions.ask("moments " + name,
-                  {about.mean, about.standard_deviation, about.rms, about.skewness});
+    questions.ask("moments " + name, {about.mean, about.standard_deviation, about.rms,
+                                      about.skewness, about.excess_kurtosis});
     questions.ask("ranks " + name, average_ranks(values));
     questions.ask("mean_interval " + name + " 0.9", ends(mean_interval(about, confidence)));
-    questions.ask("normal_deviation_interval " + name + " 0.9",
-                  ends(normal_deviation_interval(about, confidence)));
+    questions.ask("deviation_interval " + name + " 0.9",
+                  ends(deviation_interval(about, confidence)));
     questions.ask("bootstrap_deviation_interval " + name + " 0.9",
                   ends(bootstrap_deviation_interval(values, confidence)));
     for (const double level : {0.1, 0.5, 0.95, 0.99}) {
@@ -182,8 +182,6 @@ void ask_about_laws(Questions& questions) {
     for (const double degrees : {1.0, 2.5, 19.0, 399.0, 1e6}) {
       questions.ask(fmt::format("student_quantile {} {}", p, degrees),
                     {student_quantile(p, degrees)});
-      questions.ask(fmt::format("chi_square_quantile {} {}", p, degrees),
-                    {chi_square_quantile(p, degrees)});
       questions.ask(fmt::format("fisher_quantile {} 9 {}", p, degrees),
                     {fisher_quantile(p, 9.0, degrees)});
     }

@@ -8,6 +8,7 @@
 
 #include "coordinator/store/detail/table_digest.hpp"
 #include "coordinator/store/store_error.hpp"
+#include "core/campaign/budget.hpp"
 #include "core/campaign/parameter.hpp"
 #include "core/simulation/run.hpp"
 
@@ -76,15 +77,27 @@ void check_same_values(std::string_view drawn_name, const std::vector<double>& g
   }
 }
 
+void insert_budget_coefficients(Database& database, const Scenario& scenario) {
+  Statement insert = database.prepare("INSERT INTO budget_coefficient VALUES (?, ?, ?)");
+  const auto coefficients = budget_coefficients(scenario);
+  for (std::size_t i = 0; i < num_budget_entries; ++i) {
+    for (const ParameterInfo& info : parameter_infos()) {
+      const double value = coefficients[i][index(info.parameter)];
+      if (value != 0.0) insert.run(budget_entry_infos()[i].name, info.name, value);
+    }
+  }
+}
+
 }  // namespace
 
-void insert_parameters(Database& database, const ParameterArray& objectives) {
+void insert_parameters(Database& database, const Scenario& scenario) {
   Statement insert = database.prepare("INSERT INTO parameter VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
   for (const ParameterInfo& info : parameter_infos()) {
     const std::size_t i = index(info.parameter);
-    insert.run(i + 1, info.name, info.label, info.unit, objectives[i], info.paper.worst,
+    insert.run(i + 1, info.name, info.label, info.unit, scenario.objectives[i], info.paper.worst,
                info.paper.mean, info.paper.standard_deviation);
   }
+  insert_budget_coefficients(database, scenario);
 }
 
 void insert_campaign(Database& database, const Campaign& campaign, std::string_view definition) {
@@ -94,7 +107,7 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
           " build, campaign_uid) VALUES (1, ?, ?, ?, ?, ?, ?, 1 + (random() & ?))")
       .run(campaign.name, std::to_string(campaign.seed), campaign.num_runs, definition,
            model_version, std::string_view(PROOFMASS_BUILD), campaign_uid_max - 1);
-  insert_parameters(database, campaign.scenario.objectives);
+  insert_parameters(database, campaign.scenario);
   insert_environment(database, campaign.environment_table);
   insert_dispersion_values(database, campaign, 0);
   write_table_digest(database);
@@ -115,8 +128,8 @@ EnvironmentTable read_environment_table(const Database& database) {
 }
 
 std::vector<double> read_dispersion_values(const Database& database, std::string_view drawn_name) {
-  Statement select =
-      database.prepare("SELECT value, run_index FROM dispersion_value WHERE name = ? ORDER BY 2");
+  Statement select = database.prepare(
+      "SELECT value, run_index FROM dispersion_value WHERE quantity = ? ORDER BY 2");
   select.bind_all(drawn_name);
   std::vector<double> values;
   while (select.step()) {

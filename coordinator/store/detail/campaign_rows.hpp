@@ -12,9 +12,8 @@ namespace proofmass::coordinator::detail {
 /// Fills the tables `campaign`, `parameter`, `environment_row` and `dispersion_value`.
 void insert_campaign(Database& database, const Campaign& campaign, std::string_view definition);
 
-/// Fills the table `parameter`.
-/// @param objectives  Largest acceptable |error| of each, SI.
-void insert_parameters(Database& database, const ParameterArray& objectives);
+/// Fills the tables `parameter` and `budget_coefficient`.
+void insert_parameters(Database& database, const Scenario& scenario);
 
 [[nodiscard]] EnvironmentTable read_environment_table(const Database& database);
 

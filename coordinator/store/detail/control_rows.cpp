@@ -204,9 +204,9 @@ std::vector<BlamedRun> read_blamed_runs(const Database& database) {
 
 std::vector<Contradiction> read_contradictions(const Database& database) {
   Statement select = database.prepare(
-      "SELECT a.run_index, w.name, a.stored_digest, a.second_digest "
-      "FROM audit AS a JOIN worker AS w ON w.worker_key = a.worker "
-      "WHERE NOT a.is_equal ORDER BY a.run_index, a.worker");
+      "SELECT a.run_index, w.worker, a.stored_digest, a.second_digest "
+      "FROM audit AS a JOIN worker AS w USING (worker_key) "
+      "WHERE NOT a.is_equal ORDER BY a.run_index, a.worker_key");
   std::vector<Contradiction> contradictions;
   while (select.step()) {
     contradictions.push_back({.run = RunIndex{select.count(0)},

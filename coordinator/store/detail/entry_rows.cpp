@@ -40,7 +40,7 @@ EntryRows::EntryRows(const Database& database)
       delete_failure_(database.prepare("DELETE FROM run_failure WHERE run_index = ?")),
       insert_audit_(database.prepare(insert_audit_sql)),
       insert_attempt_(database.prepare(
-          "INSERT INTO attempt (first_run, num_runs, attempt, worker, reason, is_blamed,"
+          "INSERT INTO attempt (first_run, num_runs, attempt, worker_key, reason, is_blamed,"
           " lost_unix_s) VALUES (?, ?, ?, ?, ?, ?, ?)")),
       trim_attempts_(
           database.prepare("DELETE FROM attempt WHERE attempt_id <= last_insert_rowid() - ?")),
@@ -102,7 +102,8 @@ void EntryRows::compare(const Delivery& delivery) {
 }
 
 bool EntryRows::has_room_for_audit(RunIndex run, std::int64_t worker, bool is_equal) {
-  Statement select = database_.prepare("SELECT 1 FROM audit WHERE run_index = ? AND worker = ?");
+  Statement select =
+      database_.prepare("SELECT 1 FROM audit WHERE run_index = ? AND worker_key = ?");
   select.bind_all(run.value, worker);
   if (select.step()) return true;  // The row is there.
   if (!num_audits_) num_audits_ = database_.count("SELECT count(*) FROM audit");

@@ -85,7 +85,7 @@ struct Deliveries {
 
 std::map<std::int64_t, Deliveries> read_deliveries(const Database& database) {
   Statement select =
-      database.prepare("SELECT run_index, worker, compute_s, received_unix_s FROM delivery");
+      database.prepare("SELECT run_index, worker_key, compute_s, received_unix_s FROM delivery");
   std::map<std::int64_t, Deliveries> by_worker;
   while (select.step()) {
     const double compute_s = select.real(2);
@@ -146,7 +146,7 @@ void check_workers(const Database& database) {
 // An audit has the digest of the stored result, and is equal if the second one has the same.
 void check_audits(const Database& database) {
   Statement select = database.prepare(
-      "SELECT run_index, worker, stored_digest, second_digest, is_equal FROM audit");
+      "SELECT run_index, worker_key, stored_digest, second_digest, is_equal FROM audit");
   ResultRows results(database);
   while (select.step()) {
     const std::string row =

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/store/detail/result_sql.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "proto/link/kill_point.hpp"
 
@@ -34,18 +35,23 @@ SchemaObjects schema_objects(const Database& database) {
   return objects;
 }
 
-/// What a file has that was brought to version n, for each n from 0.
+/// What a file has that was brought to a version, for each from oldest_schema_version.
 const std::vector<SchemaObjects>& known_schemas() {
   static const std::vector<SchemaObjects> schemas = [] {
     Database fresh("new campaign", Access::memory);
-    std::vector<SchemaObjects> all(1);
-    for (const std::string_view migration : migrations()) {
-      fresh.execute(std::string(migration));
+    std::vector<SchemaObjects> all;
+    for (const std::string& migration : migrations()) {
+      fresh.execute(migration);
       all.push_back(schema_objects(fresh));
     }
     return all;
   }();
   return schemas;
+}
+
+/// Place of a version's step among migrations().
+std::size_t step_to(std::int64_t version) {
+  return static_cast<std::size_t>(version - oldest_schema_version);
 }
 
 std::int64_t version_of(const Database& database, const std::filesystem::path& path) {
@@ -57,6 +63,12 @@ std::int64_t version_of(const Database& database, const std::filesystem::path& p
                     path.string(), version, schema_version()));
   }
   if (version < 1) database.refuse_as_damaged(fmt::format("user_version = {}", version));
+  if (version < oldest_schema_version) {
+    throw StoreError(
+        fmt::format("campaign file = {} (was made before the first release: its user_version is "
+                    "{}, the oldest known one {})",
+                    path.string(), version, oldest_schema_version));
+  }
   return version;
 }
 
@@ -93,7 +105,18 @@ void check_small_tables(const Database& database) {
 
 }  // namespace
 
-std::int64_t schema_version() { return static_cast<std::int64_t>(migrations().size()); }
+const std::vector<std::string>& migrations() {
+  static const std::vector<std::string> steps = [] {
+    std::vector<std::string> all;
+    for (const std::string_view file : schema_files()) all.push_back(with_quantities(file));
+    return all;
+  }();
+  return steps;
+}
+
+std::int64_t schema_version() {
+  return oldest_schema_version + static_cast<std::int64_t>(migrations().size()) - 1;
+}
 
 void check_kind(Database& database, const std::filesystem::path& path) {
   const std::int64_t id = database.integer("PRAGMA application_id");
@@ -159,7 +182,7 @@ bool is_older(const Database& database) {
 }
 
 void check_schema(const Database& database, std::int64_t version) {
-  SchemaObjects expected = known_schemas().at(static_cast<std::size_t>(version));
+  SchemaObjects expected = known_schemas().at(step_to(version));
   for (const auto& [name, sql] : schema_objects(database)) {
     const auto found = expected.find(name);
     if (found == expected.end()) database.refuse("has what is no part of a campaign: " + name);
@@ -171,10 +194,11 @@ void check_schema(const Database& database, std::int64_t version) {
 
 void migrate(Database& database) {
   PROOFMASS_EXPECT(database.in_transaction());
-  for (std::int64_t version = database.integer("PRAGMA user_version"); version < schema_version();
-       ++version) {
-    database.execute(std::string(migrations()[static_cast<std::size_t>(version)]));
-    PROOFMASS_EXPECT(database.integer("PRAGMA user_version") == version + 1);
+  const std::int64_t before = database.integer("PRAGMA user_version");  // 0 of a new file.
+  for (std::int64_t version = std::max(before + 1, oldest_schema_version);
+       version <= schema_version(); ++version) {
+    database.execute(migrations()[step_to(version)]);
+    PROOFMASS_EXPECT(database.integer("PRAGMA user_version") == version);
     wire::kill_point(wire::KillPoint::while_migrating);
   }
 }

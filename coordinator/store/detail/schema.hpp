@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "coordinator/store/detail/database.hpp"
 
@@ -14,16 +15,22 @@ namespace proofmass::coordinator::detail {
 /// `PrMs`: marks an SQLite database as a campaign file.
 inline constexpr std::int64_t application_id = 0x50724D73;
 
-/// The files of schema/ in order; the n-th, from 1, leads from version n − 1 to version n. They are
-/// compiled in.
-[[nodiscard]] std::span<const std::string_view> migrations();
+/// The version of the first file of schema/, the oldest that this program reads.
+inline constexpr std::int64_t oldest_schema_version = 8;
+
+/// The files of schema/ in order, compiled in. The first makes the tables of version
+/// oldest_schema_version, each further one leads to the next version.
+[[nodiscard]] std::span<const std::string_view> schema_files();
+
+/// The same as SQL, see with_quantities().
+[[nodiscard]] const std::vector<std::string>& migrations();
 
 /// The version that this program reads and writes.
 [[nodiscard]] std::int64_t schema_version();
 
-/// Checks that a database is a campaign file, not newer than this program, and that its tables,
-/// views and indexes are those of its version and that there is nothing else. Nothing that the file
-/// defines is evaluated before its definition has been compared.
+/// Checks that a database is a campaign file, of a version that this program reads, and that its
+/// tables, views and indexes are those of its version and that there is nothing else. Nothing that
+/// the file defines is evaluated before its definition has been compared.
 /// @param path  For the message.
 /// @throws StoreError otherwise.
 void check_kind(Database& database, const std::filesystem::path& path);

@@ -40,7 +40,7 @@ WorstRunTable read_worst_runs(const Database& database) {
 }
 
 ParameterArray read_objectives(const Database& database) {
-  Statement select = database.prepare("SELECT objective FROM parameter WHERE name = ?");
+  Statement select = database.prepare("SELECT objective FROM parameter WHERE parameter = ?");
   ParameterArray objectives{};
   for (const ParameterInfo& info : parameter_infos()) {
     select.bind_all(info.name);

@@ -18,7 +18,7 @@ std::optional<double> entry_of(const Budget* budget, std::size_t i) {
   return budget == nullptr ? std::nullopt : std::optional(entry_of(*budget, i));
 }
 
-constexpr int num_statistic_columns = 31;
+constexpr int num_statistic_columns = 33;
 
 /// Binds the columns of `statistic` one after the other.
 class StatisticRow {
@@ -48,6 +48,7 @@ class StatisticRow {
     put(accuracy.worst);
     put(accuracy.worst_run.value);
     put(accuracy.num_beyond_objective);
+    put(std::optional(accuracy.beyond_objective));
     put(accuracy.mean);
     put(accuracy.mean_interval);
     put(accuracy.standard_deviation);
@@ -88,21 +89,38 @@ void replace_statistics(Database& database, const CampaignStatistics& statistics
 
 void replace_summary(const Database& database, const CampaignStatistics& statistics,
                      const ResultDigests& digests) {
+  const std::uint64_t num_given_up = database.count("SELECT count(*) FROM run_failure");
+  const std::optional<Interval> share = statistics.within_objectives(num_given_up);
   database
       .prepare(
           "INSERT OR REPLACE INTO summary (summary_id, num_finished, num_estimated,"
-          " num_not_converged, num_not_finite, num_no_draw, num_lost, num_given_up, digest,"
+          " num_not_converged, num_not_finite, num_no_draw, num_lost, num_given_up,"
+          " num_within_objectives, within_objectives_lower, within_objectives_upper, digest,"
           " health_digest)"
-          " VALUES (1, ?, ?, ?, ?, ?, ?, (SELECT count(*) FROM run_failure), ?, ?)")
+          " VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
       .run(statistics.num_runs, statistics.num_estimated, statistics.num_not_converged,
-           statistics.num_not_finite, statistics.num_no_draw, statistics.num_lost, digests.results,
-           digests.health);
+           statistics.num_not_finite, statistics.num_no_draw, statistics.num_lost, num_given_up,
+           statistics.num_within_objectives, share ? std::optional(share->lower) : std::nullopt,
+           share ? std::optional(share->upper) : std::nullopt, digests.results, digests.health);
 }
+
+namespace {
+
+/// Bounds in a column and the next one.
+std::optional<Interval> read_interval(const Statement& row, int column) {
+  const std::optional<double> lower = row.optional_real(column);
+  const std::optional<double> upper = row.optional_real(column + 1);
+  if (!lower || !upper) return std::nullopt;
+  return Interval{.lower = *lower, .upper = *upper, .confidence = default_confidence};
+}
+
+}  // namespace
 
 std::optional<Summary> read_summary(const Database& database) {
   Statement select = database.prepare(
       "SELECT num_finished, num_estimated, num_not_converged, num_not_finite, num_no_draw,"
-      " num_given_up, digest, computed_utc, num_lost, health_digest FROM summary");
+      " num_given_up, digest, computed_utc, num_lost, health_digest, num_within_objectives,"
+      " within_objectives_lower, within_objectives_upper FROM summary");
   if (!select.step()) return std::nullopt;
   return Summary{.num_finished = select.count(0),
                  .num_estimated = select.count(1),
@@ -111,6 +129,8 @@ std::optional<Summary> read_summary(const Database& database) {
                  .num_no_draw = select.count(4),
                  .num_lost = select.count(8),
                  .num_given_up = select.count(5),
+                 .num_within_objectives = select.count(10),
+                 .within_objectives = read_interval(select, 11),
                  .digests = {.results = select.text(6), .health = select.text(9)},
                  .computed_utc = select.text(7)};
 }

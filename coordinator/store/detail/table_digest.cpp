@@ -31,7 +31,7 @@ void add_environment(const Database& database, Sha256& hash) {
 void add_dispersions(const Database& database, Sha256& hash) {
   hash.add(database.count("SELECT count(*) FROM dispersion_value"));
   Statement row = database.prepare(
-      "SELECT name, run_index, value FROM dispersion_value ORDER BY name, run_index");
+      "SELECT quantity, run_index, value FROM dispersion_value ORDER BY quantity, run_index");
   while (row.step()) {
     hash.add(row.text(0));
     hash.add(row.count(1));

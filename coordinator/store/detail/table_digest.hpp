@@ -10,8 +10,8 @@ namespace proofmass::coordinator::detail {
 /// (`NULL` without a value), name, seed, num_runs, definition, model_version, build, created_utc,
 /// campaign_uid, owner, stop_rule, num_runs_max and failures_max; then the number of rows of
 /// `environment_row` and, by `position`, position and their seven numbers; then the number of rows
-/// of `dispersion_value` and, by `name` and `run_index`, name, run and value. Integers have 64
-/// bits; layout as in Sha256.
+/// of `dispersion_value` and, by `quantity` and `run_index`, quantity, run and value. Integers have
+/// 64 bits; layout as in Sha256.
 [[nodiscard]] std::string compute_table_digest(const Database& database);
 
 /// Stores the digest of all this as it is; to be called after every change of it. @pre Inside a

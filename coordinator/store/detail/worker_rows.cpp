@@ -68,8 +68,9 @@ void WorkerRows::write(const WorkerJoined& joined) {
   }
   database_
       .prepare(
-          "INSERT INTO worker (session, name, host, process_id, num_slots) VALUES (?, ?, ?, ?, ?) "
-          "ON CONFLICT (session) DO UPDATE SET name = excluded.name, host = excluded.host,"
+          "INSERT INTO worker (session, worker, host, process_id, num_slots) VALUES (?, ?, ?, ?, "
+          "?) "
+          "ON CONFLICT (session) DO UPDATE SET worker = excluded.worker, host = excluded.host,"
           " process_id = excluded.process_id, num_slots = excluded.num_slots,"
           " ended_utc = NULL, end_reason = NULL")
       .run(hexadecimal(joined.session.value), joined.name, joined.host, storable(joined.process_id),
@@ -99,13 +100,13 @@ bool WorkerRows::is_full() const {
 std::int64_t WorkerRows::key_of_further() {
   const std::string_view select =
       "SELECT ifnull((SELECT worker_key FROM worker WHERE worker_key > ? AND session IS NULL"
-      " AND name = 'further workers' LIMIT 1), 0)";
+      " AND worker = 'further workers' LIMIT 1), 0)";
   Statement row = database_.prepare(select);
   row.bind_all(num_workers_max - 1);
   if (row.step() && row.integer(0) != 0) return row.integer(0);
   row.finish();
   has_overflowed_ = true;
-  database_.prepare("INSERT INTO worker (session, name, host) VALUES (NULL, ?, '')")
+  database_.prepare("INSERT INTO worker (session, worker, host) VALUES (NULL, ?, '')")
       .run(std::string_view("further workers"));
   return database_.last_row();
 }
@@ -116,7 +117,7 @@ std::int64_t WorkerRows::key_of(wire::SessionId session) {
   std::optional<std::int64_t> key = stored_key(session);
   if (!key && is_full()) key = key_of_further();
   if (!key) {
-    database_.prepare("INSERT INTO worker (session, name, host) VALUES (?, '', '')")
+    database_.prepare("INSERT INTO worker (session, worker, host) VALUES (?, '', '')")
         .run(hexadecimal(session.value));
     key = database_.last_row();
   }
@@ -126,7 +127,7 @@ std::int64_t WorkerRows::key_of(wire::SessionId session) {
 }
 
 std::string WorkerRows::name_of(wire::SessionId session) {
-  Statement select = database_.prepare("SELECT name FROM worker WHERE worker_key = ?");
+  Statement select = database_.prepare("SELECT worker FROM worker WHERE worker_key = ?");
   select.bind_all(key_of(session));
   if (!select.step()) database_.refuse_as_damaged("worker lacks a row that is referred to");
   return select.text(0);

@@ -39,7 +39,7 @@ class DerivedChecks : public test::VerificationTest {
 
 TEST_F(DerivedChecks, HoldParametersAgainstTheDefinition) {
   EXPECT_THAT(failing_after("UPDATE parameter SET objective = 260, paper_worst = 1, unit = 'm',"
-                            " label = 'zz' WHERE name = 'k2d'"),
+                            " label = 'zz' WHERE parameter = 'k2d'"),
               Contains("definition"));
   EXPECT_THAT(check("definition").details,
               ElementsAre("parameter.label of k2d = zz (must be K2d/K1c²)",
@@ -85,7 +85,7 @@ TEST_F(DerivedChecks, NameTheFirstOfManyDifferences) {
 
 TEST_F(DerivedChecks, FindABudgetThatDoesNotFollow) {
   EXPECT_THAT(failing_after("UPDATE budget_entry SET after_mean = 1, before = 2"
-                            " WHERE name = 'total'"),
+                            " WHERE term = 'total'"),
               ElementsAre("statistics"));
   EXPECT_THAT(check("statistics").details,
               ElementsAre(StartsWith("budget_entry.before of total = 2 (must be "),
@@ -93,7 +93,7 @@ TEST_F(DerivedChecks, FindABudgetThatDoesNotFollow) {
 }
 
 TEST_F(DerivedChecks, FindBudgetsThatAreMissingOrTooMany) {
-  EXPECT_THAT(failing_after("UPDATE budget_entry SET name = 'own' WHERE name = 'residual_y'"),
+  EXPECT_THAT(failing_after("UPDATE budget_entry SET term = 'own' WHERE term = 'residual_y'"),
               ElementsAre("statistics"));
   EXPECT_THAT(check("statistics").details,
               ElementsAre("budget_entry lacks residual_y", "budget_entry has a row too many: own"));
@@ -108,6 +108,8 @@ TEST_F(DerivedChecks, FindASummaryThatDoesNotCountTheResults) {
       ElementsAre("summary.num_estimated = 13 (must be 18)",
                   "summary.num_not_converged = 2 (must be 0)",
                   "summary.num_not_finite = 3 (must be 0)", "summary.num_no_draw = 5 (must be 0)",
+                  "summary.within_objectives_lower and _upper (must be those of "
+                  "num_within_objectives)",
                   "summary.num_given_up = 4 (must be at most 0)"));
 }
 
@@ -119,7 +121,7 @@ TEST_F(DerivedChecks, HoldOlderStatisticsAgainstWhatIsKnownOfThem) {
   EXPECT_THAT(failing_after("UPDATE summary SET num_estimated = 17"), IsEmpty());
   EXPECT_EQ(check("statistics").verdict, Verdict::not_checked);
   EXPECT_EQ(check("statistics").finding, "they are not of the results that are in the file");
-  EXPECT_THAT(failing_after("UPDATE budget_entry SET before = 2 WHERE name = 'total'"),
+  EXPECT_THAT(failing_after("UPDATE budget_entry SET before = 2 WHERE term = 'total'"),
               ElementsAre("statistics"));
   EXPECT_THAT(check("statistics").details,
               ElementsAre(StartsWith("budget_entry.before of total = 2 (must be ")));
@@ -130,22 +132,21 @@ TEST_F(DerivedChecks, FindStatisticsWithoutASummary) {
   EXPECT_THAT(check("statistics").details, Contains("statistic has a row too many: k2d"));
 }
 
-// What a coordinator has made of a file of version 4: its statistics are seven numbers.
-TEST_F(DerivedChecks, LetStatisticsOfOlderProgramsBe) {
-  EXPECT_THAT(failing_after("DELETE FROM summary;"
-                            "CREATE TABLE old AS SELECT parameter, num_runs, worst,"
-                            " worst_run_index, num_beyond_objective, mean, standard_deviation"
-                            " FROM statistic;"
-                            "DELETE FROM statistic;"
-                            "INSERT INTO statistic (parameter, num_runs, worst, worst_run_index,"
-                            " num_beyond_objective, mean, standard_deviation) SELECT * FROM old;"
-                            "DROP TABLE old"),
-              IsEmpty());
-  EXPECT_EQ(check("statistics").finding,
-            "no summary tells of which results those of an older file are");
-  EXPECT_THAT(failing_after("DELETE FROM statistic; DELETE FROM budget_entry;"
-                            "UPDATE campaign SET build = '', table_digest = ''"),
-              IsEmpty());
+TEST_F(DerivedChecks, HoldBudgetCoefficientsAgainstTheDefinition) {
+  EXPECT_THAT(failing_after("UPDATE budget_coefficient SET value = 1 WHERE parameter = 'k2d'"),
+              ElementsAre("definition"));
+  EXPECT_THAT(
+      check("definition").details,
+      ElementsAre(StartsWith("budget_coefficient.value of k2d in differential_quadratic = 1 "
+                             "(must be ")));
+}
+
+TEST_F(DerivedChecks, HoldTheShareOfRunsWithinAllObjectives) {
+  EXPECT_THAT(failing_after("UPDATE summary SET within_objectives_lower = 0.5"),
+              ElementsAre("statistics"));
+  EXPECT_THAT(check("statistics").details,
+              ElementsAre("summary.within_objectives_lower and _upper (must be those of "
+                          "num_within_objectives)"));
 }
 
 TEST_F(DerivedChecks, HoldForRunsThatFailed) {
@@ -166,7 +167,7 @@ TEST_F(DerivedChecks, HoldIfEveryRunFailed) {
   EXPECT_TRUE(verify_all());
   EXPECT_THAT(names(Verdict::not_checked), IsEmpty());
   EXPECT_EQ(stored("SELECT num_no_draw || ' ' || num_estimated FROM summary"), "18 0");
-  EXPECT_THAT(failing_after("UPDATE budget_entry SET after_worst = 1 WHERE name = 'total'"),
+  EXPECT_THAT(failing_after("UPDATE budget_entry SET after_worst = 1 WHERE term = 'total'"),
               ElementsAre("statistics"));
   EXPECT_THAT(check("statistics").details,
               ElementsAre("budget_entry.after_worst of total = 1 (must be NULL)"));

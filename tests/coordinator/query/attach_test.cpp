@@ -7,8 +7,6 @@
 #include <iterator>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/detail/schema.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 #include "tests/message_of.hpp"
 
@@ -148,58 +146,6 @@ TEST_F(Attach, LeavesAFileAloneThatACoordinatorWrites) {
   EXPECT_EQ(both("SELECT count(*) FROM b.run_result"), (Rows{{std::int64_t{5}}}));
   EXPECT_EQ(store.is_in_place(), true);
   EXPECT_GT(store.log_size(), 0U);
-}
-
-/// A file of version 3 with a result of run 4.
-void make_old_file(const std::filesystem::path& path) {
-  using namespace coordinator::detail;
-  Database old(path, Access::create);
-  for (std::size_t i = 0; i < 3; ++i) old.execute(std::string(migrations()[i]));
-  old.execute("INSERT INTO campaign VALUES (1, 'old', '42', 5, 'text', 'hardy2013-1', '')");
-  for (const ParameterInfo& info : parameter_infos()) {
-    old.execute(fmt::format("INSERT INTO parameter VALUES ({}, '{}', '', '', 1, 0, 0, 0)",
-                            index(info.parameter) + 1, info.name));
-  }
-  old.execute(
-      "INSERT INTO run_result (run_index, status, num_draws, num_rounds) VALUES (4, 4, 1, 0)");
-  old.execute("INSERT INTO delivery VALUES (4, 'w', 0, 1.0, '2024-03-01T00:00:00.000Z')");
-}
-
-// Views of this version are there, and the file stays as it was.
-TEST_F(Attach, ReadsACopyOfAnOlderFile) {
-  const auto old = directory() / "old.db";
-  make_old_file(old);
-  const std::string before = content_of(old);
-  const std::string sql =
-      "SELECT (SELECT name FROM campaign), (SELECT num_finished FROM campaign_progress), "
-      "(SELECT name FROM b.campaign), (SELECT num_finished FROM b.campaign_progress)";
-  EXPECT_EQ(ask(QueryFiles(file(), {{"b", old}}), sql),
-            (Rows{{"hardy2013", std::int64_t{3}, "old", std::int64_t{1}}}));
-  EXPECT_EQ(ask(QueryFiles(old, {{"b", other_file()}}), sql),
-            (Rows{{"old", std::int64_t{1}, "other", std::int64_t{4}}}));
-  EXPECT_EQ(ask(QueryFiles(old, {{"b", old}}), sql),
-            (Rows{{"old", std::int64_t{1}, "old", std::int64_t{1}}}));
-  EXPECT_EQ(content_of(old), before);
-}
-
-// The connection to the copy of an older main file may write; the last one that may would fold the
-// log of an attached file into it when it ends.
-TEST_F(Attach, LeavesALogAloneBesideAnOlderMainFile) {
-  const auto old = directory() / "old.db";
-  make_old_file(old);
-  sqlite3* writer = nullptr;
-  ASSERT_EQ(sqlite3_open(other_file().c_str(), &writer), SQLITE_OK);
-  sqlite3_exec(writer, "PRAGMA journal_mode = WAL; INSERT INTO tag VALUES ('a', '')", nullptr,
-               nullptr, nullptr);
-  const std::string before = content_of(other_file());
-  const auto copy = directory() / "copy.db";
-  std::filesystem::copy_file(other_file(), copy);
-  std::filesystem::copy_file(other_file().string() + "-wal", copy.string() + "-wal");
-  sqlite3_close(writer);
-  EXPECT_EQ(ask(QueryFiles(old, {{"b", copy}}), "SELECT count(*) FROM b.tag"),
-            (Rows{{std::int64_t{1}}}));
-  EXPECT_EQ(content_of(copy), before);
-  EXPECT_TRUE(std::filesystem::exists(copy.string() + "-wal"));
 }
 
 TEST_F(Attach, TakesAsManyFilesAsThereIsRoomFor) {

@@ -124,9 +124,10 @@ TEST_F(QueryRefusal, NamesWhatIsWrongAndWhere) {
 }
 
 TEST_F(QueryRefusal, TakesNoNameForText) {
-  EXPECT_EQ(error_of("SELECT * FROM parameter WHERE name = \"a_c12\""),
-            "sql = SELECT * FROM parameter WHERE name = \"a_c12\" (no such column: a_c12, at line "
-            "1, character 38)");
+  EXPECT_EQ(
+      error_of("SELECT * FROM parameter WHERE parameter = \"a_c12\""),
+      "sql = SELECT * FROM parameter WHERE parameter = \"a_c12\" (no such column: a_c12, at line "
+      "1, character 43)");
 }
 
 TEST_F(QueryRefusal, ShortensALongQuery) {

@@ -125,22 +125,10 @@ TEST_F(StoreAnnotation, LeavesOneFile) {
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
 }
 
-TEST_F(StoreAnnotation, RefusesFilesThatAreNotUpToDate) {
+TEST_F(StoreAnnotation, RefusesFilesThatAreMissingOrHaveTwoNames) {
   const std::filesystem::path missing = directory() / "missing.db";
   EXPECT_EQ(store_error_of([&] { Store::annotate(missing, {AddTag{"a"}}); }),
             "campaign file = " + missing.string() + " (does not exist)");
-  std::filesystem::remove(file());
-  {
-    Database old(file(), Access::create);
-    for (std::size_t i = 0; i < 4; ++i) old.execute(std::string(detail::migrations()[i]));
-    old.execute(
-        "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version)"
-        " VALUES (1, 'old', '42', 5, 'text', 'hardy2013-1')");
-  }
-  EXPECT_EQ(error_of(AddTag{"a"}),
-            "campaign file = " + file().string() +
-                " (is older than this program: its user_version is 4, not 7; resuming the "
-                "campaign brings it up to date)");
   std::filesystem::create_hard_link(file(), directory() / "other.db");
   EXPECT_EQ(error_of(AddTag{"a"}),
             "campaign file = " + file().string() +

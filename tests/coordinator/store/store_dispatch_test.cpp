@@ -114,7 +114,7 @@ TEST_F(StoreDispatch, KnowsWhichWorkersMayComeBack) {
 
   write(store, {WorkerEnded{.session = session_1, .reason = wire::LossReason::out_of_memory}});
   EXPECT_THAT(Store::open_read_only(file()).attached_sessions(), ElementsAre(session_2));
-  EXPECT_EQ(text("SELECT name || ' ' || host || ' ' || process_id || ' ' || num_slots || ' ' || "
+  EXPECT_EQ(text("SELECT worker || ' ' || host || ' ' || process_id || ' ' || num_slots || ' ' || "
                  "end_reason FROM worker WHERE session = 'fedcba9876543210'"),
             "worker-1 node-1 4711 8 out_of_memory");
 
@@ -149,19 +149,33 @@ TEST_F(StoreDispatch, KeepsAndCountsWhoDeliveredARun) {
   write(store, {delivery, delivery_of(4)});
   write(store, {delivery_of(5), delivery_of(5)});  // The second one is not kept.
 
-  EXPECT_EQ(text("SELECT name || ' ' || attempt || ' ' || delivery.compute_s FROM delivery JOIN "
-                 "worker ON worker = worker_key WHERE run_index = 3"),
+  EXPECT_EQ(text("SELECT worker || ' ' || attempt || ' ' || delivery.compute_s FROM delivery JOIN "
+                 "worker USING (worker_key) WHERE run_index = 3"),
             "worker-1 7 2.25");
   EXPECT_EQ(integer("SELECT abs(received_unix_s - strftime('%s', 'now')) < 60 FROM delivery"), 1);
   EXPECT_EQ(text("SELECT num_results || ' ' || compute_s FROM worker"), "3 3.25");
 }
 
+TEST_F(StoreDispatch, ShowsHowEachRunEndedAndWhoComputedIt) {
+  Store store = create();
+  write(store, {worker_1()});
+  Delivery without_draw = delivery_of(7);
+  without_draw.result = test::result_of(7, RunStatus::no_draw);
+  write(store, {delivery_of(3), without_draw});
+  EXPECT_EQ(text("SELECT group_concat(run_index || ' ' || status || ' ' || worker || ' ' || host ||"
+                 " ' ' || attempt || ' ' || compute_s, ';') FROM run"),
+            "3 completed worker-1 node-1 1 0.5;7 no_draw worker-1 node-1 1 0.5");
+  EXPECT_EQ(integer("SELECT count(*) FROM run WHERE abs(julianday(received_utc) - julianday('now'))"
+                    " < 0.001"),
+            2);
+}
+
 TEST_F(StoreDispatch, TakesAResultOfAWorkerThatNeverJoined) {
   Store store = create();
   write(store, {delivery_of(0)});
-  EXPECT_EQ(text("SELECT session || name || host FROM worker"), "fedcba9876543210");
+  EXPECT_EQ(text("SELECT session || worker || host FROM worker"), "fedcba9876543210");
   write(store, {worker_1()});
-  EXPECT_EQ(text("SELECT session || name || host FROM worker"), "fedcba9876543210worker-1node-1");
+  EXPECT_EQ(text("SELECT session || worker || host FROM worker"), "fedcba9876543210worker-1node-1");
 }
 
 TEST_F(StoreDispatch, ComparesASecondResultBitForBit) {
@@ -217,7 +231,7 @@ TEST_F(StoreDispatch, KeepsTheNewestMillionLossesAndSaysSo) {
   Database(file(), Access::read_write)
       .execute(
           "UPDATE attempt SET attempt_id = 1; INSERT INTO attempt SELECT 1000000, first_run, "
-          "num_runs, attempt, worker, reason, is_blamed, lost_unix_s FROM attempt");
+          "num_runs, attempt, worker_key, reason, is_blamed, lost_unix_s FROM attempt");
   write(store, {lost(1, 1, 1, wire::LossReason::silent), lost(2, 1, 1, wire::LossReason::silent)});
   EXPECT_EQ(text("SELECT group_concat(attempt_id) FROM attempt"), "1000000,1000001,1000002");
   EXPECT_EQ(text("SELECT group_concat(kind || ' ' || text) FROM event"),
@@ -230,7 +244,7 @@ TEST_F(StoreDispatch, CountsFurtherWorkersThanAHundredThousandInOneRow) {
   write(store, {delivery_of(0)});
   Database(file(), Access::read_write)
       .execute(
-          "INSERT INTO worker (worker_key, session, name, host) VALUES (100000,"
+          "INSERT INTO worker (worker_key, session, worker, host) VALUES (100000,"
           " 'ffffffffffffffff', 'last', 'here')");
   const auto of_worker = [](std::uint64_t session, std::uint64_t run) {
     Delivery delivery = delivery_of(run);
@@ -242,7 +256,7 @@ TEST_F(StoreDispatch, CountsFurtherWorkersThanAHundredThousandInOneRow) {
   write(store, {late, of_worker(2, 1), of_worker(3, 2), delivery_of(3), worker_1()});
   write(store, {of_worker(4, 4), SecondDelivery{of_worker(5, 4)},
                 WorkerEnded{.session = wire::SessionId{2}, .reason = wire::LossReason::silent}});
-  EXPECT_EQ(text("SELECT group_concat(name || ' ' || num_results || ' ' || compute_s, ';')"
+  EXPECT_EQ(text("SELECT group_concat(worker || ' ' || num_results || ' ' || compute_s, ';')"
                  " FROM worker"),
             "worker-1 2 1.0;last 0 0.0;further workers 3 1.5");
   EXPECT_EQ(text("SELECT group_concat(kind || ' ' || text) FROM event"),
@@ -368,7 +382,7 @@ TEST_F(StoreDispatch, ShowsTheThroughputOfWorkers) {
   Database(file(), Access::read_write)
       .execute(
           "UPDATE worker SET first_seen_utc = strftime('%Y-%m-%dT%H:%M:%SZ', "
-          "last_result_unix_s - 60, 'unixepoch') WHERE name = 'worker-1'");
+          "last_result_unix_s - 60, 'unixepoch') WHERE worker = 'worker-1'");
   EXPECT_EQ(text("SELECT group_concat(worker || ' ' || num_results || ' ' || compute_s || ' ' || "
                  "ifnull(run_s, '-') || ' ' || ifnull(results_per_h, '-'), ';') "
                  "FROM worker_throughput"),

@@ -50,7 +50,7 @@ TEST_F(StoreIntegrity, IsThatOfAFileJustMade) {
 }
 
 TEST_F(StoreIntegrity, IsMissedByARowWithoutTheOneItRefersTo) {
-  change("UPDATE delivery SET worker = 99 WHERE run_index = 17");
+  change("UPDATE delivery SET worker_key = 99 WHERE run_index = 17");
   EXPECT_EQ(finding(),
             "is damaged: row 17 of delivery refers to no row of worker; restore it "
             "from a copy");
@@ -133,7 +133,7 @@ TEST_F(StoreIntegrity, IsMissedByATimeOfAWorkerThatIsNotOfItsDeliveries) {
 }
 
 TEST_F(StoreIntegrity, IsMissedByAWorkerWithResultsAndNoDeliveries) {
-  change("INSERT INTO worker (name, host, num_results) VALUES ('w', 'h', 1)");
+  change("INSERT INTO worker (worker, host, num_results) VALUES ('w', 'h', 1)");
   EXPECT_THAT(finding(), HasSubstr("worker.num_results of worker_key 2 = 1 (must be 0"));
 }
 

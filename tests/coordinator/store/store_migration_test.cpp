@@ -1,195 +1,100 @@
-// Files that older programs made.
+// Files that older programs made: here those of the first version of the schema, while the newest
+// has one step more (schema/0009_later.sql).
 
 #include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <cstdlib>
 
+#include "coordinator/archive/listing.hpp"
+#include "coordinator/query/query.hpp"
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/budget.hpp"
 #include "core/campaign/parameter.hpp"
+#include "tests/coordinator/query/query_fixture.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 using detail::Access;
-using detail::are_equal;
 using detail::Database;
 using ::testing::ElementsAre;
-using ::testing::IsEmpty;
+
+/// A file of the older version with runs 0 and 1 by `näh`, run 4 by `worker-2`, and a note.
+void make_older(const std::filesystem::path& path) {
+  Database old(path, Access::create);
+  old.execute(detail::migrations()[0]);
+  old.execute(
+      "INSERT INTO campaign (campaign_uid, name, seed, num_runs, definition, model_version, build)"
+      " VALUES (7, 'old', '42', 5, 'text', 'hardy2013-3', 'b')");
+  for (const ParameterInfo& info : parameter_infos()) {
+    old.execute("INSERT INTO parameter VALUES (" + std::to_string(index(info.parameter) + 1) +
+                ", '" + std::string(info.name) + "', '', '', 1, 0, 0, 0)");
+  }
+  for (const int run : {0, 1, 4}) {
+    old.execute("INSERT INTO run_result (run_index, status, num_draws, num_rounds) VALUES (" +
+                std::to_string(run) + ", 4, 1000, 0)");
+  }
+  old.execute(
+      "INSERT INTO worker (worker_key, worker, host, num_results, compute_s, last_result_unix_s)"
+      " VALUES (1, 'näh', 'h', 2, 3.0, 20), (2, 'worker-2', 'h', 1, 1.0, 30)");
+  old.execute(
+      "INSERT INTO delivery VALUES (0, 1, 0, 2.5, 10), (1, 1, 3, 0.5, 20), (4, 2, 0, 1, 30)");
+  old.execute("INSERT INTO note (text) VALUES ('kept')");
+}
 
 class StoreMigration : public test::StoreTest {
  protected:
-  /// A file of version 3 with runs 0 and 1 by `näh`, and run 4 by `worker-2`.
-  void make_file_of_version_3() const {
-    Database old(file(), Access::create);
-    for (int i = 0; i < 3; ++i) {
-      old.execute(std::string(detail::migrations()[static_cast<std::size_t>(i)]));
-    }
-    old.execute("INSERT INTO campaign VALUES (1, 'old', '42', 5, 'text', 'hardy2013-1', '')");
-    for (const ParameterInfo& info : parameter_infos()) {
-      old.execute("INSERT INTO parameter VALUES (" + std::to_string(index(info.parameter) + 1) +
-                  ", '" + std::string(info.name) + "', '', '', 1, 0, 0, 0)");
-    }
-    for (const int run : {0, 1, 4}) {
-      old.execute("INSERT INTO run_result (run_index, status, num_draws, num_rounds) VALUES (" +
-                  std::to_string(run) + ", 4, 1, 0)");
-    }
-    old.execute(
-        "INSERT INTO delivery VALUES (0, 'näh', 0, 2.5, '2024-02-29T12:00:00.250Z'),"
-        " (1, 'näh', 3, 0.5, '2024-02-29T12:00:10.999Z'),"
-        " (4, 'worker-2', 0, 1.0, '2024-03-01T00:00:00.000Z')");
+  void make_older_file() const { make_older(file()); }
+
+  [[nodiscard]] std::string older_than_the_program() const {
+    return "campaign file = " + file().string() +
+           " (is older than this program: its user_version is 8, not 9; resuming the campaign "
+           "brings it up to date)";
   }
 };
 
-TEST_F(StoreMigration, FromVersion3KeepsResultsAndWhoDeliveredThem) {
-  make_file_of_version_3();
-  Store store = Store::open(file());
+// If the linker took the library's own files, there would be one version.
+TEST_F(StoreMigration, HasASchemaOfTwoVersionsHere) { EXPECT_EQ(detail::schema_version(), 9); }
 
+TEST_F(StoreMigration, KeepsResultsAndWhoDeliveredThem) {
+  make_older_file();
+  Store store = Store::open(file());
+  EXPECT_EQ(store.name(), "old");
+  EXPECT_EQ(store.id(), wire::CampaignId{7});
   EXPECT_THAT(store.finished_runs(),
               ElementsAre(RunRange{RunIndex{0}, 2}, RunRange{RunIndex{4}, 1}));
   const Database database(file(), Access::read_only);
+  EXPECT_EQ(database.integer("PRAGMA user_version"), 9);
   EXPECT_EQ(
-      database.text("SELECT group_concat(run_index || ' ' || name || ' ' || attempt || ' ' || "
+      database.text("SELECT group_concat(run_index || ' ' || worker || ' ' || attempt || ' ' || "
                     "d.compute_s || ' ' || received_unix_s, ';') "
-                    "FROM delivery AS d JOIN worker ON worker = worker_key"),
-      "0 näh 0 2.5 1709208000;1 näh 3 0.5 1709208010;4 worker-2 0 1.0 1709251200");
-  EXPECT_EQ(database.text("SELECT group_concat(worker || ' ' || num_results || ' ' || compute_s || "
-                          "' ' || last_result_utc, ';') FROM worker_throughput"),
-            "näh 2 3.0 2024-02-29T12:00:10Z;worker-2 1 1.0 2024-03-01T00:00:00Z");
+                    "FROM delivery AS d JOIN worker USING (worker_key)"),
+      "0 näh 0 2.5 10;1 näh 3 0.5 20;4 worker-2 0 1.0 30");
+  EXPECT_EQ(database.text("SELECT colour || text FROM notes"), "greykept");
   EXPECT_EQ(database.integer("SELECT count(*) FROM pragma_foreign_key_check"), 0);
+  EXPECT_EQ(database.text("PRAGMA integrity_check"), "ok");
   EXPECT_EQ(store.commit(test::deliveries_of(0, 5)).num_new, 2u);
 }
 
-TEST_F(StoreMigration, FromVersion3MakesACampaignToBeServed) {
-  make_file_of_version_3();
-  const wire::CampaignId id = Store::open(file()).id();
-  const Store store = Store::open(file());
-  EXPECT_EQ(store.id(), id);
-  EXPECT_GT(id.value, 1u);
-  EXPECT_EQ(store.build(), "");
-  EXPECT_EQ(store.control(), CampaignControl{});
-  EXPECT_THAT(store.attached_sessions(), IsEmpty());  // Their sessions are not known.
-  EXPECT_THAT(store.blamed_runs(), IsEmpty());
-  EXPECT_THAT(store.given_up_runs(), IsEmpty());
-}
-
-TEST_F(StoreMigration, FromVersion4KeepsStatisticsAndFindsTheRunsThatStandOut) {
-  {
-    Store::create(file(), test::campaign_of(30), "");
-    Database old(directory() / "old.db", Access::create);
-    for (std::size_t i = 0; i < 4; ++i) old.execute(std::string(detail::migrations()[i]));
-    old.execute("ATTACH '" + file().string() + "' AS new");
-    old.execute(
-        "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition,"
-        " model_version) VALUES (1, 'old', '42', 30, 'text', 'hardy2013-1')");
-    old.execute("INSERT INTO parameter SELECT * FROM new.parameter");
-    old.execute("INSERT INTO statistic VALUES ('a_c13', 7, 0.5, 3, 0.25, 0.125, 2)");
-    old.execute("INSERT INTO worker (session, name, host) VALUES ('0000000000000001', 'w', 'h')");
-    // Half of the results by the old program: run 2 is the worst.
-    Store store = Store::open(file());
-    std::vector<Delivery> deliveries = test::deliveries_of(0, 15);
-    deliveries[2].result.estimate[4] = 7.0;
-    store.commit(deliveries);
-    const std::string columns =
-        old.text("SELECT group_concat(name) FROM pragma_table_info('run_result')");
-    old.execute("INSERT INTO run_result (" + columns + ") SELECT " + columns +
-                " FROM new.run_result");
-    old.execute("INSERT INTO delivery SELECT run_index, 1, 0, 0.0, 0 FROM run_result");
-  }
-  const auto all = [&](const std::string& view) {
-    return Database(file(), Access::read_only)
-        .text("SELECT group_concat(quote(run_index) || parameter || quote(ratio), ';') FROM " +
-              view);
+TEST_F(StoreMigration, LeadsToTheTablesOfANewFile) {
+  const auto schema_text = [](const std::filesystem::path& path) {
+    return Database(path, Access::read_only)
+        .text("SELECT group_concat(sql, ';') FROM (SELECT sql FROM sqlite_schema ORDER BY name)");
   };
-  const std::string worst = all("worst_runs");
-  const std::string overruns = all("overruns");
-  std::filesystem::rename(directory() / "old.db", file());
-  Store store = Store::open(file());
-  EXPECT_EQ(all("worst_runs"), worst);
-  EXPECT_EQ(all("overruns"), overruns);
-  EXPECT_EQ(store.summary(), std::nullopt);
-  EXPECT_EQ(store.stop_plan(), StopPlan{});
-  EXPECT_THAT(store.tags(), IsEmpty());
-  EXPECT_EQ(Database(file(), Access::read_only)
-                .text("SELECT worst || ' ' || worst_run_index || ' ' || mean || ' ' ||"
-                      " standard_deviation || ' ' || num_beyond_objective || ' ' || num_runs ||"
-                      " ' ' || quote(bias) FROM parameter_accuracy WHERE parameter = 'a_c13'"),
-            "0.5 3 0.25 0.125 2 7 NULL");
-}
-
-TEST_F(StoreMigration, FromVersion5HasNoOwnerAndNoDigestOfTables) {
-  {
-    Database old(file(), Access::create);
-    for (std::size_t i = 0; i < 5; ++i) old.execute(std::string(detail::migrations()[i]));
-    old.execute(
-        "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition,"
-        " model_version) VALUES (1, 'old', '42', 30, 'text', 'hardy2013-1')");
-  }
-  Store store = Store::open(file());
-  EXPECT_EQ(store.name(), "old");
-  EXPECT_EQ(store.owner(), "");
-  EXPECT_EQ(store.table_digest(), "");
-  EXPECT_EQ(Database(file(), Access::read_only).integer("SELECT is_log_needed FROM campaign"), 0);
-}
-
-/// What a file of version 6 says of its results and of who has them.
-constexpr const char* rows_of_version_6 =
-    "SELECT group_concat(quote(run_index) || quote(status) || quote(num_draws) || quote(num_rounds)"
-    " || quote(truth_k2c_s2_m) || quote(estimate_a_c12_rad) || quote(error_a_c12_rad)"
-    " || quote(attempt) || quote(compute_s), ';') FROM run_result JOIN delivery USING (run_index)";
-
-// The table of results is made anew, and other tables refer to its rows.
-TEST_F(StoreMigration, FromVersion6KeepsResultsThatHaveNoHealth) {
-  std::string before;
-  {
-    const std::filesystem::path newer = directory() / "newer.db";
-    std::vector<Delivery> deliveries;
-    for (const auto status : {RunStatus::completed, RunStatus::not_converged, RunStatus::not_finite,
-                              RunStatus::no_draw}) {
-      const std::uint64_t run = deliveries.size();
-      deliveries.push_back({test::result_of(run, status), test::session_1, {1}, 0.25});
-    }
-    const std::vector<Entry> entries{SecondDelivery{deliveries[1]}};
-    Store store = Store::create(newer, test::campaign_of(5), "");
-    store.commit(deliveries);
-    store.write(entries);
-    store.write_statistics({.num_runs = 4, .num_estimated = 2}, {}, {}, {},
-                           {.results = std::string(64, 'a'), .health = ""});
-    Database old(file(), Access::create);
-    for (std::size_t i = 0; i < 6; ++i) old.execute(std::string(detail::migrations()[i]));
-    old.execute("ATTACH '" + newer.string() + "' AS newer");
-    for (const std::string table : {"campaign", "parameter", "run_result", "worker", "delivery",
-                                    "audit", "overrun", "worst_run", "statistic", "summary"}) {
-      const std::string columns =
-          old.text("SELECT group_concat(name) FROM pragma_table_info('" + table + "')");
-      old.execute("INSERT INTO main." + table + " (" + columns + ") SELECT " + columns +
-                  " FROM newer." + table);
-    }
-    before = old.text(rows_of_version_6);
-  }
-  const Store store = Store::open(file());
-  store.check_integrity();
-  const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.text(rows_of_version_6), before);
-  EXPECT_EQ(database.integer("SELECT count(*) FROM pragma_foreign_key_check"), 0);
-  EXPECT_EQ(database.text("PRAGMA integrity_check"), "ok");
-  for (const RunResult& result : test::results_in(store)) {
-    EXPECT_EQ(result.health, std::nullopt);
-    EXPECT_TRUE(are_equal(result, test::result_of(result.run.value, result.status)));
-  }
-  EXPECT_EQ(store.summary()->digests,
-            (ResultDigests{.results = std::string(64, 'a'), .health = ""}));
-  EXPECT_EQ(database.integer("SELECT count(*) FROM loop_health WHERE acceleration_m_s2 IS NULL"),
-            3);
+  make_older_file();
+  { const Store store = Store::open(file()); }
+  const std::filesystem::path fresh = directory() / "fresh.db";
+  { const Store store = Store::create(fresh, test::campaign_of(5), ""); }
+  EXPECT_EQ(schema_text(file()), schema_text(fresh));
 }
 
 // It is a copy that is brought up to date.
 TEST_F(StoreMigration, OfAFileThatIsReadLeavesItAsItIs) {
-  make_file_of_version_3();
+  make_older_file();
   const std::string before = test::content_of(file());
   {
     Store store = Store::open_read_only(file());
@@ -208,20 +113,69 @@ TEST_F(StoreMigration, OfAFileThatIsReadLeavesItAsItIs) {
   EXPECT_TRUE(test::content_of(file()) == before);
 }
 
-TEST_F(StoreMigration, OfAFileThatIsReadIsPossibleFromEachVersion) {
-  for (std::size_t version = 1; version < detail::migrations().size(); ++version) {
-    std::filesystem::remove(file());
-    {
-      Database old(file(), Access::create);
-      for (std::size_t i = 0; i < version; ++i) old.execute(std::string(detail::migrations()[i]));
-      old.execute(
-          "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version)"
-          " VALUES (1, 'old', '42', 5, 'text', 'hardy2013-1')");
-    }
-    const Store store = Store::open_read_only(file());
-    EXPECT_TRUE(store.is_of_older_version()) << version;
-    EXPECT_EQ(store.num_runs(), 5u) << version;
+TEST_F(StoreMigration, IsNeededBeforeTagsAndNotes) {
+  make_older_file();
+  EXPECT_EQ(test::store_error_of([&] { Store::annotate(file(), {AddTag{"tag"}}); }),
+            older_than_the_program());
+}
+
+TEST_F(StoreMigration, OfAFileThatIsListedReadsACopy) {
+  make_older_file();
+  const std::vector<std::filesystem::path> places{directory()};
+  const std::vector<ListedCampaign> campaigns = list_campaigns(places);
+  ASSERT_EQ(campaigns.size(), 1u);
+  EXPECT_EQ(campaigns[0].problem, "");
+  EXPECT_EQ(campaigns[0].name, "old");
+}
+
+// A query sees the views of the newest version, also of files that are attached.
+TEST_F(StoreMigration, OfFilesThatAreQueriedReadsCopies) {
+  make_older_file();
+  const std::filesystem::path other = directory() / "other.db";
+  { const Store store = Store::create(other, test::campaign_of(5), ""); }
+  const std::string before = test::content_of(file());
+  const auto ask = [](const QueryFiles& files) {
+    test::RecordingWriter writer;
+    const std::string sql = "SELECT (SELECT count(*) FROM notes), (SELECT count(*) FROM b.notes)";
+    EXPECT_EQ(run_query(files, sql, {}, writer), QueryEnd::complete);
+    return writer.rows;
+  };
+  using Rows = std::vector<std::vector<test::OwnCell>>;
+  EXPECT_EQ(ask(QueryFiles(other, {{"b", file()}})), (Rows{{std::int64_t{0}, std::int64_t{1}}}));
+  EXPECT_EQ(ask(QueryFiles(file(), {{"b", other}})), (Rows{{std::int64_t{1}, std::int64_t{0}}}));
+  EXPECT_EQ(ask(QueryFiles(file(), {{"b", file()}})), (Rows{{std::int64_t{1}, std::int64_t{1}}}));
+  EXPECT_TRUE(test::content_of(file()) == before);
+}
+
+// The connection to the copy of an older main file may write; the last one that may would fold the
+// log of an attached file into it when it ends.
+TEST_F(StoreMigration, OfAMainFileThatIsQueriedLeavesTheLogOfAnotherAlone) {
+  make_older_file();
+  const std::filesystem::path other = directory() / "other.db";
+  { const Store store = Store::create(other, test::campaign_of(5), ""); }
+  const std::filesystem::path copy = directory() / "copy.db";
+  {
+    Database writer(other, Access::read_write);
+    writer.execute("PRAGMA journal_mode = WAL; INSERT INTO tag VALUES ('a', '')");
+    std::filesystem::copy_file(other, copy);
+    std::filesystem::copy_file(other.string() + "-wal", copy.string() + "-wal");
   }
+  const std::string before = test::content_of(copy);
+  test::RecordingWriter rows;
+  EXPECT_EQ(run_query(QueryFiles(file(), {{"b", copy}}), "SELECT count(*) FROM b.tag", {}, rows),
+            QueryEnd::complete);
+  EXPECT_EQ(rows.rows, (std::vector<std::vector<test::OwnCell>>{{std::int64_t{1}}}));
+  EXPECT_TRUE(test::content_of(copy) == before);
+  EXPECT_TRUE(std::filesystem::exists(copy.string() + "-wal"));
+}
+
+TEST_F(StoreMigration, IsNotPossibleFromBeforeTheFirstVersion) {
+  make_older_file();
+  Database(file(), Access::read_write).execute("PRAGMA user_version = 7");
+  EXPECT_EQ(test::store_error_of([&] { Store::open(file()); }),
+            "campaign file = " + file().string() +
+                " (was made before the first release: its user_version is 7, the oldest known one "
+                "8)");
 }
 
 /// While it lives, temporary files are made in another directory.
@@ -238,7 +192,7 @@ class TemporaryFilesIn {
 
 // The file has no name, so that no end of the process leaves it behind.
 TEST_F(StoreMigration, OfAFileThatIsReadLeavesNoTemporaryFile) {
-  make_file_of_version_3();
+  make_older_file();
   Database(file(), Access::read_write)
       .execute("UPDATE campaign SET definition = printf('%.*c', 8000000, 'x')");
   const std::filesystem::path folder = directory() / "temporary";
@@ -252,7 +206,7 @@ TEST_F(StoreMigration, OfAFileThatIsReadLeavesNoTemporaryFile) {
 }
 
 TEST_F(StoreMigration, OfAFileThatIsReadNeedsRoomForACopy) {
-  make_file_of_version_3();
+  make_older_file();
   Database(file(), Access::read_write)
       .execute("UPDATE campaign SET definition = printf('%.*c', 8000000, 'x')");
   const test::FileSizeLimit limit(100'000);
@@ -262,19 +216,17 @@ TEST_F(StoreMigration, OfAFileThatIsReadNeedsRoomForACopy) {
                 "in the temporary directory, which TMPDIR names: disk I/O error)");
 }
 
-// A time that is none: nothing of the step may remain.
+// Nothing of the step may remain.
 TEST_F(StoreMigration, ThatFailsLeavesTheFileAsItWas) {
-  make_file_of_version_3();
-  Database(file(), Access::read_write)
-      .execute("UPDATE delivery SET received_utc = 'never' WHERE run_index = 4");
+  make_older_file();
+  Database(file(), Access::read_write).execute("UPDATE note SET text = 'fails'");
   EXPECT_EQ(test::store_error_of([&] { Store::open(file()); }),
-            "campaign file = " + file().string() +
-                " (NOT NULL constraint failed: delivery_by_worker.received_unix_s)");
+            "campaign file = " + file().string() + " (CHECK constraint failed: text <> 'fails')");
   const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.integer("PRAGMA user_version"), 3);
-  EXPECT_EQ(database.text("SELECT group_concat(worker) FROM delivery"), "näh,näh,worker-2");
+  EXPECT_EQ(database.integer("PRAGMA user_version"), 8);
+  EXPECT_EQ(database.text("SELECT text FROM note"), "fails");
   EXPECT_EQ(database.integer("SELECT count(*) FROM pragma_table_info('campaign') WHERE name = "
-                             "'campaign_uid'"),
+                             "'colour'"),
             0);
 }
 

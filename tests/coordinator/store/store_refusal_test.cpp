@@ -121,21 +121,9 @@ TEST_F(StoreRefusal, OfANewerFile) {
   create();
   Database(file(), Access::read_write).execute("PRAGMA user_version = 99");
   const std::string expected =
-      message("is newer than this program: its user_version is 99, the newest known one 7");
+      message("is newer than this program: its user_version is 99, the newest known one 8");
   EXPECT_EQ(error_of_open(), expected);
   EXPECT_EQ(error_of_open_read_only(), expected);
-}
-
-TEST_F(StoreRefusal, ToAnnotateAnOlderFile) {
-  {
-    Database old(file(), Access::create);
-    for (std::size_t i = 0; i < 2; ++i) old.execute(std::string(detail::migrations()[i]));
-    old.execute("INSERT INTO campaign VALUES (1, 'old', '42', 5, 'text', 'proofmass 0', '')");
-  }
-  EXPECT_EQ(
-      store_error_of([&] { Store::annotate(file(), {AddTag{"tag"}}); }),
-      message("is older than this program: its user_version is 2, not 7; resuming the campaign "
-              "brings it up to date"));
 }
 
 // What is stored is what was delivered: nothing in a file from elsewhere changes it.
@@ -175,7 +163,8 @@ TEST_F(StoreRefusal, OfAFileWhoseSchemaIsNotThatOfACampaign) {
        "is damaged: malformed database schema (budget); restore it from a copy"},
       {"PRAGMA user_version = 0", "is damaged: user_version = 0; restore it from a copy"},
       {"PRAGMA user_version = -1", "is damaged: user_version = -1; restore it from a copy"},
-      {"PRAGMA user_version = 1", "has what is no part of a campaign: index attempt_blamed"}};
+      {"PRAGMA user_version = 7",
+       "was made before the first release: its user_version is 7, the oldest known one 8"}};
   for (const auto& [sql, reason] : cases) {
     std::filesystem::remove(file());
     create();
@@ -266,7 +255,7 @@ TEST_F(StoreRefusal, OfAnAttemptAtRunsThatThereAreNot) {
   create();
   Database(file(), Access::read_write)
       .execute(
-          "INSERT INTO attempt (first_run, num_runs, attempt, worker, reason, is_blamed,"
+          "INSERT INTO attempt (first_run, num_runs, attempt, worker_key, reason, is_blamed,"
           " lost_unix_s) VALUES (1, 1000000000000000000, 0, 1, 'crashed', 1, 0)");
   const Store store = Store::open_read_only(file());
   EXPECT_EQ(store_error_of([&] { (void)store.blamed_runs(); }),

@@ -50,7 +50,7 @@ TEST_F(StoreStandout, ErrorsInLongFormAreThoseOfTheResults) {
   const Database database(file(), Access::read_only);
   Statement row = database.prepare(
       "SELECT run_index, e.parameter, e.unit, truth, estimate, error FROM error_long AS e"
-      " JOIN parameter AS p ON p.name = e.parameter ORDER BY run_index, position");
+      " JOIN parameter AS p USING (parameter) ORDER BY run_index, position");
   for (const std::uint64_t run : {0u, 2u}) {
     for (const ParameterInfo& info : parameter_infos()) {
       const RunResult& result = deliveries[run].result;

@@ -221,7 +221,7 @@ TEST_F(StoreTest, CommitsARunOnce) {
   EXPECT_EQ(summary.num_contradicting, 0u);
   EXPECT_EQ(results_in(store).size(), 4u);
   const Database database(file(), Access::read_only);
-  EXPECT_EQ(database.text("SELECT session FROM worker JOIN delivery ON worker = worker_key WHERE "
+  EXPECT_EQ(database.text("SELECT session FROM worker JOIN delivery USING (worker_key) WHERE "
                           "run_index = 1"),
             "fedcba9876543210");
   EXPECT_EQ(database.integer("SELECT count(*) FROM delivery"), 4);

@@ -114,6 +114,20 @@ TEST(BudgetAfterCalibration, IsLinearInTheErrors) {
   EXPECT_EQ(twice.total, 2.0 * once.total);
 }
 
+TEST(BudgetCoefficients, YieldEachEntryFromTheErrors) {
+  const Scenario scenario;
+  ParameterArray errors{};
+  for (std::size_t i = 0; i < num_parameters; ++i) errors[i] = 1e-3 * static_cast<double>(i + 1);
+  const Budget budget = budget_after_calibration(scenario, errors);
+  const auto coefficients = budget_coefficients(scenario);
+  for (std::size_t entry = 0; entry < num_budget_entries; ++entry) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < num_parameters; ++i) sum += coefficients[entry][i] * errors[i];
+    EXPECT_NEAR(sum, budget.entries[entry], 1e-14 * budget.entries[entry]);
+    EXPECT_GT(sum, 0.0);
+  }
+}
+
 TEST(BudgetAfterCalibration, OfNoErrorIsZero) {
   EXPECT_EQ(budget_after_calibration(Scenario{}, ParameterArray{}).total, 0.0);
 }

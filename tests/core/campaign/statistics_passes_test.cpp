@@ -63,6 +63,7 @@ std::vector<std::uint64_t> bits_of(const AccuracyStatistic& accuracy) {
         accuracy.error.rms, accuracy.error.standard_deviation, accuracy.error.skewness}) {
     put(value);
   }
+  put_interval(accuracy.beyond_objective);
   put_interval(accuracy.mean_interval);
   put_interval(accuracy.deviation_interval);
   put_interval(accuracy.error.bias_interval);
@@ -85,6 +86,7 @@ TEST(StatisticsPasses, YieldTheBitsOfResultsInMemory) {
       EXPECT_EQ(found.num_not_converged, expected.num_not_converged);
       EXPECT_EQ(found.num_not_finite, expected.num_not_finite);
       EXPECT_EQ(found.num_no_draw, expected.num_no_draw);
+      EXPECT_EQ(found.num_within_objectives, expected.num_within_objectives);
       for (std::size_t i = 0; i < num_parameters; ++i) {
         EXPECT_EQ(bits_of(found.accuracy[i]), bits_of(expected.accuracy[i])) << num_runs;
       }

@@ -44,21 +44,6 @@ TEST(StudentTwoSided, InvertsTheQuantile) {
   }
 }
 
-// With two degrees of freedom χ² is exponential with mean 2.
-TEST(ChiSquareQuantile, HasItsClosedForm) {
-  for (const double p : {1e-6, 0.025, 0.5, 0.975, 0.9999}) {
-    EXPECT_NEAR(chi_square_quantile(p, 2.0) / (-2.0 * std::log1p(-p)), 1.0, 1e-11) << p;
-  }
-}
-
-// With one it is the square of a normal deviate.
-TEST(ChiSquareQuantile, OfOneDegreeIsASquaredNormal) {
-  for (const double p : {0.025, 0.5, 0.975}) {
-    const double z = inverse_normal(0.5 + 0.5 * p);
-    EXPECT_NEAR(chi_square_quantile(p, 1.0) / (z * z), 1.0, 1e-13) << p;
-  }
-}
-
 // I_x(a, 1) = xᵃ and I_x(1, b) = 1 − (1 − x)ᵇ.
 TEST(BetaQuantile, HasItsClosedForms) {
   for (const double p : {0.01, 0.3, 0.5, 0.9}) {

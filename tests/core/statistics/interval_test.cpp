@@ -28,25 +28,36 @@ TEST(MeanInterval, IsStudents) {
   EXPECT_EQ(interval->confidence, 0.95);
 }
 
-// χ² of 4 degrees of freedom: 0.484419 and 11.143287.
-TEST(NormalDeviationInterval, IsThatOfChiSquare) {
-  const auto interval = normal_deviation_interval(moments(one_to(5)), 0.95);
-  EXPECT_NEAR(interval->lower, std::sqrt(2.5 * 4.0 / 11.143286782), 1e-8);
-  EXPECT_NEAR(interval->upper, std::sqrt(2.5 * 4.0 / 0.484418557), 1e-8);
+// 1 to 5: s² = 2.5 and G2 = −1.2, so γ₄ = 1.8; with z = 1.959964 c = 1.644717 and ln σ² is within
+// z c √((1.8 − 0.4)/4) = 1.907100 of ln 4.111793.
+TEST(DeviationInterval, GoesByTheKurtosis) {
+  const auto interval = deviation_interval(moments(one_to(5)), 0.95);
+  EXPECT_NEAR(interval->lower, std::sqrt(4.1117934 * std::exp(-1.9070997)), 1e-6);
+  EXPECT_NEAR(interval->upper, std::sqrt(4.1117934 * std::exp(1.9070997)), 1e-6);
 }
 
-TEST(Intervals, OfASingleValueAreEmpty) {
+// Of a few values G2 can be below −2, which no law has.
+TEST(DeviationInterval, HoldsForTwoValuesInTurn) {
+  const std::vector<double> values{-1.0, 1.0, -1.0, 1.0, -1.0, 1.0};
+  const Moments about = moments(values);
+  EXPECT_LT(about.excess_kurtosis, -2.0);
+  const auto interval = deviation_interval(about, 0.95);
+  EXPECT_LT(interval->lower, about.standard_deviation);
+  EXPECT_GT(interval->upper, about.standard_deviation);
+}
+
+TEST(Intervals, OfTooFewValuesAreEmpty) {
   EXPECT_FALSE(mean_interval(moments(one_to(1)), 0.95).has_value());
-  EXPECT_FALSE(normal_deviation_interval(moments(one_to(1)), 0.95).has_value());
+  EXPECT_FALSE(deviation_interval(moments(one_to(4)), 0.95).has_value());
+  EXPECT_FALSE(deviation_interval(moments(one_to(5)), 1.0 - 1e-9).has_value());  // z = 6.
 }
 
 TEST(Intervals, RefuseAConfidenceOutsideItsRange) {
   const Moments about = moments(one_to(5));
   const std::string expected = "confidence = 95 (must be in (0, 1))";
   EXPECT_EQ(test::message_of<InvalidArgument>([&] { (void)mean_interval(about, 95.0); }), expected);
-  EXPECT_EQ(
-      test::message_of<InvalidArgument>([&] { (void)normal_deviation_interval(about, 95.0); }),
-      expected);
+  EXPECT_EQ(test::message_of<InvalidArgument>([&] { (void)deviation_interval(about, 95.0); }),
+            expected);
   EXPECT_EQ(
       test::message_of<InvalidArgument>([] { (void)percentile_interval(one_to(5), 0.5, 95.0); }),
       expected);

@@ -16,7 +16,8 @@ namespace proofmass {
 namespace {
 
 // 2, 4, 4, 4, 5, 5, 7, 9: mean 5, squares of differences 32 over n − 1 = 7; raw squares 232 over 8;
-// cubes −27 − 3 + 8 + 64 = 42, so g1 = (42/8)/2³ and G1 = g1 √56/6.
+// cubes −27 − 3 + 8 + 64 = 42, so g1 = (42/8)/2³ and G1 = g1 √56/6; fourth powers
+// 81 + 3 + 16 + 256 = 356, so g2 = (356/8)/2⁴ − 3 and G2 = (9 g2 + 6) 7/30.
 TEST(Moments, OfEightNumbersAreThoseOfPaperAndPencil) {
   const Moments about = moments(std::vector<double>{2, 4, 4, 4, 5, 5, 7, 9});
   EXPECT_EQ(about.count, 8u);
@@ -24,6 +25,7 @@ TEST(Moments, OfEightNumbersAreThoseOfPaperAndPencil) {
   EXPECT_DOUBLE_EQ(about.standard_deviation, std::sqrt(32.0 / 7.0));
   EXPECT_DOUBLE_EQ(about.rms, std::sqrt(29.0));
   EXPECT_DOUBLE_EQ(about.skewness, 42.0 / 8.0 / 8.0 * std::sqrt(56.0) / 6.0);
+  EXPECT_DOUBLE_EQ(about.excess_kurtosis, (9.0 * (356.0 / 8.0 / 16.0 - 3.0) + 6.0) * 7.0 / 30.0);
 }
 
 TEST(Moments, OfASingleValueHaveNoSpread) {
@@ -39,6 +41,7 @@ TEST(Moments, OfEqualValuesHaveNoSpread) {
   EXPECT_EQ(about.mean, 0.1);
   EXPECT_EQ(about.standard_deviation, 0.0);
   EXPECT_EQ(about.skewness, 0.0);
+  EXPECT_EQ(about.excess_kurtosis, 0.0);
 }
 
 // Multiples of 2⁻²⁶ below 1 can be added to 1e8 exactly, so the shifted values have the same
@@ -55,6 +58,7 @@ TEST(Moments, DoNotFeelAnOffsetOf1e8) {
   const Moments far = moments(shifted);
   EXPECT_NEAR(far.standard_deviation / plain.standard_deviation, 1.0, 1e-15);
   EXPECT_NEAR(far.skewness / plain.skewness, 1.0, 1e-14);
+  EXPECT_NEAR(far.excess_kurtosis / plain.excess_kurtosis, 1.0, 1e-14);
   EXPECT_EQ(far.mean, 1e8 + plain.mean);
 }
 
@@ -65,6 +69,7 @@ TEST(Moments, DoNotFeelAScale) {
   const Moments scaled = moments(values);
   EXPECT_EQ(scaled.standard_deviation, plain.standard_deviation * 0x1p-60);
   EXPECT_EQ(scaled.skewness, plain.skewness);
+  EXPECT_EQ(scaled.excess_kurtosis, plain.excess_kurtosis);
 }
 
 TEST(Moments, ChangeSignWithTheValues) {
@@ -75,8 +80,18 @@ TEST(Moments, ChangeSignWithTheValues) {
   EXPECT_EQ(moments(values).skewness, -plain.skewness);
 }
 
-TEST(Moments, HaveNoSkewnessOfTwoValues) {
+TEST(Moments, HaveNoSkewnessOfTwoValuesAndNoKurtosisOfThree) {
   EXPECT_EQ(moments(std::vector<double>{1.0, 4.0}).skewness, 0.0);
+  EXPECT_EQ(moments(std::vector<double>{1.0, 4.0, 5.0}).excess_kurtosis, 0.0);
+}
+
+// The fourth powers of 1e80 and of 1e-90 are no doubles.
+TEST(Moments, HaveNoKurtosisBeyondTheRangeOfDoubles) {
+  for (const double scale : {1e80, 1e-90}) {
+    std::vector<double> values = test::normal_column(100, {.seed = 11});
+    std::ranges::for_each(values, [&](double& value) { value *= scale; });
+    EXPECT_EQ(moments(values).excess_kurtosis, 0.0) << scale;
+  }
 }
 
 TEST(Moments, RefuseNoValues) {
