@@ -144,7 +144,11 @@ TEST_F(ConversationTest, RefusesADefinitionThatIsNotCanonical) {
             std::vector<std::string>{"malformed_definition campaign=0000000000000001 definition:1: "
                                      "line = \"# \u00e9\" (must be \"[campaign]\", as the "
                                      "definition has one spelling)"});
-  other.text = "a = \"" + std::string(10'000, 'x');
+  // Its name stands in the refusal, which is cut.
+  other = definition_of(Campaign{});
+  const std::string table = "[environment]\n";
+  other.text.insert(other.text.find(table) + table.size(),
+                    "file = \"" + std::string(1000, 'x') + "\"\n");
   tick_after(60s);
   sent.clear();  // It has asked again.
   receive(wire::EncodedDefinition(other).part({.campaign = campaign_1}));
