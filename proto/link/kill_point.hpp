@@ -15,7 +15,7 @@ enum class KillPoint : std::uint8_t {
   after_acknowledge,  ///< The acknowledgement is handed to the socket.
   after_lend,         ///< A lease is handed to the socket.
   after_open,         ///< A campaign file is open and locked.
-  while_migrating,    ///< Between two migrations of a campaign file.
+  while_migrating,    ///< The tables of a campaign file are made or changed, not committed.
   // Worker.
   after_lease,    ///< A lease is received, and nothing is computed.
   before_result,  ///< Results are computed, and not yet sent.

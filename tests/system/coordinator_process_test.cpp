@@ -197,7 +197,7 @@ INSTANTIATE_TEST_SUITE_P(AtEachNamedPoint, CoordinatorKilled,
                          });
 
 TEST_F(CoordinatorProcess, KilledWhileItMakesAFileLeavesNoHalfFile) {
-  Process killed = start_coordinator({"short.toml", "--faults", "kill=while_migrating:2"});
+  Process killed = start_coordinator({"short.toml", "--faults", "kill=while_migrating:1"});
   EXPECT_EQ(killed.wait(), -SIGKILL) << errors_of("coordinator");
   EXPECT_FALSE(std::filesystem::exists(path("served/hardy2013.db")));
   Process worker = start_worker("worker");

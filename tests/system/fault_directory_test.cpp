@@ -110,7 +110,7 @@ TEST_F(ServedDirectory, HasAFileWithABadRow) {
   fs::copy_file(file_of("null"), file_of("bad"));
   execute(file_of("bad"),
           "UPDATE campaign SET name = 'bad', campaign_uid = campaign_uid + 1;"
-          "INSERT INTO worker (session, name, host) VALUES ('zzzzzzzzzzzzzzzz', 'w', 'h')");
+          "INSERT INTO worker (session, worker, host) VALUES ('zzzzzzzzzzzzzzzz', 'w', 'h')");
   const Process coordinator = this->coordinator("coordinator", {});
   const Process worker = null_worker("worker", {"--run-time", "0"});
   expect_finished_here();
