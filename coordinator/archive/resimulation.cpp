@@ -125,7 +125,7 @@ std::vector<ResultDifference> differences_of(const RunResult& stored, const RunR
   for (const ValueColumn& column : value_columns()) {
     if (column.kind == ValueKind::error) continue;  // It follows from the others.
     const std::optional<double> a = column.value_in(stored), b = column.value_in(computed);
-    // Files from before version 7 have no health.
+    // A run without a draw has no health.
     if (!a || !b || have_same_bits(*a, *b)) continue;
     differ(column.name, fmt::format("{}", *a), fmt::format("{}", *b));
   }

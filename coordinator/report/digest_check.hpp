@@ -39,7 +39,7 @@ struct WalkedResults {
                                          const std::function<void(const RunResult&)>& visit);
 
 /// Holds what defines a campaign, its environment and its tables of drawn values against the digest
-/// that is stored with them. A file that was made before version 6 has none.
+/// that is stored with them.
 /// @throws StoreError `campaign file = x.db (is damaged: ...)`.
 void check_definition_digest(const Store& store);
 

@@ -11,7 +11,7 @@ namespace proofmass::coordinator {
 
 /// What a campaign file says about itself at a glance.
 struct CampaignPeek {
-  wire::CampaignId id;  ///< 0 if the file is from before version 4.
+  wire::CampaignId id;
   std::string name;
   wire::CampaignPhase phase = wire::CampaignPhase::active;
   int priority = 0;

@@ -75,13 +75,13 @@ class Store {
   [[nodiscard]] std::uint64_t num_runs() const;  ///< Runs wanted, finished or not.
   [[nodiscard]] std::string definition() const;
   [[nodiscard]] std::string model_version() const;  ///< That of the program that made the file.
-  [[nodiscard]] std::string build() const;          ///< The same; empty before version 4.
+  [[nodiscard]] std::string build() const;          ///< The same.
   [[nodiscard]] std::string created_utc() const;    ///< As in `2024-02-29T12:00:10Z`.
   /// Name of the key that submitted the campaign; empty without keys, or if it was not submitted.
   [[nodiscard]] std::string owner() const;
   void set_owner(std::string_view owner);
   /// SHA-256 (64 hexadecimal digits) of environment rows and table values, as it was stored with
-  /// them; empty if the file was made before version 6 and not extended since.
+  /// them.
   [[nodiscard]] std::string table_digest() const;
   /// The same of what the tables hold now: another one if a number in them has changed.
   [[nodiscard]] std::string computed_table_digest() const;

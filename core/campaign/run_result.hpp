@@ -41,7 +41,7 @@ struct RunResult {
   std::uint32_t num_rounds = 0;  ///< Estimation rounds until no estimate moved any more.
   ParameterArray truth{};        ///< SI, from the drawn instrument's exact matrices.
   ParameterArray estimate{};     ///< SI.
-  /// Nothing if has_truth() does not hold, and of runs from before model hardy2013-3.
+  /// Nothing if has_truth() does not hold.
   std::optional<LoopHealth> health{};
   Loss loss{};  ///< Says more if the status is `lost`, nothing otherwise.
 

@@ -91,7 +91,7 @@ RunStatus read_status(const Statement& row) {
   row.refuse_as_damaged(fmt::format("status = {} of run {}", status, row.count(0)));
 }
 
-// Rows from before version 7 have none.
+// A run without a draw has none.
 std::optional<LoopHealth> read_health(const Statement& row) {
   if (!row.optional_real(first_health_column)) return std::nullopt;
   LoopHealth health;
