@@ -11,6 +11,7 @@
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
 #include "coordinator/dispatch/workers.hpp"
+#include "core/error.hpp"
 #include "core/simulation/run.hpp"
 
 namespace proofmass::coordinator {
@@ -129,6 +130,33 @@ void send_to_all(const State& state, const wire::Message& message, Outbox& outbo
   for (const auto& [id, worker] : state.workers) outbox.send(id, message);
 }
 
+/// Calls the function for what a worker says: one overload for each of wire::WorkerMessage.
+struct Handler {
+  State& state;
+  WorkerId worker;
+  const std::string& key;
+  const wire::Header& header;
+  TimePoint now;
+  Outbox& outbox;
+
+  void operator()(const wire::Hello& hello) const {
+    on_hello(state, worker, header.session, key, hello, now, outbox);
+  }
+  void operator()(const wire::Heartbeat& heartbeat) const {
+    on_heartbeat(state, worker, heartbeat, header.sequence, now, outbox);
+  }
+  void operator()(const wire::ResultBatch& batch) const {
+    on_results(state, worker, batch, now, outbox);
+  }
+  void operator()(const wire::GiveBack& give_back) const {
+    on_give_back(state, worker, give_back, now, outbox);
+  }
+  void operator()(const wire::CampaignRequest& request) const {
+    on_campaign_request(state, worker, request, now, outbox);
+  }
+  void operator()(const wire::Bye& bye) const { on_bye(state, worker, bye, now, outbox); }
+};
+
 }  // namespace
 
 namespace detail {
@@ -171,6 +199,13 @@ void part_with_hung(State& state, WorkerId id, const wire::ComputedBatch& batch,
 void reject_unregistered(WorkerId id, Outbox& outbox) {
   outbox.send(id, wire::Reject{.reason = wire::RejectReason::not_registered,
                                .text = "this worker is not registered"});
+}
+
+void on_packet(State& state, WorkerId id, const std::string& key, const wire::Packet& packet,
+               TimePoint now, Outbox& outbox) {
+  const Handler handle{state, id, key, packet.header, now, outbox};
+  const bool is_of_worker = wire::visit_if<wire::WorkerMessage>(packet.message, handle);
+  PROOFMASS_EXPECT(is_of_worker);
 }
 
 void on_hello(State& state, WorkerId id, SessionId session, const std::string& key,

@@ -55,6 +55,11 @@ void on_unlisted(State& state, CampaignId id);
 
 /// Answers a message of a worker that is not registered, or of another epoch.
 void reject_unregistered(WorkerId id, Outbox& outbox);
+/// Calls the function below that is for the message.
+/// @param key  Public key of the connection; empty without keys.
+/// @pre The message is one of a worker.
+void on_packet(State& state, WorkerId id, const std::string& key, const wire::Packet& packet,
+               TimePoint now, Outbox& outbox);
 /// Registers a worker, or answers again if it is registered already.
 /// @param key  Public key of the connection; empty without keys. What is said about a host counts
 ///             for workers with this key only.

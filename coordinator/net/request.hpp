@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <variant>
 
 #include "core/campaign/campaign.hpp"
@@ -19,9 +20,20 @@ struct Submission {
   std::optional<std::uint64_t> failures_max = {};
 };
 
-/// What a client asks for, ready to be carried out.
-using Request = std::variant<Submission, wire::StatusRequest, wire::WorkersRequest,
-                             wire::ControlRequest, wire::ReleaseHostRequest, wire::RequestPart>;
+namespace detail {
+
+template <typename Sent>
+struct ReadyToCarryOut;
+template <typename... Sent>
+struct ReadyToCarryOut<std::variant<Sent...>> {
+  using type = std::variant<
+      std::conditional_t<std::is_same_v<Sent, wire::SubmitRequest>, Submission, Sent>...>;
+};
+
+}  // namespace detail
+
+/// What a client asks for, ready to be carried out: a Submission in place of the SubmitRequest.
+using Request = detail::ReadyToCarryOut<wire::ClientRequest>::type;
 
 /// @throws DefinitionError if a submission's definition is not one.
 [[nodiscard]] Request request_of(wire::ClientRequest sent);

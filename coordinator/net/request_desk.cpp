@@ -29,17 +29,14 @@ std::set<std::string> quarantined_hosts(const State& state) {
 RequestDesk::RequestDesk(Surroundings surroundings)
     : surroundings_(std::move(surroundings)), began_at_(surroundings_.now()) {}
 
-void RequestDesk::carry_out(Request request, const Asker& asker, Respond respond) {
-  std::visit([&](auto& content) { take(std::move(content), asker, respond); }, request);
-}
-
-void RequestDesk::take(Submission submission, const Asker& asker, Respond respond) {
+template <>
+void RequestDesk::take(Submission&& submission, const Asker& asker, const Respond& respond) {
   surroundings_.submissions.submit(std::make_shared<const Submission>(std::move(submission)), asker,
-                                   std::move(respond));
+                                   respond);
 }
 
-void RequestDesk::take(const wire::ControlRequest& request, const Asker& asker,
-                       const Respond& respond) {
+template <>
+void RequestDesk::take(wire::ControlRequest&& request, const Asker& asker, const Respond& respond) {
   CampaignDesk& campaigns = surroundings_.campaigns;
   const auto campaign = campaigns.find(request.campaign);
   if (!campaign) {
@@ -63,8 +60,8 @@ void RequestDesk::control_ended(const CampaignDesk::Entry& campaign, wire::Contr
   respond(surroundings_.campaigns.done_reply(campaign.id));
 }
 
-void RequestDesk::take(const wire::StatusRequest& request, const Asker& asker,
-                       const Respond& respond) {
+template <>
+void RequestDesk::take(wire::StatusRequest&& request, const Asker& asker, const Respond& respond) {
   require_right(asker, Right::observe);
   const State& state = surroundings_.state;
   const CampaignDesk& campaigns = surroundings_.campaigns;
@@ -89,8 +86,8 @@ void RequestDesk::take(const wire::StatusRequest& request, const Asker& asker,
   respond(std::move(reply));
 }
 
-void RequestDesk::take(const wire::WorkersRequest& request, const Asker& asker,
-                       const Respond& respond) {
+template <>
+void RequestDesk::take(wire::WorkersRequest&& request, const Asker& asker, const Respond& respond) {
   require_right(asker, Right::observe);
   const State& state = surroundings_.state;
   const TimePoint now = surroundings_.now();
@@ -112,7 +109,8 @@ void RequestDesk::take(const wire::WorkersRequest& request, const Asker& asker,
   respond(std::move(reply));
 }
 
-void RequestDesk::take(const wire::ReleaseHostRequest& request, const Asker& asker,
+template <>
+void RequestDesk::take(wire::ReleaseHostRequest&& request, const Asker& asker,
                        const Respond& respond) {
   require_right(asker, Right::control);
   if (!on_release_host(surroundings_.state, request.host, surroundings_.now(),
@@ -123,8 +121,13 @@ void RequestDesk::take(const wire::ReleaseHostRequest& request, const Asker& ask
       wire::DoneReply{fmt::format("host {}: runs are lent to its workers again", request.host)});
 }
 
-void RequestDesk::take(const wire::RequestPart&, const Asker&, const Respond&) {
+template <>
+void RequestDesk::take(wire::RequestPart&&, const Asker&, const Respond&) {
   throw Error("request = a part (must be a request when its parts are together)");
+}
+
+void RequestDesk::carry_out(Request request, const Asker& asker, Respond respond) {
+  std::visit([&](auto& content) { take(std::move(content), asker, respond); }, request);
 }
 
 }  // namespace proofmass::coordinator

@@ -35,12 +35,9 @@ class RequestDesk {
   void carry_out(Request request, const Asker& asker, Respond respond);
 
  private:
-  void take(Submission submission, const Asker& asker, Respond respond);
-  void take(const wire::ControlRequest& request, const Asker& asker, const Respond& respond);
-  void take(const wire::StatusRequest& request, const Asker& asker, const Respond& respond);
-  void take(const wire::WorkersRequest& request, const Asker& asker, const Respond& respond);
-  void take(const wire::ReleaseHostRequest& request, const Asker& asker, const Respond& respond);
-  void take(const wire::RequestPart& part, const Asker& asker, const Respond& respond);
+  /// Has a specialisation for each kind of Request.
+  template <typename Content>
+  void take(Content&& request, const Asker& asker, const Respond& respond) = delete;
   void control_ended(const CampaignDesk::Entry& campaign, wire::ControlAction action,
                      const Respond& respond);
 

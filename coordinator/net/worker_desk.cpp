@@ -6,7 +6,6 @@
 #include <variant>
 
 #include "coordinator/dispatch/dispatch.hpp"
-#include "core/error.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/wire/codec.hpp"
 
@@ -15,38 +14,6 @@ namespace {
 
 using wire::KillPoint;
 using wire::RejectReason;
-
-/// Calls the dispatch's function for a message of a worker.
-struct Handler {
-  State& state;
-  WorkerId worker;
-  const std::string& key;
-  const wire::Header& header;
-  TimePoint now;
-  Outbox& outbox;
-
-  void operator()(const wire::Hello& hello) const {
-    on_hello(state, worker, header.session, key, hello, now, outbox);
-  }
-  void operator()(const wire::Heartbeat& heartbeat) const {
-    on_heartbeat(state, worker, heartbeat, header.sequence, now, outbox);
-  }
-  void operator()(const wire::ResultBatch& batch) const {
-    wire::kill_point(KillPoint::after_receive);
-    on_results(state, worker, batch, now, outbox);
-  }
-  void operator()(const wire::GiveBack& give_back) const {
-    on_give_back(state, worker, give_back, now, outbox);
-  }
-  void operator()(const wire::CampaignRequest& request) const {
-    on_campaign_request(state, worker, request, now, outbox);
-  }
-  void operator()(const wire::Bye& bye) const { on_bye(state, worker, bye, now, outbox); }
-  template <typename Other>
-  void operator()(const Other&) const {
-    PROOFMASS_EXPECT(false);  // decode() lets nothing else pass.
-  }
-};
 
 template <typename Kind>
 bool is_a(const wire::Message& message) {
@@ -58,9 +25,7 @@ std::string revoked_text(const Address& address) {
 }
 
 bool is_of_a_worker(const wire::Message& message) {
-  return is_a<wire::Hello>(message) || is_a<wire::Heartbeat>(message) ||
-         is_a<wire::ResultBatch>(message) || is_a<wire::GiveBack>(message) ||
-         is_a<wire::CampaignRequest>(message) || is_a<wire::Bye>(message);
+  return wire::visit_if<wire::WorkerMessage>(message, [](const auto&) {});
 }
 
 }  // namespace
@@ -89,7 +54,8 @@ void WorkerDesk::receive(const Incoming& message, TimePoint now, Outbox& outbox)
   if (const auto* const bye = std::get_if<wire::Bye>(&packet->message)) {
     surroundings_.on_leaving(*worker, bye->reason);
   }
-  std::visit(Handler{state_, *worker, message.from.key, header, now, outbox}, packet->message);
+  if (is_a<wire::ResultBatch>(packet->message)) wire::kill_point(KillPoint::after_receive);
+  on_packet(state_, *worker, message.from.key, *packet, now, outbox);
 }
 
 std::optional<wire::Packet> WorkerDesk::decode(const Incoming& message, TimePoint now,

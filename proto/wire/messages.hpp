@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -239,9 +240,47 @@ struct Bye {
 struct Drain {};  ///< Coordinator → worker: deliver what you hold, then say Bye and end.
 struct Stop {};   ///< Coordinator → worker: drop what you hold and end.
 
-using Message = std::variant<Hello, Welcome, Reject, CampaignRequest, DefinitionPart, Forget,
-                             NotServed, RunLease, Retract, GiveBack, ResultBatch, ResultAck,
-                             Heartbeat, HeartbeatAck, Bye, Drain, Stop>;
+// Both sides handle each of the types that can reach them by an overload of its own: a type that is
+// new in one of these lists does not compile before it is encoded and handled.
+
+/// What a worker says to a coordinator.
+using WorkerMessage = std::variant<Hello, CampaignRequest, GiveBack, ResultBatch, Heartbeat, Bye>;
+/// What a coordinator says to a worker.
+using CoordinatorMessage = std::variant<Welcome, Reject, DefinitionPart, Forget, NotServed,
+                                        RunLease, Retract, ResultAck, HeartbeatAck, Drain, Stop>;
+
+namespace detail {
+
+template <typename First, typename Second>
+struct Joined;
+template <typename... First, typename... Second>
+struct Joined<std::variant<First...>, std::variant<Second...>> {
+  using type = std::variant<First..., Second...>;
+};
+
+template <typename Content, typename Messages>
+inline constexpr bool is_among = false;
+template <typename Content, typename... Contents>
+inline constexpr bool is_among<Content, std::variant<Contents...>> =
+    (std::is_same_v<Content, Contents> || ...);
+
+}  // namespace detail
+
+using Message = detail::Joined<WorkerMessage, CoordinatorMessage>::type;
+
+/// Calls the handler with what the message holds if that is one of `Messages`, which is
+/// WorkerMessage or CoordinatorMessage. The handler must take all of these.
+/// @return False if it is none of them.
+template <typename Messages, typename Handler>
+bool visit_if(const Message& message, const Handler& handle) {
+  return std::visit(
+      [&]<typename Content>(const Content& content) {
+        constexpr bool is_wanted = detail::is_among<Content, Messages>;
+        if constexpr (is_wanted) handle(content);
+        return is_wanted;
+      },
+      message);
+}
 
 /// A message as it travels.
 struct Packet {

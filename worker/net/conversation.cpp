@@ -68,18 +68,7 @@ Conversation::Conversation(wire::SessionId session, wire::Hello hello, Execution
 
 // What arrives.
 
-void Conversation::on_packet(const wire::Packet& packet, TimePoint now) {
-  // Who is refused before a session could be read is told so with another one.
-  const bool is_reject = std::holds_alternative<wire::Reject>(packet.message);
-  if (ending_ || (packet.header.session != session_ && !is_reject)) return;
-  heard_at_ = now;
-  const bool is_about_registration =
-      is_reject || std::holds_alternative<wire::Welcome>(packet.message);
-  // What another coordinator process has said before it ended means nothing to the present one.
-  if (!is_about_registration && packet.header.epoch != epoch_) return;
-  std::visit([&](const auto& content) { handle(content, packet.header, now); }, packet.message);
-}
-
+template <>
 void Conversation::handle(const wire::Welcome& welcome, const wire::Header& header, TimePoint now) {
   if (is_registered_) return;  // The answer to a repeated Hello.
   is_registered_ = true;
@@ -95,6 +84,7 @@ void Conversation::handle(const wire::Welcome& welcome, const wire::Header& head
   repeat_results(now);
 }
 
+template <>
 void Conversation::handle(const wire::Reject& reject, const wire::Header& header, TimePoint now) {
   // One that was overtaken by the Welcome after it.
   const bool is_late = header.epoch == epoch_ && header.sequence < welcome_sequence_;
@@ -113,6 +103,7 @@ void Conversation::handle(const wire::Reject& reject, const wire::Header& header
   }
 }
 
+template <>
 void Conversation::handle(const wire::DefinitionPart& part, const wire::Header&, TimePoint now) {
   using Progress = wire::IncomingDefinition::Progress;
   const auto wanted = wanted_.find(part.campaign);
@@ -122,6 +113,7 @@ void Conversation::handle(const wire::DefinitionPart& part, const wire::Header&,
   if (progress == Progress::complete) define(part.campaign, now);
 }
 
+template <>
 void Conversation::handle(const wire::Forget& forget, const wire::Header&, TimePoint) {
   const RunRange known{{0}, forget.num_runs};
   for (const RunIndex run : execution_.drop_waiting(forget.campaign, std::array{known})) {
@@ -144,6 +136,7 @@ void Conversation::handle(const wire::Forget& forget, const wire::Header&, TimeP
   leave_if_done();
 }
 
+template <>
 void Conversation::handle(const wire::NotServed& not_served, const wire::Header&, TimePoint) {
   std::vector<RunRange> ranges = not_served.ranges;
   if (ranges.empty()) ranges.push_back(all_runs);
@@ -152,6 +145,7 @@ void Conversation::handle(const wire::NotServed& not_served, const wire::Header&
   set_aside(not_served.campaign, ranges);
 }
 
+template <>
 void Conversation::handle(const wire::RunLease& lease, const wire::Header&, TimePoint now) {
   if (!is_registered_) return;
   const std::size_t width = lease.table_values.size() / lease.runs.count;
@@ -172,11 +166,13 @@ void Conversation::handle(const wire::RunLease& lease, const wire::Header&, Time
   if (!execution_.is_defined(lease.campaign) && !is_wanted) request(lease.campaign, now);
 }
 
+template <>
 void Conversation::handle(const wire::Retract& retract, const wire::Header&, TimePoint) {
   give_back(wire::LossReason::retracted, retract.campaign,
             execution_.drop_waiting(retract.campaign, retract.ranges));
 }
 
+template <>
 void Conversation::handle(const wire::ResultAck& ack, const wire::Header&, TimePoint) {
   for (const RunIndex run : ack.runs) {
     const auto found = unacknowledged_.find({ack.campaign, run});
@@ -185,13 +181,32 @@ void Conversation::handle(const wire::ResultAck& ack, const wire::Header&, TimeP
   leave_if_done();
 }
 
+template <>
 void Conversation::handle(const wire::Drain&, const wire::Header&, TimePoint now) {
   if (!leaving_) begin_to_leave({.reason = wire::LossReason::drained, .deadline = {}}, now);
 }
 
+template <>
 void Conversation::handle(const wire::Stop&, const wire::Header&, TimePoint) {
   execution_.abandon();
   end(Ending::Kind::done, "told to stop");
+}
+
+template <>
+void Conversation::handle(const wire::HeartbeatAck&, const wire::Header&, TimePoint) {}
+
+void Conversation::on_packet(const wire::Packet& packet, TimePoint now) {
+  // Who is refused before a session could be read is told so with another one.
+  const bool is_reject = std::holds_alternative<wire::Reject>(packet.message);
+  if (ending_ || (packet.header.session != session_ && !is_reject)) return;
+  heard_at_ = now;
+  const bool is_about_registration =
+      is_reject || std::holds_alternative<wire::Welcome>(packet.message);
+  // What another coordinator process has said before it ended means nothing to the present one.
+  if (!is_about_registration && packet.header.epoch != epoch_) return;
+  // What only workers say is none of its business.
+  (void)wire::visit_if<wire::CoordinatorMessage>(
+      packet.message, [&](const auto& content) { handle(content, packet.header, now); });
 }
 
 // What happens here.

@@ -135,18 +135,9 @@ class Conversation {
     std::optional<TimePoint> deadline;  ///< Nothing: as long as it takes.
   };
 
-  void handle(const wire::Welcome& welcome, const wire::Header& header, TimePoint now);
-  void handle(const wire::Reject& reject, const wire::Header& header, TimePoint now);
-  void handle(const wire::DefinitionPart& part, const wire::Header& header, TimePoint now);
-  void handle(const wire::Forget& forget, const wire::Header& header, TimePoint now);
-  void handle(const wire::NotServed& not_served, const wire::Header& header, TimePoint now);
-  void handle(const wire::RunLease& lease, const wire::Header& header, TimePoint now);
-  void handle(const wire::Retract& retract, const wire::Header& header, TimePoint now);
-  void handle(const wire::ResultAck& ack, const wire::Header& header, TimePoint now);
-  void handle(const wire::Drain& drain, const wire::Header& header, TimePoint now);
-  void handle(const wire::Stop& stop, const wire::Header& header, TimePoint now);
-  template <typename Other>
-  void handle(const Other&, const wire::Header&, TimePoint) {}  // Nothing is to be done.
+  /// Has a specialisation for each of wire::CoordinatorMessage.
+  template <typename Content>
+  void handle(const Content&, const wire::Header&, TimePoint) = delete;
 
   void send(wire::Message message);
   void say_hello(TimePoint now);
