@@ -1,7 +1,6 @@
 #include "worker/program.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
@@ -27,6 +26,8 @@
 
 namespace proofmass::worker {
 namespace {
+
+using wire::Field;
 
 constexpr int exit_failed = 1;
 constexpr int exit_usage = 2;
@@ -71,23 +72,26 @@ SignalSource signal_source(const Options& options) {
   return options.is_supervised ? SignalSource::supervisor : SignalSource::anyone;
 }
 
-wire::ClientSecurity security_for(const Options& options) {
+wire::ClientSecurity security_for(const Options& options, const wire::Log& log) {
   const auto protection = options.keys              ? wire::Protection::keys
                           : options.is_plain_waived ? wire::Protection::waived
                                                     : wire::Protection::none;
   wire::check_endpoint("connect", options.endpoint, wire::EndpointUse::connect, protection);
   if (options.keys) return wire::read_client_security(*options.keys, wire::KeyRole::worker);
   if (!wire::is_local(options.endpoint)) {
-    spdlog::warn("insecure_plain connect={} (anybody on the way can read and change what is said)",
-                 options.endpoint);
+    log({.severity = wire::Severity::warning,
+         .kind = "insecure_plain",
+         .fields = {{"connect", options.endpoint},
+                    Field::remark("(anybody on the way can read and change what is said)")}});
   }
   return {};
 }
 
-ServeConfig serve_config(const Options& options, TimePoint program_start) {
+ServeConfig serve_config(const Options& options, TimePoint program_start, const wire::Log& log) {
   ServeConfig config;
+  config.log = log;
   config.endpoint = options.endpoint;
-  config.security = security_for(options);
+  config.security = security_for(options, log);
   config.signals = signal_source(options);
   config.spool = options.spool;
   config.faults = options.faults;
@@ -113,12 +117,15 @@ int work(const Options& options, const Program& program, ServeConfig config,
                     {.num_threads = options.num_threads, .batch_size_max = batch_lanes});
   const Ending ending = serve(config, executor, progress, signals);
   if (!executor.end_within(thread_end_max)) {
-    spdlog::error("computation_hangs reason=\"{}\" (the process ends without it)", ending.reason);
+    config.log(
+        {.severity = wire::Severity::error,
+         .kind = "computation_hangs",
+         .fields = {Field::reason(ending.reason), Field::remark("(the process ends without it)")}});
     std::fflush(nullptr);
     _exit(exit_hung);
   }
   if (ending.kind == Ending::Kind::failed) throw Error(ending.reason);
-  spdlog::info("worker_ended reason=\"{}\"", ending.reason);
+  config.log({.kind = "worker_ended", .fields = {Field::reason(ending.reason)}});
   return 0;
 }
 
@@ -146,23 +153,26 @@ void leave_out_service_options(Options& options) {
 
 int run(Options options, const Program& program) {
   const TimePoint program_start = std::chrono::steady_clock::now();
-  wire::set_up_log(program.name, options.log_format,
-                   options.parent ? wire::LogLevel::warning : wire::LogLevel::info);
+  const wire::Log log =
+      wire::make_log(program.name, options.log_format,
+                     options.parent ? wire::LogLevel::warning : wire::LogLevel::info);
   if (options.parent) {
     die_with(*options.parent);
     leave_out_service_options(options);
     std::signal(SIGINT, SIG_IGN);  // Ctrl-C reaches the campaign, which tells its workers.
   }
-  const ServeConfig config = serve_config(options, program_start);
+  const ServeConfig config = serve_config(options, program_start, log);
   const auto work_from = [&](const ChildStart& start) {
     return work(options, program, config, start);
   };
   if (signal_source(options) != SignalSource::supervisor) {
     return work_from({.session = random_session(), .former = std::nullopt});
   }
-  return supervise([&](const ChildStart& start) {
-    return reporting_errors(program, [&] { return work_from(start); });
-  });
+  return supervise(
+      [&](const ChildStart& start) {
+        return reporting_errors(program, [&] { return work_from(start); });
+      },
+      log);
 }
 
 }  // namespace

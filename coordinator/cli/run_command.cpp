@@ -98,7 +98,7 @@ Log log_to(ProgressDisplay& display) {
   return [&display](const Event& event) {
     // StorageNotes tells of the storage.
     if (event.severity != Severity::error || event.kind == "storage_failed") return;
-    display.note(fmt::format("proofmass: error: {} {}", event.kind, event.text));
+    display.note("proofmass: error: " + to_text(event));
   };
 }
 

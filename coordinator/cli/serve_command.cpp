@@ -1,7 +1,6 @@
 #include "coordinator/cli/serve_command.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
@@ -21,25 +20,6 @@
 
 namespace proofmass::coordinator {
 namespace {
-
-spdlog::level::level_enum level_of(Severity severity) {
-  switch (severity) {
-    case Severity::info:
-      return spdlog::level::info;
-    case Severity::warning:
-      return spdlog::level::warn;
-    case Severity::error:
-      return spdlog::level::err;
-  }
-  PROOFMASS_EXPECT(false);
-}
-
-Log make_log(wire::LogFormat format) {
-  wire::set_up_log("proofmass-coordinator", format, wire::LogLevel::info);
-  return [](const Event& event) {
-    spdlog::log(level_of(event.severity), "{} {}", event.kind, event.text);
-  };
-}
 
 /// Tells the init system how the coordinator is.
 class Notices {
@@ -120,8 +100,9 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
 
 void log_start(const Service& service, const Log& log) {
   log({.kind = "coordinator_started",
-       .text = fmt::format("bind={} bind_clients={} campaigns={}", service.workers_endpoint(),
-                           service.clients_endpoint(), service.campaigns().size())});
+       .fields = {{"bind", service.workers_endpoint()},
+                  {"bind_clients", service.clients_endpoint()},
+                  {"campaigns", service.campaigns().size()}}});
 }
 
 /// Brings the statistics of the campaigns that are still open up to date.
@@ -134,13 +115,13 @@ bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
       if (const std::optional<std::string> reason = store.rest()) {
         log({.severity = Severity::warning,
              .kind = "write_ahead_log_kept",
-             .text = fmt::format("file={} reason=\"{}\"", file.string(), *reason)});
+             .fields = {{"file", file.string()}, Field::reason(*reason)}});
       }
     } catch (const std::exception& error) {
       is_written = false;
       log({.severity = Severity::error,
            .kind = "statistics_failed",
-           .text = fmt::format("file={} reason=\"{}\"", file.string(), error.what())});
+           .fields = {{"file", file.string()}, Field::reason(error.what())}});
     }
   }
   return is_written;
@@ -155,7 +136,7 @@ bool has_given_up_runs(const Service& service) {
 }  // namespace
 
 int serve_campaigns(const ServeOptions& options) {
-  const Log log = make_log(options.log_format);
+  const Log log = wire::make_log("proofmass-coordinator", options.log_format, wire::LogLevel::info);
   const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::drain);
   CampaignFolder folder(options.directory);
@@ -172,7 +153,7 @@ int serve_campaigns(const ServeOptions& options) {
   const bool has_given_up = has_given_up_runs(service);
   const std::size_t num_campaigns = service.campaigns().size();
   const bool is_written = finish(service.close(), log);
-  log({.kind = "coordinator_ended", .text = fmt::format("campaigns={}", num_campaigns)});
+  log({.kind = "coordinator_ended", .fields = {{"campaigns", num_campaigns}}});
   if (!is_written || service.has_storage_failed()) return exit_cannot_be_done;
   const bool is_in_order =
       options.end == ServiceEnd::when_done ? is_done : stop != StopRequest::now;

@@ -1,7 +1,5 @@
 #include "coordinator/dispatch/blame.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <utility>
 
@@ -60,10 +58,10 @@ void withdraw(State& state, CampaignId id, const HostId& host) {
 void quarantine(State& state, const HostId& host, std::uint32_t num_crashes, Outbox& outbox) {
   state.quarantined.insert(host);
   for (const auto& [id, campaign] : state.campaigns) withdraw(state, id, host);
-  outbox.log({.severity = Severity::error,
-              .kind = "host_quarantined",
-              .text = fmt::format("host={} crashes={}{}", host.name, num_crashes,
-                                  host.key.empty() ? "" : " key=" + host.key)});
+  wire::Fields fields{{"host", host.name}, {"crashes", num_crashes}};
+  if (!host.key.empty()) fields.emplace_back("key", host.key);
+  outbox.log(
+      {.severity = Severity::error, .kind = "host_quarantined", .fields = std::move(fields)});
 }
 
 /// A run that is stored is beyond suspicion; its audit is given up instead, like a run.
@@ -75,8 +73,8 @@ void count_audit_crash(State& state, CampaignId id, RunIndex run, Outbox& outbox
   campaign.audit_crashes.erase(run);
   outbox.log({.severity = Severity::error,
               .kind = "audit_given_up",
-              .text = fmt::format("run={} crashes={}", run.value, num_crashes),
-              .campaign = id});
+              .fields = {{"run", run.value}, {"crashes", num_crashes}}},
+             id);
 }
 
 /// A run that is suspected already will be tried alone; only then does a crash tell more.
@@ -184,8 +182,8 @@ void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
   outbox.give_up(id, run);
   outbox.log({.severity = Severity::error,
               .kind = "run_given_up",
-              .text = fmt::format("run={} crashes={}", run.value, suspicion.num_crashes),
-              .campaign = id});
+              .fields = {{"run", run.value}, {"crashes", suspicion.num_crashes}}},
+             id);
 }
 
 bool may_try(const State& state, const Suspicion& suspicion, const Worker& worker) {

@@ -76,11 +76,12 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   state.num_slots += worker.num_slots;
   ++state.hosts[host].num_workers;
   limit_hosts(state, host.key);
-  outbox.log(
-      {.severity = Severity::info,
-       .kind = "worker_registered",
-       .text = fmt::format("worker={} name={} host={} pid={} slots={}", id.value, hello.worker_name,
-                           hello.host, hello.process_id, hello.num_slots)});
+  outbox.log({.kind = "worker_registered",
+              .fields = {{"worker", id.value},
+                         {"name", hello.worker_name},
+                         {"host", hello.host},
+                         {"pid", hello.process_id},
+                         {"slots", hello.num_slots}}});
 }
 
 /// True if a Hello may be answered: there is an allowance of so many a second.
@@ -175,8 +176,10 @@ void part_with(State& state, WorkerId id, LossReason reason, Outbox& outbox) {
   const Worker& worker = state.workers.at(id);
   outbox.log({.severity = Severity::warning,
               .kind = "worker_gone",
-              .text = fmt::format("worker={} name={} reason={} orbits={}", id.value, worker.name,
-                                  name_of(reason), worker.num_orbits_done)});
+              .fields = {{"worker", id.value},
+                         {"name", worker.name},
+                         {"reason", name_of(reason)},
+                         {"orbits", worker.num_orbits_done}}});
   const RunsByCampaign blamed =
       is_blamed(reason) ? blame_crash(state, id, outbox) : RunsByCampaign();
   remove_worker(state, id, reason, blamed, outbox);
@@ -185,10 +188,12 @@ void part_with(State& state, WorkerId id, LossReason reason, Outbox& outbox) {
 void part_with_hung(State& state, WorkerId id, const wire::ComputedBatch& batch, Outbox& outbox) {
   outbox.log({.severity = Severity::warning,
               .kind = "worker_gone",
-              .text = fmt::format("worker={} name={} reason=hung runs={} orbits={}", id.value,
-                                  state.workers.at(id).name, to_text(RunSet(batch.ranges)),
-                                  batch.num_orbits_done),
-              .campaign = batch.campaign});
+              .fields = {{"worker", id.value},
+                         {"name", state.workers.at(id).name},
+                         {"reason", "hung"},
+                         {"runs", to_text(RunSet(batch.ranges))},
+                         {"orbits", batch.num_orbits_done}}},
+             batch.campaign);
   outbox.send(id, wire::Stop{});
   const RunsByCampaign blamed = blame_batch(state, id, batch, outbox);
   remove_worker(state, id, LossReason::hung, blamed, outbox);
@@ -224,7 +229,7 @@ void on_hello(State& state, WorkerId id, SessionId session, const std::string& k
     state.awaited.erase(session);
     outbox.log({.severity = Severity::warning,
                 .kind = "worker_refused",
-                .text = fmt::format("name={} {}", hello.worker_name, reject->text)});
+                .fields = {{"name", hello.worker_name}, Field::remark(reject->text)}});
     outbox.send(id, *reject);
   } else {
     if (is_new) register_worker(state, id, session, host, hello, now, outbox);
@@ -240,7 +245,7 @@ bool on_release_host(State& state, const std::string& host, TimePoint now, Outbo
   for (auto& [id, content] : state.hosts) {
     if (is_named(id)) content.num_crashes = 0;
   }
-  outbox.log({.kind = "host_released", .text = fmt::format("host={}", host)});
+  outbox.log({.kind = "host_released", .fields = {{"host", host}}});
   detail::lend_to_hungry(state, now, outbox);
   return true;
 }
@@ -299,10 +304,11 @@ void on_give_back(State& state, WorkerId id, const wire::GiveBack& give_back, Ti
 void on_bye(State& state, WorkerId id, const wire::Bye& bye, TimePoint now, Outbox& outbox) {
   const auto found = state.workers.find(id);
   if (found == state.workers.end()) return;
-  outbox.log({.severity = Severity::info,
-              .kind = "worker_left",
-              .text = fmt::format("worker={} name={} reason={}", id.value, found->second.name,
-                                  name_of(bye.reason))});
+  outbox.log(
+      {.severity = Severity::info,
+       .kind = "worker_left",
+       .fields = {
+           {"worker", id.value}, {"name", found->second.name}, {"reason", name_of(bye.reason)}}});
   detail::remove_worker(state, id, bye.reason, {}, outbox);
   detail::settle(state, now, outbox);
 }

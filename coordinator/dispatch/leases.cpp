@@ -1,7 +1,5 @@
 #include "coordinator/dispatch/leases.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <iterator>
@@ -78,14 +76,16 @@ void record_losses(const Lease& lease, const RunSet& runs, LossReason reason, bo
 
 void log_loss(const Lease& lease, const RunSet& runs, LossReason reason, const RunSet& blamed,
               Outbox& outbox) {
-  std::string text = fmt::format("worker={} runs={} attempt={} reason={}", lease.worker.value,
-                                 to_text(runs), lease.attempt.value, name_of(reason));
-  if (!blamed.empty()) text += fmt::format(" blamed={}", to_text(blamed));
+  wire::Fields fields{{"worker", lease.worker.value},
+                      {"runs", to_text(runs)},
+                      {"attempt", lease.attempt.value},
+                      {"reason", name_of(reason)}};
+  if (!blamed.empty()) fields.emplace_back("blamed", to_text(blamed));
   const bool is_wanted = reason == LossReason::retracted;
   outbox.log({.severity = is_wanted ? Severity::info : Severity::warning,
               .kind = "runs_lost",
-              .text = std::move(text),
-              .campaign = lease.campaign});
+              .fields = std::move(fields)},
+             lease.campaign);
 }
 
 bool remove_from_pending(CampaignState& campaign, RunIndex run) {

@@ -1,7 +1,5 @@
 #include "coordinator/dispatch/lending.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -261,13 +259,13 @@ void finish_if_done(State& state, CampaignId id, Outbox& outbox) {
   if (!is_finished(campaign)) return;
   campaign.phase = Phase::finished;
   sort_served(state);
-  outbox.log(
-      {.severity = Severity::info,
-       .kind = "campaign_finished",
-       .text = fmt::format("runs={} given_up={} duplicates={} compared={} mismatches={}",
-                           campaign.definition->num_runs, campaign.given_up.size(),
-                           campaign.num_duplicates, campaign.num_audited, campaign.num_mismatches),
-       .campaign = id});
+  outbox.log({.kind = "campaign_finished",
+              .fields = {{"runs", campaign.definition->num_runs},
+                         {"given_up", campaign.given_up.size()},
+                         {"duplicates", campaign.num_duplicates},
+                         {"compared", campaign.num_audited},
+                         {"mismatches", campaign.num_mismatches}}},
+             id);
   for (const auto& [worker, content] : state.workers) send_not_served(state, worker, id, outbox);
 }
 

@@ -2,25 +2,19 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
-#include <string_view>
+#include <utility>
 
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/identifiers.hpp"
+#include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::coordinator {
 
-/// How much a person should care; *error* means that somebody must act.
-enum class Severity : std::uint8_t { info, warning, error };
-
-/// Something that happened: one line of the log.
-struct Event {
-  Severity severity = Severity::info;
-  std::string_view kind;        ///< A literal: `runs_lost`.
-  std::string text;             ///< `worker=7 runs=120..183 attempt=1`.
-  wire::CampaignId campaign{};  ///< 0 if it concerns all campaigns.
-};
+using wire::Event;
+using wire::Field;
+using wire::Log;
+using wire::Severity;
 
 /// A result that a worker delivered, on its way to the store.
 struct Arrival {
@@ -61,7 +55,9 @@ class Outbox {
   virtual void record(const Loss& loss) = 0;
   /// The run crashed too many workers: to be kept as given up, so that the campaign can end.
   virtual void give_up(wire::CampaignId campaign, RunIndex run) = 0;
-  virtual void log(Event event) = 0;
+  virtual void log(Event event, wire::CampaignId campaign) = 0;
+  /// An event that concerns all campaigns.
+  void log(Event event) { log(std::move(event), wire::CampaignId{}); }
 };
 
 }  // namespace proofmass::coordinator

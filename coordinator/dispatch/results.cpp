@@ -223,8 +223,8 @@ void on_compared(State& state, CampaignId id, RunIndex run, WorkerId worker, boo
     ++campaign.num_mismatches;
     outbox.log({.severity = Severity::error,
                 .kind = "result_mismatch",
-                .text = fmt::format("run={} worker={}", run.value, worker.value),
-                .campaign = id});
+                .fields = {{"run", run.value}, {"worker", worker.value}}},
+               id);
   }
   detail::finish_if_done(state, id, outbox);
   if (was_backed_up) detail::lend_to_hungry(state, now, outbox);
@@ -234,10 +234,9 @@ void on_store_failed(State& state, CampaignId id, const std::string& reason, Out
   CampaignState& campaign = state.campaigns.at(id);
   if (campaign.storage_failure == reason) return;
   campaign.storage_failure = reason;
-  outbox.log({.severity = Severity::error,
-              .kind = "storage_failed",
-              .text = fmt::format("reason=\"{}\"", reason),
-              .campaign = id});
+  outbox.log(
+      {.severity = Severity::error, .kind = "storage_failed", .fields = {Field::reason(reason)}},
+      id);
 }
 
 void on_store_recovered(State& state, CampaignId id, TimePoint now, Outbox& outbox) {
@@ -246,8 +245,8 @@ void on_store_recovered(State& state, CampaignId id, TimePoint now, Outbox& outb
   campaign.storage_failure.clear();
   outbox.log({.severity = Severity::info,
               .kind = "storage_recovered",
-              .text = fmt::format("delivered={}", campaign.delivered.size()),
-              .campaign = id});
+              .fields = {{"delivered", campaign.delivered.size()}}},
+             id);
   detail::lend_to_hungry(state, now, outbox);
 }
 

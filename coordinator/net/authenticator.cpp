@@ -83,8 +83,7 @@ std::optional<Request> request_from(const std::vector<std::string>& frames) {
 
 class Authenticator::Parts {
  public:
-  Parts(zmq::context_t& context, const std::filesystem::path& directory,
-        std::function<void(Event)> log)
+  Parts(zmq::context_t& context, const std::filesystem::path& directory, Log log)
       : log_(std::move(log)),
         refusals_(log_),
         workers_(directory / wire::authorized_workers_name, Domain::workers),
@@ -180,10 +179,10 @@ class Authenticator::Parts {
     if (!what_is_wrong) return;
     log_({.severity = Severity::error,
           .kind = "allow_list_unreadable",
-          .text = fmt::format("{}; the list before it stands", *what_is_wrong)});
+          .fields = {Field::remark(*what_is_wrong + "; the list before it stands")}});
   }
 
-  std::function<void(Event)> log_;
+  Log log_;
   RefusalLog refusals_;
   AllowList workers_;
   AllowList clients_;
@@ -192,7 +191,7 @@ class Authenticator::Parts {
 };
 
 Authenticator::Authenticator(zmq::context_t& context, const std::filesystem::path& directory,
-                             std::function<void(Event)> log)
+                             Log log)
     : parts_(std::make_unique<Parts>(context, directory, std::move(log))) {}
 
 Authenticator::~Authenticator() = default;

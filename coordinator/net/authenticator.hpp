@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -35,8 +34,7 @@ class Authenticator {
   /// @param directory  With authorized_workers and authorized_clients.
   /// @param log        Refusals, and lists that cannot be read.
   /// @throws Error if a list cannot be read, or if the context has an authenticator.
-  Authenticator(zmq::context_t& context, const std::filesystem::path& directory,
-                std::function<void(Event)> log);
+  Authenticator(zmq::context_t& context, const std::filesystem::path& directory, Log log);
   ~Authenticator();
   Authenticator(const Authenticator&) = delete;
   Authenticator& operator=(const Authenticator&) = delete;

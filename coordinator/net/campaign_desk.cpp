@@ -257,11 +257,11 @@ void CampaignDesk::review_failures(CampaignId id, const Served& served) {
       served.num_failures_before + campaign.num_without_estimate + campaign.given_up.size();
   if (num_failures <= *served.plan.failures_max) return;
   on_cancel(state_, id, outbox_);
-  outbox_.log({.severity = Severity::error,
-               .kind = "too_many_failures",
-               .text = fmt::format("without_estimate={} failures_max={}", num_failures,
-                                   *served.plan.failures_max),
-               .campaign = id});
+  outbox_.log(
+      {.severity = Severity::error,
+       .kind = "too_many_failures",
+       .fields = {{"without_estimate", num_failures}, {"failures_max", *served.plan.failures_max}}},
+      id);
 }
 
 void CampaignDesk::review_control(CampaignId id, Served& served) {
@@ -302,14 +302,13 @@ void CampaignDesk::take_summary(CampaignId id, Served& served) {
     if (!is_news) return;
     outbox_.log({.severity = Severity::error,
                  .kind = "statistics_failed",
-                 .text = fmt::format("reason=\"{}\"", failure),
-                 .campaign = id});
+                 .fields = {Field::reason(failure)}},
+                id);
     return;
   }
-  outbox_.log({.kind = "campaign_summarised",
-               .text = num_runs ? fmt::format("runs={} next={}", definition.num_runs, *num_runs)
-                                : fmt::format("runs={}", definition.num_runs),
-               .campaign = id});
+  wire::Fields fields{{"runs", definition.num_runs}};
+  if (num_runs) fields.emplace_back("next", *num_runs);
+  outbox_.log({.kind = "campaign_summarised", .fields = std::move(fields)}, id);
   if (num_runs && !served.is_held && state_.campaigns.at(id).phase == Phase::finished) {
     go_on_to(id, *num_runs);
   }
@@ -336,8 +335,8 @@ void CampaignDesk::go_on_to(CampaignId id, std::uint64_t num_runs) {
           served_.at(id).is_decided = true;
           outbox_.log({.severity = Severity::error,
                        .kind = "campaign_not_extended",
-                       .text = fmt::format("runs={} reason=\"{}\"", num_runs, failure),
-                       .campaign = id});
+                       .fields = {{"runs", num_runs}, Field::reason(failure)}},
+                      id);
         };
       });
 }
@@ -438,8 +437,7 @@ void CampaignDesk::close_ended(CampaignId id) {
           const auto found = ended_.find(id);
           if (found == ended_.end()) return;
           found->second.stamp = stamp;
-          outbox_.log({.kind = "campaign_closed",
-                       .text = fmt::format("name={}", found->second.status.name)});
+          outbox_.log({.kind = "campaign_closed", .fields = {{"name", found->second.status.name}}});
         };
       });
 }
@@ -447,7 +445,7 @@ void CampaignDesk::close_ended(CampaignId id) {
 void CampaignDesk::say_not_closed(std::string_view reason) {
   outbox_.log({.severity = Severity::warning,
                .kind = "campaign_not_closed",
-               .text = fmt::format("reason=\"{}\"", reason)});
+               .fields = {Field::reason(reason)}});
 }
 
 bool CampaignDesk::is_all_done() const {

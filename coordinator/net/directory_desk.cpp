@@ -1,7 +1,5 @@
 #include "coordinator/net/directory_desk.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <exception>
 #include <memory>
@@ -56,8 +54,7 @@ void DirectoryDesk::take(FileOutcome outcome) {
     return note({.file = file, .reason = error.what()});
   }
   if (unserved_.erase(file) == 0) return;
-  surroundings_.outbox.log(
-      {.kind = "campaign_file_served", .text = fmt::format("file={}", file.string())});
+  surroundings_.outbox.log({.kind = "campaign_file_served", .fields = {{"file", file.string()}}});
 }
 
 void DirectoryDesk::note(FileFailure failure) {
@@ -67,7 +64,7 @@ void DirectoryDesk::note(FileFailure failure) {
   if (!is_news) return;
   surroundings_.outbox.log({.severity = Severity::error,
                             .kind = "campaign_not_served",
-                            .text = fmt::format("reason=\"{}\"", known.reason)});
+                            .fields = {Field::reason(known.reason)}});
 }
 
 void DirectoryDesk::review(TimePoint now) {
@@ -106,14 +103,14 @@ void DirectoryDesk::unlist(const EndedFile& changed, bool is_there) {
   if (!surroundings_.campaigns.unlist(changed) || is_there) return;
   surroundings_.outbox.log({.severity = Severity::warning,
                             .kind = "campaign_file_gone",
-                            .text = fmt::format("file={}", changed.file.string())});
+                            .fields = {{"file", changed.file.string()}}});
 }
 
 void DirectoryDesk::forget(const std::filesystem::path& file) {
   unserved_.erase(file);
   const bool is_served = surroundings_.campaigns.known().files.contains(file);
   surroundings_.outbox.log({.kind = is_served ? "campaign_file_served" : "campaign_file_gone",
-                            .text = fmt::format("file={}", file.string())});
+                            .fields = {{"file", file.string()}}});
 }
 
 bool DirectoryDesk::is_all_served() const {

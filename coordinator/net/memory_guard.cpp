@@ -103,21 +103,24 @@ class MemoryGuard::Parts {
     const std::size_t size = settled_size();
     is_open_ = actions_.open();
     const bool is_news = bound_.note_reset(size);
-    note("sockets_reset",
-         fmt::format("resident_mib={} left_mib={} memory_max_mib={} (peers connect anew)",
-                     mebibytes(size_before), mebibytes(size), mebibytes(size_max_)));
+    note("sockets_reset", {{"resident_mib", mebibytes(size_before)},
+                           {"left_mib", mebibytes(size)},
+                           {"memory_max_mib", mebibytes(size_max_)},
+                           Field::remark("(peers connect anew)")});
     if (is_news) {
-      note("memory_high",
-           fmt::format("resident_mib={} memory_max_mib={} (not held by sockets; next reset at {} "
-                       "MiB)",
-                       mebibytes(size), mebibytes(size_max_), mebibytes(bound_.limit())));
+      note("memory_high", {{"resident_mib", mebibytes(size)},
+                           {"memory_max_mib", mebibytes(size_max_)},
+                           Field::remark(fmt::format("(not held by sockets; next reset at {} MiB)",
+                                                     mebibytes(bound_.limit())))});
     }
-    if (!is_open_) note("sockets_unbound", "an address is taken; tried again until it is free");
+    if (!is_open_) {
+      note("sockets_unbound", {Field::remark("an address is taken; tried again until it is free")});
+    }
   }
 
   void open() {
     is_open_ = actions_.open();
-    if (is_open_) note("sockets_bound", "");
+    if (is_open_) note("sockets_bound", {});
   }
 
   /// Size of the process once what the sockets held is free. Nothing comes in meanwhile.
@@ -136,10 +139,10 @@ class MemoryGuard::Parts {
     }
   }
 
-  void note(std::string_view kind, std::string text) {
+  void note(std::string_view kind, wire::Fields fields) {
     actions_.note({.severity = kind == "sockets_unbound" ? Severity::error : Severity::warning,
                    .kind = kind,
-                   .text = std::move(text)});
+                   .fields = std::move(fields)});
   }
 
   bool is_stopping_after(Clock::duration duration) {

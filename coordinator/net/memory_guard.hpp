@@ -53,9 +53,9 @@ class MemoryGuard {
  public:
   /// What a guard does to sockets, in its own thread.
   struct Actions {
-    std::function<void()> close;      ///< Lets all go that the sockets hold; nothing comes in then.
-    std::function<bool()> open;       ///< False if the addresses cannot be had now: called again.
-    std::function<void(Event)> note;  ///< `sockets_reset`, `memory_high`, `sockets_unbound`.
+    std::function<void()> close;  ///< Lets all go that the sockets hold; nothing comes in then.
+    std::function<bool()> open;   ///< False if the addresses cannot be had now: called again.
+    Log note;                     ///< `sockets_reset`, `memory_high`, `sockets_unbound`.
   };
 
   MemoryGuard(std::size_t size_max, Actions actions);

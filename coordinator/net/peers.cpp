@@ -1,7 +1,5 @@
 #include "coordinator/net/peers.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "core/error.hpp"
@@ -10,9 +8,9 @@ namespace proofmass::coordinator {
 
 using wire::WorkerId;
 
-std::string to_text(const Address& address) {
-  return fmt::format("address={} key={}", address.host.empty() ? "unknown" : address.host,
-                     address.key.empty() ? "none" : address.key);
+wire::Fields fields_of(const Address& address) {
+  return {{"address", address.host.empty() ? "unknown" : address.host},
+          {"key", address.key.empty() ? "none" : address.key}};
 }
 
 std::optional<WorkerId> Peers::meet(wire::SessionId session, std::uint64_t sequence,

@@ -10,6 +10,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::coordinator {
@@ -23,7 +24,7 @@ struct Address {
 };
 
 /// `address=10.0.0.7 key=...`, for logs.
-[[nodiscard]] std::string to_text(const Address& address);
+[[nodiscard]] wire::Fields fields_of(const Address& address);
 
 /// Who is who: session (of a worker process), its number in the dispatch, and the connection that
 /// it was last heard on.

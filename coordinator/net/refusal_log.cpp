@@ -1,7 +1,5 @@
 #include "coordinator/net/refusal_log.hpp"
 
-#include <fmt/format.h>
-
 #include <utility>
 
 namespace proofmass::coordinator {
@@ -23,28 +21,31 @@ std::string_view or_else(std::string_view text, std::string_view substitute) {
 
 }  // namespace
 
-RefusalLog::RefusalLog(std::function<void(Event)> log) : log_(std::move(log)) {}
+RefusalLog::RefusalLog(Log log) : log_(std::move(log)) {}
 
 void RefusalLog::refused(const Refusal& refusal, TimePoint now) {
   if (lines_.empty() || now - began_at_ >= period) begin_minute(now);
-  std::string line =
-      fmt::format("domain={} address={} key={} reason=\"{}\"", or_else(refusal.domain, "none"),
-                  or_else(plain(refusal.address), "unknown"), or_else(refusal.public_key, "none"),
-                  refusal.reason);
+  Event event{.severity = Severity::warning,
+              .kind = "peer_refused",
+              .fields = {{"domain", or_else(refusal.domain, "none")},
+                         {"address", or_else(plain(refusal.address), "unknown")},
+                         {"key", or_else(refusal.public_key, "none")},
+                         Field::reason(refusal.reason)}};
+  std::string line = to_text(event);
   if (lines_.contains(line)) return;
   if (lines_.size() >= lines_per_period_max) {
     ++num_left_out_;
     return;
   }
-  lines_.insert(line);
-  log_({.severity = Severity::warning, .kind = "peer_refused", .text = std::move(line)});
+  lines_.insert(std::move(line));
+  log_(std::move(event));
 }
 
 void RefusalLog::begin_minute(TimePoint now) {
   if (num_left_out_ > 0) {
     log_({.severity = Severity::warning,
           .kind = "peers_refused",
-          .text = fmt::format("count={} without a line each", num_left_out_)});
+          .fields = {{"count", num_left_out_}, Field::remark("without a line each")}});
   }
   num_left_out_ = 0;
   lines_.clear();

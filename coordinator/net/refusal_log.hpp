@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -26,14 +25,14 @@ class RefusalLog {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  explicit RefusalLog(std::function<void(Event)> log);
+  explicit RefusalLog(Log log);
 
   void refused(const Refusal& refusal, TimePoint now);
 
  private:
   void begin_minute(TimePoint now);
 
-  std::function<void(Event)> log_;
+  Log log_;
   TimePoint began_at_;
   std::set<std::string> lines_;  ///< Of this minute.
   std::uint64_t num_left_out_ = 0;

@@ -1,7 +1,5 @@
 #include "coordinator/net/service.hpp"
 
-#include <fmt/format.h>
-
 #include <exception>
 #include <functional>
 #include <string_view>
@@ -141,10 +139,11 @@ class Service::Parts final : public Outbox {
 
   void give_up(CampaignId campaign, RunIndex run) override { writer_.give_up(campaign, run); }
 
-  void log(Event event) override {
+  using Outbox::log;
+  void log(Event event, CampaignId campaign) override {
     log_(event);
-    if (event.campaign != CampaignId{} && !desk_.is_served(event.campaign)) return;
-    writer_.record_event(event.campaign, {.kind = std::string(event.kind), .text = event.text});
+    if (campaign != CampaignId{} && !desk_.is_served(campaign)) return;
+    writer_.record_event(campaign, entry_of(event));
   }
 
  private:
@@ -249,7 +248,7 @@ class Service::Parts final : public Outbox {
   bool is_over(const std::atomic<StopRequest>& stop) {
     if (stop == StopRequest::now) return true;
     if (stop == StopRequest::drain && !drained_until_) {
-      log({.kind = "coordinator_draining", .text = {}});
+      log({.kind = "coordinator_draining"});
       drained_until_ = now() + config_.drain_max;
       on_drain(state_, *this);
     }
@@ -290,7 +289,7 @@ class Service::Parts final : public Outbox {
     if (num_unsent == num_unsent_logged_) return;
     log({.severity = Severity::warning,
          .kind = "messages_unsent",
-         .text = fmt::format("count={}", num_unsent - num_unsent_logged_)});
+         .fields = {{"count", num_unsent - num_unsent_logged_}}});
     num_unsent_logged_ = num_unsent;
   }
 
@@ -329,7 +328,7 @@ class Service::Parts final : public Outbox {
     } catch (const std::exception& error) {
       log({.severity = Severity::error,
            .kind = "request_failed",
-           .text = fmt::format("of={} reason=\"{}\"", who, error.what())});
+           .fields = {{"of", who}, Field::reason(error.what())}});
     }
   }
 
@@ -355,33 +354,28 @@ class Service::Parts final : public Outbox {
   void complete(const LogGrown& grown) {
     log({.severity = Severity::warning,
          .kind = "write_ahead_log_grown",
-         .text = fmt::format("size_bytes={} (somebody reads an old state of the file)", grown.size),
-         .campaign = grown.campaign});
+         .fields = {{"size_bytes", grown.size},
+                    Field::remark("(somebody reads an old state of the file)")}},
+        grown.campaign);
   }
   void complete(const FileReturned& returned) {
     if (!desk_.is_served(returned.campaign)) return;
     log({.severity = Severity::warning,
          .kind = kind_of(returned.kind),
-         .text = fmt::format("runs={}", state_.campaigns.at(returned.campaign).committed.size()),
-         .campaign = returned.campaign});
+         .fields = {{"runs", state_.campaigns.at(returned.campaign).committed.size()}}},
+        returned.campaign);
   }
   void complete(const LogKept& kept) {
     log({.severity = Severity::warning,
          .kind = "write_ahead_log_kept",
-         .text = fmt::format("reason=\"{}\"", kept.reason),
-         .campaign = kept.campaign});
+         .fields = {Field::reason(kept.reason)}},
+        kept.campaign);
   }
   void complete(const LogFolded& folded) {
-    log({.severity = Severity::info,
-         .kind = "write_ahead_log_folded",
-         .text = "",
-         .campaign = folded.campaign});
+    log({.kind = "write_ahead_log_folded"}, folded.campaign);
   }
   void complete(const LogShrunk& shrunk) {
-    log({.severity = Severity::info,
-         .kind = "write_ahead_log_shrunk",
-         .text = "",
-         .campaign = shrunk.campaign});
+    log({.kind = "write_ahead_log_shrunk"}, shrunk.campaign);
   }
 
   /// Results are acknowledged before their workers are told to end.
@@ -416,9 +410,10 @@ class Service::Parts final : public Outbox {
     has_storage_failed_ = true;
     log({.severity = Severity::error,
          .kind = "results_not_stored",
-         .text = fmt::format("name={} runs={} reason=\"{}\"", campaign.definition->name,
-                             campaign.delivered.size(), campaign.storage_failure),
-         .campaign = id});
+         .fields = {{"name", campaign.definition->name},
+                    {"runs", campaign.delivered.size()},
+                    Field::reason(campaign.storage_failure)}},
+        id);
   }
 
   WakingTime time_{std::chrono::steady_clock::now()};

@@ -63,9 +63,6 @@ struct ServiceConfig {
   std::optional<wire::FaultPlan> faults;  ///< On the workers' messages; for tests of this program.
 };
 
-/// Told of all that happens, in the service's thread.
-using Log = std::function<void(const Event&)>;
-
 /// A coordinator: lends the runs of its campaigns to the workers that connect, stores their results
 /// and answers clients. One thread serves all sockets; another writes to the campaign files.
 class Service {

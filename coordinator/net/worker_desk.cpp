@@ -83,9 +83,10 @@ std::optional<wire::Packet> WorkerDesk::decode(const Incoming& message, TimePoin
 
 void WorkerDesk::close_out(const Address& from, RejectReason reason, const std::string& text,
                            TimePoint now, Outbox& outbox) {
-  outbox.log({.severity = Severity::warning,
-              .kind = "peer_closed_out",
-              .text = fmt::format("{} reason=\"{}\"", to_text(from), text)});
+  wire::Fields fields = fields_of(from);
+  fields.push_back(Field::reason(text));
+  outbox.log(
+      {.severity = Severity::warning, .kind = "peer_closed_out", .fields = std::move(fields)});
   const wire::Reject reject{.reason = reason, .text = text};
   const auto worker = peers_.worker_at(from.routing_id);
   if (worker) {

@@ -9,6 +9,7 @@
 #include "core/campaign/identifiers.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/statistics/stop_rule.hpp"
+#include "proto/text/event.hpp"
 #include "proto/wire/client_messages.hpp"
 #include "proto/wire/messages.hpp"
 
@@ -48,6 +49,10 @@ struct EventEntry {
   std::string kind;  ///< What happened, in one word: `coordinator_started`.
   std::string text;  ///< Details; what is beyond 2,000 characters is cut.
 };
+
+[[nodiscard]] inline EventEntry entry_of(const wire::Event& event) {
+  return {.kind = std::string(event.kind), .text = to_text(event.fields)};
+}
 
 /// A worker process that is registered. Registering again changes nothing but the missing end.
 struct WorkerJoined {

@@ -3,7 +3,8 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
-#include <string_view>
+
+#include "proto/text/event.hpp"
 
 namespace proofmass::wire {
 
@@ -15,14 +16,13 @@ enum class LogFormat : std::uint8_t {
 /// What is written at all.
 enum class LogLevel : std::uint8_t { info, warning };
 
-/// From now on the log goes to standard error, each message as one line of visible_text(). To be
-/// called once, by the only thread.
-void set_up_log(const std::string& program, LogFormat format, LogLevel level);
+/// A log that writes events to standard error, one line each: to_text() behind time, program and
+/// severity, or json_line(). Any thread may call it.
+[[nodiscard]] Log make_log(const std::string& program, LogFormat format, LogLevel level);
 
-/// A log message such as `worker_crashed signal=11 restart_in_s=1.0` as one line of JSON: `time`
-/// (UTC), `level`, `event`, and each `key=value` as a string of its own; what is no such pair, or
-/// has a name that is taken, is in `text`.
-[[nodiscard]] std::string json_line(std::string_view message, std::string_view level,
-                                    std::chrono::system_clock::time_point time);
+/// The event as one line of JSON: `time` (UTC), `level`, `event`, each field with its name, and the
+/// remarks in `text`. Counts and numbers are numbers; text is what the field holds, except that
+/// bytes that are not UTF-8 are replaced by U+FFFD.
+[[nodiscard]] std::string json_line(const Event& event, std::chrono::system_clock::time_point time);
 
 }  // namespace proofmass::wire

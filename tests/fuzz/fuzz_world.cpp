@@ -91,9 +91,9 @@ class World final : public coordinator::Outbox {
     PROOFMASS_EXPECT(run.value < fuzz_num_runs);
     ++summary_.num_given_up;
   }
-  void log(coordinator::Event event) override {
+  void log(coordinator::Event event, wire::CampaignId) override {
     // A line of the log is one line.
-    PROOFMASS_EXPECT(event.text.find('\n') == std::string::npos);
+    PROOFMASS_EXPECT(to_text(event).find('\n') == std::string::npos);
   }
 
  private:

@@ -368,20 +368,20 @@ void PlayedCoordinator::give_up(wire::CampaignId campaign, RunIndex run) {
   });
 }
 
-void PlayedCoordinator::log(coordinator::Event event) {
+void PlayedCoordinator::log(coordinator::Event event, wire::CampaignId campaign) {
   ++num_events_[std::string(event.kind)];
+  const std::string text = to_text(event);
   if (std::getenv("PROOFMASS_SEED") != nullptr) {  // A world is replayed.
     const double now_s = std::chrono::duration<double>(agenda_.now().time_since_epoch()).count();
-    std::printf("%9.3f %.*s %s\n", now_s, static_cast<int>(event.kind.size()), event.kind.data(),
-                event.text.c_str());
+    std::printf("%9.3f %s\n", now_s, text.c_str());
   }
   if (event.kind == "host_quarantined" && !may_crash_) {
-    EXPECT_EQ(event.text.find(honest_key), std::string::npos) << event.text;
+    EXPECT_EQ(text.find(honest_key), std::string::npos) << text;
   }
   if (event.kind == "audit_given_up") {
-    unsigned long long run = 0;
-    ASSERT_EQ(std::sscanf(event.text.c_str(), "run=%llu", &run), 1);
-    files_.at(event.campaign).audits_given_up.insert({run});
+    ASSERT_EQ(event.fields.at(0).name, "run");
+    const auto run = std::get<std::uint64_t>(event.fields.at(0).value);
+    files_.at(campaign).audits_given_up.insert({run});
   }
 }
 

@@ -108,7 +108,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
   void compare(coordinator::Arrival arrival) override;
   void record(const coordinator::Loss& loss) override;
   void give_up(wire::CampaignId campaign, RunIndex run) override;
-  void log(coordinator::Event event) override;
+  void log(coordinator::Event event, wire::CampaignId campaign) override;
 
  private:
   struct Peer {

@@ -129,9 +129,11 @@ void Conversation::handle(const wire::Forget& forget, const wire::Header&, TimeP
     execution_.forget(forget.campaign);
   }
   if (const std::size_t count = drop_results(forget.campaign, known); count > 0) {
-    note(Notice::Severity::warning,
-         fmt::format("results_forgotten campaign={:016x} results={} (finished or cancelled)",
-                     forget.campaign.value, count));
+    note({.severity = wire::Severity::warning,
+          .kind = "results_forgotten",
+          .fields = {{"campaign", fmt::format("{:016x}", forget.campaign.value)},
+                     {"results", count},
+                     wire::Field::remark("(finished or cancelled)")}});
   }
   leave_if_done();
 }
@@ -285,9 +287,12 @@ void Conversation::come_again(const wire::Reject& reject, TimePoint now) {
   hello_delay_ = config_.hello_delay;
   refusal_delay_ = std::min(2 * refusal_delay_, config_.refusal_delay_max);
   if (!noted_refusals_.insert(reject.reason).second) return;
-  note(Notice::Severity::error,
-       fmt::format("refused reason=\"{}\" (asks again every {} to {} s)", reject.text,
-                   whole_seconds(config_.refusal_delay), whole_seconds(config_.refusal_delay_max)));
+  const std::string how =
+      fmt::format("(asks again every {} to {} s)", whole_seconds(config_.refusal_delay),
+                  whole_seconds(config_.refusal_delay_max));
+  note({.severity = wire::Severity::error,
+        .kind = "refused",
+        .fields = {wire::Field::reason(reject.text), wire::Field::remark(how)}});
 }
 
 void Conversation::say_hello(TimePoint now) {
@@ -367,9 +372,10 @@ void Conversation::define(wire::CampaignId campaign, TimePoint now) {
   const auto read = read_definition(execution_, wanted.incoming.take());
   if (const auto* const refusal = std::get_if<std::string>(&read)) {
     wanted.request_due_at = now + config_.request_again_after;
-    return note(
-        Notice::Severity::error,
-        fmt::format("malformed_definition campaign={:016x} {:.400}", campaign.value, *refusal));
+    return note({.severity = wire::Severity::error,
+                 .kind = "malformed_definition",
+                 .fields = {{"campaign", fmt::format("{:016x}", campaign.value)},
+                            wire::Field::remark(fmt::format("{:.400}", *refusal))}});
   }
   const auto& definition = std::get<std::shared_ptr<const Campaign>>(read);
   wanted_.erase(campaign);

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/text/event.hpp"
 #include "proto/wire/definition_codec.hpp"
 #include "proto/wire/messages.hpp"
 #include "worker/execution/execution.hpp"
@@ -25,13 +26,6 @@ struct Ending {
   };
   Kind kind = Kind::done;
   std::string reason;  ///< For people.
-};
-
-/// Something that is worth a line in the log.
-struct Notice {
-  enum class Severity : std::uint8_t { info, warning, error };
-  Severity severity = Severity::info;
-  std::string text;  ///< `results_forgotten campaign=7 results=12`.
 };
 
 /// Times of a worker's conversation.
@@ -87,7 +81,7 @@ class Conversation {
   /// True, once, if nothing more is heard on the present connection: another one is to be made.
   [[nodiscard]] bool take_reconnection() { return std::exchange(wants_connection_, false); }
   /// What has happened since the last call.
-  [[nodiscard]] std::vector<Notice> take_notices() { return std::exchange(notices_, {}); }
+  [[nodiscard]] std::vector<wire::Event> take_events() { return std::exchange(events_, {}); }
   /// The coordinator does not let this worker in. It may some day; until then nothing else changes.
   void on_refused(const std::string& reason);
   /// The execution has something new to take.
@@ -167,7 +161,7 @@ class Conversation {
   void leave_if_done();
   void leave(const std::string& reason);
   void end(Ending::Kind kind, std::string reason);
-  void note(Notice::Severity severity, std::string text);
+  void note(wire::Event event);
 
   wire::SessionId session_;
   wire::Hello hello_;
@@ -199,7 +193,7 @@ class Conversation {
   std::map<RunKey, wire::Attempt> unfinished_;           ///< All runs that the execution has.
   std::map<RunKey, SentResult> unacknowledged_;
   std::size_t num_set_aside_ = 0;  ///< Of those.
-  std::vector<Notice> notices_;
+  std::vector<wire::Event> events_;
   std::optional<Leaving> leaving_;
   std::optional<Ending> ending_;
 };

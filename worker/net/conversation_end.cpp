@@ -80,9 +80,9 @@ void Conversation::leave(const std::string& reason) {
 }
 
 /// As many as a log can take in at a time; whoever serves the conversation takes them at once.
-void Conversation::note(Notice::Severity severity, std::string text) {
-  constexpr std::size_t notices_max = 100;
-  if (notices_.size() < notices_max) notices_.push_back({severity, std::move(text)});
+void Conversation::note(wire::Event event) {
+  constexpr std::size_t events_max = 100;
+  if (events_.size() < events_max) events_.push_back(std::move(event));
 }
 
 void Conversation::end(Ending::Kind kind, std::string reason) {

@@ -58,9 +58,11 @@ void Conversation::set_aside(wire::CampaignId campaign, std::span<const RunRange
   }
   num_set_aside_ += count;
   if (count == 0) return;
-  note(Notice::Severity::warning,
-       fmt::format("results_set_aside campaign={:016x} results={} (not served now)", campaign.value,
-                   count));
+  note({.severity = wire::Severity::warning,
+        .kind = "results_set_aside",
+        .fields = {{"campaign", fmt::format("{:016x}", campaign.value)},
+                   {"results", count},
+                   wire::Field::remark("(not served now)")}});
 }
 
 std::vector<Conversation::RunKey> Conversation::keep_finished(TimePoint now) {

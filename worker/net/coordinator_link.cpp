@@ -1,7 +1,6 @@
 #include "worker/net/coordinator_link.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -92,9 +91,8 @@ class CoordinatorLink::Parts {
   }
 
   void transmit(const std::string& bytes) {
-    if (!socket_.send(zmq::buffer(bytes), zmq::send_flags::dontwait)) {
-      spdlog::debug("message_not_sent bytes={}", bytes.size());
-    }
+    // What the queue has no room for is lost; the conversation repeats what is not answered.
+    (void)socket_.send(zmq::buffer(bytes), zmq::send_flags::dontwait);
   }
 
   zmq::context_t context_;

@@ -1,7 +1,6 @@
 #include "worker/net/serve.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
@@ -17,6 +16,8 @@
 
 namespace proofmass::worker {
 namespace {
+
+using wire::Field;
 
 constexpr std::chrono::milliseconds tick_interval(100);
 constexpr std::chrono::seconds awake_turn_max(1);       ///< Longer ones were spent asleep.
@@ -37,16 +38,18 @@ bool take_turn(TimePoint& due_at, TimePoint now, Duration interval) {
 class Keeping {
  public:
   Keeping(const std::optional<std::filesystem::path>& path, std::string_view model,
-          Conversation& conversation)
-      : conversation_(conversation) {
+          Conversation& conversation, const wire::Log& log)
+      : conversation_(conversation), log_(log) {
     if (!path) return;
     spool_.emplace(*path, model);
     spooler_.emplace(*spool_);
     if (spool_->num_bytes_dropped() > 0) {
-      spdlog::warn("spool_torn bytes_dropped={}", spool_->num_bytes_dropped());
+      log_({.severity = wire::Severity::warning,
+            .kind = "spool_torn",
+            .fields = {{"bytes_dropped", spool_->num_bytes_dropped()}}});
     }
     if (spool_->former_results().empty()) return;
-    spdlog::info("spool_read results={}", spool_->former_results().size());
+    log_({.kind = "spool_read", .fields = {{"results", spool_->former_results().size()}}});
     conversation_.restore(spool_->former_results());
   }
 
@@ -59,18 +62,25 @@ class Keeping {
     if (spooler_) {
       warn(spooler_->finish(conversation_.unacknowledged()));
     } else if (conversation_.num_unacknowledged() > 0) {
-      spdlog::warn("results_lost results={} reason=\"no spool\"",
-                   conversation_.num_unacknowledged());
+      log_(
+          {.severity = wire::Severity::warning,
+           .kind = "results_lost",
+           .fields = {{"results", conversation_.num_unacknowledged()}, Field::reason("no spool")}});
     }
   }
 
  private:
   void warn(const std::optional<std::string>& reason) {
-    if (reason && reason != former_reason_) spdlog::warn("spool_failed {}", *reason);
+    if (reason && reason != former_reason_) {
+      log_({.severity = wire::Severity::warning,
+            .kind = "spool_failed",
+            .fields = {Field::remark(*reason)}});
+    }
     former_reason_ = reason;
   }
 
   Conversation& conversation_;
+  const wire::Log& log_;
   std::optional<Spool> spool_;
   std::optional<Spooler> spooler_;
   std::optional<std::string> former_reason_;
@@ -115,14 +125,15 @@ class Service {
  public:
   Service(const ServeConfig& config, Execution& execution, const wire::Wake& progress,
           StopSignals& signals)
-      : progress_(progress),
+      : log_(config.log),
+        progress_(progress),
         signals_(signals),
         wait_max_(config.faults ? fault_interval : tick_interval),
         link_(config.endpoint, config.security, config.faults),
         conversation_(
             config.session, config.hello, execution,
             [this](const wire::Packet& packet) { send(packet); }, time_now(), config.conversation),
-        keeping_(config.spool, config.hello.model_version, conversation_),
+        keeping_(config.spool, config.hello.model_version, conversation_, log_),
         notices_(conversation_) {}
 
   Ending run() {
@@ -137,7 +148,7 @@ class Service {
       if (progress_.take()) conversation_.on_progress(now);
       heed_signals(now);
       if (take_turn(tick_at, now, tick_interval)) on_tick(now);
-      log_notices();
+      for (const wire::Event& event : conversation_.take_events()) log_(event);
     }
     notices_.stopping();
     keeping_.finish();
@@ -147,11 +158,13 @@ class Service {
  private:
   void heed_link(TimePoint now) {
     if (link_.take_connected()) {
-      spdlog::info("connected");
+      log_({.kind = "connected"});
       conversation_.on_connected(now);
     }
     if (const auto refusal = link_.take_refusal()) {
-      spdlog::error("connection_refused reason=\"{}\"", *refusal);
+      log_({.severity = wire::Severity::error,
+            .kind = "connection_refused",
+            .fields = {Field::reason(*refusal)}});
       conversation_.on_refused(*refusal);
     }
     link_.receive(now, [&](std::string_view bytes) {
@@ -163,7 +176,9 @@ class Service {
   void receive(std::string_view bytes, TimePoint now) {
     const auto decoded = wire::decode(bytes);
     if (const auto* const error = std::get_if<wire::DecodeError>(&decoded)) {
-      return spdlog::error("malformed_message {}", error->text);
+      return log_({.severity = wire::Severity::error,
+                   .kind = "malformed_message",
+                   .fields = {Field::remark(error->text)}});
     }
     const auto& packet = std::get<wire::Packet>(decoded);
     if (std::holds_alternative<wire::RunLease>(packet.message)) {
@@ -171,7 +186,7 @@ class Service {
     }
     const bool was_registered = conversation_.is_registered();
     conversation_.on_packet(packet, now);
-    if (conversation_.is_registered() && !was_registered) spdlog::info("registered");
+    if (conversation_.is_registered() && !was_registered) log_({.kind = "registered"});
   }
 
   void send(const wire::Packet& packet) {
@@ -188,7 +203,8 @@ class Service {
     const StopRequest request = signals_.request();
     if (request == former_request_) return;
     former_request_ = request;
-    spdlog::info("asked_to_end how={}", request == StopRequest::drain ? "drain" : "at_once");
+    log_({.kind = "asked_to_end",
+          .fields = {{"how", request == StopRequest::drain ? "drain" : "at_once"}}});
     if (request == StopRequest::drain) {
       conversation_.on_drain_request(now);
     } else {
@@ -203,22 +219,7 @@ class Service {
     notices_.on_tick(now);
   }
 
-  void log_notices() {
-    for (const Notice& notice : conversation_.take_notices()) {
-      switch (notice.severity) {
-        case Notice::Severity::info:
-          spdlog::info(notice.text);
-          break;
-        case Notice::Severity::warning:
-          spdlog::warn(notice.text);
-          break;
-        case Notice::Severity::error:
-          spdlog::error(notice.text);
-          break;
-      }
-    }
-  }
-
+  const wire::Log& log_;
   const wire::Wake& progress_;
   StopSignals& signals_;
   StopRequest former_request_ = StopRequest::none;

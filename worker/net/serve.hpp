@@ -7,6 +7,7 @@
 #include "proto/link/faults.hpp"
 #include "proto/link/security.hpp"
 #include "proto/link/wake.hpp"
+#include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"
 #include "worker/net/conversation.hpp"
 #include "worker/net/stop_signals.hpp"
@@ -22,6 +23,7 @@ struct ServeConfig {
   ConversationConfig conversation;
   SignalSource signals = SignalSource::anyone;
   std::optional<std::filesystem::path> spool;  ///< Where results survive this process.
+  wire::Log log = [](const wire::Event&) {};   ///< Told of all that happens.
   std::optional<wire::FaultPlan> faults;       ///< On all messages; for tests of this program.
 };
 

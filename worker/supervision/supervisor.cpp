@@ -2,17 +2,18 @@
 
 #include <fmt/format.h>
 #include <signal.h>
-#include <spdlog/spdlog.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <random>
 #include <string>
+#include <utility>
 
 #include "core/error.hpp"
 
@@ -44,10 +45,21 @@ timespec timespec_of(Clock::duration time) {
   return {.tv_sec = ns / 1'000'000'000, .tv_nsec = ns % 1'000'000'000};
 }
 
+wire::Fields how_ended(int status) {
+  if (!WIFSIGNALED(status)) {
+    return {{"exit_code", static_cast<unsigned>(WEXITSTATUS(status))},
+            wire::Field::remark("(a computation hangs)")};
+  }
+  const int signal = WTERMSIG(status);
+  return {{"signal", static_cast<unsigned>(signal)},
+          wire::Field::remark(fmt::format("({})", strsignal(signal)))};
+}
+
 class Supervisor {
  public:
-  Supervisor(const std::function<int(const ChildStart&)>& work, const RestartConfig& config)
-      : work_(work), policy_(config), config_(config), signals_(supervised_signals()) {
+  Supervisor(const std::function<int(const ChildStart&)>& work, const wire::Log& log,
+             const RestartConfig& config)
+      : work_(work), log_(log), policy_(config), config_(config), signals_(supervised_signals()) {
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
   }
 
@@ -114,18 +126,18 @@ class Supervisor {
 
   /// False if it was asked to end meanwhile.
   bool wait_before_restart(int status) {
-    const std::string how =
-        WIFSIGNALED(status)
-            ? fmt::format("signal={} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)))
-            : fmt::format("exit_code={} (a computation hangs)", WEXITSTATUS(status));
+    wire::Fields fields = how_ended(status);
     const auto delay = policy_.on_crash(Clock::now());
     if (!delay) {
       throw Error(fmt::format(
           "crashes = {} (must be fewer within {} s); the last by {}", config_.num_crashes_max,
-          std::chrono::duration_cast<std::chrono::seconds>(config_.window).count(), how));
+          std::chrono::duration_cast<std::chrono::seconds>(config_.window).count(),
+          to_text(fields)));
     }
-    spdlog::error("worker_crashed {} restart_in_s={:.1f}", how,
-                  std::chrono::duration<double>(*delay).count());
+    const double delay_s = std::chrono::duration<double>(*delay).count();
+    fields.emplace_back("restart_in_s", std::round(10.0 * delay_s) / 10.0);
+    log_(
+        {.severity = wire::Severity::error, .kind = "worker_crashed", .fields = std::move(fields)});
     return !is_asked_to_end_within(*delay);
   }
 
@@ -140,6 +152,7 @@ class Supervisor {
   }
 
   const std::function<int(const ChildStart&)>& work_;
+  const wire::Log& log_;
   RestartPolicy policy_;
   RestartConfig config_;
   sigset_t signals_;
@@ -157,8 +170,9 @@ wire::SessionId random_session() {
   return {value};
 }
 
-int supervise(const std::function<int(const ChildStart&)>& work, const RestartConfig& config) {
-  return Supervisor(work, config).run();
+int supervise(const std::function<int(const ChildStart&)>& work, const wire::Log& log,
+              const RestartConfig& config) {
+  return Supervisor(work, log, config).run();
 }
 
 }  // namespace proofmass::worker

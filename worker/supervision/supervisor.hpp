@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 
+#include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"
 #include "worker/supervision/restart_policy.hpp"
 
@@ -31,9 +32,10 @@ inline constexpr int exit_hung = 3;
 /// it gets SIGTERM if the supervisor ends.
 ///
 /// @param work  Called in the child; must not throw. Its value is the child's exit code.
+/// @param log   Told when a child has crashed.
 /// @return The exit code of the last child.
 /// @throws Error if no child can be made, or if it crashes too often.
-[[nodiscard]] int supervise(const std::function<int(const ChildStart&)>& work,
+[[nodiscard]] int supervise(const std::function<int(const ChildStart&)>& work, const wire::Log& log,
                             const RestartConfig& config = {});
 
 }  // namespace proofmass::worker

@@ -11,6 +11,8 @@
 namespace proofmass::coordinator::detail {
 namespace {
 
+using wire::Field;
+
 constexpr std::uint64_t event_text_size_max = 2000;
 constexpr std::int64_t num_events_max = 10'000;
 
@@ -55,9 +57,9 @@ CommitSummary EntryRows::write(std::span<const Entry> entries) {
   }
   workers_.write_counts(now_unix_s_);
   if (workers_.take_overflow()) {
-    write_entry(EventEntry{
-        .kind = "worker_table_full",
-        .text = fmt::format("rows={} (further workers share one row)", num_workers_max)});
+    write_entry(entry_of({.kind = "worker_table_full",
+                          .fields = {{"rows", std::uint64_t{num_workers_max}},
+                                     Field::remark("(further workers share one row)")}}));
   }
   return std::exchange(summary_, {});
 }
@@ -115,21 +117,21 @@ bool EntryRows::has_room_for_audit(RunIndex run, std::int64_t worker, bool is_eq
     return true;
   }
   if (!std::exchange(is_audit_full_, true)) {
-    write_entry(
-        EventEntry{.kind = "audit_history_full",
-                   .text = fmt::format("rows={} (further second results are compared and not kept)",
-                                       *num_audits_)});
+    write_entry(entry_of(
+        {.kind = "audit_history_full",
+         .fields = {{"rows", *num_audits_},
+                    Field::remark("(further second results are compared and not kept)")}}));
   }
   return false;
 }
 
 void EntryRows::report_contradiction(const Delivery& delivery) {
   ++summary_.num_contradicting;
-  write_entry(
-      EventEntry{.kind = "contradicting_result",
-                 .text = fmt::format("run={} worker={} session={} attempt={}",
-                                     delivery.result.run.value, workers_.name_of(delivery.worker),
-                                     hexadecimal(delivery.worker.value), delivery.attempt.value)});
+  write_entry(entry_of({.kind = "contradicting_result",
+                        .fields = {{"run", delivery.result.run.value},
+                                   {"worker", workers_.name_of(delivery.worker)},
+                                   {"session", hexadecimal(delivery.worker.value)},
+                                   {"attempt", delivery.attempt.value}}}));
 }
 
 void EntryRows::write_entry(const LostRuns& lost) {
@@ -138,9 +140,9 @@ void EntryRows::write_entry(const LostRuns& lost) {
                       std::int64_t{lost.is_blamed}, now_unix_s_);
   trim_attempts_.run(num_attempts_max);
   if (database_.last_row() != num_attempts_max + 1) return;
-  write_entry(
-      EventEntry{.kind = "attempt_history_full",
-                 .text = fmt::format("rows={} (older ones are dropped)", num_attempts_max)});
+  write_entry(entry_of({.kind = "attempt_history_full",
+                        .fields = {{"rows", std::uint64_t{num_attempts_max}},
+                                   Field::remark("(older ones are dropped)")}}));
 }
 
 void EntryRows::write_entry(const GivenUpRun& given_up) {

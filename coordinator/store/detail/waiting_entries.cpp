@@ -1,7 +1,5 @@
 #include "coordinator/store/detail/waiting_entries.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <iterator>
 #include <utility>
@@ -49,10 +47,9 @@ void WaitingEntries::take(std::size_t num_max, std::vector<Entry>& entries, Time
   urgent_since_ = num_urgent_ == 0 ? std::nullopt : std::optional(now);
   if (num_dropped_ == 0) return;
   entries.push_back(
-      EventEntry{.kind = "records_dropped",
-                 .text = fmt::format("losses_and_events={} (the disk did not take them for too "
-                                     "long)",
-                                     std::exchange(num_dropped_, 0))});
+      entry_of({.kind = "records_dropped",
+                .fields = {{"losses_and_events", std::exchange(num_dropped_, 0)},
+                           wire::Field::remark("(the disk did not take them for too long)")}}));
 }
 
 }  // namespace proofmass::coordinator::detail

@@ -94,7 +94,7 @@ class Rounds final : public Outbox {
   void compare(Arrival) override { ADD_FAILURE() << "a run was computed twice"; }
   void record(const Loss&) override { ADD_FAILURE() << "runs were lost"; }
   void give_up(CampaignId, RunIndex) override { ADD_FAILURE() << "a run was given up"; }
-  void log(Event) override {}
+  void log(Event, CampaignId) override {}
 
  private:
   /// One message an attempt, as workers send them. The thread is free before its results arrive: it

@@ -30,8 +30,8 @@ class RecordingOutbox final : public coordinator::Outbox {
   void compare(coordinator::Arrival arrival) override { compared_.push_back(std::move(arrival)); }
   void record(const coordinator::Loss& loss) override { losses_.push_back(loss); }
   void give_up(wire::CampaignId, RunIndex run) override { given_up_.push_back(run); }
-  void log(coordinator::Event event) override {
-    events_.push_back(std::string(event.kind) + ' ' + event.text);
+  void log(coordinator::Event event, wire::CampaignId) override {
+    events_.push_back(to_text(event));
   }
 
   /// The oldest message that has not been taken, which must be of this kind and for this worker.

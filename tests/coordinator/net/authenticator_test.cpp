@@ -109,7 +109,7 @@ class AuthenticatorTest : public ::testing::Test {
 
   // What is logged of one refusal but the address, which is this host's.
   [[nodiscard]] std::string logged() const {
-    return events_.empty() ? "nothing" : events_.front().text;
+    return events_.empty() ? "nothing" : to_text(events_.front().fields);
   }
 
   test::ScratchDirectory directory_;
@@ -225,7 +225,7 @@ TEST_F(AuthenticatorTest, ListThatCannotBeReadIsLoggedAndTheOldOneStands) {
   ASSERT_EQ(events_.size(), 1u);
   EXPECT_EQ(events_[0].kind, "allow_list_unreadable");
   EXPECT_EQ(events_[0].severity, Severity::error);
-  EXPECT_EQ(events_[0].text,
+  EXPECT_EQ(to_text(events_[0].fields),
             (directory_ / "authorized_workers").string() +
                 " line = 1 (must begin with a public key of 40 characters); the list before it "
                 "stands");

@@ -101,9 +101,10 @@ TEST(Peers, RememberWhoWasClosedOutUpToALimit) {
 }
 
 TEST(PeerAddress, IsWrittenForPeople) {
-  EXPECT_EQ(to_text({.routing_id = "\1", .key = "abc", .host = "10.0.0.7"}),
+  EXPECT_EQ(to_text(fields_of({.routing_id = "\1", .key = "abc", .host = "10.0.0.7"})),
             "address=10.0.0.7 key=abc");
-  EXPECT_EQ(to_text({.routing_id = "\1", .key = "", .host = ""}), "address=unknown key=none");
+  EXPECT_EQ(to_text(fields_of({.routing_id = "\1", .key = "", .host = ""})),
+            "address=unknown key=none");
 }
 
 }  // namespace

@@ -28,7 +28,8 @@ TEST_F(RefusalLogTest, SaysWhoAndWhy) {
   ASSERT_EQ(events_.size(), 1u);
   EXPECT_EQ(events_[0].kind, "peer_refused");
   EXPECT_EQ(events_[0].severity, Severity::warning);
-  EXPECT_EQ(events_[0].text, "domain=workers address=10.0.0.7 key=KEY reason=\"unknown key\"");
+  EXPECT_EQ(to_text(events_[0].fields),
+            "domain=workers address=10.0.0.7 key=KEY reason=\"unknown key\"");
 }
 
 TEST_F(RefusalLogTest, WritesAddressesPlainly) {
@@ -36,9 +37,12 @@ TEST_F(RefusalLogTest, WritesAddressesPlainly) {
   refuse("KEY", seconds(0), "::ffff:1");
   refuse("", seconds(0));
   ASSERT_EQ(events_.size(), 3u);
-  EXPECT_EQ(events_[0].text, "domain=workers address=10.0.0.7 key=KEY reason=\"unknown key\"");
-  EXPECT_EQ(events_[1].text, "domain=workers address=::ffff:1 key=KEY reason=\"unknown key\"");
-  EXPECT_EQ(events_[2].text, "domain=workers address=unknown key=none reason=\"unknown key\"");
+  EXPECT_EQ(to_text(events_[0].fields),
+            "domain=workers address=10.0.0.7 key=KEY reason=\"unknown key\"");
+  EXPECT_EQ(to_text(events_[1].fields),
+            "domain=workers address=::ffff:1 key=KEY reason=\"unknown key\"");
+  EXPECT_EQ(to_text(events_[2].fields),
+            "domain=workers address=unknown key=none reason=\"unknown key\"");
 }
 
 TEST_F(RefusalLogTest, SaysTheSameOnceAMinute) {
@@ -55,7 +59,7 @@ TEST_F(RefusalLogTest, CountsAFlood) {
   refuse("KEY", seconds(100));
   ASSERT_EQ(events_.size(), 22u);
   EXPECT_EQ(events_[20].kind, "peers_refused");
-  EXPECT_EQ(events_[20].text, "count=980 without a line each");
+  EXPECT_EQ(to_text(events_[20].fields), "count=980 without a line each");
 }
 
 }  // namespace

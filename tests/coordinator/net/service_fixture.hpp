@@ -175,7 +175,7 @@ class ServiceTest : public testing::Test {
 
   void note(const coordinator::Event& event) {
     const std::lock_guard lock(mutex);
-    events.push_back(std::string(event.kind) + ' ' + event.text);
+    events.push_back(to_text(event));
     changed.notify_all();
   }
 

@@ -124,9 +124,9 @@ TEST_F(ConversationTest, AsksAgainForADefinitionThatMakesNoSense) {
   EXPECT_TRUE(execution.is_defined(campaign_1));
 }
 
-std::vector<std::string> take_notices(Conversation& conversation) {
+std::vector<std::string> take_events(Conversation& conversation) {
   std::vector<std::string> texts;
-  for (const Notice& notice : conversation.take_notices()) texts.push_back(notice.text);
+  for (const wire::Event& event : conversation.take_events()) texts.push_back(to_text(event));
   return texts;
 }
 
@@ -140,7 +140,7 @@ TEST_F(ConversationTest, RefusesADefinitionThatIsNotCanonical) {
   other.text.insert(0, "# \u00e9\n");
   receive(wire::EncodedDefinition(other).part({.campaign = campaign_1}));
   EXPECT_FALSE(execution.is_defined(campaign_1));
-  EXPECT_EQ(take_notices(*conversation),
+  EXPECT_EQ(take_events(*conversation),
             std::vector<std::string>{"malformed_definition campaign=0000000000000001 definition:1: "
                                      "line = \"# \u00e9\" (must be \"[campaign]\", as the "
                                      "definition has one spelling)"});
@@ -152,7 +152,7 @@ TEST_F(ConversationTest, RefusesADefinitionThatIsNotCanonical) {
   tick_after(60s);
   sent.clear();  // It has asked again.
   receive(wire::EncodedDefinition(other).part({.campaign = campaign_1}));
-  EXPECT_LT(take_notices(*conversation).at(0).size(), 500U);
+  EXPECT_LT(take_events(*conversation).at(0).size(), 500U);
   receive(definition(campaign_1));
   EXPECT_TRUE(execution.is_defined(campaign_1));
 }

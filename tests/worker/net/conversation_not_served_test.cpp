@@ -9,9 +9,9 @@ using namespace std::chrono_literals;
 
 class NotServedTest : public ConversationTest {
  protected:
-  [[nodiscard]] std::vector<std::string> notices() {
+  [[nodiscard]] std::vector<std::string> events() {
     std::vector<std::string> texts;
-    for (const Notice& notice : conversation->take_notices()) texts.push_back(notice.text);
+    for (const wire::Event& event : conversation->take_events()) texts.push_back(to_text(event));
     return texts;
   }
   wire::Heartbeat next_heartbeat() {
@@ -44,8 +44,8 @@ TEST_F(NotServedTest, ResultsAreKeptAndSentAgainEverMoreSeldom) {
   receive(wire::NotServed{.campaign = campaign_1, .ranges = {}});
   EXPECT_EQ(conversation->num_unacknowledged(), 2U);
   EXPECT_EQ(conversation->num_set_aside(), 2U);
-  EXPECT_EQ(notices(), std::vector<std::string>{"results_set_aside campaign=0000000000000001 "
-                                                "results=2 (not served now)"});
+  EXPECT_EQ(events(), std::vector<std::string>{"results_set_aside campaign=0000000000000001 "
+                                               "results=2 (not served now)"});
   std::vector<int> sent_at_s;
   for (int second = 1; second <= 300; ++second) {
     tick_after(1s);
@@ -56,7 +56,7 @@ TEST_F(NotServedTest, ResultsAreKeptAndSentAgainEverMoreSeldom) {
     }
   }
   EXPECT_EQ(sent_at_s, (std::vector<int>{5, 15, 35, 75, 135, 195, 255}));
-  EXPECT_TRUE(notices().empty()) << "once";
+  EXPECT_TRUE(events().empty()) << "once";
   acknowledge({{10}, {11}});
   EXPECT_EQ(conversation->num_unacknowledged(), 0U);
   EXPECT_EQ(conversation->num_set_aside(), 0U);
@@ -95,10 +95,10 @@ TEST_F(NotServedTest, ForgetLeavesRunsThatTheCoordinatorDoesNotKnow) {
   execution.begin_batch();
   receive(lease(5, 1));
   receive(wire::NotServed{.campaign = campaign_1, .ranges = {{{10}, 2}}});
-  (void)notices();
+  (void)events();
   receive(wire::Forget{.campaign = campaign_1, .num_runs = 10});
-  EXPECT_EQ(notices(), std::vector<std::string>{"results_forgotten campaign=0000000000000001 "
-                                                "results=2 (finished or cancelled)"});
+  EXPECT_EQ(events(), std::vector<std::string>{"results_forgotten campaign=0000000000000001 "
+                                               "results=2 (finished or cancelled)"});
   EXPECT_EQ(conversation->num_unacknowledged(), 2U);
   EXPECT_EQ(conversation->num_set_aside(), 2U);
   EXPECT_EQ(conversation->num_unfinished(), 1U) << "run 20 is being computed";

@@ -13,9 +13,9 @@ class RefusalTest : public ConversationTest {
   void refuse(RejectReason reason) {
     receive(wire::Reject{.reason = reason, .text = "not now"}, first_epoch);
   }
-  [[nodiscard]] std::vector<std::string> notices() {
+  [[nodiscard]] std::vector<std::string> events() {
     std::vector<std::string> texts;
-    for (const Notice& notice : conversation->take_notices()) texts.push_back(notice.text);
+    for (const wire::Event& event : conversation->take_events()) texts.push_back(to_text(event));
     return texts;
   }
   /// Until it says something, in steps of 100 ms.
@@ -50,7 +50,7 @@ TEST_F(RefusalTest, IsNotFinalIfThereAreTooManyWorkersOrTooMuchCrashed) {
       EXPECT_FALSE(conversation->take_reconnection());
       least = std::min<Duration>(2 * least, 60s);
     }
-    EXPECT_EQ(notices(),
+    EXPECT_EQ(events(),
               std::vector<std::string>{"refused reason=\"not now\" (asks again every 15 to 60 s)"})
         << "once";
     receive(welcome);

@@ -46,7 +46,8 @@ class SupervisorTest : public testing::Test {
     if (supervisor != 0) return supervisor;
     int exit_code = 99;
     try {
-      exit_code = supervise(work, config);
+      exit_code = supervise(
+          work, [](const wire::Event&) {}, config);
     } catch (const Error& error) {
       std::fprintf(stderr, "%s\n", error.what());
     }
