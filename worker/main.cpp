@@ -2,7 +2,7 @@
 #include <memory>
 #include <span>
 
-#include "core/simulation/run.hpp"
+#include "core/campaign/campaign.hpp"
 #include "worker/program.hpp"
 
 namespace {
@@ -12,7 +12,7 @@ using namespace proofmass;
 /// Runs of one campaign, all with the plan that is made here.
 worker::PreparedCampaign prepare(const Campaign& campaign) {
   // Shared by the copies that std::function makes.
-  const auto plan = std::make_shared<const RunPlan>(campaign);
+  const std::shared_ptr<const Plan> plan = campaign.prepare();
   return {.simulate =
               [plan, set = best_instruction_set()](std::span<const RunRequest> requests,
                                                    const std::function<void(int)>& progress) {

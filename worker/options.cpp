@@ -8,15 +8,16 @@
 #include <map>
 #include <thread>
 
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
-#include "core/simulation/run.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::worker {
 namespace {
 
-constexpr unsigned threads_max = wire::slots_max / batch_lanes;
+unsigned threads_max() { return wire::slots_max / static_cast<unsigned>(model().batch_size()); }
+
 constexpr std::uint64_t seconds_max = std::uint64_t{366} * 24 * 3600;
 
 /// Seconds in the unit; nothing if there is no such unit.
@@ -53,11 +54,11 @@ void add_connection(CLI::App& app, Options& options) {
 }
 
 void add_work(CLI::App& app, Options& options) {
-  options.num_threads = std::clamp(std::thread::hardware_concurrency(), 1U, threads_max);
+  options.num_threads = std::clamp(std::thread::hardware_concurrency(), 1U, threads_max());
   app.add_option("--threads", options.num_threads,
                  "Threads that simulate, one a processor by default")
       ->envname("PROOFMASS_THREADS")
-      ->check(wire::in_range(1U, threads_max));
+      ->check(wire::in_range(1U, threads_max()));
   app.add_option("--spool", options.spool,
                  "File for results that are not acknowledged\nwhen the worker ends")
       ->envname("PROOFMASS_SPOOL");

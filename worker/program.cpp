@@ -13,9 +13,8 @@
 #include <memory>
 #include <utility>
 
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
-#include "core/simulation/reference_digest.hpp"
-#include "core/simulation/run.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/wire/endpoint.hpp"
@@ -50,16 +49,16 @@ void die_with(pid_t parent) {
 wire::Hello hello_for(const Options& options, const ChildStart& start) {
   const std::string host = host_name();
   const auto process_id = static_cast<std::uint64_t>(getpid());
-  wire::Hello hello{.worker_name = options.name.empty()
-                                       ? wire::name_from(fmt::format("{}-{}", host, process_id))
-                                       : options.name,
-                    .host = host,
-                    .process_id = process_id,
-                    .num_slots = static_cast<std::uint32_t>(options.num_threads * batch_lanes),
-                    .model_version = std::string(model_version),
-                    .build = PROOFMASS_VERSION,
-                    .reference_digest = reference_digest(best_instruction_set()),
-                    .former = start.former};
+  wire::Hello hello{
+      .worker_name = options.name.empty() ? wire::name_from(fmt::format("{}-{}", host, process_id))
+                                          : options.name,
+      .host = host,
+      .process_id = process_id,
+      .num_slots = static_cast<std::uint32_t>(options.num_threads * model().batch_size()),
+      .model_version = std::string(model().version()),
+      .build = PROOFMASS_VERSION,
+      .reference_digest = model().reference_digest(best_instruction_set()),
+      .former = start.former};
   if (!wire::is_name(hello.worker_name)) {
     throw InvalidArgument(
         fmt::format("name = {} (must be 1 to 128 of [A-Za-z0-9._-])", hello.worker_name));
@@ -114,7 +113,7 @@ int work(const Options& options, const Program& program, ServeConfig config,
   StopSignals signals(config.signals);
   const wire::Wake progress;
   Executor executor(program.prepare, [&progress] { progress.notify(); },
-                    {.num_threads = options.num_threads, .batch_size_max = batch_lanes});
+                    {.num_threads = options.num_threads, .batch_size_max = model().batch_size()});
   const Ending ending = serve(config, executor, progress, signals);
   if (!executor.end_within(thread_end_max)) {
     config.log(

@@ -13,6 +13,7 @@
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/digest_check.hpp"
+#include "core/campaign/model.hpp"
 #include "core/campaign/run_ranges.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/error_change.hpp"
@@ -55,7 +56,7 @@ class Survey {
       : comparison_(comparison) {
     comparison.missing_in_first = {.num_given_up = first.num_given_up};
     comparison.missing_in_second = {.num_given_up = second.num_given_up};
-    if (first.campaign.seed != second.campaign.seed) comparison.why_unpaired = "the seeds differ";
+    if (first.campaign->seed != second.campaign->seed) comparison.why_unpaired = "the seeds differ";
   }
 
   /// @return Whether runs may be paired, as far as is known.
@@ -102,21 +103,19 @@ void walk_compared(const ComparedCampaign& first, const ComparedCampaign& second
   });
 }
 
-double error_of(const RunResult& result, std::size_t parameter) {
-  return result.error(parameter_infos()[parameter].parameter);
-}
+std::size_t num_quantities() { return model().results().quantities.size(); }
 
 /// Errors of one side in two passes, and the largest |error| of each parameter; the order of
-/// parameter_infos().
+/// the model's quantities.
 struct SideErrors {
-  std::array<ErrorPasses, num_parameters> errors;
-  std::array<double, num_parameters> worst{};
-  std::array<CompensatedSum, num_parameters> magnitudes;
+  std::vector<ErrorPasses> errors = std::vector<ErrorPasses>(num_quantities());
+  std::vector<double> worst = std::vector<double>(num_quantities());
+  std::vector<CompensatedSum> magnitudes = std::vector<CompensatedSum>(num_quantities());
 
   void add(const RunResult* result) {
     if (result == nullptr) return;
-    for (std::size_t i = 0; i < num_parameters; ++i) {
-      const double error = error_of(*result, i);
+    for (std::size_t i = 0; i < num_quantities(); ++i) {
+      const double error = result->error(i);
       errors[i].add(error);
       magnitudes[i].add(std::abs(error));
       worst[i] = std::max(worst[i], std::abs(error));
@@ -125,7 +124,7 @@ struct SideErrors {
 
   void add_again(const RunResult* result) {
     if (result == nullptr) return;
-    for (std::size_t i = 0; i < num_parameters; ++i) errors[i].add_again(error_of(*result, i));
+    for (std::size_t i = 0; i < num_quantities(); ++i) errors[i].add_again(result->error(i));
   }
 
   [[nodiscard]] ComparedAccuracy accuracy(std::size_t parameter) const {
@@ -142,14 +141,14 @@ struct SideErrors {
 struct BothErrors {
   SideErrors first;
   SideErrors second;
-  std::array<double, num_parameters> tail_limits{};
+  std::vector<double> tail_limits = std::vector<double>(num_quantities());
 
   void add(const RunResult* a, const RunResult* b) {
     first.add(a);
     second.add(b);
   }
   void begin_second() {
-    for (std::size_t i = 0; i < num_parameters; ++i) {
+    for (std::size_t i = 0; i < num_quantities(); ++i) {
       tail_limits[i] = tail_limit(first.errors[i], second.errors[i]);
       first.errors[i].begin_second(tail_limits[i]);
       second.errors[i].begin_second(tail_limits[i]);
@@ -195,8 +194,8 @@ class Pairs {
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
       const std::size_t parameter = begin_ + i;
       parameters_[i].add(
-          {.error = error_of(first, parameter), .mean = errors.first.errors[parameter].mean()},
-          {.error = error_of(second, parameter), .mean = errors.second.errors[parameter].mean()},
+          {.error = first.error(parameter), .mean = errors.first.errors[parameter].mean()},
+          {.error = second.error(parameter), .mean = errors.second.errors[parameter].mean()},
           errors.tail_limits[parameter]);
     }
   }
@@ -218,9 +217,9 @@ class Pairs {
 void compare_pairs(const ComparedCampaign& first, const ComparedCampaign& second,
                    BothErrors& errors, CampaignComparison& comparison) {
   const std::size_t size = comparison.num_first * 2 * sizeof(double);
-  const std::size_t num_at_a_time = std::clamp(kept_size / size, std::size_t{1}, num_parameters);
-  for (std::size_t begin = 0; begin < num_parameters; begin += num_at_a_time) {
-    Pairs pairs(begin, std::min(begin + num_at_a_time, num_parameters), comparison.num_first);
+  const std::size_t num_at_a_time = std::clamp(kept_size / size, std::size_t{1}, num_quantities());
+  for (std::size_t begin = 0; begin < num_quantities(); begin += num_at_a_time) {
+    Pairs pairs(begin, std::min(begin + num_at_a_time, num_quantities()), comparison.num_first);
     walk_compared(first, second, true, [&](const RunResult* a, const RunResult* b) {
       if (begin == 0) errors.add_again(a, b);
       pairs.add(*a, *b, errors);
@@ -234,8 +233,8 @@ ChangePValues compare_few(const ComparedCampaign& first, const ComparedCampaign&
                           std::size_t parameter) {
   std::vector<double> of_first, of_second;
   walk_compared(first, second, false, [&](const RunResult* a, const RunResult* b) {
-    if (a != nullptr) of_first.push_back(error_of(*a, parameter));
-    if (b != nullptr) of_second.push_back(error_of(*b, parameter));
+    if (a != nullptr) of_first.push_back(a->error(parameter));
+    if (b != nullptr) of_second.push_back(b->error(parameter));
   });
   return compare_few_errors(of_first, of_second);
 }
@@ -245,7 +244,7 @@ void compare_unpaired_runs(const ComparedCampaign& first, const ComparedCampaign
   walk_compared(first, second, false,
                 [&](const RunResult* a, const RunResult* b) { errors.add_again(a, b); });
   const bool are_few = std::min(comparison.num_first, comparison.num_second) < num_welch_min;
-  for (std::size_t i = 0; i < num_parameters; ++i) {
+  for (std::size_t i = 0; i < num_quantities(); ++i) {
     ParameterComparison& parameter = comparison.parameters[i];
     const ErrorPasses& a = errors.first.errors[i];
     const ErrorPasses& b = errors.second.errors[i];
@@ -255,7 +254,7 @@ void compare_unpaired_runs(const ComparedCampaign& first, const ComparedCampaign
 }
 
 void keep_accuracies(const BothErrors& errors, CampaignComparison& comparison) {
-  for (std::size_t i = 0; i < num_parameters; ++i) {
+  for (std::size_t i = 0; i < num_quantities(); ++i) {
     ParameterComparison& parameter = comparison.parameters[i];
     parameter.first = errors.first.accuracy(i);
     parameter.second = errors.second.accuracy(i);
@@ -263,17 +262,17 @@ void keep_accuracies(const BothErrors& errors, CampaignComparison& comparison) {
   }
 }
 
-void adjust_p_values(std::array<ParameterComparison, num_parameters>& parameters) {
+void adjust_p_values(std::vector<ParameterComparison>& parameters) {
   std::vector<ChangePValues> p_values;
   for (const ParameterComparison& parameter : parameters) p_values.push_back(parameter.p_values);
   const std::vector<ChangePValues> adjusted = adjusted_changes(p_values);
-  for (std::size_t i = 0; i < num_parameters; ++i) parameters[i].adjusted_p_values = adjusted[i];
+  for (std::size_t i = 0; i < num_quantities(); ++i) parameters[i].adjusted_p_values = adjusted[i];
 }
 
 std::vector<DefinitionDifference> all_differences(const ComparedCampaign& first,
                                                   const ComparedCampaign& second) {
   std::vector<DefinitionDifference> differences =
-      compare_definitions(first.campaign, second.campaign);
+      first.campaign->differences_from(*second.campaign);
   if (first.model_version != second.model_version) {
     differences.push_back({"model", first.model_version, second.model_version});
   }
@@ -292,7 +291,7 @@ class CheckedReader {
     if (has_ended_) return std::nullopt;
     const std::optional<RunResult> result = reader_.next();
     if (result) {
-      require_in_range(*result);
+      require_in_range(*result, model().results());
       digest_.add(*result);
       ++num_results_;
     } else {
@@ -346,6 +345,7 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
                                      const ComparedCampaign& second) {
   CampaignComparison comparison;
   comparison.differences = all_differences(first, second);
+  comparison.parameters.resize(num_quantities());
   BothErrors errors;
   read_first_pass(first, second, comparison, errors);
   comparison.num_first = errors.first.errors.front().count();

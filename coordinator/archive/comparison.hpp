@@ -13,7 +13,6 @@
 #include "coordinator/report/missing_estimates.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/parameter.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/statistics/error_change.hpp"
 #include "core/statistics/interval.hpp"
@@ -25,7 +24,7 @@ using ResultStream = std::function<std::optional<RunResult>()>;
 
 /// A campaign that is compared with another.
 struct ComparedCampaign {
-  Campaign campaign;
+  std::shared_ptr<const Campaign> campaign;
   std::string model_version;
   std::string build;
   std::uint64_t num_given_up = 0;  ///< Runs without a result.
@@ -59,7 +58,7 @@ struct ParameterComparison {
   std::optional<Interval> bias_interval;  ///< Of second bias − first; empty if nothing varies.
   double tail_limit = 0.0;                ///< tail_limit() of both campaigns, SI.
   ChangePValues p_values;                 ///< That chance alone makes such a change.
-  ChangePValues adjusted_p_values;        ///< The same, in any test of the ten parameters.
+  ChangePValues adjusted_p_values;        ///< The same, in any test of all parameters.
 };
 
 /// What two campaigns differ in, and what that does to the accuracy.
@@ -76,8 +75,7 @@ struct CampaignComparison {
   MissingEstimates missing_in_second;
   /// Why the parameters are not compared; empty if they are.
   std::string why_not_compared;
-  /// Indexed by `index(parameter)`.
-  std::array<ParameterComparison, num_parameters> parameters{};
+  std::vector<ParameterComparison> parameters;  ///< Of each quantity.
 
   [[nodiscard]] bool is_paired() const { return why_unpaired.empty(); }
 };

@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "coordinator/archive/comparison_text.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -21,9 +22,9 @@ Json json_of(const ChangePValues& p_values) {
   return {{"bias", p_values.location}, {"scatter", p_values.scale}, {"tail", p_values.tail}};
 }
 
-Json json_of(const ParameterInfo& info, const ParameterComparison& parameter) {
-  Json json{{"parameter", info.name},
-            {"unit", info.unit},
+Json json_of(const Quantity& quantity, const ParameterComparison& parameter) {
+  Json json{{"parameter", quantity.name},
+            {"unit", quantity.unit},
             {"tail_limit", parameter.tail_limit},
             {"first", json_of(parameter.first)},
             {"second", json_of(parameter.second)},
@@ -57,8 +58,9 @@ std::string comparison_json(const CampaignComparison& comparison, std::string_vi
     json["differences"].push_back({{"field", field}, {"first", of_first}, {"second", of_second}});
   }
   if (comparison.why_not_compared.empty()) {
-    for (const ParameterInfo& info : parameter_infos()) {
-      json["parameters"].push_back(json_of(info, comparison.parameters[index(info.parameter)]));
+    for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
+      const Quantity& quantity = model().results().quantities[i];
+      json["parameters"].push_back(json_of(quantity, comparison.parameters[i]));
     }
   }
   constexpr int indent = 2;

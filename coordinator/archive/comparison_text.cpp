@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "coordinator/report/text_cells.hpp"
+#include "core/campaign/model.hpp"
 #include "core/statistics/comparison.hpp"
 
 namespace proofmass::coordinator {
@@ -65,8 +66,9 @@ std::string heading(std::initializer_list<std::pair<std::string_view, std::size_
   return line + "\n" + horizontal_rule(text_width(line)) + "\n";
 }
 
-std::string row_label(const ParameterInfo& info) {
-  return left_aligned(info.label, label_width) + left_aligned(info.display_unit, unit_width);
+std::string row_label(const Quantity& quantity) {
+  return left_aligned(quantity.symbol, label_width) +
+         left_aligned(quantity.display_unit, unit_width);
 }
 
 std::string p_cell(double p_value) {
@@ -79,10 +81,10 @@ std::string ended(std::string row) {
   return row + "\n";
 }
 
-std::string bias_row(const ParameterInfo& info, const ParameterComparison& parameter) {
-  const double scale = info.display_scale;
+std::string bias_row(const Quantity& quantity, const ParameterComparison& parameter) {
+  const double scale = quantity.display_scale;
   const double change = parameter.second.bias - parameter.first.bias;
-  std::string text = row_label(info);
+  std::string text = row_label(quantity);
   for (const double bias : {parameter.first.bias, parameter.second.bias}) {
     text += right_aligned(signed_figure(bias / scale), figure_width);
   }
@@ -114,8 +116,9 @@ std::string bias_table(const CampaignComparison& comparison) {
                                                                      {"from", change_width},
                                                                      {"to", change_width},
                                                                      {"p", figure_width}});
-  for (const ParameterInfo& info : parameter_infos()) {
-    text += bias_row(info, comparison.parameters[index(info.parameter)]);
+  for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
+    const Quantity& quantity = model().results().quantities[i];
+    text += bias_row(quantity, comparison.parameters[i]);
   }
   return text +
          fmt::format("from, to: 95 % interval of the change; p: {}\n", tests_of(comparison).bias);
@@ -135,11 +138,12 @@ std::string scatter_table(const CampaignComparison& comparison) {
                {"tail A", figure_width + 2},
                {"tail B", figure_width},
                {"p", figure_width}});
-  for (const ParameterInfo& info : parameter_infos()) {
-    const auto& parameter = comparison.parameters[index(info.parameter)];
-    std::string row = row_label(info);
+  for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
+    const Quantity& quantity = model().results().quantities[i];
+    const auto& parameter = comparison.parameters[i];
+    std::string row = row_label(quantity);
     for (const ComparedAccuracy& side : {parameter.first, parameter.second}) {
-      row += right_aligned(measured_figure(side.standard_deviation / info.display_scale),
+      row += right_aligned(measured_figure(side.standard_deviation / quantity.display_scale),
                            figure_width);
     }
     row += p_cell(parameter.adjusted_p_values.scale) +
@@ -152,7 +156,7 @@ std::string scatter_table(const CampaignComparison& comparison) {
   return text + fmt::format(
                     "p: {} of distances from the mean; tail: beyond twice the root\n"
                     "mean square of A and B, p: {}\n"
-                    "All p are adjusted for three tests of ten parameters (Holm); *: below "
+                    "All p are adjusted for three tests of all parameters (Holm); *: below "
                     "{:.2f}\n",
                     tests.scatter, tests.tail, significance);
 }
@@ -163,12 +167,13 @@ std::string magnitude_table(const CampaignComparison& comparison) {
                                                             {"mean B", change_width},
                                                             {"worst A", change_width},
                                                             {"worst B", change_width}});
-  for (const ParameterInfo& info : parameter_infos()) {
-    const auto& parameter = comparison.parameters[index(info.parameter)];
-    text += row_label(info);
+  for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
+    const Quantity& quantity = model().results().quantities[i];
+    const auto& parameter = comparison.parameters[i];
+    text += row_label(quantity);
     for (const double value : {parameter.first.mean, parameter.second.mean, parameter.first.worst,
                                parameter.second.worst}) {
-      text += right_aligned(measured_figure(value / info.display_scale), change_width);
+      text += right_aligned(measured_figure(value / quantity.display_scale), change_width);
     }
     text += "\n";
   }

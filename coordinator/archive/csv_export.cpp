@@ -6,6 +6,7 @@
 
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -22,10 +23,10 @@ std::string heading(const DrawnColumns& draws) {
 }
 
 void append_draws(const DrawnColumns& draws, RunIndex run, fmt::memory_buffer& line) {
-  const std::optional<DrawnValues> values = draws.values_of(run);
+  const std::vector<double> values = draws.values_of(run);
   for (std::size_t i = 0; i < draws.count(); ++i) {
     line.push_back(',');
-    if (values) fmt::format_to(std::back_inserter(line), "{}", (*values)[i]);
+    if (!values.empty()) fmt::format_to(std::back_inserter(line), "{}", values[i]);
   }
 }
 
@@ -39,7 +40,8 @@ void append_line(const RunResult& result, const DrawnColumns& draws, fmt::memory
     if (value) fmt::format_to(end, "{}", *value);
   }
   if (result.status == RunStatus::lost) {
-    fmt::format_to(end, ",{},{}", name_of(result.loss.cause), name_of(result.loss.session));
+    fmt::format_to(end, ",{},{}", name_at(model().results().loss_causes, result.loss.cause),
+                   name_at(model().results().loss_sessions, result.loss.session));
   } else {
     fmt::format_to(end, ",,");
   }

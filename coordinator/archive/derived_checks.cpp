@@ -14,8 +14,6 @@
 
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/summarise.hpp"
-#include "core/campaign/budget.hpp"
-#include "core/campaign/parameter.hpp"
 #include "core/campaign/run_ranges.hpp"
 
 namespace proofmass::coordinator {
@@ -57,34 +55,34 @@ Lines given_up_differences(const Store& store, const Summary& summary) {
                       num_given_up)};
 }
 
-Check check_current(const Store& store, const Scenario& scenario, const Summary& summary,
+Check check_current(const Store& store, const Campaign& campaign, const Summary& summary,
                     const CampaignStatistics& statistics) {
   Lines lines = count_differences(summary, statistics);
   append(lines, given_up_differences(store, summary));
-  append(lines, statistic_differences(store, scenario, statistics));
+  append(lines, statistic_differences(store, campaign, statistics));
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
   return Check::holds(
       fmt::format("of {} runs: every number and every budget", statistics.num_runs));
 }
 
 // Without a summary nothing was ever stored but the budget before calibration.
-Check check_first(const Store& store, const Scenario& scenario) {
-  Lines lines = statistic_differences(store, scenario, {});
+Check check_first(const Store& store, const Campaign& campaign) {
+  Lines lines = statistic_differences(store, campaign, {});
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
   return Check::not_checked("none are stored: a coordinator has the file, or was killed");
 }
 
 }  // namespace
 
-Check check_stored_statistics(const Store& store, const Scenario& scenario,
+Check check_stored_statistics(const Store& store, const Campaign& campaign,
                               const ResultScan& scan) {
   const std::optional<Summary> summary = store.summary();
-  if (!summary) return check_first(store, scenario);
+  if (!summary) return check_first(store, campaign);
   if (summary->num_finished == num_runs_in(scan.runs) && summary->digests == scan.digests &&
       scan.num_violations == 0) {
-    return check_current(store, scenario, *summary, read_results(store, scenario).statistics);
+    return check_current(store, campaign, *summary, read_results(store, campaign).statistics);
   }
-  Lines lines = store.budget_differences(budget_before_calibration(scenario));
+  Lines lines = store.budget_differences(campaign.error_budget());
   const std::uint64_t num_counted =
       summary->num_estimated + summary->num_not_finite + summary->num_no_draw + summary->num_lost;
   if (num_counted != summary->num_finished) {
@@ -95,10 +93,10 @@ Check check_stored_statistics(const Store& store, const Scenario& scenario,
   return Check::not_checked("they are not of the results that are in the file");
 }
 
-Check check_stored_stop_checks(const Store& store, const Scenario& scenario,
+Check check_stored_stop_checks(const Store& store, const Campaign& campaign,
                                const ResultScan& scan) {
   if (scan.num_violations > 0) return Check::not_checked("a result breaks its rule");
-  Lines lines = stop_check_differences(store, scenario.objectives);
+  Lines lines = stop_check_differences(store, campaign.objectives());
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
   const auto num_checks = static_cast<std::uint64_t>(store.stop_checks().size());
   return Check::holds(num_checks == 0 ? "none" : fmt::format("{} of a stop rule", num_checks));

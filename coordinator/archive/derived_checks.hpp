@@ -3,7 +3,7 @@
 #include "coordinator/archive/result_scan.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/campaign/scenario.hpp"
+#include "core/campaign/campaign.hpp"
 
 namespace proofmass::coordinator {
 
@@ -13,11 +13,11 @@ namespace proofmass::coordinator {
 /// Holds `statistic`, `budget_entry` and `summary` against the results that the summary is of. A
 /// coordinator brings them up to date when a campaign ends or is stopped: in between they are of
 /// fewer results, and only what does not depend on results is checked.
-[[nodiscard]] Check check_stored_statistics(const Store& store, const Scenario& scenario,
+[[nodiscard]] Check check_stored_statistics(const Store& store, const Campaign& campaign,
                                             const ResultScan& scan);
 
 /// Holds `stop_check` against the results.
-[[nodiscard]] Check check_stored_stop_checks(const Store& store, const Scenario& scenario,
+[[nodiscard]] Check check_stored_stop_checks(const Store& store, const Campaign& campaign,
                                              const ResultScan& scan);
 
 /// Fails if two workers delivered different results of one run.

@@ -2,8 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
@@ -14,7 +15,7 @@ namespace proofmass::coordinator {
 enum class DrawColumns : std::uint8_t { left_out, included };
 
 /// `draw_offcentring_m.x`.
-/// @param quantity  Index into drawn_names().
+/// @param quantity  Index into Model::drawn().
 [[nodiscard]] std::string draw_column_name(std::size_t quantity);
 
 /// The columns of drawn values of an export, none or one for each drawn quantity. They are computed
@@ -26,14 +27,14 @@ class DrawnColumns {
   /// @throws as stored_campaign_unchecked().
   DrawnColumns(const Store& store, DrawColumns columns);
 
-  /// 0 or num_drawn.
-  [[nodiscard]] std::size_t count() const { return campaign_ ? num_drawn : 0; }
+  /// 0 or the number of drawn quantities.
+  [[nodiscard]] std::size_t count() const;
 
   /// Empty if there are no columns or if all draws of the run were rejected.
-  [[nodiscard]] std::optional<DrawnValues> values_of(RunIndex run) const;
+  [[nodiscard]] std::vector<double> values_of(RunIndex run) const;
 
  private:
-  std::optional<Campaign> campaign_;
+  std::shared_ptr<const Campaign> campaign_;  ///< Null without columns.
 };
 
 }  // namespace proofmass::coordinator

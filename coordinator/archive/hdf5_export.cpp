@@ -14,7 +14,7 @@
 #include "coordinator/archive/draft_file.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
-#include "core/campaign/drawn_quantities.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -183,11 +183,13 @@ Handle enumeration_type(const Writer& writer, Enumeration first, Enumeration las
   return type;
 }
 
-/// The sessions by their targets; 0 is none.
-Handle loss_session_type(const Writer& writer) {
-  Handle type = enumeration_type(writer, SessionTarget::a_c11_delta_x, SessionTarget::no_target);
-  constexpr std::uint8_t none = 0;
-  writer.check(H5Tenum_insert(type, "none", &none));
+/// Names of positions from 1; 0 is none.
+Handle position_type(const Writer& writer, const std::vector<std::string_view>& names) {
+  Handle type = writer.handle(H5Tenum_create(H5T_STD_U8LE), H5Tclose);
+  for (std::uint8_t position = 0; position <= names.size(); ++position) {
+    const std::string name(name_at(names, position));
+    writer.check(H5Tenum_insert(type, name.c_str(), &position));
+  }
   return type;
 }
 
@@ -197,8 +199,8 @@ class Columns {
   Columns(const Writer& writer, const DrawnColumns& draws)
       : draws_(draws),
         status_type_(enumeration_type(writer, RunStatus::completed, RunStatus::lost)),
-        loss_cause_type_(enumeration_type(writer, LossCause::none, LossCause::square_noise)),
-        loss_session_type_(loss_session_type(writer)),
+        loss_cause_type_(position_type(writer, model().results().loss_causes)),
+        loss_session_type_(position_type(writer, model().results().loss_sessions)),
         run_index_(writer, writer.root(), "run_index", H5T_STD_U64LE, H5T_NATIVE_UINT64),
         status_(writer, writer.root(), "status", status_type_, status_type_),
         num_draws_(writer, writer.root(), "num_draws", H5T_STD_U32LE, H5T_NATIVE_UINT32),
@@ -227,12 +229,12 @@ class Columns {
     const bool is_lost = result.status == RunStatus::lost;
     loss_cause_.add(static_cast<std::uint8_t>(result.loss.cause));
     loss_session_.add(is_lost ? static_cast<std::uint8_t>(result.loss.session) : std::uint8_t{0});
-    for (std::size_t i = 0; i < num_value_columns; ++i) {
+    for (std::size_t i = 0; i < value_columns().size(); ++i) {
       values_[i].add(value_columns()[i].value_in(result).value_or(no_meaning));
     }
-    const std::optional<DrawnValues> drawn = draws_.values_of(result.run);
+    const std::vector<double> drawn = draws_.values_of(result.run);
     for (std::size_t i = 0; i < draws_.count(); ++i) {
-      drawn_values_[i].add(drawn ? (*drawn)[i] : no_meaning);
+      drawn_values_[i].add(drawn.empty() ? no_meaning : drawn[i]);
     }
   }
 
@@ -254,9 +256,9 @@ class Columns {
     if (draws_.count() == 0) return;
     const Handle group = writer.make_group("draw");
     for (std::size_t i = 0; i < draws_.count(); ++i) {
-      drawn_values_.emplace_back(writer, group, drawn_names()[i], H5T_IEEE_F64LE,
-                                 H5T_NATIVE_DOUBLE);
-      writer.set_text(drawn_values_.back().dataset(), "unit", std::string(drawn_unit(i)));
+      drawn_values_.emplace_back(writer, group, std::string(model().drawn()[i].name),
+                                 H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE);
+      writer.set_text(drawn_values_.back().dataset(), "unit", std::string(model().drawn()[i].unit));
     }
   }
 

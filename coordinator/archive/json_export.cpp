@@ -10,7 +10,7 @@
 
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
-#include "core/campaign/drawn_quantities.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -34,7 +34,7 @@ Json columns_json(const DrawnColumns& draws) {
     columns.push_back({{"name", column.name}, {"unit", column.unit}});
   }
   for (std::size_t i = 0; i < draws.count(); ++i) {
-    columns.push_back({{"name", draw_column_name(i)}, {"unit", drawn_unit(i)}});
+    columns.push_back({{"name", draw_column_name(i)}, {"unit", model().drawn()[i].unit}});
   }
   return columns;
 }
@@ -53,8 +53,9 @@ class RunLines {
       add_number(column.name, column.value_in(result));
     }
     if (result.status == RunStatus::lost) {
-      fmt::format_to(end, R"(,"loss_cause":"{}","loss_session":"{}")", name_of(result.loss.cause),
-                     name_of(result.loss.session));
+      fmt::format_to(end, R"(,"loss_cause":"{}","loss_session":"{}")",
+                     name_at(model().results().loss_causes, result.loss.cause),
+                     name_at(model().results().loss_sessions, result.loss.session));
     } else {
       fmt::format_to(end, R"(,"loss_cause":null,"loss_session":null)");
     }
@@ -76,9 +77,9 @@ class RunLines {
   }
 
   void add_draws(RunIndex run) {
-    const std::optional<DrawnValues> values = draws_.values_of(run);
+    const std::vector<double> values = draws_.values_of(run);
     for (std::size_t i = 0; i < draws_.count(); ++i) {
-      add_number(draw_column_name(i), values ? std::optional((*values)[i]) : std::nullopt);
+      add_number(draw_column_name(i), values.empty() ? std::nullopt : std::optional(values[i]));
     }
   }
 

@@ -10,7 +10,6 @@
 
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/archive/verification.hpp"
-#include "core/campaign/draw.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -19,20 +18,17 @@ constexpr std::size_t num_at_a_time = 8192;
 
 /// The first difference of a run, in words; empty if there is none.
 std::string difference_of(const Campaign& campaign, const RunResult& stored) {
-  const AcceptedDraw draw =
-      draw_instrument(campaign, stored.run, campaign.table_values(stored.run));
-  if (!draw.instrument || draw.num_draws != stored.num_draws) {
+  const RunDraw draw = campaign.draw(stored.run);
+  if (draw.truth.empty() || draw.num_draws != stored.num_draws) {
     return fmt::format("run {}: num_draws = {} (must be {})", stored.run.value, stored.num_draws,
                        draw.num_draws);
   }
-  const ParameterArray truth =
-      true_parameters(*draw.instrument, campaign.scenario.drag_free.bias_compensation_error_x_m_s2);
   for (const ValueColumn& column : value_columns()) {
     if (column.kind != ValueKind::truth) continue;
-    const std::size_t i = index(column.parameter);
-    if (have_same_bits(stored.truth[i], truth[i])) continue;
+    const std::size_t i = column.index;
+    if (have_same_bits(stored.truth[i], draw.truth[i])) continue;
     return fmt::format("run {}: {} = {} (must be {})", stored.run.value, column.name,
-                       stored.truth[i], truth[i]);
+                       stored.truth[i], draw.truth[i]);
   }
   return "";
 }

@@ -12,8 +12,8 @@
 #include <utility>
 
 #include "coordinator/archive/result_columns.hpp"
+#include "core/campaign/model.hpp"
 #include "core/campaign/run_ranges.hpp"
-#include "core/simulation/run.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -23,10 +23,10 @@ class Simulation {
  public:
   Simulation(const Campaign& campaign, std::span<const RunResult> stored,
              const IsStopped& is_stopped)
-      : campaign_(campaign), stored_(stored), is_stopped_(is_stopped), plan_(campaign) {}
+      : campaign_(campaign), stored_(stored), is_stopped_(is_stopped), plan_(campaign.prepare()) {}
 
   std::vector<ResultDifference> run(std::size_t num_threads) {
-    const std::size_t num_batches = (stored_.size() + batch_lanes - 1) / batch_lanes;
+    const std::size_t num_batches = (stored_.size() + batch_size_ - 1) / batch_size_;
     std::vector<std::jthread> others;
     for (std::size_t i = 1; i < std::min(num_threads, num_batches); ++i) {
       others.emplace_back([this] { simulate_batches(); });
@@ -42,9 +42,9 @@ class Simulation {
   void simulate_batches() {
     try {
       while (!has_failed_) {
-        const std::size_t first = next_.fetch_add(batch_lanes);
+        const std::size_t first = next_.fetch_add(batch_size_);
         if (first >= stored_.size()) return;
-        const std::size_t count = std::min(batch_lanes, stored_.size() - first);
+        const std::size_t count = std::min(batch_size_, stored_.size() - first);
         simulate(stored_.subspan(first, count));
       }
     } catch (...) {
@@ -61,7 +61,7 @@ class Simulation {
       if (has_failed_ || is_stopped_()) throw Interrupted();
     };
     const std::vector<RunResult> computed =
-        plan_.simulate_batch(requests, best_instruction_set(), on_progress);
+        plan_->simulate_batch(requests, best_instruction_set(), on_progress);
     for (std::size_t i = 0; i < batch.size(); ++i) keep(differences_of(batch[i], computed[i]));
   }
 
@@ -80,7 +80,8 @@ class Simulation {
   const Campaign& campaign_;
   std::span<const RunResult> stored_;
   const IsStopped& is_stopped_;
-  RunPlan plan_;
+  std::unique_ptr<const Plan> plan_;
+  std::size_t batch_size_ = model().batch_size();
   std::atomic<std::size_t> next_ = 0;
   std::atomic<bool> has_failed_ = false;
   std::mutex mutex_;  ///< Guards what follows.
@@ -131,7 +132,8 @@ std::vector<ResultDifference> differences_of(const RunResult& stored, const RunR
   }
   if (!(stored.loss == computed.loss)) {
     const auto text_of = [](const Loss& loss) {
-      return fmt::format("{} in {}", name_of(loss.cause), name_of(loss.session));
+      return fmt::format("{} in {}", name_at(model().results().loss_causes, loss.cause),
+                         name_at(model().results().loss_sessions, loss.session));
     };
     differ("loss_cause", text_of(stored.loss), text_of(computed.loss));
   }

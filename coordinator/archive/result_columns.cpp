@@ -1,48 +1,59 @@
 #include "coordinator/archive/result_columns.hpp"
 
-#include <cstddef>
+#include <fmt/format.h>
 
+#include <span>
+
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-std::array<ValueColumn, num_value_columns> make_columns() {
-  std::array<ValueColumn, num_value_columns> columns;
-  std::size_t i = 0;
+void append(std::vector<ValueColumn>& columns, ValueKind kind, std::size_t index,
+            const auto& quantity) {
+  columns.push_back({.kind = kind,
+                     .index = index,
+                     .own_name = quantity.column(),
+                     .name = fmt::format("{}_{}", name_of(kind), quantity.column()),
+                     .unit = quantity.unit});
+}
+
+std::vector<ValueColumn> make_columns(const ResultSchema& schema) {
+  std::vector<ValueColumn> columns;
   for (const ValueKind kind : {ValueKind::truth, ValueKind::estimate, ValueKind::error}) {
-    for (const ParameterInfo& info : parameter_infos()) {
-      ValueColumn& column = columns[i++];
-      column.kind = kind;
-      column.parameter = info.parameter;
-      column.own_name = std::string(info.name) + std::string(info.unit_suffix);
-      column.name = std::string(name_of(kind)) + "_" + column.own_name;
-      column.unit = info.unit;
+    for (std::size_t i = 0; i < schema.quantities.size(); ++i) {
+      append(columns, kind, i, schema.quantities[i]);
     }
   }
-  for (const HealthValue& value : health_values()) {
-    ValueColumn& column = columns[i++];
-    column.kind = ValueKind::health;
-    column.health = value.member;
-    column.own_name = std::string(value.name) + std::string(value.unit_suffix);
-    column.name = "health_" + column.own_name;
-    column.unit = value.unit;
+  std::size_t num_standard_errors = 0;
+  for (const Quantity& quantity : schema.quantities) {
+    if (!quantity.has_standard_error) continue;
+    append(columns, ValueKind::standard_error, num_standard_errors++, quantity);
+  }
+  for (std::size_t i = 0; i < schema.health.size(); ++i) {
+    append(columns, ValueKind::health, i, schema.health[i]);
   }
   return columns;
 }
 
-bool is_known(ValueKind kind, const RunResult& result) {
+/// The list that has the value; empty if the run's status leaves it without a meaning.
+std::span<const double> values_in(const RunResult& result, ValueKind kind) {
   switch (kind) {
     case ValueKind::truth:
-      return result.has_truth();
+      if (!result.has_truth()) return {};
+      return result.truth;
     case ValueKind::estimate:
     case ValueKind::error:
-      return result.has_estimate();
+      if (!result.has_estimate()) return {};
+      return result.estimate;
+    case ValueKind::standard_error:
+      return result.standard_error;
     case ValueKind::health:
-      return result.health.has_value();
+      return result.health;
   }
   PROOFMASS_EXPECT(false);
-  return false;
+  return {};
 }
 
 }  // namespace
@@ -55,6 +66,8 @@ std::string_view name_of(ValueKind kind) {
       return "estimate";
     case ValueKind::error:
       return "error";
+    case ValueKind::standard_error:
+      return "standard_error";
     case ValueKind::health:
       return "health";
   }
@@ -63,23 +76,13 @@ std::string_view name_of(ValueKind kind) {
 }
 
 std::optional<double> ValueColumn::value_in(const RunResult& result) const {
-  if (!is_known(kind, result)) return std::nullopt;
-  switch (kind) {
-    case ValueKind::truth:
-      return result.truth[index(parameter)];
-    case ValueKind::estimate:
-      return result.estimate[index(parameter)];
-    case ValueKind::error:
-      return result.error(parameter);
-    case ValueKind::health:
-      return (*result.health).*health;
-  }
-  PROOFMASS_EXPECT(false);
-  return {};
+  const std::span<const double> values = values_in(result, kind);
+  if (index >= values.size()) return std::nullopt;
+  return kind == ValueKind::error ? result.error(index) : values[index];
 }
 
-const std::array<ValueColumn, num_value_columns>& value_columns() {
-  static const std::array<ValueColumn, num_value_columns> columns = make_columns();
+const std::vector<ValueColumn>& value_columns() {
+  static const std::vector<ValueColumn> columns = make_columns(model().results());
   return columns;
 }
 

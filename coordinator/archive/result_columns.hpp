@@ -1,21 +1,21 @@
 #pragma once
 
-#include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
-#include "core/campaign/parameter.hpp"
 #include "core/campaign/run_result.hpp"
 
 namespace proofmass::coordinator {
 
-/// What is known of a parameter in one run, or of the health of its loops.
-enum class ValueKind : std::uint8_t { truth, estimate, error, health };
+/// What is known of a quantity in one run, or of the health of the run.
+enum class ValueKind : std::uint8_t { truth, estimate, error, standard_error, health };
 
-/// `truth`, `estimate`, `error`, `health`.
+/// `truth`, `estimate`, `error`, `standard_error`, `health`.
 [[nodiscard]] std::string_view name_of(ValueKind kind);
 
 /// True if both are the same to the last bit; zeros have no sign, as in a campaign file.
@@ -26,9 +26,8 @@ enum class ValueKind : std::uint8_t { truth, estimate, error, health };
 /// A column of doubles, one for each run, SI.
 struct ValueColumn {
   ValueKind kind = ValueKind::truth;
-  Parameter parameter = Parameter::a_c11_delta_x;  ///< Unless the kind is `health`.
-  double LoopHealth::*health = nullptr;            ///< If it is.
-  std::string own_name;                            ///< With its unit: `a_c12_rad`, `attitude_rad`.
+  std::size_t index = 0;  ///< Of the value in its list of a RunResult.
+  std::string own_name;   ///< With its unit: `a_c12_rad`, `attitude_rad`.
   std::string name;       ///< As in the table `run_result`: `truth_a_c12_rad`.
   std::string_view unit;  ///< `m`, `rad`, `s²/m`, `m/s²` or `1`.
 
@@ -36,10 +35,8 @@ struct ValueColumn {
   [[nodiscard]] std::optional<double> value_in(const RunResult& result) const;
 };
 
-inline constexpr std::size_t num_value_columns = 3 * num_parameters + num_health_values;
-
-/// Ten truths, ten estimates, ten errors, five numbers of health, in the order of the table
-/// `run_result`.
-[[nodiscard]] const std::array<ValueColumn, num_value_columns>& value_columns();
+/// Truths, estimates, errors, standard errors if there are any, and health: all columns of values,
+/// in the order of the table `run_result`.
+[[nodiscard]] const std::vector<ValueColumn>& value_columns();
 
 }  // namespace proofmass::coordinator

@@ -7,7 +7,7 @@
 
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/report/digest.hpp"
-#include "core/campaign/run_result.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -19,11 +19,12 @@ class Rules {
       : num_rounds_max_(num_rounds_max), scan_(scan) {}
 
   void check(const RunResult& result) {
-    for (const std::string& broken : broken_count_rules(result, num_rounds_max_)) {
+    for (const std::string& broken :
+         broken_count_rules(result, model().results().num_draws_max, num_rounds_max_)) {
       violate(result.run, broken);
     }
     for (const ValueColumn& column : value_columns()) {
-      if (column.name.starts_with("error_")) continue;  // Follow from the others.
+      if (column.kind == ValueKind::error) continue;  // Follow from the others.
       const std::optional<double> value = column.value_in(result);
       if (!value || is_in_range(*value)) continue;
       violate(result.run, fmt::format("{} = {} (must be in [{}, {}])", column.name, *value,
@@ -68,9 +69,9 @@ void violate_missing(std::span<const RunRange> those, std::span<const RunRange> 
 
 }  // namespace
 
-ResultScan scan_results(const Store& store, const Scenario& scenario, const IsStopped& is_stopped) {
+ResultScan scan_results(const Store& store, const Campaign& campaign, const IsStopped& is_stopped) {
   ResultScan scan;
-  Rules rules(scenario.estimation.num_rounds_max, scan);
+  Rules rules(campaign.num_rounds_max(), scan);
   Digest digest;
   std::uint64_t num_visits = 0;
   store.for_each_result([&](const RunResult& result) {

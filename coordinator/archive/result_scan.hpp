@@ -6,8 +6,8 @@
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/identifiers.hpp"
-#include "core/campaign/scenario.hpp"
 
 namespace proofmass::coordinator {
 
@@ -27,7 +27,7 @@ inline constexpr std::uint64_t violations_named_max = 10;
 /// those who delivered them. Both are of one state of the file if Store::read_one_state() says so.
 ///
 /// @throws StoreError if the file cannot be read or has them in another order, Interrupted.
-[[nodiscard]] ResultScan scan_results(const Store& store, const Scenario& scenario,
+[[nodiscard]] ResultScan scan_results(const Store& store, const Campaign& campaign,
                                       const IsStopped& is_stopped);
 
 }  // namespace proofmass::coordinator

@@ -2,38 +2,30 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <cstddef>
-#include <optional>
-#include <utility>
-#include <vector>
-
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/digest_check.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 
-Campaign stored_campaign(const Store& store) {
-  std::optional<Campaign> campaign;
+std::shared_ptr<const Campaign> stored_campaign(const Store& store) {
+  std::shared_ptr<const Campaign> campaign;
   store.read_one_state([&] {
     check_definition_digest(store);
     campaign = stored_campaign_unchecked(store);
   });
-  return *std::move(campaign);
+  return campaign;
 }
 
-Campaign stored_campaign_unchecked(const Store& store) {
-  std::vector<std::vector<double>> columns;
-  for (std::size_t element = 0; element < num_drawn; ++element) {
-    const std::array elements{element};
-    std::vector<double> column = std::move(store.table_columns(elements).front());
-    if (!column.empty()) columns.push_back(std::move(column));
-  }
-  Campaign campaign = parse_campaign("stored definition", store.definition(),
-                                     store.environment_table(), std::move(columns));
-  require_identity(campaign, {.name = store.name(),
-                              .seed = fmt::to_string(store.seed()),
-                              .num_runs = fmt::to_string(store.num_runs())});
+std::shared_ptr<const Campaign> stored_campaign_unchecked(const Store& store) {
+  std::shared_ptr<const Campaign> campaign =
+      model().campaign_of({.text = store.definition(),
+                           .tables = store.data_tables(),
+                           .table_columns = store.table_columns()},
+                          TableColumns::included, "stored definition");
+  require_identity(*campaign, {.name = store.name(),
+                               .seed = fmt::to_string(store.seed()),
+                               .num_runs = fmt::to_string(store.num_runs())});
   return campaign;
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 
@@ -8,9 +10,9 @@ namespace proofmass::coordinator {
 /// The campaign that a campaign file holds.
 /// @throws DefinitionError if its definition is not one or another one's, StoreError if it cannot
 /// be read or is not the one that was stored, see check_definition_digest().
-[[nodiscard]] Campaign stored_campaign(const Store& store);
+[[nodiscard]] std::shared_ptr<const Campaign> stored_campaign(const Store& store);
 
 /// The same of a definition that may have been changed, for who looks for changes.
-[[nodiscard]] Campaign stored_campaign_unchecked(const Store& store);
+[[nodiscard]] std::shared_ptr<const Campaign> stored_campaign_unchecked(const Store& store);
 
 }  // namespace proofmass::coordinator

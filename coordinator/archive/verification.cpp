@@ -79,7 +79,7 @@ class Verification {
 
   Check check_definition() {
     campaign_ = stored_campaign_unchecked(*store_);
-    std::vector<std::string> details = store_->parameter_differences(campaign_->scenario);
+    std::vector<std::string> details = store_->parameter_differences(*campaign_);
     const std::string stored = store_->table_digest();
     const std::string computed = store_->computed_table_digest();
     if (computed != stored) {
@@ -106,7 +106,7 @@ class Verification {
 
   Check check_results() {
     if (!campaign_) return Check::not_checked("the definition cannot be read");
-    scan_ = scan_results(*store_, campaign_->scenario, is_stopped_);
+    scan_ = scan_results(*store_, *campaign_, is_stopped_);
     const std::string counts =
         fmt::format("{} of {} runs", num_runs_in(scan_->runs), store_->num_runs());
     if (scan_->num_violations == 0) return Check::holds(counts + ": each number obeys its rule");
@@ -156,12 +156,12 @@ class Verification {
 
   Check check_statistics() {
     if (!scan_) return Check::not_checked("the results cannot be read");
-    return check_stored_statistics(*store_, campaign_->scenario, *scan_);
+    return check_stored_statistics(*store_, *campaign_, *scan_);
   }
 
   Check check_stop_checks() {
     if (!scan_) return Check::not_checked("the results cannot be read");
-    return check_stored_stop_checks(*store_, campaign_->scenario, *scan_);
+    return check_stored_stop_checks(*store_, *campaign_, *scan_);
   }
 
   Check check_draws() {
@@ -248,7 +248,7 @@ class Verification {
 
   bool holds_ = true;
   std::optional<Store> store_;
-  std::optional<Campaign> campaign_;
+  std::shared_ptr<const Campaign> campaign_;
   bool is_same_model_ = false;
   std::optional<ResultScan> scan_;
 };

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "coordinator/archive/archive_error.hpp"
-#include "core/simulation/run.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 
@@ -41,7 +41,7 @@ struct Check {
 struct VerifyOptions {
   double fraction = 0.01;       ///< Of the finished runs, simulated again; in [0, 1], one at least.
   std::size_t num_threads = 1;  ///< That draw and simulate; at least 1.
-  std::string_view model_version = proofmass::model_version;  ///< That of the simulation.
+  std::string_view model_version = model().version();  ///< That of the simulation.
 };
 
 /// Checks whether a campaign file is whole and holds what its definition yields, in this order:

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "coordinator/campaign_file/data_file.hpp"
+#include "core/campaign/model.hpp"
 #include "core/definition/document.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -37,34 +38,12 @@ std::vector<Assignment> assignments_of(const Overrides& overrides) {
 }
 
 /// Reads the data files that a definition names, each once.
-class DataFiles {
+class DataFilesIn final : public DataFiles {
  public:
-  DataFiles(const Document& document, std::filesystem::path folder)
+  DataFilesIn(const Document& document, std::filesystem::path folder)
       : document_(document), folder_(std::move(folder)) {}
 
-  void read_environment(Campaign& campaign) {
-    if (campaign.scenario.environment.kind != EnvironmentKind::file) return;
-    if (campaign.environment_file.empty()) return;  // Campaign::validate() says what is missing.
-    const std::string& text = text_of(campaign.environment_file, "environment.file");
-    campaign.environment_table = detail::parse_environment(text, name_of(campaign.environment_file),
-                                                           campaign.scenario.orbit.period_s);
-  }
-
-  void read_columns(Campaign& campaign) {
-    for (const std::size_t element : table_elements(campaign.dispersions)) {
-      const Dispersion& dispersion = campaign.dispersions[element];
-      const std::string path = fmt::format("dispersion.{}.file", drawn_names()[element]);
-      campaign.table_columns.push_back(detail::parse_column(
-          text_of(dispersion.file, path), name_of(dispersion.file), dispersion.column));
-    }
-  }
-
- private:
-  [[nodiscard]] std::string name_of(const std::string& file) const {
-    return (folder_ / file).string();
-  }
-
-  const std::string& text_of(const std::string& file, const std::string& path) {
+  const std::string& text_of(const std::string& file, const std::string& path) override {
     const auto known = texts_.find(file);
     if (known != texts_.end()) return known->second;
     try {
@@ -74,18 +53,15 @@ class DataFiles {
     }
   }
 
+  [[nodiscard]] std::string name_of(const std::string& file) const override {
+    return (folder_ / file).string();
+  }
+
+ private:
   const Document& document_;
   std::filesystem::path folder_;
   std::map<std::string, std::string> texts_;
 };
-
-void validate(const Campaign& campaign, const Document& document) {
-  try {
-    campaign.validate();
-  } catch (const ConfigError& error) {
-    throw document.located(error);
-  }
-}
 
 std::string read_campaign_text(const std::filesystem::path& file) {
   try {
@@ -97,15 +73,11 @@ std::string read_campaign_text(const std::filesystem::path& file) {
 
 }  // namespace
 
-Campaign read_campaign(const std::filesystem::path& file, const Overrides& overrides) {
+std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
+                                        const Overrides& overrides) {
   Document document(file.string(), read_campaign_text(file), assignments_of(overrides));
-  Campaign campaign = read_definition(document);
-  document.check();
-  DataFiles data(document, file.parent_path());
-  data.read_environment(campaign);
-  data.read_columns(campaign);
-  validate(campaign, document);
-  return campaign;
+  DataFilesIn files(document, file.parent_path());
+  return model().read_campaign(document, files);
 }
 
 void require_identity(const Campaign& defined, const StoredIdentity& stored) {
@@ -122,7 +94,7 @@ void require_identity(const Campaign& defined, const StoredIdentity& stored) {
 
 std::vector<std::string> definition_differences(const Campaign& stored, const Campaign& wanted) {
   std::vector<std::string> texts;
-  for (const auto& [field, first, second] : compare_definitions(stored, wanted)) {
+  for (const auto& [field, first, second] : stored.differences_from(wanted)) {
     texts.push_back(fmt::format("{}: {} in the database, {} asked for", field, first, second));
   }
   return texts;

@@ -3,13 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/campaign/campaign.hpp"
-#include "core/definition/campaign_definition.hpp"
 
 namespace proofmass::coordinator {
 
@@ -34,8 +34,8 @@ inline constexpr std::uintmax_t data_file_size_max = std::uintmax_t{64} << 20;
 /// dispersion group before those of its elements.
 ///
 /// @throws DefinitionError naming file, line, field, value and rule.
-[[nodiscard]] Campaign read_campaign(const std::filesystem::path& file,
-                                     const Overrides& overrides = {});
+[[nodiscard]] std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
+                                                      const Overrides& overrides = {});
 
 /// What a database says of its campaign besides the definition, as text.
 struct StoredIdentity {

@@ -10,7 +10,7 @@
 #include "coordinator/cli/report_command.hpp"
 #include "core/campaign/dispersion.hpp"
 #include "core/campaign/identifiers.hpp"
-#include "core/campaign/parameter.hpp"
+#include "core/campaign/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
@@ -41,7 +41,8 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
   sensitivity.add_option("--run", options->run, "Why this run is as far off as it is")
       ->check(wire::in_range(std::uint64_t{0}, num_runs_max - 1));
   sensitivity.add_option("--rows", options->num_rows, "Quantities to name for each error")
-      ->check(wire::in_range(std::size_t{1}, num_drawn + num_parameters))
+      ->check(wire::in_range(std::size_t{1},
+                             model().drawn().size() + model().results().quantities.size()))
       ->capture_default_str();
   sensitivity.callback(
       [options, &chosen] { chosen = [options] { return print_sensitivity(*options); }; });

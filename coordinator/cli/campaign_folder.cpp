@@ -13,8 +13,8 @@
 
 #include "coordinator/cli/campaign_start.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
-#include "core/simulation/run.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -44,12 +44,11 @@ int lock(const std::filesystem::path& directory) {
 
 ServedCampaign load_file(const std::filesystem::path& file) {
   Store store = Store::open(file);
-  if (store.model_version() != model_version) {
+  if (store.model_version() != model().version()) {
     throw Error(fmt::format("{}: model = {} (this program has {})", file.string(),
-                            store.model_version(), model_version));
+                            store.model_version(), model().version()));
   }
-  // Shared with the dispatch and with messages under way.
-  auto definition = std::make_shared<const Campaign>(stored_campaign(store));
+  std::shared_ptr<const Campaign> definition = stored_campaign(store);
   return {.file = file, .store = std::move(store), .definition = std::move(definition)};
 }
 
@@ -90,13 +89,13 @@ void CampaignFolder::require_same(const std::filesystem::path& file, const Campa
 // What the file holds was compared before.
 std::shared_ptr<const Campaign> CampaignFolder::extend(Store& store, const Campaign& wanted) {
   extend_same(store, wanted, file_of(wanted));
-  return std::make_shared<const Campaign>(wanted);
+  return wanted.clone();
 }
 
 std::optional<std::uint64_t> CampaignFolder::summarise(
-    const std::filesystem::path& file, const Scenario& scenario,
+    const std::filesystem::path& file, const Campaign& campaign,
     const std::function<void(const std::function<void(Store&)>&)>& write) {
-  return summarise_file(file, scenario, write);
+  return summarise_file(file, campaign, write);
 }
 
 std::filesystem::path CampaignFolder::file_of(const Campaign& campaign) const {

@@ -31,7 +31,7 @@ class CampaignFolder final : public CampaignFiles, public CampaignDirectory {
   [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,
                                                        const Campaign& wanted) override;
   std::optional<std::uint64_t> summarise(
-      const std::filesystem::path& file, const Scenario& scenario,
+      const std::filesystem::path& file, const Campaign& campaign,
       const std::function<void(const std::function<void(Store&)>&)>& write) override;
 
  private:

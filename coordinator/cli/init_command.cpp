@@ -8,6 +8,7 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/exit_code.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 
@@ -16,7 +17,7 @@ int write_campaign(const std::filesystem::path& file, IfFileExists if_exists) {
     throw UsageError(fmt::format("{} exists (replace it with --force)", file.string()));
   }
   std::ofstream stream(file, std::ios::binary | std::ios::trunc);
-  stream << commented_campaign(hardy2013_campaign());
+  stream << model().example();
   stream.close();
   if (!stream) throw Error(fmt::format("{}: {}", file.string(), std::strerror(errno)));
   fmt::print("wrote {}\n", file.string());

@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <memory>
 
-#include "coordinator/cli/bench_command.hpp"
 #include "coordinator/cli/command_line.hpp"
 #include "coordinator/cli/init_command.hpp"
 #include "coordinator/cli/keygen_command.hpp"
@@ -15,7 +14,6 @@ namespace proofmass::coordinator {
 namespace {
 
 constexpr unsigned workers_max = 1024;
-constexpr std::uint64_t bench_runs_max = 1'000'000;
 
 // Each command shares its options with the callback that CLI11 keeps and with the chosen command.
 
@@ -50,17 +48,6 @@ void add_init(CLI::App& app, Command& chosen) {
   });
 }
 
-void add_bench(CLI::App& app, Command& chosen) {
-  const auto options = std::make_shared<BenchOptions>();
-  CLI::App& bench = *app.add_subcommand("bench", "Measure the speed of this machine");
-  bench.add_option("--runs", options->num_runs, "Runs of each instruction set")
-      ->check(wire::in_range(std::uint64_t{1}, bench_runs_max))
-      ->capture_default_str();
-  bench.add_flag_callback(
-      "--json", [options] { options->format = BenchFormat::json; }, "Print JSON");
-  bench.callback([options, &chosen] { chosen = [options] { return run_bench(*options); }; });
-}
-
 void add_keygen(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<KeygenOptions>();
   CLI::App& keygen = *app.add_subcommand("keygen", "Make keys of a coordinator, workers, clients");
@@ -76,7 +63,6 @@ void add_keygen(CLI::App& app, Command& chosen) {
 void add_local_commands(CLI::App& app, Command& chosen) {
   add_run(app, chosen);
   add_init(app, chosen);
-  add_bench(app, chosen);
   add_keygen(app, chosen);
 }
 

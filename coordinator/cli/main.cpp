@@ -1,22 +1,7 @@
+#include "coordinator/bench/bench_command.hpp"
 #include "coordinator/cli/command_line.hpp"
-#include "coordinator/cli/program.hpp"
 
 int main(int argc, char** argv) {
   using namespace proofmass::coordinator;
-
-  CLI::App app("Proofmass validates the in-flight calibration of drag-free accelerometers.",
-               "proofmass");
-  app.footer(exit_codes_text);
-  app.set_version_flag("--version", "proofmass " PROOFMASS_VERSION);
-  app.require_subcommand(1);
-  app.set_config("--config", "", "TOML file with options, a section a command")
-      ->envname("PROOFMASS_CONFIG");
-  app.allow_config_extras(CLI::config_extras_mode::error);
-
-  Command chosen;
-  add_local_commands(app, chosen);
-  add_analysis_commands(app, chosen);
-  add_archive_commands(app, chosen);
-  add_client_commands(app, chosen);
-  return run_program(app, argc, argv, [&] { return chosen(); });
+  return run_proofmass(argc, argv, add_bench_command);
 }

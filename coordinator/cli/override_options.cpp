@@ -4,8 +4,8 @@
 
 #include "coordinator/cli/exit_code.hpp"
 #include "core/campaign/identifiers.hpp"
+#include "core/campaign/model_rules.hpp"
 #include "core/error.hpp"
-#include "core/statistics/stop_rule.hpp"
 #include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {

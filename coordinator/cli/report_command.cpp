@@ -13,6 +13,7 @@
 #include "coordinator/report/requirement_text.hpp"
 #include "coordinator/report/sensitivity_text.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/model.hpp"
 #include "core/definition/nearest_name.hpp"
 #include "core/statistics/sensitivity.hpp"
 
@@ -22,7 +23,7 @@ namespace {
 std::vector<RequirementAnswer> answers_of(const Store& store,
                                           const std::vector<std::string>& requirements) {
   try {
-    return check_requirements(store, stored_campaign(store).scenario.objectives, requirements);
+    return check_requirements(store, stored_campaign(store)->objectives(), requirements);
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }
@@ -39,13 +40,11 @@ int print_requirements(const Store& store, const std::vector<std::string>& requi
   return are_met ? exit_done : exit_not_met;
 }
 
-Parameter parameter_named(std::string_view name) {
-  const auto& infos = parameter_infos();
-  const auto found = std::ranges::find(infos, name, &ParameterInfo::name);
-  if (found != infos.end()) return found->parameter;
-  std::string names;
-  for (const ParameterInfo& info : infos) names += fmt::format(" {}", info.name);
-  throw UsageError(fmt::format("parameter = {} (must be one of{})", name, names));
+std::size_t quantity_named(std::string_view name) {
+  const ResultSchema& schema = model().results();
+  if (const std::optional<std::size_t> found = find_quantity(schema, name)) return *found;
+  throw UsageError(fmt::format("parameter = {} (must be one of {})", name,
+                               fmt::join(quantity_names(schema), " ")));
 }
 
 }  // namespace
@@ -53,35 +52,35 @@ Parameter parameter_named(std::string_view name) {
 int print_report(const ReportOptions& options) {
   const Store store = Store::open_read_only(options.database);
   if (!options.requirements.empty()) return print_requirements(store, options.requirements);
-  print_lines(report_text(store, stored_campaign(store).scenario));
+  print_lines(report_text(store, *stored_campaign(store)));
   return exit_done;
 }
 
 int print_sensitivity(const SensitivityOptions& options) {
-  std::vector<Parameter> parameters;
-  if (options.parameter) parameters.push_back(parameter_named(*options.parameter));
+  std::vector<std::size_t> quantities;
+  if (options.parameter) quantities.push_back(quantity_named(*options.parameter));
   const Store store = Store::open_read_only(options.database);
   std::optional<RunIndex> explained;
   if (options.run) explained = RunIndex{*options.run};
   const DrawnRuns drawn =
-      read_drawn_runs(store, stored_campaign(store), sensitivity_runs_max, explained);
+      read_drawn_runs(store, *stored_campaign(store), sensitivity_runs_max, explained);
   if (drawn.runs.size() < sensitivity_values_min) {
     throw Error(fmt::format("runs with an estimate = {} (sensitivities need {} at least)",
                             drawn.runs.size(), sensitivity_values_min));
   }
   if (explained) {
-    const Parameter parameter =
-        parameters.empty() ? worst_parameter_of(drawn, *explained) : parameters.front();
-    print_lines(explanation_text(drawn, parameter, *explained, options.num_rows));
+    const std::size_t quantity =
+        quantities.empty() ? worst_quantity_of(drawn, *explained) : quantities.front();
+    print_lines(explanation_text(drawn, quantity, *explained, options.num_rows));
     return exit_done;
   }
-  if (parameters.empty()) {
-    for (const ParameterInfo& info : parameter_infos()) parameters.push_back(info.parameter);
+  if (quantities.empty()) {
+    for (std::size_t i = 0; i < drawn.errors.size(); ++i) quantities.push_back(i);
   }
   std::string_view separator = "";
-  for (const Parameter parameter : parameters) {
+  for (const std::size_t quantity : quantities) {
     print_lines(
-        fmt::format("{}{}", separator, sensitivity_text(drawn, parameter, options.num_rows)));
+        fmt::format("{}{}", separator, sensitivity_text(drawn, quantity, options.num_rows)));
     separator = "\n";
   }
   return exit_done;

@@ -25,9 +25,8 @@
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/store_error.hpp"
+#include "core/campaign/model.hpp"
 #include "core/campaign/run_ranges.hpp"
-#include "core/simulation/reference_digest.hpp"
-#include "core/simulation/run.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -45,7 +44,8 @@ std::uint64_t num_missing(const Store& store) {
 /// No more than there are batches: runs of one batch take no longer than one of them.
 std::uint64_t num_workers(const RunOptions& options, std::uint64_t num_runs_missing) {
   const unsigned num_processors = std::max(1U, std::thread::hardware_concurrency());
-  const std::uint64_t num_batches = (num_runs_missing + batch_lanes - 1) / batch_lanes;
+  const std::uint64_t num_batches =
+      (num_runs_missing + model().batch_size() - 1) / model().batch_size();
   return std::min<std::uint64_t>(options.num_workers.value_or(num_processors), num_batches);
 }
 
@@ -66,13 +66,13 @@ class GrowingFile final : public CampaignFiles {
   }
   [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,
                                                        const Campaign& wanted) override {
-    store.extend(wanted, canonical_definition(wanted));
-    return std::make_shared<const Campaign>(wanted);
+    store.extend(wanted, wanted.definition(TableColumns::left_out).text);
+    return wanted.clone();
   }
   std::optional<std::uint64_t> summarise(
-      const std::filesystem::path& file, const Scenario& scenario,
+      const std::filesystem::path& file, const Campaign& campaign,
       const std::function<void(const std::function<void(Store&)>&)>& write) override {
-    return summarise_file(file, scenario, write);
+    return summarise_file(file, campaign, write);
   }
 };
 
@@ -85,7 +85,7 @@ ServiceConfig service_config(const PrivateEndpoint& endpoint, std::uint64_t num_
   config.end = ServiceEnd::when_done;
   config.given_up = GivenUpRuns::retry;
   config.version = PROOFMASS_VERSION;
-  config.dispatch.reference_digest = reference_digest(best_instruction_set());
+  config.dispatch.reference_digest = model().reference_digest(best_instruction_set());
   config.dispatch.reattach_wait = Duration::zero();  // Workers of the last time ended with it.
   // All workers may die at once, and runs must be found guilty before the machine is.
   config.dispatch.crashes_per_host_max =
@@ -202,9 +202,9 @@ void bring_to_rest(Store& store, const std::filesystem::path& database) {
 }
 
 /// Statistics of a file that cannot be written stay as they are; what is stored is said.
-int end_interrupted(Store& store, const Scenario& scenario, const std::filesystem::path& database) {
+int end_interrupted(Store& store, const Campaign& campaign, const std::filesystem::path& database) {
   try {
-    update_statistics(store, scenario);
+    update_statistics(store, campaign);
     bring_to_rest(store, database);
   } catch (const StoreError& error) {
     wire::say(fmt::format("proofmass: error: {}\n", wire::visible_text(error.what())));
@@ -234,15 +234,17 @@ int say_cancelled(const Store& store, std::uint64_t failures_max) {
 }  // namespace
 
 int run_campaign(const RunOptions& options) {
-  const Campaign campaign = read_campaign(options.campaign_file, options.overrides);
+  const std::unique_ptr<Campaign> campaign =
+      read_campaign(options.campaign_file, options.overrides);
   const std::filesystem::path database = database_of(options);
-  Outcome outcome = compute(open_or_create(campaign, plan_of(options, campaign.num_runs), database),
-                            campaign.num_runs, options);
-  if (!outcome.is_done) return end_interrupted(outcome.store, campaign.scenario, database);
-  update_statistics(outcome.store, campaign.scenario);
+  Outcome outcome =
+      compute(open_or_create(*campaign, plan_of(options, campaign->num_runs), database),
+              campaign->num_runs, options);
+  if (!outcome.is_done) return end_interrupted(outcome.store, *campaign, database);
+  update_statistics(outcome.store, *campaign);
   require_in_place(outcome.store, database);
   bring_to_rest(outcome.store, database);
-  print_lines(report_text(outcome.store, campaign.scenario));
+  print_lines(report_text(outcome.store, *campaign));
   if (outcome.store.control().phase == wire::CampaignPhase::cancelled) {
     return say_cancelled(outcome.store, options.stop.failures_max.value_or(0));
   }

@@ -14,8 +14,7 @@
 #include "coordinator/cli/signal_thread.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/report/report.hpp"
-#include "core/simulation/reference_digest.hpp"
-#include "core/simulation/run.hpp"
+#include "core/campaign/model.hpp"
 #include "proto/link/init_system.hpp"
 
 namespace proofmass::coordinator {
@@ -61,7 +60,7 @@ class Notices {
 std::vector<ServedCampaign> campaigns_of(const ServeOptions& options, CampaignFolder& folder) {
   std::vector<ServedCampaign> campaigns;
   for (const std::filesystem::path& file : options.campaign_files) {
-    campaigns.push_back(folder.open(read_campaign(file), {}, {}));
+    campaigns.push_back(folder.open(*read_campaign(file), {}, {}));
   }
   return campaigns;
 }
@@ -92,7 +91,7 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
   config.directory = &folder;
   config.limits = options.limits;
   config.version = PROOFMASS_VERSION;
-  config.dispatch.reference_digest = reference_digest(best_instruction_set());
+  config.dispatch.reference_digest = model().reference_digest(best_instruction_set());
   if (!options.faults.empty()) config.faults = wire::FaultPlan::parse(options.faults);
   scale_times(config, options.time_scale);
   return config;
@@ -111,7 +110,7 @@ bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
   bool is_written = true;
   for (auto& [file, store, definition] : campaigns) {
     try {
-      update_statistics(store, definition->scenario);
+      update_statistics(store, *definition);
       if (const std::optional<std::string> reason = store.rest()) {
         log({.severity = Severity::warning,
              .kind = "write_ahead_log_kept",

@@ -7,12 +7,12 @@
 
 namespace proofmass::coordinator {
 
-Campaign campaign_to_submit(const SubmitOptions& options) {
-  Campaign campaign = read_campaign(options.campaign_file, options.overrides);
+std::unique_ptr<Campaign> campaign_to_submit(const SubmitOptions& options) {
+  std::unique_ptr<Campaign> campaign = read_campaign(options.campaign_file, options.overrides);
   if (options.name) {
-    campaign.name = *options.name;
+    campaign->name = *options.name;
     try {
-      campaign.validate();
+      campaign->validate();
     } catch (const ConfigError& error) {
       throw UsageError(error.what());
     }
@@ -21,7 +21,7 @@ Campaign campaign_to_submit(const SubmitOptions& options) {
 }
 
 wire::SubmitRequest submit_request(const SubmitOptions& options, const Campaign& campaign) {
-  return {.definition = definition_of(campaign),
+  return {.definition = campaign.definition(TableColumns::included),
           .priority = options.priority,
           .audit_fraction = options.audit_fraction,
           .stop_rule = options.stop.rule,
@@ -29,12 +29,12 @@ wire::SubmitRequest submit_request(const SubmitOptions& options, const Campaign&
 }
 
 int submit_campaign(const SubmitOptions& options) {
-  const Campaign campaign = campaign_to_submit(options);
-  const wire::SubmitRequest request = submit_request(options, campaign);
+  const std::unique_ptr<Campaign> campaign = campaign_to_submit(options);
+  const wire::SubmitRequest request = submit_request(options, *campaign);
   return with_connection(options.client, [&](const Ask& ask) {
     const auto done = reply_of<wire::DoneReply>(ask, request);
     const bool is_json = options.client.format == OutputFormat::json;
-    print_lines(is_json ? done_json("submit", campaign.name, done) : done.text + "\n");
+    print_lines(is_json ? done_json("submit", campaign->name, done) : done.text + "\n");
     return exit_done;
   });
 }

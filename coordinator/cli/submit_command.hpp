@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -23,7 +24,7 @@ struct SubmitOptions {
 
 /// The campaign that the arguments name.
 /// @throws DefinitionError if the file cannot be used; UsageError if the name cannot.
-[[nodiscard]] Campaign campaign_to_submit(const SubmitOptions& options);
+[[nodiscard]] std::unique_ptr<Campaign> campaign_to_submit(const SubmitOptions& options);
 
 /// The request that the arguments ask for.
 [[nodiscard]] wire::SubmitRequest submit_request(const SubmitOptions& options,

@@ -11,8 +11,8 @@
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
 #include "coordinator/dispatch/workers.hpp"
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
-#include "core/simulation/run.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -23,10 +23,10 @@ double seconds(Duration duration) { return std::chrono::duration<double>(duratio
 std::optional<wire::Reject> refusal(const State& state, const HostId& host,
                                     const wire::Hello& hello) {
   using wire::RejectReason;
-  if (hello.model_version != model_version) {
+  if (hello.model_version != model().version()) {
     return wire::Reject{.reason = RejectReason::incompatible,
                         .text = fmt::format("model_version = {} (must be {}, the coordinator's)",
-                                            hello.model_version, model_version)};
+                                            hello.model_version, model().version())};
   }
   if (hello.reference_digest != state.config.reference_digest) {
     return wire::Reject{

@@ -10,6 +10,7 @@
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
 #include "coordinator/dispatch/workers.hpp"
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
@@ -118,9 +119,11 @@ void reopen_if_unfinished(State& state, CampaignState& campaign) {
 
 /// The rule that a result of the batch breaks, as `run 7: num_draws = 0 (...)`; empty if none does.
 std::string broken_rule(const CampaignState& campaign, const wire::ResultBatch& batch) {
-  const std::int64_t num_rounds_max = campaign.definition->scenario.estimation.num_rounds_max;
+  const std::int64_t num_rounds_max = campaign.definition->num_rounds_max();
+  const std::uint32_t num_draws_max = model().results().num_draws_max;
   for (const wire::ComputedRun& computed : batch.results) {
-    const std::vector<std::string> broken = broken_count_rules(computed.result, num_rounds_max);
+    const std::vector<std::string> broken =
+        broken_count_rules(computed.result, num_draws_max, num_rounds_max);
     if (!broken.empty()) {
       return fmt::format("run {}: {}", computed.result.run.value, broken.front());
     }

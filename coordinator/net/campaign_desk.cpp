@@ -318,27 +318,27 @@ void CampaignDesk::go_on_to(CampaignId id, std::uint64_t num_runs) {
   Served& served = served_.at(id);
   served.is_decided = false;
   served.is_held = true;
-  Campaign wanted = *state_.campaigns.at(id).definition;
-  wanted.num_runs = num_runs;
-  surroundings_.background.post_next(
-      [this, id, wanted = std::move(wanted)]() -> Background::Finish {
-        std::shared_ptr<const Campaign> extended;
-        std::string failure;
-        try {
-          writer_.access(id, [&](Store& store) { extended = files_->extend(store, wanted); });
-        } catch (const std::exception& error) {
-          failure = error.what();
-        }
-        return [this, id, extended, failure, num_runs = wanted.num_runs] {
-          served_.at(id).is_held = false;
-          if (extended != nullptr) return extend(id, extended);
-          served_.at(id).is_decided = true;
-          outbox_.log({.severity = Severity::error,
-                       .kind = "campaign_not_extended",
-                       .fields = {{"runs", num_runs}, Field::reason(failure)}},
-                      id);
-        };
-      });
+  // Shared by the copies that std::function makes.
+  const std::shared_ptr<Campaign> wanted = state_.campaigns.at(id).definition->clone();
+  wanted->num_runs = num_runs;
+  surroundings_.background.post_next([this, id, wanted]() -> Background::Finish {
+    std::shared_ptr<const Campaign> extended;
+    std::string failure;
+    try {
+      writer_.access(id, [&](Store& store) { extended = files_->extend(store, *wanted); });
+    } catch (const std::exception& error) {
+      failure = error.what();
+    }
+    return [this, id, extended, failure, num_runs = wanted->num_runs] {
+      served_.at(id).is_held = false;
+      if (extended != nullptr) return extend(id, extended);
+      served_.at(id).is_decided = true;
+      outbox_.log({.severity = Severity::error,
+                   .kind = "campaign_not_extended",
+                   .fields = {{"runs", num_runs}, Field::reason(failure)}},
+                  id);
+    };
+  });
 }
 
 void CampaignDesk::begin_summary(CampaignId id, Served& served) {
@@ -347,11 +347,11 @@ void CampaignDesk::begin_summary(CampaignId id, Served& served) {
       std::launch::async,
       [this, id, file = served.file, definition = state_.campaigns.at(id).definition] {
         try {
-          return Summarised{
-              .failure = {},
-              .num_runs = files_->summarise(
-                  file, definition->scenario,
-                  [&](const std::function<void(Store&)>& action) { writer_.access(id, action); })};
+          return Summarised{.failure = {},
+                            .num_runs = files_->summarise(
+                                file, *definition, [&](const std::function<void(Store&)>& action) {
+                                  writer_.access(id, action);
+                                })};
         } catch (const std::exception& error) {
           return Summarised{.failure = error.what(), .num_runs = {}};
         }

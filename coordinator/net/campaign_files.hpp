@@ -10,7 +10,6 @@
 #include "coordinator/net/rights.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/scenario.hpp"
 
 namespace proofmass::coordinator {
 
@@ -69,7 +68,7 @@ class CampaignFiles {
   /// @param write  Lets its argument use the file in the writer's thread.
   /// @return The number of runs that the rule asks for next; empty if there are enough.
   virtual std::optional<std::uint64_t> summarise(
-      const std::filesystem::path& file, const Scenario& scenario,
+      const std::filesystem::path& file, const Campaign& campaign,
       const std::function<void(const std::function<void(Store&)>&)>& write) = 0;
 };
 

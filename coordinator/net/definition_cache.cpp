@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/definition/campaign_definition.hpp"
-
 namespace proofmass::coordinator {
 
 wire::DefinitionPart DefinitionCache::part(const wire::CampaignRequest& request,
@@ -17,9 +15,8 @@ wire::DefinitionPart DefinitionCache::part(const wire::CampaignRequest& request,
   }
   if (found == entries_.end()) {
     make_room();
-    Entry entry{
-        .definition = definition,
-        .encoded = wire::EncodedDefinition(definition_of(*definition, TableColumns::left_out))};
+    Entry entry{.definition = definition,
+                .encoded = wire::EncodedDefinition(definition->definition(TableColumns::left_out))};
     size_ += entry.encoded.size();
     ++num_encoded_;
     found = entries_.emplace(request.campaign, std::move(entry)).first;

@@ -171,11 +171,11 @@ std::vector<FileOutcome> look_at_all(const CampaignDirectory& directory, KnownCa
 }
 
 std::uint64_t definition_size(const Campaign& campaign) {
-  constexpr std::uint64_t numbers_per_row = 7;
-  std::uint64_t num_values = numbers_per_row * campaign.environment_table.size();
+  const Definition definition = campaign.definition(TableColumns::left_out);
+  std::uint64_t num_values = 0;
+  for (const DataTable& table : definition.tables) num_values += table.values.size();
   for (const std::vector<double>& column : campaign.table_columns) num_values += column.size();
-  constexpr std::uint64_t text_size = 4096;  // What a definition takes without tables, about.
-  return text_size + sizeof(double) * num_values;
+  return definition.text.size() + sizeof(double) * num_values;
 }
 
 }  // namespace proofmass::coordinator

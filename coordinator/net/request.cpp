@@ -2,13 +2,14 @@
 
 #include <utility>
 
-#include "core/definition/campaign_definition.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 Request read(wire::SubmitRequest&& sent) {
-  return Submission{.campaign = campaign_of(std::move(sent.definition)),
+  return Submission{.campaign = model().campaign_of(std::move(sent.definition),
+                                                    TableColumns::included, "definition"),
                     .priority = sent.priority,
                     .audit_fraction = sent.audit_fraction,
                     .stop_rule = std::move(sent.stop_rule),

@@ -13,7 +13,8 @@ namespace proofmass::coordinator {
 
 /// A SubmitRequest whose definition has been read.
 struct Submission {
-  Campaign campaign;  ///< Valid, with its table columns.
+  /// Valid, with its table columns; shared with the work that stores it.
+  std::shared_ptr<const Campaign> campaign;
   int priority = 0;
   double audit_fraction = 0.0;
   std::string stop_rule = {};

@@ -10,8 +10,8 @@
 #include <variant>
 
 #include "coordinator/dispatch/dispatch.hpp"
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
-#include "core/simulation/run.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -69,7 +69,7 @@ void RequestDesk::take(wire::StatusRequest&& request, const Asker& asker, const 
   const Duration uptime = surroundings_.now() - began_at_;
   wire::StatusReply reply{
       .version = surroundings_.version,
-      .model_version = std::string(model_version),
+      .model_version = std::string(model().version()),
       .uptime_s = std::chrono::duration<double>(uptime).count(),
       .num_workers = state.workers.size(),
       .num_slots = state.num_slots,

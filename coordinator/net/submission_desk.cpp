@@ -16,7 +16,7 @@ using Submitted = std::shared_ptr<const Submission>;
 StopPlan plan_of(const Submission& request) {
   StopPlan plan{
       .stop_rule = request.stop_rule, .num_runs_max = {}, .failures_max = request.failures_max};
-  if (!plan.stop_rule.empty()) plan.num_runs_max = request.campaign.num_runs;
+  if (!plan.stop_rule.empty()) plan.num_runs_max = request.campaign->num_runs;
   return plan;
 }
 
@@ -37,7 +37,7 @@ SubmissionDesk::SubmissionDesk(Surroundings surroundings)
     : surroundings_(std::move(surroundings)), campaigns_(surroundings_.campaigns) {}
 
 void SubmissionDesk::submit(const Submitted& request, const Asker& asker, Respond respond) {
-  const std::string& name = request->campaign.name;
+  const std::string& name = request->campaign->name;
   if (surroundings_.files == nullptr) {
     throw Error(fmt::format(
         "submit = {} (this coordinator serves the campaigns that it began with)", name));
@@ -54,7 +54,7 @@ void SubmissionDesk::submit(const Submitted& request, const Asker& asker, Respon
     return;
   }
   const std::string& owner = entry ? entry->owner : asker.name;
-  check_limits(owner, definition_size(request->campaign), !entry || entry->has_ended);
+  check_limits(owner, definition_size(*request->campaign), !entry || entry->has_ended);
   if (entry && !entry->has_ended) {
     change_served(entry->id, request, std::move(respond));
   } else {
@@ -105,8 +105,8 @@ void SubmissionDesk::open_file(const Submitted& request, const Asker& asker,
                                const std::string& owner, Respond respond) {
   CampaignFiles& files = *surroundings_.files;
   serve_opened(
-      request->campaign.name, {.owner = owner, .size = definition_size(request->campaign)},
-      [&files, request, asker] { return files.open(request->campaign, plan_of(*request), asker); },
+      request->campaign->name, {.owner = owner, .size = definition_size(*request->campaign)},
+      [&files, request, asker] { return files.open(*request->campaign, plan_of(*request), asker); },
       control_of(*request), std::move(respond));
 }
 
@@ -157,7 +157,7 @@ void SubmissionDesk::serve_opened(const std::string& name, UnderWay under_way,
 void SubmissionDesk::change_served(CampaignId id, const Submitted& request, Respond respond) {
   const StopPlan plan = plan_of(*request);
   const std::uint64_t num_runs =
-      horizon_of(plan, request->campaign.num_runs, campaigns_.num_runs_of(id));
+      horizon_of(plan, request->campaign->num_runs, campaigns_.num_runs_of(id));
   const bool has_new_plan = plan != campaigns_.plan_of(id);
   campaigns_.take_hold(id);
   const auto work = [this, id, request, plan, num_runs, has_new_plan, respond,
@@ -168,11 +168,11 @@ void SubmissionDesk::change_served(CampaignId id, const Submitted& request, Resp
                                 .audit_fraction = request->audit_fraction};
     std::string failure;
     try {
-      Campaign wanted = request->campaign;
-      wanted.num_runs = num_runs;
-      surroundings_.files->require_same(file, wanted);
+      const std::unique_ptr<Campaign> wanted = request->campaign->clone();
+      wanted->num_runs = num_runs;
+      surroundings_.files->require_same(file, *wanted);
       surroundings_.writer.access(id, [&](Store& store) {
-        change.definition = surroundings_.files->extend(store, wanted);
+        change.definition = surroundings_.files->extend(store, *wanted);
         if (has_new_plan) store.set_stop_plan(plan);
       });
     } catch (const std::exception& error) {

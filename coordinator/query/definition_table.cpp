@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "coordinator/query/virtual_table.hpp"
-#include "core/definition/definition_items.hpp"
 
 SQLITE_EXTENSION_INIT3
 
@@ -103,10 +102,10 @@ int filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value*
   return guarded(*base->pVtab, table_name, [&] {
     DefinitionTable& table = table_of(base->pVtab);
     const std::string database = plan == 0 ? "main" : database_of(table.connection, values[0]);
-    cursor.definition =
-        table.databases.current(table.connection, database, [](const Campaign& campaign) {
+    cursor.definition = table.databases.current(
+        table.connection, database, [](const std::shared_ptr<const Campaign>& campaign) {
           return std::make_shared<Definition>(
-              Definition{.campaign = campaign.name, .items = definition_items(campaign)});
+              Definition{.campaign = campaign->name, .items = campaign->items()});
         });
     cursor.position = 0;
   });

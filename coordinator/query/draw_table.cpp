@@ -14,7 +14,7 @@
 #include "coordinator/query/draw_scan.hpp"
 #include "coordinator/query/drawn_campaign.hpp"
 #include "coordinator/query/virtual_table.hpp"
-#include "core/campaign/drawn_quantities.hpp"
+#include "core/campaign/model.hpp"
 
 SQLITE_EXTENSION_INIT3
 
@@ -40,7 +40,7 @@ struct DrawCursor : sqlite3_vtab_cursor {
   DrawScan scan;
   std::uint64_t run = 0;
   std::size_t quantity = 0;
-  std::optional<DrawnValues> values;  // Of the run.
+  std::vector<double> values;  // Of the run; empty if all draws were rejected.
 };
 
 DrawTable& table_of(sqlite3_vtab* table) { return *static_cast<DrawTable*>(table); }
@@ -109,7 +109,9 @@ std::optional<int> constraint_for(const Offer& offer, sqlite3_index_info* plan) 
 void estimate_cost(sqlite3_index_info& plan) {
   const bool has_range = (plan.idxNum & range_bits) != 0;
   const double runs = (plan.idxNum & run_bit) != 0 ? 1.0 : has_range ? 1e3 : 1e5;
-  const double rows = runs * ((plan.idxNum & quantity_bit) != 0 ? 1.0 : double{num_drawn});
+  const double rows =
+      runs *
+      ((plan.idxNum & quantity_bit) != 0 ? 1.0 : static_cast<double>(model().drawn().size()));
   plan.estimatedCost = 12.0 * runs + rows;
   plan.estimatedRows = static_cast<sqlite3_int64>(rows);
   constexpr int one_row = run_bit | quantity_bit;
@@ -155,9 +157,10 @@ void narrow(DrawScan& scan, const Offer& offer, sqlite3_value* value) {
   } else if (offer.run_comparison && type == SQLITE_FLOAT) {
     scan.narrow(*offer.run_comparison, sqlite3_value_double(value));
   } else if (!offer.run_comparison && type == SQLITE_TEXT) {
-    const auto found = std::ranges::find(drawn_names(), text_of(value));
-    if (found == drawn_names().end()) return scan.leave_none();
-    scan.quantity = static_cast<std::size_t>(found - drawn_names().begin());
+    const std::span<const DrawnQuantity> drawn = model().drawn();
+    const auto found = std::ranges::find(drawn, text_of(value), &DrawnQuantity::name);
+    if (found == drawn.end()) return scan.leave_none();
+    scan.quantity = static_cast<std::size_t>(found - drawn.begin());
   }
 }
 
@@ -172,9 +175,11 @@ int filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value*
   DrawCursor& cursor = cursor_of(base);
   return guarded(*base->pVtab, table_name, [&] {
     DrawTable& table = table_of(base->pVtab);
-    cursor.runs = table.databases.current(
-        table.connection, database_in(table, plan, values),
-        [](Campaign campaign) { return std::make_shared<DrawnCampaign>(std::move(campaign)); });
+    cursor.runs =
+        table.databases.current(table.connection, database_in(table, plan, values),
+                                [](std::shared_ptr<const Campaign> campaign) {
+                                  return std::make_shared<DrawnCampaign>(std::move(campaign));
+                                });
     cursor.scan = {.first_run = 0, .end_run = cursor.runs->num_runs(), .quantity = {}};
     for (std::size_t i = 0; i < offers.size(); ++i) {
       if ((plan & (1 << i)) == 0) continue;
@@ -189,7 +194,8 @@ int next(sqlite3_vtab_cursor* base) {
   DrawCursor& cursor = cursor_of(base);
   return guarded(*base->pVtab, table_name, [&] {
     ++cursor.quantity;
-    if (cursor.scan.quantity || cursor.quantity == num_drawn) go_to_run(cursor, cursor.run + 1);
+    if (cursor.scan.quantity || cursor.quantity == model().drawn().size())
+      go_to_run(cursor, cursor.run + 1);
   });
 }
 
@@ -208,13 +214,15 @@ int column(sqlite3_vtab_cursor* base, sqlite3_context* context, int number) {
       sqlite3_result_int64(context, static_cast<sqlite3_int64>(cursor.run));
       break;
     case quantity_column:
-      set_text(context, drawn_names()[cursor.quantity]);
+      set_text(context, std::string(model().drawn()[cursor.quantity].name));
       break;
     case unit_column:
-      set_text(context, drawn_unit(cursor.quantity));
+      set_text(context, std::string(model().drawn()[cursor.quantity].unit));
       break;
     case value_column:
-      if (cursor.values) sqlite3_result_double(context, (*cursor.values)[cursor.quantity]);
+      if (!cursor.values.empty()) {
+        sqlite3_result_double(context, cursor.values[cursor.quantity]);
+      }
       break;
     default:
       set_text(context, cursor.runs->campaign_name());
@@ -224,7 +232,7 @@ int column(sqlite3_vtab_cursor* base, sqlite3_context* context, int number) {
 
 int row_identifier(sqlite3_vtab_cursor* base, sqlite3_int64* identifier) {
   const DrawCursor& cursor = cursor_of(base);
-  *identifier = static_cast<sqlite3_int64>(cursor.run * num_drawn + cursor.quantity);
+  *identifier = static_cast<sqlite3_int64>(cursor.run * model().drawn().size() + cursor.quantity);
   return SQLITE_OK;
 }
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "core/campaign/drawn_quantities.hpp"
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
 
 SQLITE_EXTENSION_INIT3
@@ -71,31 +71,33 @@ std::string quoted_name(std::string_view name) {
   return quoted + "\"";
 }
 
-EnvironmentTable environment_table_of(sqlite3* connection, const std::string& database) {
-  Selection row(connection,
-                fmt::format("SELECT time_s, linear_x_m_s2, linear_y_m_s2, "
-                            "linear_z_m_s2, angular_x_rad_s2, angular_y_rad_s2, "
-                            "angular_z_rad_s2 FROM {}.environment_row ORDER BY position",
-                            quoted_name(database)));
-  EnvironmentTable table;
-  while (row.step()) {
-    table.push_back({.time_s = row.real(0),
-                     .linear_m_s2 = {row.real(1), row.real(2), row.real(3)},
-                     .angular_rad_s2 = {row.real(4), row.real(5), row.real(6)}});
+std::vector<DataTable> data_tables_of(sqlite3* connection, const std::string& database) {
+  std::vector<DataTable> tables;
+  for (const DataTableSchema& schema : model().results().tables) {
+    const int num_columns = static_cast<int>(schema.columns.size());
+    DataTable table{.key = std::string(schema.key),
+                    .num_columns = static_cast<std::uint32_t>(num_columns)};
+    Selection row(connection, fmt::format("SELECT {} FROM {}.{} ORDER BY position",
+                                          fmt::join(schema.columns, ", "), quoted_name(database),
+                                          schema.table));
+    while (row.step()) {
+      for (int column = 0; column < num_columns; ++column) table.values.push_back(row.real(column));
+    }
+    if (!table.values.empty()) tables.push_back(std::move(table));
   }
-  return table;
+  return tables;
 }
 
-// One column for each quantity that has values, in the order of drawn_names().
+// One column for each quantity that has values, in the order of Model::drawn().
 std::vector<std::vector<double>> table_columns_of(sqlite3* connection,
                                                   const std::string& database) {
   const std::string sql =
       fmt::format("SELECT value FROM {}.dispersion_value WHERE quantity = ? ORDER BY run_index",
                   quoted_name(database));
   std::vector<std::vector<double>> columns;
-  for (const std::string& name : drawn_names()) {
+  for (const DrawnQuantity& drawn : model().drawn()) {
     Selection row(connection, sql);
-    row.bind(name);
+    row.bind(std::string(drawn.name));
     std::vector<double> column;
     while (row.step()) column.push_back(row.real(0));
     if (!column.empty()) columns.push_back(std::move(column));
@@ -121,15 +123,16 @@ std::vector<std::string> databases_of(sqlite3* connection) {
 
 }  // namespace
 
-Campaign read_campaign_of(sqlite3* connection, const std::string& database) {
+std::shared_ptr<const Campaign> read_campaign_of(sqlite3* connection, const std::string& database) {
   Selection row(connection, fmt::format("SELECT definition, name, seed, num_runs FROM {}.campaign",
                                         quoted_name(database)));
   row.require_row();
-  Campaign campaign =
-      parse_campaign("stored definition", row.text(0), environment_table_of(connection, database),
-                     table_columns_of(connection, database));
-  require_identity(campaign, {.name = row.text(1), .seed = row.text(2), .num_runs = row.text(3)});
-  campaign.validate();
+  std::shared_ptr<const Campaign> campaign =
+      model().campaign_of({.text = row.text(0),
+                           .tables = data_tables_of(connection, database),
+                           .table_columns = table_columns_of(connection, database)},
+                          TableColumns::included, "stored definition");
+  require_identity(*campaign, {.name = row.text(1), .seed = row.text(2), .num_runs = row.text(3)});
   return campaign;
 }
 
@@ -163,11 +166,12 @@ DatabaseState state_of(sqlite3* connection, const std::string& database) {
   return {.data_version = row.integer(0), .num_changes = sqlite3_total_changes64(connection)};
 }
 
-DrawnCampaign::DrawnCampaign(Campaign campaign) : campaign_(std::move(campaign)) {}
+DrawnCampaign::DrawnCampaign(std::shared_ptr<const Campaign> campaign)
+    : campaign_(std::move(campaign)) {}
 
-const std::optional<DrawnValues>& DrawnCampaign::values_of(RunIndex run) {
+const std::vector<double>& DrawnCampaign::values_of(RunIndex run) {
   if (last_run_ == run) return last_values_;
-  last_values_ = accepted_values(campaign_, run);
+  last_values_ = campaign_->draw(run).values;
   last_run_ = run;
   return last_values_;
 }

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/campaign/campaign.hpp"
 
@@ -14,7 +16,8 @@ namespace proofmass::coordinator {
 /// The campaign that a database of a connection holds, read through that connection.
 /// @param database  `main`, or the name under which it is attached.
 /// @throws Error if it holds none or a damaged one.
-[[nodiscard]] Campaign read_campaign_of(sqlite3* connection, const std::string& database);
+[[nodiscard]] std::shared_ptr<const Campaign> read_campaign_of(sqlite3* connection,
+                                                               const std::string& database);
 
 /// The database of a connection that a query means by an argument of a table.
 /// @param argument  `main`, the name under which a database is attached, or the name of the
@@ -36,20 +39,20 @@ struct DatabaseState {
 /// What the runs of a campaign draw, computed again when asked for.
 class DrawnCampaign {
  public:
-  explicit DrawnCampaign(Campaign campaign);
+  explicit DrawnCampaign(std::shared_ptr<const Campaign> campaign);
 
-  [[nodiscard]] std::string_view campaign_name() const { return campaign_.name; }
-  [[nodiscard]] std::uint64_t num_runs() const { return campaign_.num_runs; }
+  [[nodiscard]] std::string_view campaign_name() const { return campaign_->name; }
+  [[nodiscard]] std::uint64_t num_runs() const { return campaign_->num_runs; }
 
   /// The values of the run's accepted draw, those its simulation begins with; empty if all draws
   /// were rejected. The reference holds until the next call.
   /// @pre The run is one of the campaign's.
-  [[nodiscard]] const std::optional<DrawnValues>& values_of(RunIndex run);
+  [[nodiscard]] const std::vector<double>& values_of(RunIndex run);
 
  private:
-  Campaign campaign_;
+  std::shared_ptr<const Campaign> campaign_;
   std::optional<RunIndex> last_run_;  ///< A join asks for the quantities of a run one by one.
-  std::optional<DrawnValues> last_values_;
+  std::vector<double> last_values_;
 };
 
 }  // namespace proofmass::coordinator

@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/text_cells.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -54,31 +57,37 @@ std::string absent_cells() {
   return text + right_aligned("- ", beyond_width);
 }
 
-std::string row(const ParameterInfo& info, double objective, const std::string& cells) {
-  std::string text = left_aligned(info.label, label_width) +
-                     left_aligned(info.display_unit, unit_width) +
-                     right_aligned(given_figure(objective / info.display_scale), objective_width);
+std::string row(const Quantity& quantity, double objective, const std::string& cells) {
+  std::string text =
+      left_aligned(quantity.symbol, label_width) + left_aligned(quantity.display_unit, unit_width) +
+      right_aligned(
+          std::isfinite(objective) ? given_figure(objective / quantity.display_scale) : "-",
+          objective_width);
   text += cells + "│";
-  for (const double value : {info.paper.worst, info.paper.mean, info.paper.standard_deviation}) {
-    text += right_aligned(given_figure(value / info.display_scale), paper_width);
+  if (!quantity.published) return text + "\n";
+  const PublishedAccuracy& published = *quantity.published;
+  for (const double value : {published.worst, published.mean, published.standard_deviation}) {
+    text += right_aligned(given_figure(value / quantity.display_scale), paper_width);
   }
   return text + "\n";
 }
 
 }  // namespace
 
-std::string accuracy_table(const Scenario& scenario, const CampaignStatistics& statistics) {
+std::string accuracy_table(const Campaign& campaign, const CampaignStatistics& statistics) {
   std::string text =
       fmt::format("Accuracy of calibration: |estimate − truth| of {} {}\n\n",
                   statistics.num_estimated, statistics.num_estimated == 1 ? "run" : "runs");
   text += heading();
-  for (const ParameterInfo& info : parameter_infos()) {
-    const std::size_t i = index(info.parameter);
-    const std::string cells =
-        statistics.num_estimated == 0
-            ? absent_cells()
-            : measured_cells(statistics.accuracy[i], statistics.num_estimated, info.display_scale);
-    text += row(info, scenario.objectives[i], cells);
+  const std::vector<double> objectives = campaign.objectives();
+  const std::vector<Quantity>& quantities = model().results().quantities;
+  for (std::size_t i = 0; i < quantities.size(); ++i) {
+    const Quantity& quantity = quantities[i];
+    const std::string cells = statistics.num_estimated == 0
+                                  ? absent_cells()
+                                  : measured_cells(statistics.accuracy[i], statistics.num_estimated,
+                                                   quantity.display_scale);
+    text += row(quantity, objectives[i], cells);
   }
   return text + "beyond: runs whose error exceeds the objective; the paper: Hardy et al. 2013\n";
 }

@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <optional>
 
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/campaign/budget.hpp"
+#include "core/campaign/error_budget.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -54,37 +53,26 @@ std::string totals_text(const RunTotals& totals) {
       totals.median, totals.percentile_95, totals.worst, totals.worst_run.value);
 }
 
-// In inertial pointing, the paper's, f_EP is f_orb and needs no word.
-std::string test_frequency_note(const Scenario& scenario) {
-  const auto spinning = std::ranges::count_if(
-      scenario.sessions, [](const Session& session) { return session.spin_rate_rad_s != 0.0; });
-  if (spinning == 0) return "";
-  return fmt::format(
-      "T at f_EP of the session that finds the parameter; {} of {} sessions spin, where T has no\n"
-      "line at f_EP = f_orb + f_spin to first order in the eccentricity\n",
-      spinning, scenario.sessions.size());
-}
-
 }  // namespace
 
-std::string budget_table(const Scenario& scenario, const CampaignStatistics& statistics,
+std::string budget_table(const Campaign& campaign, const CampaignStatistics& statistics,
                          const std::optional<RunTotals>& totals) {
-  const Budget before = budget_before_calibration(scenario);
-  const Budget after_worst = budget_after_calibration(scenario, statistics.worst_errors());
-  const Budget after_mean = budget_after_calibration(scenario, statistics.mean_errors());
+  const std::optional<ErrorBudget> budget = campaign.error_budget();
+  if (!budget) return "";
+  const bool has_errors = statistics.num_estimated > 0;
+  const Budget after_worst = has_errors ? budget->after(statistics.worst_errors()) : Budget{};
+  const Budget after_mean = has_errors ? budget->after(statistics.mean_errors()) : Budget{};
   const auto figures = [&](const auto& value_of) -> Figures {
-    if (statistics.num_estimated == 0) return {value_of(before), std::nullopt, std::nullopt};
-    return {value_of(before), value_of(after_worst), value_of(after_mean)};
+    if (!has_errors) return {value_of(budget->before), std::nullopt, std::nullopt};
+    return {value_of(budget->before), value_of(after_worst), value_of(after_mean)};
   };
-  std::string text = "Budget of the test of the equivalence principle, m/s²\n\n" + heading();
-  for (std::size_t i = 0; i < num_budget_entries; ++i) {
-    text += row(budget_entry_infos()[i],
-                figures([&](const Budget& budget) { return budget.entries[i]; }));
+  std::string text = fmt::format("{}\n\n{}", budget->title, heading());
+  for (std::size_t i = 0; i < budget->infos.size(); ++i) {
+    text += row(budget->infos[i], figures([&](const Budget& of) { return of.entries[i]; }));
   }
-  text +=
-      rule() + row(budget_total_info, figures([](const Budget& budget) { return budget.total; }));
+  text += rule() + row(budget->total_info, figures([](const Budget& of) { return of.total; }));
   text += "before: bounds of construction; worst, mean: left by the errors of calibration\n";
-  text += test_frequency_note(scenario);
+  text += budget->note;
   return totals ? text + totals_text(*totals) : text;
 }
 

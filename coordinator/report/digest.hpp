@@ -11,13 +11,14 @@ namespace proofmass::coordinator {
 /// SHA-256 over results in run order: two files of one campaign have the same digest, whoever
 /// computed the runs, in whatever order they arrived.
 ///
-/// A result is 184 bytes, little-endian: run index (64 bits), status, draws, rounds (32 bits each),
-/// 32 bits of zero, then ten truths and ten estimates (doubles; 0 where they mean nothing, no
-/// negative zeros).
+/// A result is 184 bytes for the ten quantities of MICROSCOPE, little-endian: run index (64 bits),
+/// status, draws, rounds (32 bits each), 32 bits of zero, then the truth and the estimate of each
+/// quantity (doubles; 0 where they mean nothing, no negative zeros), and the standard errors if the
+/// model has any.
 ///
 /// The health of loops has a digest of its own, so that that of the results is the same as of
-/// before there was any. Of a result that has it, that is 56 bytes: run index, the five numbers in
-/// the order of LoopHealth, cause and session of the loss (32 bits each; 0 unless the run is lost).
+/// before there was any. Of a result that has it, these are run index, the numbers in the order of
+/// ResultSchema::health, cause and session of the loss (32 bits each; 0 unless the run is lost).
 class Digest {
  public:
   void add(const RunResult& result);

@@ -1,9 +1,7 @@
 #include "coordinator/report/drawn_runs.hpp"
 
-#include <fmt/format.h>
-
 #include "coordinator/report/digest_check.hpp"
-#include "core/campaign/draw.hpp"
+#include "core/campaign/model.hpp"
 #include "core/campaign/run_ranges.hpp"
 
 namespace proofmass::coordinator {
@@ -11,20 +9,21 @@ namespace proofmass::coordinator {
 namespace {
 
 std::vector<std::string> column_names() {
-  std::vector<std::string> names(drawn_names().begin(), drawn_names().end());
-  for (const ParameterInfo& info : parameter_infos()) {
-    names.push_back(fmt::format("truth_{}{}", info.name, info.unit_suffix));
+  std::vector<std::string> names;
+  for (const DrawnQuantity& drawn : model().drawn()) names.emplace_back(drawn.name);
+  for (const Quantity& quantity : model().results().quantities) {
+    names.push_back("truth_" + quantity.column());
   }
   return names;
 }
 
-void append(const RunResult& result, const DrawnValues& values, DrawnRuns& drawn) {
+void append(const RunResult& result, const RunDraw& draw, DrawnRuns& drawn) {
   drawn.runs.push_back(result.run);
-  for (std::size_t i = 0; i < num_drawn; ++i) drawn.columns[i].push_back(values[i]);
-  for (const ParameterInfo& info : parameter_infos()) {
-    const std::size_t i = index(info.parameter);
+  const std::size_t num_drawn = draw.values.size();
+  for (std::size_t i = 0; i < num_drawn; ++i) drawn.columns[i].push_back(draw.values[i]);
+  for (std::size_t i = 0; i < result.truth.size(); ++i) {
     drawn.columns[num_drawn + i].push_back(result.truth[i]);
-    drawn.errors[i].push_back(result.error(info.parameter));
+    drawn.errors[i].push_back(result.error(i));
   }
 }
 
@@ -35,6 +34,7 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
   DrawnRuns drawn;
   drawn.names = column_names();
   drawn.columns.resize(drawn.names.size());
+  drawn.errors.resize(model().results().quantities.size());
   drawn.missing.num_given_up = num_runs_in(store.given_up_runs());
   (void)walk_checked(store, [&](const RunResult& result) {
     const bool is_first = drawn.num_first < num_runs_max;
@@ -46,10 +46,8 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
     drawn.last_with_estimate = result.run;
     if (!is_first && result.run != also) return;
     if (is_first) ++drawn.num_first;
-    require_in_range(result);
-    const DrawnValues values = draw_values(campaign.dispersions, campaign.seed, result.run,
-                                           result.num_draws - 1, campaign.table_values(result.run));
-    append(result, values, drawn);
+    require_in_range(result, model().results());
+    append(result, campaign.draw(result.run), drawn);
   });
   return drawn;
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -9,7 +8,6 @@
 #include "coordinator/report/missing_estimates.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/dispersion.hpp"
 
 namespace proofmass::coordinator {
 
@@ -21,12 +19,11 @@ struct DrawnRuns {
   std::uint64_t num_first = 0;                 ///< Runs that are here as the first ones.
   std::vector<RunIndex> runs;                  ///< Ascending; n of them.
   MissingEstimates missing;  ///< Runs among these that are left out; all that are given up.
-  /// Drawn quantities as in drawn_names(), then the true parameters that follow from them, as in
+  /// Drawn quantities as in Model::drawn(), then the true parameters that follow from them, as in
   /// `truth_k2d_s2_m`. Units are in the names.
   std::vector<std::string> names;
   std::vector<std::vector<double>> columns;  ///< Their values, shape [names.size()][n].
-  /// estimate − truth, SI; shape [num_parameters][n].
-  std::array<std::vector<double>, num_parameters> errors;
+  std::vector<std::vector<double>> errors;   ///< estimate − truth, SI; shape [quantities][n].
 };
 
 /// The first runs of a campaign file that have an estimate, `num_runs_max` of them at most.

@@ -8,6 +8,7 @@
 #include "coordinator/report/probability_text.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/text_cells.hpp"
+#include "core/campaign/model.hpp"
 #include "core/statistics/interval.hpp"
 
 namespace proofmass::coordinator {
@@ -43,8 +44,8 @@ std::string heading() {
       horizontal_rule(rates_width));
 }
 
-std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy) {
-  const double scale = info.display_scale;
+std::string row(const Quantity& quantity, const AccuracyStatistic& accuracy) {
+  const double scale = quantity.display_scale;
   const std::optional<Interval>& bias = accuracy.error.bias_interval;
   const auto bias_cell = [&](double bound) {
     return right_aligned(bias ? signed_figure(bound / scale) : "-", bias_width);
@@ -54,17 +55,15 @@ std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy) {
     percentiles += right_aligned(measured_figure(percentile.value / scale), percentile_width);
   }
   const Interval& beyond = accuracy.beyond_objective;
-  return fmt::format("{}{}{} │{} │{}{}\n", left_aligned(info.label, label_width),
+  return fmt::format("{}{}{} │{} │{}{}\n", left_aligned(quantity.symbol, label_width),
                      bias_cell(bias ? bias->lower : 0.0), bias_cell(bias ? bias->upper : 0.0),
                      percentiles, right_aligned(measured_figure(100.0 * beyond.lower), from_width),
                      right_aligned(measured_figure(100.0 * beyond.upper), to_width));
 }
 
-static_assert(num_parameters == 10);  // The text says it in a word.
-
 std::string joint_text(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
   constexpr std::size_t margin = 2;
-  return line_of(fmt::format("all ten objectives together: {} of {} runs,",
+  return line_of(fmt::format("all objectives together: {} of {} runs,",
                              statistics.num_within_objectives, statistics.num_runs + num_given_up),
                  interval_percent(*statistics.within_objectives(num_given_up)) + " of all draws",
                  margin);
@@ -76,8 +75,8 @@ std::string error_table(const CampaignStatistics& statistics, std::uint64_t num_
   if (statistics.num_estimated == 0) return "";
   std::string text =
       fmt::format("95 % intervals of bias and of draws beyond the objective\n\n{}", heading());
-  for (const ParameterInfo& info : parameter_infos()) {
-    text += row(info, statistics.accuracy[index(info.parameter)]);
+  for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
+    text += row(model().results().quantities[i], statistics.accuracy[i]);
   }
   return text + joint_text(statistics, num_given_up);
 }

@@ -8,10 +8,8 @@ namespace proofmass::coordinator {
 
 void Exceedances::add(const RunResult& result) {
   if (!result.has_estimate()) return;
-  ParameterArray errors{};
-  for (const ParameterInfo& info : parameter_infos()) {
-    errors[index(info.parameter)] = result.error(info.parameter);
-  }
+  std::vector<double> errors(objectives_.size());
+  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = result.error(i);
   ++num_estimated_;
   if (exceeds(requirement_, errors, objectives_)) ++num_exceeding_;
 }

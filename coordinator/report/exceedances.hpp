@@ -1,8 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
-#include "core/campaign/parameter.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/statistics/requirement.hpp"
 
@@ -11,9 +12,9 @@ namespace proofmass::coordinator {
 /// Counts the runs that exceed what is required.
 class Exceedances {
  public:
-  /// @param objectives  Largest acceptable |error| of each parameter, SI.
-  Exceedances(const Requirement& requirement, const ParameterArray& objectives)
-      : requirement_(requirement), objectives_(objectives) {}
+  /// @param objectives  Largest acceptable |error| of each quantity, SI.
+  Exceedances(const Requirement& requirement, std::span<const double> objectives)
+      : requirement_(requirement), objectives_(objectives.begin(), objectives.end()) {}
 
   /// Counts a result that has an estimate; others are none.
   void add(const RunResult& result);
@@ -24,7 +25,7 @@ class Exceedances {
 
  private:
   Requirement requirement_;
-  ParameterArray objectives_;
+  std::vector<double> objectives_;
   std::uint64_t num_estimated_ = 0;
   std::uint64_t num_exceeding_ = 0;
 };

@@ -7,6 +7,7 @@
 
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/text_cells.hpp"
+#include "core/campaign/model.hpp"
 #include "core/statistics/tolerance.hpp"
 
 namespace proofmass::coordinator {
@@ -49,14 +50,14 @@ std::string heading() {
                      rule);
 }
 
-std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy,
+std::string row(const Quantity& quantity, const AccuracyStatistic& accuracy,
                 std::uint64_t num_runs) {
-  const double scale = info.display_scale;
+  const double scale = quantity.display_scale;
   const std::string deviation =
       num_runs < 2 ? triple("-", "-", "-")
                    : triple(accuracy.standard_deviation, accuracy.deviation_interval, scale);
   const std::string skewness = num_runs < 3 ? "-" : fmt::format("{:.2f}", accuracy.error.skewness);
-  return fmt::format("{}{}│{}│{}{}\n", left_aligned(info.label, label_width),
+  return fmt::format("{}{}│{}│{}{}\n", left_aligned(quantity.symbol, label_width),
                      triple(accuracy.mean, accuracy.mean_interval, scale), deviation,
                      right_aligned(signed_figure(accuracy.error.bias / scale), bias_width),
                      right_aligned(skewness, skewness_width));
@@ -65,7 +66,7 @@ std::string row(const ParameterInfo& info, const AccuracyStatistic& accuracy,
 /// Fewest runs that the bootstrap covers what it says from; core/statistics/README.md.
 constexpr std::uint64_t num_runs_of_bootstrap = 200;
 
-constexpr std::string_view of_one_parameter = "  (one parameter by itself, not all ten together)\n";
+constexpr std::string_view of_one_parameter = "  (one parameter by itself, not all together)\n";
 
 /// What "the worst of n" is worth [Wilks1941].
 std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_estimate) {
@@ -85,8 +86,8 @@ std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_est
 std::string interval_table(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
   if (statistics.num_estimated == 0) return "";
   std::string text = fmt::format("95 % intervals, in the units above\n\n{}", heading());
-  for (const ParameterInfo& info : parameter_infos()) {
-    text += row(info, statistics.accuracy[index(info.parameter)], statistics.num_estimated);
+  for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
+    text += row(model().results().quantities[i], statistics.accuracy[i], statistics.num_estimated);
   }
   if (statistics.num_estimated < num_runs_of_bootstrap) {
     text += "std: an interval from fewer than 200 runs is too narrow, see core/statistics\n";

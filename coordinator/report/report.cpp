@@ -6,6 +6,7 @@
 
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "core/campaign/model.hpp"
 #include "core/campaign/run_ranges.hpp"
 #include "core/campaign/statistics_passes.hpp"
 
@@ -25,21 +26,21 @@ void check_given_up(const Store& store, const CampaignStatistics& statistics,
   }
 }
 
-std::string report_of_one_state(const Store& store, const Scenario& scenario) {
-  const ReadResults results = read_results(store, scenario);
+std::string report_of_one_state(const Store& store, const Campaign& campaign) {
+  const ReadResults results = read_results(store, campaign);
   const CampaignStatistics& statistics = results.statistics;
   const DigestCheck check = check_digest(store, statistics.num_runs, results.digests);
   const std::vector<RunRange> given_up = store.given_up_runs();
   const std::uint64_t num_given_up = num_runs_in(given_up);
   check_given_up(store, statistics, num_given_up);
-  check_stop_checks(store, scenario.objectives);
+  check_stop_checks(store, campaign.objectives());
   std::string text = summary_text(store.name(), store.seed(), store.num_runs(), statistics,
                                   results.digests.results, check) +
                      given_up_text(given_up) + stop_text(store);
   for (const std::string& table :
-       {accuracy_table(scenario, statistics), interval_table(statistics, num_given_up),
+       {accuracy_table(campaign, statistics), interval_table(statistics, num_given_up),
         error_table(statistics, num_given_up),
-        budget_table(scenario, statistics, results.totals)}) {
+        budget_table(campaign, statistics, results.totals)}) {
     if (!table.empty()) text += "\n" + table;
   }
   return text;
@@ -47,9 +48,9 @@ std::string report_of_one_state(const Store& store, const Scenario& scenario) {
 
 }  // namespace
 
-std::string report_text(const Store& store, const Scenario& scenario) {
+std::string report_text(const Store& store, const Campaign& campaign) {
   std::string text;
-  store.read_one_state([&] { text = report_of_one_state(store, scenario); });
+  store.read_one_state([&] { text = report_of_one_state(store, campaign); });
   return text;
 }
 
@@ -100,69 +101,51 @@ bool are_current(const Store& store) {
 
 }  // namespace
 
-ReadResults read_results(const Store& store, const Scenario& scenario) {
-  StatisticsPasses passes(scenario.objectives);
-  RunTotalPasses totals(scenario);
+ReadResults read_results(const Store& store, const Campaign& campaign) {
+  StatisticsPasses passes(campaign.objectives());
+  std::optional<RunTotalPasses> totals;
+  if (std::optional<ErrorBudget> budget = campaign.error_budget()) {
+    totals.emplace(*std::move(budget));
+  }
   ReadResults results{.statistics = {}, .digests = {}, .totals = {}};
   // Both are asked each time: they may need different numbers of passes.
   const auto is_pass_needed = [&] {
     const bool is_for_statistics = passes.end_pass();
-    return totals.end_pass() || is_for_statistics;
+    return (totals && totals->end_pass()) || is_for_statistics;
   };
   store.read_one_state([&] {
     Digest digest;
     store.for_each_result([&](const RunResult& result) {
-      require_in_range(result);
+      require_in_range(result, model().results());
       passes.add(result);
-      totals.add(result);
+      if (totals) totals->add(result);
       digest.add(result);
     });
     while (is_pass_needed()) {
       store.for_each_result([&](const RunResult& result) {
         passes.add(result);
-        totals.add(result);
+        if (totals) totals->add(result);
       });
     }
     results.statistics = passes.statistics();
     results.digests = digest.finish();
-    results.totals = totals.totals();
+    if (totals) results.totals = totals->totals();
   });
   return results;
 }
 
-void update_statistics(Store& store, const Scenario& scenario) {
+void update_statistics(Store& store, const Campaign& campaign) {
   if (are_current(store)) return;
-  write_statistics(store, scenario, read_results(store, scenario));
+  write_statistics(store, campaign, read_results(store, campaign));
 }
 
-namespace {
-
-/// The budgets that are stored with statistics.
-struct StoredBudgets {
-  Budget before;
-  Budget after_worst;
-  Budget after_mean;
-};
-
-StoredBudgets budgets_of(const Scenario& scenario, const CampaignStatistics& statistics) {
-  return {.before = budget_before_calibration(scenario),
-          .after_worst = budget_after_calibration(scenario, statistics.worst_errors()),
-          .after_mean = budget_after_calibration(scenario, statistics.mean_errors())};
+void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results) {
+  store.write_statistics(results.statistics, campaign.error_budget(), results.digests);
 }
 
-}  // namespace
-
-void write_statistics(Store& store, const Scenario& scenario, const ReadResults& results) {
-  const StoredBudgets budgets = budgets_of(scenario, results.statistics);
-  store.write_statistics(results.statistics, budgets.before, budgets.after_worst,
-                         budgets.after_mean, results.digests);
-}
-
-std::vector<std::string> statistic_differences(const Store& store, const Scenario& scenario,
+std::vector<std::string> statistic_differences(const Store& store, const Campaign& campaign,
                                                const CampaignStatistics& statistics) {
-  const StoredBudgets budgets = budgets_of(scenario, statistics);
-  return store.statistic_differences(statistics, budgets.before, budgets.after_worst,
-                                     budgets.after_mean);
+  return store.statistic_differences(statistics, campaign.error_budget());
 }
 
 }  // namespace proofmass::coordinator

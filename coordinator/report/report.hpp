@@ -10,7 +10,7 @@
 #include "coordinator/report/digest_check.hpp"
 #include "coordinator/report/run_totals.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/campaign/scenario.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/statistics.hpp"
 
 namespace proofmass::coordinator {
@@ -19,7 +19,7 @@ namespace proofmass::coordinator {
 /// the file. Lines have at most 80 characters.
 /// @throws StoreError if results, given-up runs or stop checks are not what was stored; see
 ///         check_digest().
-[[nodiscard]] std::string report_text(const Store& store, const Scenario& scenario);
+[[nodiscard]] std::string report_text(const Store& store, const Campaign& campaign);
 
 /// Name, seed, and how many runs ended how.
 /// @param num_runs  Runs wanted.
@@ -35,7 +35,7 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string given_up_text(std::span<const RunRange> given_up);
 
 /// Accuracy of each parameter beside [Hardy2013] tab:perfo-numerical.
-[[nodiscard]] std::string accuracy_table(const Scenario& scenario,
+[[nodiscard]] std::string accuracy_table(const Campaign& campaign,
                                          const CampaignStatistics& statistics);
 
 /// What the draws that were made say about all draws: 95 % intervals of mean and standard
@@ -52,7 +52,7 @@ namespace proofmass::coordinator {
 
 /// Budget before and after calibration beside [Hardy2013] tab:Budget and tab:Budget_cali, and what
 /// single runs have.
-[[nodiscard]] std::string budget_table(const Scenario& scenario,
+[[nodiscard]] std::string budget_table(const Campaign& campaign,
                                        const CampaignStatistics& statistics,
                                        const std::optional<RunTotals>& totals);
 
@@ -66,19 +66,19 @@ struct ReadResults {
 /// Reads all results, of one state of the file, as often as StatisticsPasses needs them: twice if
 /// they are many. Memory does not grow with them.
 /// @throws Error if a number is out of range, see require_in_range().
-[[nodiscard]] ReadResults read_results(const Store& store, const Scenario& scenario);
+[[nodiscard]] ReadResults read_results(const Store& store, const Campaign& campaign);
 
 /// Stores statistics, their digest, and the budgets that follow from them in the file.
-void write_statistics(Store& store, const Scenario& scenario, const ReadResults& results);
+void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results);
 
 /// What `statistic` and `budget_entry` have other than write_statistics() would store, a line each:
 /// `statistic.mean of k2d = 1 (must be 25.5)`.
 [[nodiscard]] std::vector<std::string> statistic_differences(const Store& store,
-                                                             const Scenario& scenario,
+                                                             const Campaign& campaign,
                                                              const CampaignStatistics& statistics);
 
 /// Brings the statistics and budgets that are stored in the file up to its results; does nothing
 /// if they are.
-void update_statistics(Store& store, const Scenario& scenario);
+void update_statistics(Store& store, const Campaign& campaign);
 
 }  // namespace proofmass::coordinator

@@ -8,6 +8,7 @@
 #include "coordinator/report/exceedances.hpp"
 #include "coordinator/report/probability_text.hpp"
 #include "coordinator/report/text_cells.hpp"
+#include "core/campaign/model_rules.hpp"
 #include "core/campaign/run_ranges.hpp"
 #include "core/error.hpp"
 
@@ -15,7 +16,7 @@ namespace proofmass::coordinator {
 namespace {
 
 /// Keeps the errors of one parameter, 8 bytes a run, at a time; none for all objectives.
-void check(const Store& store, const ParameterArray& objectives, RequirementAnswer& answer) {
+void check(const Store& store, std::span<const double> objectives, RequirementAnswer& answer) {
   const Requirement& requirement = answer.requirement;
   const bool is_of_errors = requirement.subject == Requirement::Subject::parameter;
   answer.missing = {.num_given_up = num_runs_in(store.given_up_runs())};
@@ -23,7 +24,7 @@ void check(const Store& store, const ParameterArray& objectives, RequirementAnsw
   Exceedances exceedances(requirement, objectives);
   std::uint64_t num_runs = answer.missing.num_given_up;
   (void)walk_checked(store, [&](const RunResult& result) {
-    require_in_range(result);
+    require_in_range(result, model().results());
     ++num_runs;
     answer.missing.add(result);
     exceedances.add(result);
@@ -86,10 +87,10 @@ std::string bound_line(const RequirementAnswer& answer) {
                        least ? fmt::format("{} draws at least,", *least) : "no number of draws",
                        given_percent(tolerance.coverage), given_percent(tolerance.confidence));
   }
-  const ParameterInfo& info = parameter_infos()[index(answer.requirement.parameter)];
+  const Quantity& quantity = model().results().quantities[answer.requirement.parameter];
   return fmt::format("Bound        {} of all draws below {:.6g}{}{}, with {}\n",
                      given_percent(tolerance.coverage), check.bound->value,
-                     info.unit == "1" ? "" : " ", info.unit == "1" ? "" : info.unit,
+                     quantity.unit == "1" ? "" : " ", quantity.unit == "1" ? "" : quantity.unit,
                      given_percent(tolerance.confidence));
 }
 
@@ -110,7 +111,7 @@ std::string needed_line(const RequirementAnswer& answer) {
 }  // namespace
 
 std::vector<RequirementAnswer> check_requirements(const Store& store,
-                                                  const ParameterArray& objectives,
+                                                  std::span<const double> objectives,
                                                   std::span<const std::string> texts) {
   std::vector<RequirementAnswer> answers;
   for (const std::string& text : texts) {

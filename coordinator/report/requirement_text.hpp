@@ -25,7 +25,7 @@ struct RequirementAnswer {
 /// @param texts       See parse_requirement().
 /// @throws ConfigError if one cannot be read.
 [[nodiscard]] std::vector<RequirementAnswer> check_requirements(const Store& store,
-                                                                const ParameterArray& objectives,
+                                                                std::span<const double> objectives,
                                                                 std::span<const std::string> texts);
 
 /// Answer, the bound by which it was decided, the tolerance bound, and the draws it takes; lines of

@@ -1,19 +1,19 @@
 #include "coordinator/report/run_totals.hpp"
 
 #include <cmath>
+#include <utility>
+#include <vector>
 
 namespace proofmass::coordinator {
 
-RunTotalPasses::RunTotalPasses(const Scenario& scenario)
-    : scenario_(scenario), passes_({.levels = {0.5, 0.95}}) {}
+RunTotalPasses::RunTotalPasses(ErrorBudget budget)
+    : budget_(std::move(budget)), passes_({.levels = {0.5, 0.95}}) {}
 
 void RunTotalPasses::add(const RunResult& result) {
   if (!result.has_estimate()) return;
-  ParameterArray errors{};
-  for (const ParameterInfo& info : parameter_infos()) {
-    errors[index(info.parameter)] = std::abs(result.error(info.parameter));
-  }
-  const double total = budget_after_calibration(scenario_, errors).total;
+  std::vector<double> errors(result.estimate.size());
+  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = std::abs(result.error(i));
+  const double total = budget_.after(errors).total;
   passes_.add(total);
   if (!is_first_ && total <= totals_.worst) return;
   is_first_ = false;

@@ -3,9 +3,8 @@
 #include <cstddef>
 #include <optional>
 
-#include "core/campaign/budget.hpp"
+#include "core/campaign/error_budget.hpp"
 #include "core/campaign/run_result.hpp"
-#include "core/campaign/scenario.hpp"
 #include "core/statistics/value_passes.hpp"
 
 namespace proofmass::coordinator {
@@ -22,8 +21,7 @@ struct RunTotals {
 /// Computes them of results that are seen in passes, see ValuePasses.
 class RunTotalPasses {
  public:
-  /// @param scenario  Is kept by reference.
-  explicit RunTotalPasses(const Scenario& scenario);
+  explicit RunTotalPasses(ErrorBudget budget);
 
   /// Leaves out a result without an estimate.
   void add(const RunResult& result);
@@ -33,7 +31,7 @@ class RunTotalPasses {
   [[nodiscard]] std::optional<RunTotals> totals() const;
 
  private:
-  const Scenario& scenario_;
+  ErrorBudget budget_;
   ValuePasses passes_;
   RunTotals totals_;
   bool is_first_ = true;  ///< No total was added in any pass.

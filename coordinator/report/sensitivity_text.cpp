@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "coordinator/report/text_cells.hpp"
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
 #include "core/statistics/sensitivity.hpp"
 #include "core/statistics/term_search.hpp"
@@ -39,8 +40,8 @@ std::vector<Column> inputs_of(const DrawnRuns& drawn) {
 
 /// Of error and |error|, the most significant first.
 std::vector<std::vector<Sensitivity>> sensitivities_of(const DrawnRuns& drawn,
-                                                       Parameter parameter) {
-  const std::vector<double>& errors = drawn.errors[index(parameter)];
+                                                       std::size_t quantity) {
+  const std::vector<double>& errors = drawn.errors[quantity];
   const std::vector<double> magnitudes = magnitudes_of(errors);
   const std::vector<Column> inputs = inputs_of(drawn);
   const std::vector<Column> outputs{errors, magnitudes};
@@ -96,9 +97,9 @@ std::string term_row(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
 }
 
 /// The sum of quantities and products of two that explains the error.
-std::string term_table(const DrawnRuns& drawn, Parameter parameter) {
+std::string term_table(const DrawnRuns& drawn, std::size_t quantity) {
   const std::vector<ExplanatoryTerm> terms = explanatory_terms(
-      inputs_of(drawn), drawn.errors[index(parameter)], num_terms_max, default_confidence);
+      inputs_of(drawn), drawn.errors[quantity], num_terms_max, default_confidence);
   if (terms.empty()) return "No quantity and no product of two explains the error.\n";
   std::string text =
       left_aligned("error as a sum of", terms_width) + right_aligned("slope", slope_width) +
@@ -170,36 +171,35 @@ std::string explanation_rows(const DrawnRuns& drawn, std::span<const Sensitivity
 
 }  // namespace
 
-std::string sensitivity_text(const DrawnRuns& drawn, Parameter parameter, std::size_t num_rows) {
-  const auto both = sensitivities_of(drawn, parameter);
-  return fmt::format("{}: {} runs\n{}{}\n{}\n{}{}\n{}", parameter_infos()[index(parameter)].label,
-                     drawn.runs.size(), limit_line(drawn), left_out(drawn),
+std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity, std::size_t num_rows) {
+  const auto both = sensitivities_of(drawn, quantity);
+  return fmt::format("{}: {} runs\n{}{}\n{}\n{}{}\n{}",
+                     model().results().quantities[quantity].symbol, drawn.runs.size(),
+                     limit_line(drawn), left_out(drawn),
                      sensitivity_rows(drawn, first_of(both[1], num_rows), "|error|"),
                      sensitivity_rows(drawn, first_of(both[0], num_rows), "error"), key_of(both[1]),
-                     term_table(drawn, parameter));
+                     term_table(drawn, quantity));
 }
 
-std::string explanation_text(const DrawnRuns& drawn, Parameter parameter, RunIndex run,
+std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIndex run,
                              std::size_t num_rows) {
   const std::size_t position = position_of(drawn, run);
-  const ParameterInfo& info = parameter_infos()[index(parameter)];
-  const std::vector<double>& errors = drawn.errors[index(parameter)];
-  const auto both = sensitivities_of(drawn, parameter);
+  const Quantity& info = model().results().quantities[quantity];
+  const std::vector<double>& errors = drawn.errors[quantity];
+  const auto both = sensitivities_of(drawn, quantity);
   return fmt::format("Run {}: error of {} {:.3g} {}, rank {} of {}\n{}{}\n{}\n{}", run.value,
-                     info.label, errors[position] / info.display_scale, info.display_unit,
+                     info.symbol, errors[position] / info.display_scale, info.display_unit,
                      rank_of(errors, position), errors.size(), limit_line(drawn), left_out(drawn),
                      explanation_rows(drawn, first_of(both[1], num_rows), position, "|error|"),
                      explanation_rows(drawn, first_of(both[0], num_rows), position, "error"));
 }
 
-Parameter worst_parameter_of(const DrawnRuns& drawn, RunIndex run) {
+std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run) {
   const std::size_t position = position_of(drawn, run);
-  const auto& infos = parameter_infos();
-  return std::ranges::min_element(infos, {},
-                                  [&](const ParameterInfo& info) {
-                                    return rank_of(drawn.errors[index(info.parameter)], position);
-                                  })
-      ->parameter;
+  const auto worst = std::ranges::min_element(
+      drawn.errors, {},
+      [&](const std::vector<double>& errors) { return rank_of(errors, position); });
+  return static_cast<std::size_t>(worst - drawn.errors.begin());
 }
 
 }  // namespace proofmass::coordinator

@@ -5,7 +5,6 @@
 
 #include "coordinator/report/drawn_runs.hpp"
 #include "core/campaign/identifiers.hpp"
-#include "core/campaign/parameter.hpp"
 
 namespace proofmass::coordinator {
 
@@ -17,17 +16,17 @@ inline constexpr std::uint64_t sensitivity_runs_max = 100'000;
 /// of sensitivities() of each, and the error as a sum of explanatory_terms(). Lines have at most 80
 /// characters.
 /// @throws InvalidArgument below 16 runs.
-[[nodiscard]] std::string sensitivity_text(const DrawnRuns& drawn, Parameter parameter,
+[[nodiscard]] std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
                                            std::size_t num_rows);
 
 /// Why a run is as far off as it is: the place of its |error| among the runs, and its values of the
 /// quantities that drive |error| and error of the parameter, each with its percentile.
 /// @throws InvalidArgument if the run is not among those, or they are below 16.
-[[nodiscard]] std::string explanation_text(const DrawnRuns& drawn, Parameter parameter,
+[[nodiscard]] std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity,
                                            RunIndex run, std::size_t num_rows);
 
 /// The parameter for which the run's |error| has the highest rank.
 /// @throws InvalidArgument if the run is not among those.
-[[nodiscard]] Parameter worst_parameter_of(const DrawnRuns& drawn, RunIndex run);
+[[nodiscard]] std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run);
 
 }  // namespace proofmass::coordinator

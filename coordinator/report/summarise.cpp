@@ -10,14 +10,14 @@
 #include "coordinator/report/exceedances.hpp"
 #include "coordinator/report/probability_text.hpp"
 #include "coordinator/report/report.hpp"
-#include "core/statistics/stop_rule.hpp"
+#include "core/campaign/model_rules.hpp"
 #include "core/statistics/value_passes.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 StopCheck check_exceedances(const StopRule& rule, const Store& store,
-                            const ParameterArray& objectives, std::uint64_t num_runs) {
+                            std::span<const double> objectives, std::uint64_t num_runs) {
   Exceedances exceedances(rule.requirement, objectives);
   ResultReader reader = store.results({RunIndex{0}, num_runs});
   while (const std::optional<RunResult> result = reader.next()) exceedances.add(*result);
@@ -26,7 +26,7 @@ StopCheck check_exceedances(const StopRule& rule, const Store& store,
 
 /// The rule against the runs [0, num_runs): errors of those that have an estimate, or how many of
 /// all exceed something.
-StopCheck check_with(const StopRule& rule, const Store& store, const ParameterArray& objectives,
+StopCheck check_with(const StopRule& rule, const Store& store, std::span<const double> objectives,
                      std::uint64_t num_runs) {
   if (is_about_exceedances(rule)) return check_exceedances(rule, store, objectives, num_runs);
   ValuePasses errors(wanted_by(rule));
@@ -47,7 +47,7 @@ std::optional<StoredStopCheck> last_check(const Store& store, const StopPlan& pl
 }  // namespace
 
 std::optional<std::uint64_t> summarise_file(
-    const std::filesystem::path& file, const Scenario& scenario,
+    const std::filesystem::path& file, const Campaign& campaign,
     const std::function<void(const std::function<void(Store&)>&)>& write) {
   const Store reader = Store::open_read_only(file);
   std::optional<ReadResults> results;
@@ -56,19 +56,19 @@ std::optional<std::uint64_t> summarise_file(
   StopCheck check;
   std::uint64_t num_runs = 0;
   reader.read_one_state([&] {
-    results = read_results(reader, scenario);
+    results = read_results(reader, campaign);
     plan = reader.stop_plan();
     num_runs = reader.num_runs();
     if (plan.stop_rule.empty()) return;
     rule = parse_stop_rule(plan.stop_rule);
-    check = check_with(rule, reader, scenario.objectives, num_runs);
+    check = check_with(rule, reader, campaign.objectives(), num_runs);
   });
   if (plan.stop_rule.empty()) {
-    write([&](Store& store) { write_statistics(store, scenario, *results); });
+    write([&](Store& store) { write_statistics(store, campaign, *results); });
     return std::nullopt;
   }
   write([&](Store& store) {
-    write_statistics(store, scenario, *results);
+    write_statistics(store, campaign, *results);
     store.record_stop_check(num_runs, statistic_of(plan.stop_rule), check);
   });
   const std::uint64_t num_runs_max = plan.num_runs_max.value_or(num_runs);
@@ -95,7 +95,7 @@ bool was_reached(const StopCheck& check, bool stored) {
 }
 
 StopCheckRow recomputed(const StopCheckRow& row, const StopRule& rule, const Store& store,
-                        const ParameterArray& objectives) {
+                        std::span<const double> objectives) {
   StopCheckRow must = row;
   must.check = check_with(rule, store, objectives, row.num_runs);
   // A verdict depends on nothing that the row does not name.
@@ -106,7 +106,7 @@ StopCheckRow recomputed(const StopCheckRow& row, const StopRule& rule, const Sto
 }
 
 /// The check that ended a campaign; empty if it has not ended, or has no rule.
-std::optional<StopCheckRow> deciding_check(const Store& store, const ParameterArray& objectives) {
+std::optional<StopCheckRow> deciding_check(const Store& store, std::span<const double> objectives) {
   const std::string text = store.stop_plan().stop_rule;
   if (text.empty() || store.control().phase != wire::CampaignPhase::finished) return std::nullopt;
   const StopRule rule = parse_stop_rule(text);
@@ -127,7 +127,7 @@ std::uint64_t num_held(const Store& store) {
 }  // namespace
 
 std::vector<std::string> stop_check_differences(const Store& store,
-                                                const ParameterArray& objectives) {
+                                                std::span<const double> objectives) {
   std::vector<std::string> differences;
   std::vector<StopCheckRow> expected;
   const std::uint64_t num_runs = store.num_runs();
@@ -152,7 +152,7 @@ std::vector<std::string> stop_check_differences(const Store& store,
   return differences;
 }
 
-void check_stop_checks(const Store& store, const ParameterArray& objectives) {
+void check_stop_checks(const Store& store, std::span<const double> objectives) {
   const std::vector<std::string> differences = stop_check_differences(store, objectives);
   if (!differences.empty()) store.refuse_as_damaged(differences.front());
 }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "coordinator/store/store.hpp"
-#include "core/campaign/scenario.hpp"
+#include "core/campaign/campaign.hpp"
 
 namespace proofmass::coordinator {
 
@@ -19,7 +19,7 @@ namespace proofmass::coordinator {
 /// @return The number of runs that the stop rule asks for next; empty if there is none, if it is
 ///         reached, or if there are as many runs as there may be.
 std::optional<std::uint64_t> summarise_file(
-    const std::filesystem::path& file, const Scenario& scenario,
+    const std::filesystem::path& file, const Campaign& campaign,
     const std::function<void(const std::function<void(Store&)>&)>& write);
 
 /// What `stop_check` has other than the results yield, a line each:
@@ -33,10 +33,10 @@ std::optional<std::uint64_t> summarise_file(
 /// @pre All results are in range, and one state of the file is read.
 /// @param objectives  Those of the campaign's scenario.
 [[nodiscard]] std::vector<std::string> stop_check_differences(const Store& store,
-                                                              const ParameterArray& objectives);
+                                                              std::span<const double> objectives);
 
 /// @throws StoreError `campaign file = x.db (is damaged: ...)` with the first of these differences.
-void check_stop_checks(const Store& store, const ParameterArray& objectives);
+void check_stop_checks(const Store& store, std::span<const double> objectives);
 
 /// What came of a campaign's stop rule, in lines of at most 80 characters unless the rule is
 /// longer; empty if there is none or it was not checked.

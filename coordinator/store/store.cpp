@@ -25,7 +25,7 @@
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_lock.hpp"
 #include "coordinator/store/detail/table_digest.hpp"
-#include "core/campaign/dispersion.hpp"
+#include "core/campaign/model.hpp"
 #include "proto/link/kill_point.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -78,9 +78,7 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
   Transaction transaction(database);
   detail::migrate(database);
   detail::insert_campaign(database, campaign, definition);
-  const Budget before = budget_before_calibration(campaign.scenario);
-  detail::replace_budgets(database,
-                          {.before = before, .after_worst = nullptr, .after_mean = nullptr});
+  detail::replace_budgets(database, campaign.error_budget(), {});
   transaction.commit();
 }
 
@@ -207,14 +205,15 @@ std::string Store::computed_table_digest() const {
   return detail::compute_table_digest(parts_->database);
 }
 
-EnvironmentTable Store::environment_table() const {
-  return detail::read_environment_table(parts_->database);
+std::vector<DataTable> Store::data_tables() const {
+  return detail::read_data_tables(parts_->database);
 }
 
-std::vector<std::vector<double>> Store::table_columns(std::span<const std::size_t> elements) const {
+std::vector<std::vector<double>> Store::table_columns() const {
   std::vector<std::vector<double>> columns;
-  for (const std::size_t element : elements) {
-    columns.push_back(detail::read_dispersion_values(parts_->database, drawn_names()[element]));
+  for (const DrawnQuantity& quantity : model().drawn()) {
+    columns.push_back(detail::read_dispersion_values(parts_->database, quantity.name));
+    if (columns.back().empty()) columns.pop_back();
   }
   return columns;
 }

@@ -14,12 +14,10 @@
 #include "coordinator/store/records.hpp"
 #include "coordinator/store/result_reader.hpp"
 #include "coordinator/store/store_error.hpp"
-#include "core/campaign/budget.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/identifiers.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"
-#include "core/environment/environment_table.hpp"
 #include "core/statistics/stop_rule.hpp"
 #include "proto/wire/messages.hpp"
 
@@ -85,12 +83,11 @@ class Store {
   [[nodiscard]] std::string table_digest() const;
   /// The same of what the tables hold now: another one if a number in them has changed.
   [[nodiscard]] std::string computed_table_digest() const;
-  [[nodiscard]] EnvironmentTable environment_table() const;
+  /// The data that all runs share.
+  [[nodiscard]] std::vector<DataTable> data_tables() const;
 
-  /// Values of `table` quantities for each run, shape [elements][num_runs].
-  /// @param elements  Indices into drawn_names(), as from table_elements().
-  [[nodiscard]] std::vector<std::vector<double>> table_columns(
-      std::span<const std::size_t> elements) const;
+  /// Values of `table` quantities for each run, as in Campaign::table_columns.
+  [[nodiscard]] std::vector<std::vector<double>> table_columns() const;
 
   /// Raises the number of runs; takes the table values of the new ones.
   /// @throws StoreError if that number is less than before, or if name, seed, environment or the
@@ -182,26 +179,24 @@ class Store {
   [[nodiscard]] ResultReader results(RunRange runs) const;  ///< Of some of the runs.
 
   /// Replaces the stored statistics and budgets, and the summary of what they were computed from.
-  /// @param after_worst  With each parameter's worst error; ignored while no run has an estimate.
-  /// @param after_mean   The same with the mean errors.
-  /// @param digests      Of the same results.
-  void write_statistics(const CampaignStatistics& statistics, const Budget& before,
-                        const Budget& after_worst, const Budget& after_mean,
-                        const ResultDigests& digests);
+  /// @param budget   Of the campaign.
+  /// @param digests  Of the same results.
+  void write_statistics(const CampaignStatistics& statistics,
+                        const std::optional<ErrorBudget>& budget, const ResultDigests& digests);
+
   /// That of the last write_statistics(); empty before the first.
   [[nodiscard]] std::optional<Summary> summary() const;
 
-  /// What `parameter` and `budget_coefficient` have other than a new file of a campaign with this
-  /// scenario, a line each: `parameter.unit of k2d = m (must be s²/m)`. Numbers are equal if their
-  /// bits are.
-  [[nodiscard]] std::vector<std::string> parameter_differences(const Scenario& scenario) const;
+  /// What `parameter` and `budget_coefficient` have other than a new file of a campaign of this
+  /// definition, a line each: `parameter.unit of k2d = m (must be s²/m)`. Numbers are equal if
+  /// their bits are.
+  [[nodiscard]] std::vector<std::string> parameter_differences(const Campaign& campaign) const;
   /// What `statistic` and `budget_entry` have other than write_statistics() would store, likewise.
-  [[nodiscard]] std::vector<std::string> statistic_differences(const CampaignStatistics& statistics,
-                                                               const Budget& before,
-                                                               const Budget& after_worst,
-                                                               const Budget& after_mean) const;
+  [[nodiscard]] std::vector<std::string> statistic_differences(
+      const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget) const;
   /// The same of `budget_entry` alone, but for the budgets after calibration.
-  [[nodiscard]] std::vector<std::string> budget_differences(const Budget& before) const;
+  [[nodiscard]] std::vector<std::string> budget_differences(
+      const std::optional<ErrorBudget>& budget) const;
   /// What rows of `stop_check` have other than these; there may be more of them.
   [[nodiscard]] std::vector<std::string> stop_check_differences(
       std::span<const StopCheckRow> expected) const;

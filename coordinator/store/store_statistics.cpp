@@ -17,62 +17,50 @@ using detail::Database;
 
 namespace {
 
-void replace_all(Database& database, const CampaignStatistics& statistics, const Budget& before,
-                 const Budget& after_worst, const Budget& after_mean) {
-  const bool has_estimates = statistics.num_estimated > 0;
+void replace_all(Database& database, const CampaignStatistics& statistics,
+                 const std::optional<ErrorBudget>& budget) {
   detail::replace_statistics(database, statistics);
-  detail::replace_budgets(database, {.before = before,
-                                     .after_worst = has_estimates ? &after_worst : nullptr,
-                                     .after_mean = has_estimates ? &after_mean : nullptr});
+  detail::replace_budgets(database, budget, statistics);
 }
 
 }  // namespace
 
-void Store::write_statistics(const CampaignStatistics& statistics, const Budget& before,
-                             const Budget& after_worst, const Budget& after_mean,
+void Store::write_statistics(const CampaignStatistics& statistics,
+                             const std::optional<ErrorBudget>& budget,
                              const ResultDigests& digests) {
   parts_->change([&](Database& database) {
-    replace_all(database, statistics, before, after_worst, after_mean);
+    replace_all(database, statistics, budget);
     detail::replace_summary(database, statistics, digests);
   });
 }
 
 std::optional<Summary> Store::summary() const { return detail::read_summary(parts_->database); }
 
-std::vector<std::string> Store::parameter_differences(const Scenario& scenario) const {
+std::vector<std::string> Store::parameter_differences(const Campaign& campaign) const {
   constexpr std::array tables{
       ComparedTable{.name = "parameter", .row_name = "parameter"},
       ComparedTable{.name = "budget_coefficient", .row_name = "parameter || ' in ' || term"}};
   return detail::table_differences(
-      parts_->database, [&](Database& expected) { detail::insert_parameters(expected, scenario); },
+      parts_->database, [&](Database& expected) { detail::insert_parameters(expected, campaign); },
       tables);
 }
 
-std::vector<std::string> Store::statistic_differences(const CampaignStatistics& statistics,
-                                                      const Budget& before,
-                                                      const Budget& after_worst,
-                                                      const Budget& after_mean) const {
+std::vector<std::string> Store::statistic_differences(
+    const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget) const {
   constexpr std::array tables{ComparedTable{.name = "statistic", .row_name = "parameter"},
                               ComparedTable{.name = "budget_entry", .row_name = "term"}};
   return detail::table_differences(
-      parts_->database,
-      [&](Database& expected) {
-        replace_all(expected, statistics, before, after_worst, after_mean);
-      },
+      parts_->database, [&](Database& expected) { replace_all(expected, statistics, budget); },
       tables);
 }
 
-std::vector<std::string> Store::budget_differences(const Budget& before) const {
+std::vector<std::string> Store::budget_differences(const std::optional<ErrorBudget>& budget) const {
   constexpr std::array tables{ComparedTable{
       .name = "budget_entry",
       .row_name = "term",
       .columns = "position, label, before, paper_before, paper_after_worst, paper_after_mean"}};
   return detail::table_differences(
-      parts_->database,
-      [&](Database& expected) {
-        detail::replace_budgets(expected,
-                                {.before = before, .after_worst = nullptr, .after_mean = nullptr});
-      },
+      parts_->database, [&](Database& expected) { detail::replace_budgets(expected, budget, {}); },
       tables);
 }
 

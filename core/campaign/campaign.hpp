@@ -1,40 +1,121 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "core/campaign/dispersion.hpp"
+#include "core/campaign/definition.hpp"
+#include "core/campaign/error_budget.hpp"
 #include "core/campaign/identifiers.hpp"
-#include "core/campaign/scenario.hpp"
-#include "core/environment/environment_table.hpp"
+#include "core/campaign/run_result.hpp"
+#include "core/math/instruction_set.hpp"
 
 namespace proofmass {
 
-/// Everything a campaign's results depend on, and how many runs there are.
-struct Campaign {
-  std::string name = "hardy2013";
-  std::uint64_t seed = 1;
-  std::uint64_t num_runs = 100;
-  Scenario scenario;
-  DispersionSet dispersions = nominal_dispersions();
-  std::string environment_file;        ///< As written in the campaign file; empty if harmonic.
-  EnvironmentTable environment_table;  ///< Rows of that file; empty if harmonic.
-  /// For each of table_elements(dispersions), its value for every run; at least num_runs each.
-  std::vector<std::vector<double>> table_columns;
-
-  /// @throws ConfigError naming the field, its value and the rule.
-  void validate() const;
-  /// The same but for `table_columns`, which may be absent.
-  /// @throws ConfigError naming the field, its value and the rule.
-  void validate_without_columns() const;
-
-  /// Values of the `table` quantities for one run, in the order of table_elements().
-  [[nodiscard]] std::vector<double> table_values(RunIndex run) const;
+/// A run to be simulated, with campaign.table_values(run).
+struct RunRequest {
+  RunIndex run;
+  std::vector<double> table_values;
 };
 
-/// The campaign of [Hardy2013] section 5: 100 draws, the corrections of the paper.
-[[nodiscard]] Campaign hardy2013_campaign();
+/// Everything that the runs of a campaign share, made once and used for any run, by any number of
+/// threads.
+class Plan {
+ public:
+  virtual ~Plan() = default;
+
+  /// Simulates runs and estimates what the model estimates. Each result is a pure function of the
+  /// campaign and the request: the same bits in any batch, on any instruction set.
+  ///
+  /// @param requests  At most Model::batch_size().
+  /// @param set       One of available_instruction_sets().
+  /// @param progress  Called now and then with the number of orbits done; the runs advance
+  ///                  together.
+  /// @return Results in the order of `requests`.
+  [[nodiscard]] virtual std::vector<RunResult> simulate_batch(
+      std::span<const RunRequest> requests, InstructionSet set,
+      const std::function<void(int)>& progress = {}) const = 0;
+
+  /// Orbits of one run: what `progress` counts to.
+  [[nodiscard]] virtual int num_orbits() const = 0;
+};
+
+/// What a run begins with.
+struct RunDraw {
+  std::uint32_t num_draws = 0;  ///< As in RunResult.
+  /// Of each of Model::drawn(); empty if no draw was accepted.
+  std::vector<double> values{};
+  std::vector<double> truth{};  ///< Of each quantity of the results, SI; likewise.
+};
+
+/// A campaign of some model: everything its results depend on, and how many runs there are.
+class Campaign {
+ public:
+  std::string name;
+  std::uint64_t seed = 1;
+  std::uint64_t num_runs = 100;
+  /// For each of table_quantities(), its value for every run; at least num_runs each.
+  std::vector<std::vector<double>> table_columns;
+
+  virtual ~Campaign() = default;
+
+  /// @throws ConfigError naming the field, its value and the rule.
+  virtual void validate() const = 0;
+
+  /// A copy, to be given another name or number of runs.
+  [[nodiscard]] virtual std::unique_ptr<Campaign> clone() const = 0;
+
+  /// What a worker needs to compute runs. @pre validate() passed, but for `table_columns`.
+  [[nodiscard]] virtual std::unique_ptr<const Plan> prepare() const = 0;
+
+  /// @pre validate() passed, but for `table_columns`.
+  [[nodiscard]] virtual Definition definition(TableColumns columns) const = 0;
+  /// Every key of the definition's text with its value, in the order of the text.
+  [[nodiscard]] virtual std::vector<DefinitionItem> items() const = 0;
+  /// Everything but the number of runs that two campaigns of one model do not share, in the order
+  /// of a campaign file. The name of a data file whose values are the same is no difference.
+  [[nodiscard]] virtual std::vector<DefinitionDifference> differences_from(
+      const Campaign& other) const = 0;
+
+  /// Largest acceptable |error| of each quantity, SI; infinite if there is none.
+  [[nodiscard]] virtual std::vector<double> objectives() const = 0;
+  /// Most estimation rounds of a run.
+  [[nodiscard]] virtual std::int64_t num_rounds_max() const = 0;
+  /// Drawn quantities whose values come from a table: indices into Model::drawn(), ascending.
+  [[nodiscard]] virtual std::vector<std::size_t> table_quantities() const = 0;
+  /// The draw that a run begins with. A pure function, some 11 µs. @pre The run is one of these.
+  [[nodiscard]] virtual RunDraw draw(RunIndex run) const = 0;
+  /// Nothing if the model has none.
+  [[nodiscard]] virtual std::optional<ErrorBudget> error_budget() const { return std::nullopt; }
+
+  /// Values of the `table` quantities for one run, in the order of table_quantities().
+  [[nodiscard]] std::vector<double> table_values(RunIndex run) const;
+
+ protected:
+  Campaign() = default;
+  Campaign(const Campaign&) = default;
+  Campaign(Campaign&&) = default;
+  Campaign& operator=(const Campaign&) = default;
+  Campaign& operator=(Campaign&&) = default;
+};
+
+/// The rules for the name, the seed and the number of runs.
+/// @throws ConfigError naming the field, its value and the rule.
+void check_identity(const Campaign& campaign);
+
+/// Checks that `table_columns` has a column for each of these quantities, with a finite value for
+/// each run.
+/// @param sources  A quantity's path and the heading of its column: `dispersion.offcentring_m.x`.
+/// @throws ConfigError likewise.
+struct TableSource {
+  std::string path;
+  std::string column;
+};
+void check_table_columns(const Campaign& campaign, std::span<const TableSource> sources);
 
 }  // namespace proofmass

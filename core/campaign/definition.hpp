@@ -3,7 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <variant>
 #include <vector>
+
+#include "core/error.hpp"
 
 namespace proofmass {
 
@@ -20,7 +23,7 @@ struct DataTable {
 /// All that the runs of a campaign follow from, as it travels from program to program: nobody on
 /// the way needs to know what it means.
 struct Definition {
-  std::string text;  ///< TOML in canonical form, the one that canonical_definition() writes.
+  std::string text;  ///< TOML in canonical form, the one that the model writes.
   std::vector<DataTable> tables = {};
   /// Values of which each run has one of its own, a column for each `table` law, in their order.
   /// Workers get them with the runs instead.
@@ -29,7 +32,38 @@ struct Definition {
   bool operator==(const Definition&) const = default;
 };
 
+/// Whether a definition has the values of its `table` laws.
+enum class TableColumns : std::uint8_t {
+  included,
+  left_out,  ///< They come with the runs.
+};
+
 /// Most bytes of a definition's text. Every campaign that can be read from a text fits.
 inline constexpr std::size_t definition_text_size_max = std::size_t{1} << 20;
+
+/// A definition, a data file that it names, or an override cannot be used. Reads
+/// `campaign.toml:12: estimation.transient_s = -5 (must be >= 0)`; where several things are wrong,
+/// it is the first in the text.
+class DefinitionError : public Error {
+ public:
+  using Error::Error;
+};
+
+/// A value of a campaign file: a whole number, another number, or a text. A list is a text too, as
+/// it stands in the file.
+using DefinitionValue = std::variant<std::int64_t, double, std::string>;
+
+struct DefinitionItem {
+  std::string key;  ///< `estimation.transient_s`, `session[3].excitations[0].axis`,
+                    ///< `dispersion.offcentring_m.x.law`.
+  DefinitionValue value;
+};
+
+/// A value that two campaigns do not share.
+struct DefinitionDifference {
+  std::string field;   ///< `noise.scale`.
+  std::string first;   ///< As in a campaign file, or what is to be said about a file's rows.
+  std::string second;  ///< The same.
+};
 
 }  // namespace proofmass

@@ -1,12 +1,9 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "core/campaign/identifiers.hpp"
 
@@ -43,42 +40,13 @@ struct Dispersion {
   void validate(std::string_view path) const;
 };
 
-/// Quantities that are drawn together by nature, such as the six scale factors.
-struct DrawGroup {
-  std::string_view name;     ///< `scale_factor_error`.
-  std::string_view comment;  ///< One line: meaning and unit.
-  double bound;              ///< Nominal law: uniform on ±bound.
-  std::size_t first;         ///< Index of its first element among all.
-  std::size_t count;
-};
-
-inline constexpr std::size_t num_draw_groups = 12;
-inline constexpr std::size_t num_drawn = 60;
-
-/// The groups in file order; together they cover all drawn quantities once.
-[[nodiscard]] const std::array<DrawGroup, num_draw_groups>& draw_groups();
-
-/// Names of all drawn quantities: `scale_factor_error.sensor_1_x`. The name is that of the random
-/// stream, so it must never change.
-[[nodiscard]] const std::array<std::string, num_drawn>& drawn_names();
-
-/// A value for each drawn quantity, indexed like drawn_names().
-using DrawnValues = std::array<double, num_drawn>;
-using DispersionSet = std::array<Dispersion, num_drawn>;
-
-/// Uniform laws inside the construction bounds of MICROSCOPE.
-[[nodiscard]] DispersionSet nominal_dispersions();
-
-/// Indices of the quantities with law `table`, ascending.
-[[nodiscard]] std::vector<std::size_t> table_elements(const DispersionSet& dispersions);
-
-/// The values of a run's draw number `draw` (from 0), before any acceptance rule: a pure function
-/// of its arguments.
+/// The value of a quantity in a run's draw number `draw` (from 0), before any acceptance rule: a
+/// pure function of its arguments.
 ///
-/// @param table_values  The run's values of the `table` quantities, in the order of
-/// table_elements().
-[[nodiscard]] DrawnValues draw_values(const DispersionSet& dispersions, std::uint64_t seed,
-                                      RunIndex run, std::uint32_t draw,
-                                      std::span<const double> table_values);
+/// @param name         Of the quantity; that of its random stream, so it must never change.
+/// @param table_value  Its value in this run, for the law `table`.
+[[nodiscard]] double draw_value(const Dispersion& dispersion, std::string_view name,
+                                std::uint64_t seed, RunIndex run, std::uint32_t draw,
+                                double table_value);
 
 }  // namespace proofmass

@@ -25,37 +25,8 @@ std::string_view name_of(RunStatus status) {
   return {};
 }
 
-const std::array<HealthValue, num_health_values>& health_values() {
-  static constexpr std::array<HealthValue, num_health_values> values{{
-      {&LoopHealth::acceleration_m_s2, "acceleration", "_m_s2", "m/s²"},
-      {&LoopHealth::attitude_rad, "attitude", "_rad", "rad"},
-      {&LoopHealth::residual_m_s2, "residual", "_m_s2", "m/s²"},
-      {&LoopHealth::quadratic_noise, "quadratic_noise", "", "1"},
-      {&LoopHealth::square_noise, "square_noise", "", "1"},
-  }};
-  return values;
-}
-
-std::string_view name_of(LossCause cause) {
-  switch (cause) {
-    case LossCause::none:
-      return "none";
-    case LossCause::saturation:
-      return "saturation";
-    case LossCause::attitude:
-      return "attitude";
-    case LossCause::residual:
-      return "residual";
-    case LossCause::quadratic_noise:
-      return "quadratic_noise";
-    case LossCause::square_noise:
-      return "square_noise";
-  }
-  PROOFMASS_EXPECT(false);
-  return {};
-}
-
-std::vector<std::string> broken_count_rules(const RunResult& result, std::int64_t num_rounds_max) {
+std::vector<std::string> broken_count_rules(const RunResult& result, std::uint32_t num_draws_max,
+                                            std::int64_t num_rounds_max) {
   std::vector<std::string> broken;
   const auto require_between = [&](std::string_view name, std::int64_t value, std::int64_t least,
                                    std::int64_t most) {
@@ -71,17 +42,15 @@ std::vector<std::string> broken_count_rules(const RunResult& result, std::int64_
   return broken;
 }
 
-void require_in_range(const RunResult& result) {
-  const auto require = [&](std::string_view kind, const ParameterInfo& info, double value) {
+void require_in_range(const RunResult& result, const ResultSchema& schema) {
+  const auto require = [&](std::string_view kind, const Quantity& quantity, double value) {
     if (is_in_range(value)) return;
-    throw Error(fmt::format("{}_{}{} of run {} = {} (must be in [{}, {}])", kind, info.name,
-                            info.unit_suffix, result.run.value, value, -magnitude_max,
-                            magnitude_max));
+    throw Error(fmt::format("{}_{} of run {} = {} (must be in [{}, {}])", kind, quantity.column(),
+                            result.run.value, value, -magnitude_max, magnitude_max));
   };
-  for (const ParameterInfo& info : parameter_infos()) {
-    const std::size_t i = index(info.parameter);
-    if (result.has_truth()) require("truth", info, result.truth[i]);
-    if (result.has_estimate()) require("estimate", info, result.estimate[i]);
+  for (std::size_t i = 0; i < schema.quantities.size(); ++i) {
+    if (result.has_truth()) require("truth", schema.quantities[i], result.truth[i]);
+    if (result.has_estimate()) require("estimate", schema.quantities[i], result.estimate[i]);
   }
 }
 

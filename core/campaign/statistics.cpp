@@ -50,15 +50,15 @@ ErrorStatistic error_statistic(const Moments& about) {
           .skewness = about.skewness};
 }
 
-ParameterArray CampaignStatistics::worst_errors() const {
-  ParameterArray errors{};
-  for (std::size_t i = 0; i < num_parameters; ++i) errors[i] = accuracy[i].worst;
+std::vector<double> CampaignStatistics::worst_errors() const {
+  std::vector<double> errors;
+  for (const AccuracyStatistic& of_quantity : accuracy) errors.push_back(of_quantity.worst);
   return errors;
 }
 
-ParameterArray CampaignStatistics::mean_errors() const {
-  ParameterArray errors{};
-  for (std::size_t i = 0; i < num_parameters; ++i) errors[i] = accuracy[i].mean;
+std::vector<double> CampaignStatistics::mean_errors() const {
+  std::vector<double> errors;
+  for (const AccuracyStatistic& of_quantity : accuracy) errors.push_back(of_quantity.mean);
   return errors;
 }
 
@@ -75,9 +75,8 @@ void StatisticsAccumulator::add(const RunResult& result) {
   ++counts_.num_estimated;
   estimated_runs_.push_back(result.run);
   bool is_within = true;
-  for (const ParameterInfo& info : parameter_infos()) {
-    const std::size_t i = index(info.parameter);
-    errors_[i].push_back(result.error(info.parameter));
+  for (std::size_t i = 0; i < errors_.size(); ++i) {
+    errors_[i].push_back(result.error(i));
     if (std::abs(errors_[i].back()) > objectives_[i]) is_within = false;
   }
   if (is_within) ++counts_.num_within_objectives;
@@ -85,17 +84,16 @@ void StatisticsAccumulator::add(const RunResult& result) {
 
 CampaignStatistics StatisticsAccumulator::statistics() const {
   CampaignStatistics statistics = counts_;
+  statistics.accuracy.resize(errors_.size());
   if (estimated_runs_.empty()) return statistics;
-  for (const ParameterInfo& info : parameter_infos()) {
-    statistics.accuracy[index(info.parameter)] = accuracy(info.parameter);
-  }
+  for (std::size_t i = 0; i < errors_.size(); ++i) statistics.accuracy[i] = accuracy(i);
   return statistics;
 }
 
-AccuracyStatistic StatisticsAccumulator::accuracy(Parameter parameter) const {
-  const std::vector<double> magnitudes = magnitudes_of(errors_[index(parameter)]);
+AccuracyStatistic StatisticsAccumulator::accuracy(std::size_t quantity) const {
+  const std::vector<double> magnitudes = magnitudes_of(errors_[quantity]);
   const Extreme worst = extremes(magnitudes).largest;
-  const double objective = objectives_[index(parameter)];
+  const double objective = objectives_[quantity];
   const auto num_beyond =
       std::ranges::count_if(magnitudes, [&](double error) { return error > objective; });
   const Moments about = moments(magnitudes);
@@ -110,7 +108,7 @@ AccuracyStatistic StatisticsAccumulator::accuracy(Parameter parameter) const {
           .mean_interval = mean_interval(about, default_confidence),
           .deviation_interval = bootstrap_deviation_interval(magnitudes, default_confidence),
           .percentiles = percentiles_of(magnitudes),
-          .error = error_statistic(moments(errors_[index(parameter)]))};
+          .error = error_statistic(moments(errors_[quantity]))};
 }
 
 }  // namespace proofmass

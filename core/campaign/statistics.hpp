@@ -1,12 +1,13 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/campaign/identifiers.hpp"
-#include "core/campaign/parameter.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
@@ -24,7 +25,7 @@ struct PercentileStatistic {
   std::optional<Interval> interval;  ///< Empty if runs are too few, 368 for the 99th.
 };
 
-/// estimate − truth of one parameter, signed, over the runs that have an estimate. SI.
+/// estimate − truth of one quantity, signed, over the runs that have an estimate. SI.
 struct ErrorStatistic {
   double bias = 0.0;                      ///< Mean.
   std::optional<Interval> bias_interval;  ///< Empty for a single run; so is the other.
@@ -37,7 +38,7 @@ struct ErrorStatistic {
 /// Of the moments of these errors.
 [[nodiscard]] ErrorStatistic error_statistic(const Moments& about);
 
-/// |estimate − truth| of one parameter over the runs that have an estimate. Intervals are of 95 %.
+/// |estimate − truth| of one quantity over the runs that have an estimate. Intervals are of 95 %.
 struct AccuracyStatistic {
   double worst = 0.0;                          ///< SI.
   RunIndex worst_run;                          ///< The first run that reaches `worst`.
@@ -61,17 +62,17 @@ struct CampaignStatistics {
   std::uint64_t num_lost = 0;
   /// Runs in which no |error| is above its objective; one without an estimate is none of them.
   std::uint64_t num_within_objectives = 0;
-  /// Indexed by `index(parameter)`; all zero if num_estimated = 0.
-  std::array<AccuracyStatistic, num_parameters> accuracy{};
+  /// Of each quantity; all zero if num_estimated = 0.
+  std::vector<AccuracyStatistic> accuracy;
 
   /// Of the share of runs within all objectives among all draws, 95 %.
   /// @param num_given_up  Runs that have no result, beside num_runs; they count as beyond.
   /// @return Nothing if there is no run.
   [[nodiscard]] std::optional<Interval> within_objectives(std::uint64_t num_given_up) const;
-  /// The worst |error| of each parameter, SI.
-  [[nodiscard]] ParameterArray worst_errors() const;
-  /// The mean |error| of each parameter, SI.
-  [[nodiscard]] ParameterArray mean_errors() const;
+  /// The worst |error| of each quantity, SI.
+  [[nodiscard]] std::vector<double> worst_errors() const;
+  /// The mean |error| of each quantity, SI.
+  [[nodiscard]] std::vector<double> mean_errors() const;
 };
 
 /// Accumulates results in run order, so that the statistics do not depend on the order in which
@@ -79,8 +80,9 @@ struct CampaignStatistics {
 /// StatisticsPasses yields the same bits of results that are too many for that.
 class StatisticsAccumulator {
  public:
-  /// @param objectives  Largest acceptable |error| of each parameter, SI.
-  explicit StatisticsAccumulator(const ParameterArray& objectives) : objectives_(objectives) {}
+  /// @param objectives  Largest acceptable |error| of each quantity, SI.
+  explicit StatisticsAccumulator(std::vector<double> objectives)
+      : objectives_(std::move(objectives)), errors_(objectives_.size()) {}
 
   /// @pre Runs are added in strictly ascending order.
   void add(const RunResult& result);
@@ -91,18 +93,18 @@ class StatisticsAccumulator {
   [[nodiscard]] const std::vector<RunIndex>& estimated_runs() const { return estimated_runs_; }
 
   /// estimate − truth of the runs that have an estimate, in run order, SI.
-  [[nodiscard]] const std::vector<double>& errors(Parameter parameter) const {
-    return errors_[index(parameter)];
+  [[nodiscard]] const std::vector<double>& errors(std::size_t quantity) const {
+    return errors_[quantity];
   }
 
  private:
-  [[nodiscard]] AccuracyStatistic accuracy(Parameter parameter) const;
+  [[nodiscard]] AccuracyStatistic accuracy(std::size_t quantity) const;
 
-  ParameterArray objectives_;
+  std::vector<double> objectives_;
   CampaignStatistics counts_;
   std::optional<RunIndex> last_run_;
   std::vector<RunIndex> estimated_runs_;
-  std::array<std::vector<double>, num_parameters> errors_;  ///< Of estimated_runs_.
+  std::vector<std::vector<double>> errors_;  ///< Of each quantity and of estimated_runs_.
 };
 
 }  // namespace proofmass

@@ -1,18 +1,19 @@
 #include "core/campaign/statistics_passes.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "core/error.hpp"
 
 namespace proofmass {
 
-StatisticsPasses::StatisticsPasses(const ParameterArray& objectives, std::size_t num_kept_max)
-    : objectives_(objectives) {
+StatisticsPasses::StatisticsPasses(std::vector<double> objectives, std::size_t num_kept_max)
+    : objectives_(std::move(objectives)) {
   const ValuePasses::Wanted of_magnitudes{
       .levels = {percentile_levels.begin(), percentile_levels.end()},
       .has_deviation_interval = true};
-  for (std::size_t i = 0; i < num_parameters; ++i) {
-    parameters_.push_back({.errors = ValuePasses({}, num_kept_max),
+  for (std::size_t i = 0; i < objectives_.size(); ++i) {
+    quantities_.push_back({.errors = ValuePasses({}, num_kept_max),
                            .magnitudes = ValuePasses(of_magnitudes, num_kept_max),
                            .worst_run = {}});
   }
@@ -24,20 +25,19 @@ void StatisticsPasses::add(const RunResult& result) {
   if (is_first_pass_) count(result);
   if (!result.has_estimate()) return;
   bool is_within = true;
-  for (const ParameterInfo& info : parameter_infos()) {
-    const std::size_t i = index(info.parameter);
-    ParameterPasses& parameter = parameters_[i];
-    const double error = result.error(info.parameter);
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    QuantityPasses& quantity = quantities_[i];
+    const double error = result.error(i);
     const double magnitude = std::abs(error);
-    parameter.errors.add(error);
-    parameter.magnitudes.add(magnitude);
+    quantity.errors.add(error);
+    quantity.magnitudes.add(magnitude);
     if (!is_first_pass_) continue;
-    if (counts_.num_estimated == 1 || magnitude > parameter.worst) {
-      parameter.worst = magnitude;
-      parameter.worst_run = result.run;
+    if (counts_.num_estimated == 1 || magnitude > quantity.worst) {
+      quantity.worst = magnitude;
+      quantity.worst_run = result.run;
     }
     if (magnitude <= objectives_[i]) continue;
-    ++parameter.num_beyond;
+    ++quantity.num_beyond;
     is_within = false;
   }
   if (is_first_pass_ && is_within) ++counts_.num_within_objectives;
@@ -56,40 +56,41 @@ bool StatisticsPasses::end_pass() {
   is_first_pass_ = false;
   last_run_.reset();
   bool is_another_needed = false;
-  for (ParameterPasses& parameter : parameters_) {
-    if (parameter.errors.end_pass()) is_another_needed = true;
-    if (parameter.magnitudes.end_pass()) is_another_needed = true;
+  for (QuantityPasses& quantity : quantities_) {
+    if (quantity.errors.end_pass()) is_another_needed = true;
+    if (quantity.magnitudes.end_pass()) is_another_needed = true;
   }
   return is_another_needed;
 }
 
 CampaignStatistics StatisticsPasses::statistics() const {
   CampaignStatistics statistics = counts_;
+  statistics.accuracy.resize(quantities_.size());
   if (counts_.num_estimated == 0) return statistics;
-  for (std::size_t i = 0; i < num_parameters; ++i) {
-    statistics.accuracy[i] = accuracy(parameters_[i]);
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    statistics.accuracy[i] = accuracy(quantities_[i]);
   }
   return statistics;
 }
 
-AccuracyStatistic StatisticsPasses::accuracy(const ParameterPasses& parameter) const {
-  const Moments& about = parameter.magnitudes.moments();
-  AccuracyStatistic accuracy{.worst = parameter.worst,
-                             .worst_run = parameter.worst_run,
+AccuracyStatistic StatisticsPasses::accuracy(const QuantityPasses& quantity) const {
+  const Moments& about = quantity.magnitudes.moments();
+  AccuracyStatistic accuracy{.worst = quantity.worst,
+                             .worst_run = quantity.worst_run,
                              .mean = about.mean,
                              .standard_deviation = about.standard_deviation,
-                             .num_beyond_objective = parameter.num_beyond,
+                             .num_beyond_objective = quantity.num_beyond,
                              .beyond_objective = probability_interval(
-                                 static_cast<double>(parameter.num_beyond),
+                                 static_cast<double>(quantity.num_beyond),
                                  static_cast<double>(counts_.num_estimated), default_confidence),
                              .mean_interval = mean_interval(about, default_confidence),
-                             .deviation_interval = parameter.magnitudes.deviation_interval(),
-                             .error = error_statistic(parameter.errors.moments())};
+                             .deviation_interval = quantity.magnitudes.deviation_interval(),
+                             .error = error_statistic(quantity.errors.moments())};
   for (std::size_t i = 0; i < percentile_levels.size(); ++i) {
     const double level = percentile_levels[i];
     accuracy.percentiles[i] = {.level = level,
-                               .value = parameter.magnitudes.percentile(level),
-                               .interval = parameter.magnitudes.percentile_interval(level)};
+                               .value = quantity.magnitudes.percentile(level),
+                               .interval = quantity.magnitudes.percentile_interval(level)};
   }
   return accuracy;
 }

@@ -16,9 +16,9 @@ namespace proofmass {
 /// most.
 class StatisticsPasses {
  public:
-  /// @param objectives    Largest acceptable |error| of each parameter, SI.
+  /// @param objectives    Largest acceptable |error| of each quantity, SI.
   /// @param num_kept_max  Runs that are kept, and up to which one pass is enough; for tests.
-  explicit StatisticsPasses(const ParameterArray& objectives,
+  explicit StatisticsPasses(std::vector<double> objectives,
                             std::size_t num_kept_max = num_passed_values_kept);
 
   /// @pre Runs of a pass are added in strictly ascending order.
@@ -29,8 +29,8 @@ class StatisticsPasses {
   [[nodiscard]] CampaignStatistics statistics() const;
 
  private:
-  /// What is computed of one parameter.
-  struct ParameterPasses {
+  /// What is computed of one quantity.
+  struct QuantityPasses {
     ValuePasses errors;      ///< estimate − truth.
     ValuePasses magnitudes;  ///< |estimate − truth|.
     double worst = 0.0;
@@ -39,13 +39,13 @@ class StatisticsPasses {
   };
 
   void count(const RunResult& result);
-  [[nodiscard]] AccuracyStatistic accuracy(const ParameterPasses& parameter) const;
+  [[nodiscard]] AccuracyStatistic accuracy(const QuantityPasses& quantity) const;
 
-  ParameterArray objectives_;
+  std::vector<double> objectives_;
   CampaignStatistics counts_;
   bool is_first_pass_ = true;
-  std::optional<RunIndex> last_run_;         ///< Of this pass.
-  std::vector<ParameterPasses> parameters_;  ///< Indexed by `index(parameter)`.
+  std::optional<RunIndex> last_run_;  ///< Of this pass.
+  std::vector<QuantityPasses> quantities_;
 };
 
 }  // namespace proofmass

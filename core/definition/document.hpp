@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/campaign/definition.hpp"
 #include "core/campaign/field.hpp"
-#include "core/definition/campaign_definition.hpp"
 
 namespace proofmass {
 

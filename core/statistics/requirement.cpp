@@ -61,10 +61,11 @@ void add_runs_needed(const Tolerance& tolerance, RequirementCheck& check) {
 
 }  // namespace
 
-Requirement parse_requirement(std::string_view text) {
+Requirement parse_requirement(std::string_view text, std::span<const std::string_view> parameters) {
   detail::Phrase phrase("requirement", text,
                         "PARAMETER < LIMIT for COVERAGE% with CONFIDENCE%\" or \"all objectives "
-                        "for COVERAGE% with CONFIDENCE%");
+                        "for COVERAGE% with CONFIDENCE%",
+                        parameters);
   const Requirement requirement = detail::read_requirement(phrase);
   phrase.expect_end();
   return requirement;
@@ -87,12 +88,12 @@ Requirement detail::read_requirement(Phrase& phrase) {
   return requirement;
 }
 
-bool exceeds(const Requirement& requirement, const ParameterArray& errors,
-             const ParameterArray& objectives) {
+bool exceeds(const Requirement& requirement, std::span<const double> errors,
+             std::span<const double> objectives) {
   if (requirement.subject == Requirement::Subject::parameter) {
-    return std::abs(errors[index(requirement.parameter)]) >= requirement.limit;
+    return std::abs(errors[requirement.parameter]) >= requirement.limit;
   }
-  for (std::size_t i = 0; i < num_parameters; ++i) {
+  for (std::size_t i = 0; i < errors.size(); ++i) {
     if (std::abs(errors[i]) > objectives[i]) return true;
   }
   return false;

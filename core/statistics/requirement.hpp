@@ -1,42 +1,44 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string_view>
 
-#include "core/campaign/parameter.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/tolerance.hpp"
 
 namespace proofmass {
 
 /// "In at least `coverage` of all cases |estimate − truth| of the parameter is below the limit", or
-/// "all ten parameters meet their objectives", to be shown with a confidence.
+/// "all parameters meet their objectives", to be shown with a confidence.
 struct Requirement {
   enum class Subject {
     parameter,       ///< One parameter against a limit.
     all_objectives,  ///< Every parameter of a run against its objective.
   };
 
-  Parameter parameter = Parameter::a_c12;  ///< For Subject::parameter.
-  double limit = 0.0;                      ///< The same: SI, > 0; an error on it exceeds it.
+  std::size_t parameter = 0;  ///< For Subject::parameter: its position among the names.
+  double limit = 0.0;         ///< The same: SI, > 0; an error on it exceeds it.
   Tolerance tolerance;
   Subject subject = Subject::parameter;
 };
 
 /// Reads `a_c12 < 9e-4 for 99% with 95%`, the limit in SI units, or
 /// `all objectives for 95% with 90%`.
+/// @param parameters  Their names.
 /// @throws ConfigError such as `requirement = a_c14 < 1 for 9% with 9% (a_c14 is no parameter;
 /// ...)`.
-[[nodiscard]] Requirement parse_requirement(std::string_view text);
+[[nodiscard]] Requirement parse_requirement(std::string_view text,
+                                            std::span<const std::string_view> parameters);
 
 /// True if a run with these errors does not do what is required: |error| of the parameter is at or
 /// above the limit, or of any parameter above its objective.
 /// @param errors      estimate − truth, SI.
-/// @param objectives  Largest acceptable |error| of each parameter, SI.
-[[nodiscard]] bool exceeds(const Requirement& requirement, const ParameterArray& errors,
-                           const ParameterArray& objectives);
+/// @param objectives  Largest acceptable |error| of each parameter, SI; as many.
+[[nodiscard]] bool exceeds(const Requirement& requirement, std::span<const double> errors,
+                           std::span<const double> objectives);
 
 /// How many runs there are, and how many of them exceed what is required.
 struct ExceedanceCount {

@@ -80,11 +80,12 @@ StopRule rule_about_verdict(detail::Phrase& phrase) {
 
 }  // namespace
 
-StopRule parse_stop_rule(std::string_view text) {
+StopRule parse_stop_rule(std::string_view text, std::span<const std::string_view> parameters) {
   detail::Phrase phrase(
       "until", text,
       "STATISTIC(PARAMETER) within PERCENT%\", \"all objectives within PERCENT%\" "
-      "or \"REQUIREMENT decided");
+      "or \"REQUIREMENT decided",
+      parameters);
   if (phrase.ends_with("decided")) return rule_about_verdict(phrase);
   StopRule rule;
   if (phrase.takes("all")) {

@@ -1,11 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string_view>
 
-#include "core/campaign/parameter.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/requirement.hpp"
 #include "core/statistics/value_passes.hpp"
@@ -23,8 +23,8 @@ struct StopRule {
   };
 
   Statistic statistic = Statistic::standard_deviation;
-  double level = 0.0;  ///< For `percentile`, in (0, 1); else 0.
-  Parameter parameter = Parameter::a_c13;
+  double level = 0.0;                ///< For `percentile`, in (0, 1); else 0.
+  std::size_t parameter = 0;         ///< Position among the names.
   double relative_half_width = 0.0;  ///< Of the 95 % interval, to be reached; in (0, 1).
   /// For `verdict`; for `success` it says what a success is.
   Requirement requirement = {};
@@ -33,8 +33,10 @@ struct StopRule {
 /// Reads `std(a_c13) within 5%`, where the statistic is `mean`, `std` or a percentile `p1` to
 /// `p99`; `all objectives within 2%`; or a requirement with the word `decided` behind it, as in
 /// `a_c12 < 9e-4 for 99% with 95% decided`, see parse_requirement().
+/// @param parameters  Their names.
 /// @throws ConfigError such as `until = max(k2c) within 5% (max is no statistic; ...)`.
-[[nodiscard]] StopRule parse_stop_rule(std::string_view text);
+[[nodiscard]] StopRule parse_stop_rule(std::string_view text,
+                                       std::span<const std::string_view> parameters);
 
 /// What the rule is about, as it was written: `std(a_c13)` of `std(a_c13) within 5%`,
 /// `all objectives`, and a rule that ends in `decided` as a whole.

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
 #include "proto/proofmass.pb.h"
 #include "proto/wire/codec.hpp"
@@ -93,14 +94,6 @@ void write(const GiveBack& give_back, proto::Envelope& envelope) {
   for (const HeldRuns& held : give_back.runs) write_held(held, *message.add_runs());
 }
 
-void write_health(const LoopHealth& health, proto::LoopHealth& message) {
-  message.set_acceleration_m_s2(health.acceleration_m_s2);
-  message.set_attitude_rad(health.attitude_rad);
-  message.set_residual_m_s2(health.residual_m_s2);
-  message.set_quadratic_noise(health.quadratic_noise);
-  message.set_square_noise(health.square_noise);
-}
-
 void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
   const RunResult& result = computed.result;
   message.set_run(result.run.value);
@@ -109,18 +102,18 @@ void write_run(const ComputedRun& computed, proto::ComputedRun& message) {
   message.set_num_rounds(result.num_rounds);
   if (result.has_truth()) {
     message.mutable_truth()->Assign(result.truth.begin(), result.truth.end());
+    // What was simulated has health; the message has it whenever the status allows it.
+    std::vector<double> health = result.health;
+    health.resize(model().results().health.size());
+    message.mutable_health()->Assign(health.begin(), health.end());
   }
   if (result.has_estimate()) {
     message.mutable_estimate()->Assign(result.estimate.begin(), result.estimate.end());
+    message.mutable_standard_error()->Assign(result.standard_error.begin(),
+                                             result.standard_error.end());
   }
-  // What was simulated has health; the message has it whenever the status allows it.
-  if (result.has_truth()) {
-    write_health(result.health.value_or(LoopHealth{}), *message.mutable_health());
-  }
-  if (result.status == RunStatus::lost) {
-    message.set_loss_cause(static_cast<proto::LossCause>(result.loss.cause));
-    message.set_loss_session(static_cast<proto::SessionTarget>(result.loss.session));
-  }
+  message.set_loss_cause(result.loss.cause);
+  message.set_loss_session(result.loss.session);
   message.set_compute_s(computed.compute_s);
   message.set_elapsed_s(computed.elapsed_s);
 }

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <initializer_list>
 
-#include "core/campaign/dispersion.hpp"
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
 #include "proto/proofmass.pb.h"
 #include "proto/wire/checks.hpp"
@@ -134,7 +134,9 @@ Message read(const proto::RunLease& message) {
   require_in(message.first_run(), 0, num_runs_max - message.num_runs(), "first_run");
   const auto& values = message.table_values();
   const auto num_runs = static_cast<int>(message.num_runs());
-  require(values.size() % num_runs == 0 && values.size() / num_runs <= static_cast<int>(num_drawn),
+  const std::size_t num_drawn = model().drawn().size();
+  require(values.size() % num_runs == 0 &&
+              static_cast<std::size_t>(values.size() / num_runs) <= num_drawn,
           "table_values", fmt::format("{} entries", values.size()),
           fmt::format("must be the same number for each run, at most {}", num_drawn));
   const bool all_finite =
@@ -164,23 +166,23 @@ Message read(const proto::GiveBack& message) {
   return give_back;
 }
 
-/// Ten values in range if they mean something, none if not.
+void require_size(int size, std::size_t must, std::string_view field) {
+  if (static_cast<std::size_t>(size) == must) return;
+  throw ConfigError(field, fmt::format("{} entries", size),
+                    fmt::format("must be {} with this status", must));
+}
+
+/// Values in range, one for each of `count`.
 template <typename Values>
-ParameterArray read_parameters(const Values& values, bool meaningful, std::string_view field) {
-  const int count = meaningful ? static_cast<int>(num_parameters) : 0;
-  if (values.size() != count) {
-    throw ConfigError(field, fmt::format("{} entries", values.size()),
-                      fmt::format("must be {} with this status", count));
-  }
-  ParameterArray parameters{};
-  std::copy(values.begin(), values.end(), parameters.begin());
-  for (const double value : parameters) {
+std::vector<double> read_values(const Values& values, std::size_t count, std::string_view field) {
+  require_size(values.size(), count, field);
+  for (const double value : values) {
     if (!is_in_range(value)) {
       throw ConfigError(field, fmt::format("{}", value),
                         fmt::format("must be in [{}, {}]", -magnitude_max, magnitude_max));
     }
   }
-  return parameters;
+  return {values.begin(), values.end()};
 }
 
 double checked_time(double time_s, std::string_view field) {
@@ -188,35 +190,41 @@ double checked_time(double time_s, std::string_view field) {
   throw ConfigError(field, fmt::format("{}", time_s), fmt::format("must be <= {}", time_s_max));
 }
 
-double checked_health(double value, std::string_view field) {
-  if (value >= 0.0 && value <= magnitude_max) return value;
-  throw ConfigError(field, fmt::format("{}", value),
-                    fmt::format("must be in [0, {}]", magnitude_max));
+std::vector<double> read_health(const proto::ComputedRun& message, bool has_health,
+                                const std::vector<HealthQuantity>& quantities) {
+  require_size(message.health_size(), has_health ? quantities.size() : 0, "health");
+  std::vector<double> health(message.health().begin(), message.health().end());
+  for (std::size_t i = 0; i < health.size(); ++i) {
+    if (health[i] >= 0.0 && health[i] <= magnitude_max) continue;
+    throw ConfigError(fmt::format("health.{}", quantities[i].column()),
+                      fmt::format("{}", health[i]),
+                      fmt::format("must be in [0, {}]", magnitude_max));
+  }
+  return health;
 }
 
-void read_health(const proto::ComputedRun& message, RunResult& result) {
-  if (message.has_health() != result.has_truth()) {
-    throw ConfigError("health", message.has_health() ? "there" : "none",
-                      "must be there unless the status is no_draw");
-  }
-  if (!message.has_health()) return;
-  const proto::LoopHealth& health = message.health();
-  result.health = LoopHealth{
-      .acceleration_m_s2 = checked_health(health.acceleration_m_s2(), "health.acceleration_m_s2"),
-      .attitude_rad = checked_health(health.attitude_rad(), "health.attitude_rad"),
-      .residual_m_s2 = checked_health(health.residual_m_s2(), "health.residual_m_s2"),
-      .quadratic_noise = checked_health(health.quadratic_noise(), "health.quadratic_noise"),
-      .square_noise = checked_health(health.square_noise(), "health.square_noise")};
-  const bool is_lost = result.status == RunStatus::lost;
-  const int cause = static_cast<int>(message.loss_cause());
-  const int session = static_cast<int>(message.loss_session());
-  require_in(static_cast<std::uint64_t>(cause), is_lost ? 1 : 0, is_lost ? num_loss_causes : 0,
+Loss read_loss(const proto::ComputedRun& message, bool is_lost, const ResultSchema& schema) {
+  require_in(message.loss_cause(), is_lost ? 1 : 0, is_lost ? schema.loss_causes.size() : 0,
              "loss_cause");
-  require_in(static_cast<std::uint64_t>(session), is_lost ? 1 : 0,
-             is_lost ? num_session_targets : 0, "loss_session");
-  if (!is_lost) return;
-  result.loss = {.cause = static_cast<LossCause>(cause),
-                 .session = static_cast<SessionTarget>(session)};
+  require_in(message.loss_session(), is_lost ? 1 : 0, is_lost ? schema.loss_sessions.size() : 0,
+             "loss_session");
+  return {.cause = message.loss_cause(), .session = message.loss_session()};
+}
+
+/// Every list is as long as the model's results say; its numbers are in range.
+void read_values(const proto::ComputedRun& message, RunResult& result) {
+  const ResultSchema& schema = model().results();
+  const std::size_t num_quantities = schema.quantities.size();
+  const auto num_errors = static_cast<std::size_t>(
+      std::ranges::count_if(schema.quantities, &Quantity::has_standard_error));
+  const bool has_errors = result.has_estimate() && message.standard_error_size() > 0;
+  result.truth = read_values(message.truth(), result.has_truth() ? num_quantities : 0, "truth");
+  result.estimate =
+      read_values(message.estimate(), result.has_estimate() ? num_quantities : 0, "estimate");
+  result.standard_error =
+      read_values(message.standard_error(), has_errors ? num_errors : 0, "standard_error");
+  result.health = read_health(message, result.has_truth(), schema.health);
+  result.loss = read_loss(message, result.status == RunStatus::lost, schema);
 }
 
 ComputedRun read_run(const proto::ComputedRun& message) {
@@ -227,9 +235,7 @@ ComputedRun read_run(const proto::ComputedRun& message) {
   result.status = static_cast<RunStatus>(status);
   result.num_draws = message.num_draws();
   result.num_rounds = message.num_rounds();
-  result.truth = read_parameters(message.truth(), result.has_truth(), "truth");
-  result.estimate = read_parameters(message.estimate(), result.has_estimate(), "estimate");
-  read_health(message, result);
+  read_values(message, result);
   return {.result = result,
           .compute_s = checked_time(message.compute_s(), "compute_s"),
           .elapsed_s = checked_time(message.elapsed_s(), "elapsed_s")};

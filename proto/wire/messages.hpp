@@ -18,7 +18,7 @@
 namespace proofmass::wire {
 
 /// Grows with every change that an older peer would misunderstand.
-inline constexpr std::uint32_t protocol_version = 6;
+inline constexpr std::uint32_t protocol_version = 7;
 
 inline constexpr std::uint32_t runs_per_lease_max = 4096;  ///< Also of a batch of results.
 inline constexpr std::size_t ranges_per_message_max = 4096;

@@ -2,6 +2,8 @@
 
 #include <cstddef>
 
+#include "tests/support/microscope_results.hpp"
+
 namespace proofmass::test {
 namespace {
 
@@ -16,7 +18,7 @@ double made_up(std::uint64_t seed, RunIndex run, std::size_t parameter, std::uin
 }  // namespace
 
 RunResult null_result(std::uint64_t seed, RunIndex run) {
-  RunResult result{.run = run, .num_draws = 1, .num_rounds = 3};
+  RunResult result = zero_result({.run = run, .num_draws = 1, .num_rounds = 3});
   for (std::size_t i = 0; i < num_parameters; ++i) {
     result.truth[i] = 1e-4 * made_up(seed, run, i, 0);
     result.estimate[i] = result.truth[i] + 1e-6 * made_up(seed, run, i, 1);

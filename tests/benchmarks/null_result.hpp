@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "core/simulation/run.hpp"
+#include "core/microscope/simulation/run.hpp"
 
 namespace proofmass::test {
 

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/simulation/run.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "tests/benchmarks/null_result.hpp"
 #include "worker/program.hpp"
 

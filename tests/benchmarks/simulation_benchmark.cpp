@@ -4,15 +4,16 @@
 
 #include <benchmark/benchmark.h>
 
-#include "core/campaign/draw.hpp"
+#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/simulation/run.hpp"
+#include "core/microscope/simulation/session_record.hpp"
 #include "core/random/normal.hpp"
-#include "core/simulation/run.hpp"
-#include "core/simulation/session_record.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass {
 namespace {
 
-double num_steps(const Campaign& campaign) {
+double num_steps(const MicroscopeCampaign& campaign) {
   const double period_s = campaign.scenario.simulation.sample_period_s;
   double steps = 0.0;
   for (const Session& session : campaign.scenario.sessions) {
@@ -28,7 +29,7 @@ void count_steps(benchmark::State& state, double steps_per_iteration) {
 }
 
 void whole_run(benchmark::State& state) {
-  const Campaign campaign;
+  const MicroscopeCampaign campaign;
   const RunPlan plan(campaign);
   std::uint64_t run = 0;
   for (auto _ : state) benchmark::DoNotOptimize(plan.simulate(RunIndex{run++}, {}));
@@ -37,7 +38,7 @@ void whole_run(benchmark::State& state) {
 BENCHMARK(whole_run)->Unit(benchmark::kMillisecond);
 
 void plan_of_a_campaign(benchmark::State& state) {
-  const Campaign campaign;
+  const MicroscopeCampaign campaign;
   for (auto _ : state) benchmark::DoNotOptimize(RunPlan(campaign).num_orbits());
 }
 BENCHMARK(plan_of_a_campaign)->Unit(benchmark::kMillisecond);
@@ -61,7 +62,7 @@ BENCHMARK(noise_of_a_step);
 
 /// A session, its shared signals and a drawn satellite.
 struct Bench {
-  Campaign campaign;
+  MicroscopeCampaign campaign;
   const Session& session = campaign.scenario.sessions[index(SessionTarget::a_c13)];
   KeplerOrbit orbit{campaign.scenario.orbit};
   Environment environment{campaign.scenario.environment, campaign.environment_table,

@@ -23,7 +23,9 @@
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
 #include "coordinator/store/store_writer.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/benchmarks/null_result.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
 namespace {
@@ -104,7 +106,7 @@ class Counter {
 };
 
 void fill(const std::filesystem::path& file, std::uint64_t num_runs) {
-  Campaign campaign;
+  MicroscopeCampaign campaign;
   campaign.num_runs = num_runs;
   Counter counter;
   StoreWriter writer([&] { counter.wake(); });
@@ -174,7 +176,7 @@ void measure(const std::filesystem::path& file, std::uint64_t num_runs) {
   report("open for reading", [&] { Store::open_read_only(file); });
   report("update statistics", [&] {
     Store store = Store::open(file);
-    coordinator::update_statistics(store, Scenario{});
+    coordinator::update_statistics(store, MicroscopeCampaign{});
   });
   ask_views(file);
   report("check integrity", [&] { Store::open_read_only(file).check_integrity(); });

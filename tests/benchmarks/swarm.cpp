@@ -26,8 +26,8 @@
 #include <vector>
 #include <zmq.hpp>
 
-#include "core/simulation/reference_digest.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/simulation/reference_digest.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "proto/link/key_files.hpp"
 #include "proto/link/socket.hpp"
 #include "tests/benchmarks/swarm_worker.hpp"

@@ -15,12 +15,16 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/campaign_file/data_file.hpp"
 #include "coordinator/net/allow_list.hpp"
+#include "core/definition/csv.hpp"
 #include "core/error.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/definition/environment_reader.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "proto/link/key_files.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/fuzz/file_mutator.hpp"
 #include "tests/fuzz/file_world.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
 namespace {
@@ -80,13 +84,13 @@ TEST_F(MutatedTexts, AreDefinitionsOrRefused) {
   const auto file = directory_ / "campaign.toml";
   mutate(canonical_definition(hardy2013_campaign()), [&](const std::string& text) {
     std::ofstream(file, std::ios::binary) << text;
-    coordinator::read_campaign(file).validate();
+    coordinator::read_campaign(file)->validate();
   });
 }
 
 /// What a campaign of one orbit a session and one sample a second is stored as.
 std::string short_definition() {
-  Campaign campaign = hardy2013_campaign();
+  MicroscopeCampaign campaign = hardy2013_campaign();
   campaign.scenario.simulation.sample_period_s = 1.0;
   campaign.scenario.simulation.settling_s = 0.0;
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
@@ -110,7 +114,7 @@ TEST_F(MutatedTexts, WithExtremeNumbersAreDefinitionsThatCanBeSimulatedOrRefused
                                     static_cast<std::size_t>(match->length(1)), value);
       SCOPED_TRACE(match->str() + " becomes " + value);
       try {
-        const Campaign campaign = parse_campaign("stored definition", changed, {}, {});
+        const MicroscopeCampaign campaign = parse_campaign("stored definition", changed, {}, {});
         const RunPlan plan(campaign);
         (void)plan.simulate_batch(std::array{RunRequest{}}, best_instruction_set());
         ++num_simulated;
@@ -140,14 +144,13 @@ TEST_F(MutatedTexts, AreEnvironmentTablesOrRefused) {
       "angular_z_rad_s2\n";
   for (int i = 0; i < 8; ++i) text += std::to_string(1000 * i) + ",1e-8,2e-8,0,1e-9,0,-1.5e-9\n";
   mutate(text, [](const std::string& changed) {
-    (void)coordinator::detail::parse_environment(changed, "environment.csv", 5950.0);
+    (void)detail::parse_environment(changed, "environment.csv", 5950.0);
   });
 }
 
 TEST_F(MutatedTexts, AreColumnsOrRefused) {
-  mutate("a,b\n1.5,2\n-3e-4,0\n7,8\n", [](const std::string& changed) {
-    (void)coordinator::detail::parse_column(changed, "draws.csv", "b");
-  });
+  mutate("a,b\n1.5,2\n-3e-4,0\n7,8\n",
+         [](const std::string& changed) { (void)parse_column(changed, "draws.csv", "b"); });
 }
 
 }  // namespace

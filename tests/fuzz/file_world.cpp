@@ -25,7 +25,9 @@
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/error.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/simulation/run.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
 namespace {
@@ -39,8 +41,8 @@ constexpr wire::SessionId session{0xfedcba9876543210};
 bool never() { return false; }
 
 /// One orbit at 1 Hz: what `verify` simulates again takes little.
-Campaign short_campaign(const std::string& name) {
-  Campaign campaign;
+MicroscopeCampaign short_campaign(const std::string& name) {
+  MicroscopeCampaign campaign;
   campaign.name = name;
   campaign.num_runs = num_runs;
   campaign.scenario.simulation.sample_period_s = 1.0;
@@ -48,8 +50,8 @@ Campaign short_campaign(const std::string& name) {
   return campaign;
 }
 
-Campaign table_campaign() {
-  Campaign campaign = short_campaign("tables");
+MicroscopeCampaign table_campaign() {
+  MicroscopeCampaign campaign = short_campaign("tables");
   campaign.dispersions[3] = {.law = Law::table, .file = "draws.csv", .column = "a"};
   campaign.table_columns = {std::vector<double>(num_runs, 1e-4)};
   campaign.scenario.environment.kind = EnvironmentKind::file;
@@ -60,7 +62,7 @@ Campaign table_campaign() {
   return campaign;
 }
 
-std::vector<RunResult> simulated(const Campaign& campaign, std::uint64_t count) {
+std::vector<RunResult> simulated(const MicroscopeCampaign& campaign, std::uint64_t count) {
   const RunPlan plan(campaign);
   std::vector<RunResult> results;
   for (std::uint64_t run = 0; run < count;) {
@@ -75,7 +77,7 @@ std::vector<RunResult> simulated(const Campaign& campaign, std::uint64_t count) 
 }
 
 /// Opens a new file with so many results in it.
-Store make_file(const fs::path& file, const Campaign& campaign, std::uint64_t count) {
+Store make_file(const fs::path& file, const MicroscopeCampaign& campaign, std::uint64_t count) {
   campaign.validate();
   Store store = Store::create(file, campaign, canonical_definition(campaign));
   store.begin_coordinator(
@@ -91,7 +93,7 @@ Store make_file(const fs::path& file, const Campaign& campaign, std::uint64_t co
 }
 
 /// Everything that a campaign can have gone through.
-void add_troubles(Store& store, const Campaign& campaign) {
+void add_troubles(Store& store, const MicroscopeCampaign& campaign) {
   std::vector<Entry> entries;
   const RunRange lost{.first = RunIndex{16}, .count = 3};
   for (const bool is_blamed : {false, true, true, true}) {
@@ -154,10 +156,10 @@ void export_text(const fs::path& file) {
 
 void read_drawn(const fs::path& file) {
   const Store store = Store::open_read_only(file);
-  const DrawnRuns drawn = read_drawn_runs(store, stored_campaign(store), sensitivity_runs_max);
-  (void)sensitivity_text(drawn, Parameter::k2c, 3);
+  const DrawnRuns drawn = read_drawn_runs(store, *stored_campaign(store), sensitivity_runs_max);
+  (void)sensitivity_text(drawn, index(Parameter::k2c), 3);
   if (drawn.runs.empty()) return;
-  (void)explanation_text(drawn, worst_parameter_of(drawn, drawn.runs.front()), drawn.runs.front(),
+  (void)explanation_text(drawn, worst_quantity_of(drawn, drawn.runs.front()), drawn.runs.front(),
                          3);
 }
 
@@ -182,26 +184,27 @@ void back_up(const fs::path& file) {
 }
 
 void run(const fs::path& file) {
-  Campaign wanted = short_campaign("finished");
+  MicroscopeCampaign wanted = short_campaign("finished");
   wanted.num_runs = num_runs + 5;
   try {
     (void)open_or_create(wanted, {}, file, "remedy");
   } catch (const Error&) {
   }
   Store store = Store::open(file);
-  const Campaign campaign = stored_campaign(store);
+  const MicroscopeCampaign campaign = microscope(*stored_campaign(store));
   (void)store.blamed_runs();
   (void)store.given_up_runs();
   (void)store.compared_runs();
   (void)store.contradictions();
   (void)store.attached_sessions();
-  const Delivery delivery{.result = {.run = RunIndex{11}, .num_draws = 1, .num_rounds = 1},
-                          .worker = session,
-                          .attempt = {1},
-                          .compute_s = 0.5};
+  const Delivery delivery{
+      .result = zero_result({.run = RunIndex{11}, .num_draws = 1, .num_rounds = 1}),
+      .worker = session,
+      .attempt = {1},
+      .compute_s = 0.5};
   (void)store.commit({&delivery, 1});
-  (void)summarise_file(file, campaign.scenario, [&](const auto& write) { write(store); });
-  update_statistics(store, campaign.scenario);
+  (void)summarise_file(file, campaign, [&](const auto& write) { write(store); });
+  update_statistics(store, campaign);
 }
 
 void serve(const fs::path& file) {
@@ -216,7 +219,7 @@ void serve(const fs::path& file) {
   const std::atomic<StopRequest> stop = StopRequest::now;
   service.run(stop, [] {});
   for (ServedCampaign& campaign : service.close()) {
-    update_statistics(campaign.store, campaign.definition->scenario);
+    update_statistics(campaign.store, *campaign.definition);
   }
 }
 
@@ -231,11 +234,11 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
     }
     case FileUse::report: {
       const Store store = Store::open_read_only(file);
-      (void)report_text(store, stored_campaign(store).scenario);
+      (void)report_text(store, *stored_campaign(store));
       return;
     }
     case FileUse::requirement: {
-      const ParameterArray objectives = Scenario{}.objectives;
+      const std::vector<double> objectives = MicroscopeCampaign{}.objectives();
       const std::array<std::string, 2> texts{"a_c12 < 9e-4 for 90% with 90%",
                                              "all objectives for 90% with 90%"};
       for (const auto& answer :
@@ -278,21 +281,21 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
 std::vector<fs::path> make_seed_files(const fs::path& directory) {
   const std::vector<fs::path> files{directory / "finished.db", directory / "half.db",
                                     directory / "tables.db"};
-  const Campaign finished = short_campaign("finished");
+  const MicroscopeCampaign finished = short_campaign("finished");
   {
     Store store = make_file(files[0], finished, num_runs);
-    update_statistics(store, finished.scenario);
+    update_statistics(store, finished);
     store.end_coordinator(wire::Epoch{77});
   }
   {
-    const Campaign half = short_campaign("half");
+    const MicroscopeCampaign half = short_campaign("half");
     Store store = make_file(files[1], half, 16);
     add_troubles(store, half);
   }
   Store::annotate(files[1], {AddTag{"old"}, AddNote{"A note."}});
-  const Campaign tables = table_campaign();
+  const MicroscopeCampaign tables = table_campaign();
   Store store = make_file(files[2], tables, num_runs);
-  update_statistics(store, tables.scenario);
+  update_statistics(store, tables);
   return files;
 }
 

@@ -8,8 +8,8 @@
 
 #include "coordinator/dispatch/dispatch.hpp"
 #include "coordinator/net/worker_desk.hpp"
-#include "core/definition/campaign_definition.hpp"
 #include "core/error.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/codec.hpp"
 #include "tests/fuzz/fuzz_input.hpp"
@@ -24,7 +24,7 @@ using wire::CampaignId;
 constexpr std::size_t num_connections = 8;
 
 std::shared_ptr<const Campaign> make_campaign(bool has_table) {
-  Campaign campaign;
+  MicroscopeCampaign campaign;
   campaign.num_runs = fuzz_num_runs;
   if (has_table) {
     campaign.name = "table";
@@ -32,7 +32,7 @@ std::shared_ptr<const Campaign> make_campaign(bool has_table) {
     campaign.table_columns = {std::vector<double>(fuzz_num_runs, 1e-4)};
   }
   campaign.validate();
-  return std::make_shared<const Campaign>(std::move(campaign));
+  return std::make_shared<const MicroscopeCampaign>(std::move(campaign));
 }
 
 coordinator::StoredCampaign stored(bool has_table) {

@@ -6,11 +6,12 @@
 #include <utility>
 #include <vector>
 
-#include "core/definition/campaign_definition.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/codec.hpp"
 #include "tests/fuzz/fuzz_input.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
 namespace {
@@ -71,7 +72,7 @@ class Speaker {
     wire::ResultBatch batch{.campaign = campaign, .attempt = {attempt}, .results = {}};
     for (std::uint64_t run = first; run < first + count; ++run) {
       wire::ComputedRun computed;
-      computed.result.run = {run};
+      computed.result = zero_result({.run = {run}});
       computed.result.num_draws = 1;
       computed.compute_s = 0.5;
       computed.elapsed_s = 8.0;
@@ -278,8 +279,8 @@ std::string hosts_that_lie() {
   return to_bytes(steps);
 }
 
-Campaign campaign_with_table() {
-  Campaign campaign;
+MicroscopeCampaign campaign_with_table() {
+  MicroscopeCampaign campaign;
   campaign.num_runs = 2;
   campaign.dispersions[3] = {.law = Law::table, .file = "f.csv", .column = "a"};
   campaign.table_columns = {{1e-4, 2e-4}};

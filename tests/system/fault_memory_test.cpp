@@ -23,8 +23,8 @@
 #include <variant>
 #include <vector>
 
-#include "core/simulation/reference_digest.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/simulation/reference_digest.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "proto/wire/codec.hpp"
 #include "tests/proto/link/raw_peer.hpp"
 #include "tests/system/fault_fixture.hpp"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/system/process.hpp"
 
@@ -20,7 +21,7 @@ using testing::HasSubstr;
 class QueryProcess : public StoreTest {
  protected:
   QueryProcess() {
-    const Campaign campaign = campaign_of(4);
+    const MicroscopeCampaign campaign = campaign_of(4);
     coordinator::Store store =
         coordinator::Store::create(file(), campaign, canonical_definition(campaign));
     const coordinator::Entry worker = worker_1();

@@ -8,7 +8,7 @@
 #include <utility>
 #include <variant>
 
-#include "core/definition/campaign_definition.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 
 namespace proofmass::test {
 namespace {
@@ -189,9 +189,9 @@ void PlayedCoordinator::extend(wire::CampaignId id, std::uint64_t num_runs) {
   }
   ++num_events_["campaign_extended"];
   if (!life_->state.campaigns.contains(id)) serve(id);  // It was finished, and left out.
-  Campaign extended = *file.stored.definition;
-  extended.num_runs = num_runs;
-  file.stored.definition = std::make_shared<const Campaign>(extended);
+  std::unique_ptr<Campaign> extended = file.stored.definition->clone();
+  extended->num_runs = num_runs;
+  file.stored.definition = std::move(extended);
   on_extended(life_->state, id, file.stored.definition, agenda_.now(), *this);
   after_event();
 }
@@ -305,7 +305,7 @@ void PlayedCoordinator::send_definition(wire::WorkerId worker, const wire::Campa
   ++num_events_["definition_sent"];
   auto known = definitions_.find(definition.get());
   if (known == definitions_.end()) {
-    const wire::EncodedDefinition encoded(definition_of(*definition, TableColumns::left_out));
+    const wire::EncodedDefinition encoded(definition->definition(TableColumns::left_out));
     known = definitions_.emplace(definition.get(), std::pair(definition, encoded)).first;
   }
   send(worker, known->second.second.part(request));

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "tests/support/microscope_results.hpp"
+
 namespace proofmass::test {
 namespace {
 
@@ -120,7 +122,8 @@ PlayedExecution::Outcome PlayedExecution::advance() {
       continue;
     }
     for (const auto& [campaign, run] : batch->runs) {
-      wire::ComputedRun computed{.result = {.run = run, .num_draws = 1}, .elapsed_s = 0.7};
+      wire::ComputedRun computed{.result = zero_result({.run = run, .num_draws = 1}),
+                                 .elapsed_s = 0.7};
       finished_.push_back({.campaign = campaign, .computed = computed});
     }
     outcome = Outcome::finished;

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "worker/execution/execution.hpp"
 
 namespace proofmass::test {
@@ -32,7 +33,7 @@ class PlayedExecution final : public worker::Execution {
   bool is_defined(wire::CampaignId campaign) const override { return defined_.contains(campaign); }
   /// Nothing depends on what the definition says, and to read it takes longer than all else here.
   std::shared_ptr<const Campaign> read(Definition) const override {
-    return std::make_shared<const Campaign>();
+    return std::make_shared<const MicroscopeCampaign>();
   }
   void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) override;
   void submit(wire::RunLease lease) override;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/simulation/run.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "tests/system/simulated_network_world.hpp"
 
 // Troubles beyond the network: files that cannot be opened, lose their names or come back as older

@@ -9,7 +9,7 @@
 #include <utility>
 #include <variant>
 
-#include "core/simulation/run.hpp"
+#include "core/microscope/simulation/run.hpp"
 
 namespace proofmass::test {
 namespace {
@@ -66,14 +66,15 @@ void World::draw_weather() {
 void World::add_campaigns() {
   for (const auto& [id, num_runs, priority] :
        {std::tuple(other, 24U, 0), std::tuple(urgent, 12U, 5)}) {
-    Campaign campaign;
+    MicroscopeCampaign campaign;
     campaign.num_runs = num_runs;
     campaign.seed = random_.number();
-    coordinator::StoredCampaign stored{.definition = std::make_shared<const Campaign>(campaign),
-                                       .priority = priority,
-                                       .finished = {},
-                                       .given_up = {},
-                                       .blamed = {}};
+    coordinator::StoredCampaign stored{
+        .definition = std::make_shared<const MicroscopeCampaign>(campaign),
+        .priority = priority,
+        .finished = {},
+        .given_up = {},
+        .blamed = {}};
     constexpr std::array fractions{0.0, 0.0, 0.3, 1.0};
     stored.audit_fraction = fractions.at(random_.below(fractions.size()));
     coordinator_.add_file(id, stored);

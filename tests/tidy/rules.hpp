@@ -11,7 +11,8 @@ namespace proofmass::test {
 using Findings = std::vector<std::string>;
 
 /// core includes only numerics; coordinator and worker never see each other; SQLite, ZeroMQ and
-/// generated Protobuf types stay in the few sources that may know them.
+/// generated Protobuf types stay in the few sources that may know them. What runs campaigns knows
+/// no model by name: programs choose theirs where they are linked.
 [[nodiscard]] Findings check_layers(const SourceFile& file);
 
 /// A header begins with `#pragma once`.

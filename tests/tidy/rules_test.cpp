@@ -47,11 +47,42 @@ TEST(CheckLayers, AllowsWhatTheLayersAreFor) {
   EXPECT_THAT(layers("coordinator/query/draw_table.cpp", "<sqlite3ext.h>"), IsEmpty());
   EXPECT_THAT(layers("worker/net/a.cpp", "<zmq.hpp>"), IsEmpty());
   EXPECT_THAT(layers("proto/wire/a.cpp", "\"proofmass.pb.h\""), IsEmpty());
-  EXPECT_THAT(layers("worker/a.cpp", "\"core/simulation/run.hpp\""), IsEmpty());
   EXPECT_THAT(layers("core/a.cpp", "<cmath>"), IsEmpty());
   EXPECT_THAT(layers("core/definition/a.hpp", "<toml++/toml.h>"), IsEmpty());
-  EXPECT_THAT(layers("worker/net/a.cpp", "\"core/definition/campaign_definition.hpp\""), IsEmpty());
+  EXPECT_THAT(layers("core/microscope/definition/a.hpp", "<toml++/toml.h>"), IsEmpty());
   EXPECT_THAT(layers("tests/system/a.cpp", "<sqlite3.h>"), IsEmpty());
+}
+
+TEST(CheckLayers, KeepTheEngineFromKnowingOneModel) {
+  const std::string model = "\"core/microscope/campaign/parameter.hpp\"";
+  for (const std::string path :
+       {"proto/wire/a.cpp", "proto/wire/a.hpp", "coordinator/report/a.hpp", "coordinator/cli/a.cpp",
+        "coordinator/query/extension.cpp", "worker/program.cpp", "worker/net/main.cpp",
+        "core/campaign/a.cpp", "core/definition/a.cpp", "core/signal/a.hpp"}) {
+    EXPECT_THAT(layers(path, model), SizeIs(1)) << path;
+  }
+  for (const std::string path : {"coordinator/bench/a.cpp", "coordinator/cli/main.cpp",
+                                 "coordinator/cli/coordinator_main.cpp", "worker/main.cpp",
+                                 "core/microscope/session/a.hpp", "tests/worker/a.cpp"}) {
+    EXPECT_THAT(layers(path, model), IsEmpty()) << path;
+  }
+}
+
+TEST(CheckLayers, KeepMathematicsFromKnowingCampaigns) {
+  for (const std::string topic : {"math", "random", "signal", "statistics", "statistics/detail"}) {
+    const std::string path = "core/" + topic + "/a.cpp";
+    EXPECT_THAT(layers(path, "\"core/campaign/campaign.hpp\""), SizeIs(1)) << path;
+    EXPECT_THAT(layers(path, "\"core/campaign/identifiers.hpp\""), IsEmpty()) << path;
+  }
+  EXPECT_THAT(layers("core/definition/a.hpp", "\"core/campaign/definition.hpp\""), IsEmpty());
+}
+
+TEST(CheckLayers, KeepTextToDefinitionsAndModels) {
+  const std::string document = "\"core/definition/document.hpp\"";
+  EXPECT_THAT(layers("core/microscope/definition/a.cpp", document), IsEmpty());
+  EXPECT_THAT(layers("core/microscope/microscope_model.cpp", document), IsEmpty());
+  EXPECT_THAT(layers("core/microscope/simulation/a.cpp", document), SizeIs(1));
+  EXPECT_THAT(layers("core/statistics/a.cpp", document), SizeIs(1));
 }
 
 TEST(CheckHeaderGuard, CatchesAHeaderWithoutOne) {

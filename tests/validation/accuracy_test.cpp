@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "core/campaign/statistics.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/simulation/run.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass {
 namespace {
@@ -22,11 +23,11 @@ constexpr ParameterArray prototype_second_order{7.5e-9,  6.5e-9,  53e-9,   2.7e-
 
 /// Batches give the bits of the scalar reference in a tenth of its time.
 CampaignStatistics statistics_of(Correction correction) {
-  Campaign campaign;
+  MicroscopeCampaign campaign;
   campaign.seed = 20130501;
   campaign.scenario.estimation.correction = correction;
   const RunPlan plan(campaign);
-  StatisticsAccumulator statistics(campaign.scenario.objectives);
+  StatisticsAccumulator statistics(campaign.objectives());
   for (std::uint64_t first = 0; first < num_runs; first += batch_lanes) {
     std::vector<RunRequest> requests;
     for (std::uint64_t i = 0; i < batch_lanes; ++i) requests.push_back({RunIndex{first + i}, {}});
@@ -42,7 +43,7 @@ CampaignStatistics statistics_of(Correction correction) {
 void expect_within_factor(const CampaignStatistics& statistics, const ParameterArray& expected,
                           double factor) {
   EXPECT_EQ(statistics.num_estimated, num_runs);
-  for (const ParameterInfo& info : parameter_infos()) {
+  for (const test::ParameterInfo& info : test::parameter_infos()) {
     const double ratio =
         statistics.accuracy[index(info.parameter)].mean / expected[index(info.parameter)];
     EXPECT_GT(ratio, 1.0 / factor) << info.name;
@@ -62,8 +63,8 @@ TEST(Accuracy, FirstOrderMeansAreThePapersWhereItSaysWhatItDid) {
   using enum Parameter;
   const CampaignStatistics statistics = statistics_of(Correction::first_order);
   for (const Parameter parameter : {k2d, k2c, a_c12, a_c13, a_c11_delta_x, a_c11_delta_y}) {
-    const ParameterInfo& info = parameter_infos()[index(parameter)];
-    const double ratio = statistics.accuracy[index(parameter)].mean / info.paper.mean;
+    const test::ParameterInfo& info = test::parameter_infos()[index(parameter)];
+    const double ratio = statistics.accuracy[index(parameter)].mean / info.published->mean;
     EXPECT_GT(ratio, 1.0 / 1.7) << info.name;
     EXPECT_LT(ratio, 1.7) << info.name;
   }

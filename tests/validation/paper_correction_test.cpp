@@ -6,13 +6,13 @@
 #include <complex>
 #include <vector>
 
-#include "core/simulation/run.hpp"
+#include "core/microscope/simulation/run.hpp"
 
 namespace proofmass {
 namespace {
 
-Campaign silent_campaign(Correction correction) {
-  Campaign campaign;
+MicroscopeCampaign silent_campaign(Correction correction) {
+  MicroscopeCampaign campaign;
   campaign.seed = 42;
   campaign.scenario.noise.scale = 0.0;
   campaign.scenario.estimation.correction = correction;

@@ -11,10 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "core/campaign/draw.hpp"
-#include "core/control/star_tracker.hpp"
+#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/control/star_tracker.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "core/random/stream.hpp"
-#include "core/simulation/run.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass {
 namespace {
@@ -29,14 +30,14 @@ Dispersion fixed(double value) {
 }
 
 /// The paper's campaign without noise, with second-order corrections and every drawn quantity at 0.
-Campaign silent_campaign() {
-  Campaign campaign;
+MicroscopeCampaign silent_campaign() {
+  MicroscopeCampaign campaign;
   campaign.scenario.noise.scale = 0.0;
   for (Dispersion& dispersion : campaign.dispersions) dispersion = fixed(0.0);
   return campaign;
 }
 
-void set(Campaign& campaign, std::string_view name, double value) {
+void set(MicroscopeCampaign& campaign, std::string_view name, double value) {
   for (std::size_t i = 0; i < num_drawn; ++i) {
     if (drawn_names()[i] != name) continue;
     campaign.dispersions[i] = fixed(value);
@@ -45,7 +46,7 @@ void set(Campaign& campaign, std::string_view name, double value) {
   FAIL() << "no drawn quantity " << name;
 }
 
-double fixed_value(const Campaign& campaign, std::string_view name) {
+double fixed_value(const MicroscopeCampaign& campaign, std::string_view name) {
   for (std::size_t i = 0; i < num_drawn; ++i) {
     if (drawn_names()[i] == name) return campaign.dispersions[i].value;
   }
@@ -56,7 +57,7 @@ double fixed_value(const Campaign& campaign, std::string_view name) {
 /// What each estimate may be off, SI: 1/50 of its objective; a_c12 |η_c| more and a_c13 half of
 /// that, because the moving masses follow θ while a_c1j also contains η, which their sessions
 /// cannot see.
-ParameterArray allowance_without_biases(const Campaign& campaign) {
+ParameterArray allowance_without_biases(const MicroscopeCampaign& campaign) {
   ParameterArray allowance = campaign.scenario.objectives;
   for (double& value : allowance) value *= part_of_objective;
   const auto common_coupling = [&campaign](const std::string& axis) {
@@ -77,7 +78,7 @@ ParameterArray allowance_without_biases(const Campaign& campaign) {
 /// - the loop leaves the applied acceleration Γ_c = −[M_c]⁻¹([M_d] b_1d + ½ Σ [dθ_k] p_k) where it
 /// nulls
 ///   the measured one, and 2 K2d Γ_c adds to a_d11'.
-ParameterArray allowance_for_biases(const Campaign& campaign) {
+ParameterArray allowance_for_biases(const MicroscopeCampaign& campaign) {
   DrawnValues values{};
   for (std::size_t i = 0; i < num_drawn; ++i) values[i] = campaign.dispersions[i].value;
   const Instrument instrument = make_instrument(values);
@@ -115,18 +116,19 @@ ParameterArray allowance_for_biases(const Campaign& campaign) {
   return allowance;
 }
 
-void expect_recovery(const Campaign& campaign, const ParameterArray& allowance) {
+void expect_recovery(const MicroscopeCampaign& campaign, const ParameterArray& allowance) {
   campaign.validate();
   const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
   ASSERT_EQ(result.status, RunStatus::completed);
-  for (const ParameterInfo& info : parameter_infos()) {
-    EXPECT_LE(std::abs(result.error(info.parameter)), allowance[index(info.parameter)])
+  for (const test::ParameterInfo& info : test::parameter_infos()) {
+    EXPECT_LE(std::abs(result.error(index(info.parameter))), allowance[index(info.parameter)])
         << info.name << ", error/objective "
-        << result.error(info.parameter) / campaign.scenario.objectives[index(info.parameter)];
+        << result.error(index(info.parameter)) /
+               campaign.scenario.objectives[index(info.parameter)];
   }
 }
 
-void expect_recovery(const Campaign& campaign) {
+void expect_recovery(const MicroscopeCampaign& campaign) {
   expect_recovery(campaign, allowance_without_biases(campaign));
 }
 
@@ -135,7 +137,7 @@ TEST(Recovery, OfAPerfectInstrumentIsZeroToOneFiftieth) { expect_recovery(silent
 class RecoveryOfOneParameter : public testing::TestWithParam<Parameter> {};
 
 /// Sets what makes one of the ten parameters large, and nothing else.
-void excite(Campaign& campaign, Parameter parameter) {
+void excite(MicroscopeCampaign& campaign, Parameter parameter) {
   switch (parameter) {
     case Parameter::a_c11_delta_x:
       return set(campaign, "offcentring_m.x", 20e-6);
@@ -168,13 +170,13 @@ void excite(Campaign& campaign, Parameter parameter) {
 }
 
 TEST_P(RecoveryOfOneParameter, IsWithinOneFiftieth) {
-  Campaign campaign = silent_campaign();
+  MicroscopeCampaign campaign = silent_campaign();
   excite(campaign, GetParam());
   expect_recovery(campaign);
 }
 
 std::string parameter_name(const testing::TestParamInfo<Parameter>& test) {
-  return std::string(parameter_infos()[index(test.param)].name);
+  return std::string(test::parameter_infos()[index(test.param)].name);
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, RecoveryOfOneParameter,
@@ -187,7 +189,7 @@ INSTANTIATE_TEST_SUITE_P(Each, RecoveryOfOneParameter,
 /// The paper's sessions in a frame that spins at 4.5 f_orb. A gradient's line at 2 f_orb is one at
 /// 2 f_EP = 11 f_orb there, with eccentric companions f_orb away; the Earth's direction turns at
 /// f_EP = 5.5 f_orb, that of the Sun at f_spin; the moving mass meets the Coriolis acceleration.
-void spin_sessions(Campaign& campaign) {
+void spin_sessions(MicroscopeCampaign& campaign) {
   const double period_s = campaign.scenario.orbit.period_s;
   const std::vector<LineMultiple> turning{{5.5, 0}, {0, 0, 1}, {2, 0, 2}};
   const std::vector<LineMultiple> environment{{5.5, 0}, {0, 0, 1}, {3.5, 0}, {6.5, 0},
@@ -229,8 +231,8 @@ enum class Biases { absent, at_their_bounds };
 /// A corner of the box of all construction bounds: every drawn quantity at plus or minus its bound,
 /// the signs from a generator. Misalignments are shrunk where the acceptance bounds cut the corner
 /// off.
-Campaign corner(std::uint32_t number, Biases biases) {
-  Campaign campaign = silent_campaign();
+MicroscopeCampaign corner(std::uint32_t number, Biases biases) {
+  MicroscopeCampaign campaign = silent_campaign();
   const DispersionSet nominal = nominal_dispersions();
   for (std::size_t i = 0; i < num_drawn; ++i) {
     const std::string& name = drawn_names()[i];
@@ -254,7 +256,7 @@ TEST_P(RecoveryAtACorner, IsWithinOneFiftieth) {
 }
 
 TEST_P(RecoveryAtACorner, IsOffByNoMoreThanUnseenBiasesExplain) {
-  const Campaign campaign = corner(GetParam(), Biases::at_their_bounds);
+  const MicroscopeCampaign campaign = corner(GetParam(), Biases::at_their_bounds);
   ParameterArray allowance = allowance_without_biases(campaign);
   const ParameterArray extra = allowance_for_biases(campaign);
   for (std::size_t i = 0; i < num_parameters; ++i) allowance[i] += extra[i];
@@ -268,8 +270,8 @@ INSTANTIATE_TEST_SUITE_P(Of, RecoveryAtACorner, testing::Range(0U, 12U));
 class RecoveryOfADraw : public testing::TestWithParam<std::uint64_t> {};
 
 /// A draw of seed 42 without noise, and what its estimates may be off.
-std::pair<Campaign, ParameterArray> silent_draw(std::uint64_t run) {
-  Campaign campaign;
+std::pair<MicroscopeCampaign, ParameterArray> silent_draw(std::uint64_t run) {
+  MicroscopeCampaign campaign;
   campaign.scenario.noise.scale = 0.0;
   campaign.seed = 42;
   const AcceptedDraw draw = draw_instrument(campaign, RunIndex{run}, {});
@@ -310,13 +312,13 @@ TEST(RecoveryInAFrameThatSpins, FindsTheCentrifugalAccelerationInADPrime) {
   constexpr double k2c = 14000.0;
   constexpr double delta_x = 20e-6;
   const auto error_with = [&](double offcentring_m) {
-    Campaign campaign = silent_campaign();
+    MicroscopeCampaign campaign = silent_campaign();
     excite(campaign, Parameter::k2c);
     set(campaign, "offcentring_m.x", offcentring_m);
     spin_sessions(campaign);
-    return RunPlan(campaign).simulate(RunIndex{0}, {}).error(Parameter::a_d11_prime);
+    return RunPlan(campaign).simulate(RunIndex{0}, {}).error(index(Parameter::a_d11_prime));
   };
-  const Campaign campaign;
+  const MicroscopeCampaign campaign;
   const double mean_motion = 2.0 * std::numbers::pi / campaign.scenario.orbit.period_s;
   const double expected = k2c * (4.5 * 4.5 + 0.5) * mean_motion * mean_motion * delta_x;
   EXPECT_NEAR(0.5 * (error_with(delta_x) - error_with(-delta_x)), expected, 0.01 * expected);

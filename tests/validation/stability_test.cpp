@@ -8,7 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "core/simulation/run.hpp"
+#include "core/microscope/simulation/run.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass {
 namespace {
@@ -16,14 +17,14 @@ namespace {
 constexpr std::size_t num_runs = batch_lanes;
 
 /// The paper's campaign in sessions of two orbits, which cost a seventh.
-Campaign short_campaign() {
-  Campaign campaign;
+MicroscopeCampaign short_campaign() {
+  MicroscopeCampaign campaign;
   campaign.seed = 11;
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 2;
   return campaign;
 }
 
-std::vector<RunResult> simulate(const Campaign& campaign) {
+std::vector<RunResult> simulate(const MicroscopeCampaign& campaign) {
   campaign.validate();
   std::vector<RunRequest> requests;
   for (std::uint64_t run = 0; run < num_runs; ++run) requests.push_back({RunIndex{run}, {}});
@@ -31,7 +32,7 @@ std::vector<RunResult> simulate(const Campaign& campaign) {
 }
 
 /// Multiplies the gain of every thruster axis.
-void set_thrust_gain(Campaign& campaign, double gain) {
+void set_thrust_gain(MicroscopeCampaign& campaign, double gain) {
   for (std::size_t i = 0; i < num_drawn; ++i) {
     if (!drawn_names()[i].starts_with("thruster_scale_error")) continue;
     campaign.dispersions[i].law = Law::fixed;
@@ -44,7 +45,7 @@ void set_thrust_gain(Campaign& campaign, double gain) {
 class Stability : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    Campaign campaign = short_campaign();
+    MicroscopeCampaign campaign = short_campaign();
     const std::vector<RunResult> noisy = simulate(campaign);
     campaign.scenario.noise.scale = 0.0;
     silent() = simulate(campaign);
@@ -73,7 +74,7 @@ class Stability : public testing::Test {
   /// The noise of a squared measurement scales its sensors' quadratic factors by 1 + x, where x has
   /// the variance of half of square_noise; that is doubled, as two orbits tell it to a third only.
   /// Six deviations of x are a tenth at the limit, by which 1/(1 − x) may exceed 1 + x.
-  static double allowance(const Campaign& campaign, const RunResult& result,
+  static double allowance(const MicroscopeCampaign& campaign, const RunResult& result,
                           std::size_t parameter) {
     const RunResult& without_noise = silent()[result.run.value];
     const double systematic =
@@ -82,29 +83,29 @@ class Stability : public testing::Test {
     const double k2c = without_noise.truth[index(Parameter::k2c)];
     const bool is_quadratic =
         parameter == index(Parameter::k2d) || parameter == index(Parameter::k2c);
-    const double of_square =
-        is_quadratic ? (std::abs(k2d) + std::abs(k2c)) * std::sqrt(result.health->square_noise)
-                     : 0.0;
+    const double of_square = is_quadratic ? (std::abs(k2d) + std::abs(k2c)) *
+                                                std::sqrt(test::health_of(result).square_noise)
+                                          : 0.0;
     const double of_noise = campaign.scenario.noise.scale * deviation()[parameter];
     return 1.1 * 6.0 * std::hypot(of_noise, of_square) + 1.5 * systematic +
            campaign.scenario.objectives[parameter] / 50.0;
   }
 
   /// @returns How many of the runs are completed.
-  static std::size_t expect_explained(const Campaign& campaign, const std::string& what) {
+  static std::size_t expect_explained(const MicroscopeCampaign& campaign, const std::string& what) {
     std::size_t num_completed = 0;
     const std::vector<RunResult> results = simulate(campaign);
     for (std::size_t i = 0; i < num_runs; ++i) {
       const RunResult& result = results[i];
       if (result.status == RunStatus::lost) {
-        EXPECT_NE(result.loss.cause, LossCause::none);
+        EXPECT_NE(result.loss.cause, static_cast<std::uint32_t>(LossCause::none));
         continue;
       }
       EXPECT_EQ(result.status, RunStatus::completed) << what << ", run " << i;
       ++num_completed;
-      for (const ParameterInfo& info : parameter_infos()) {
+      for (const test::ParameterInfo& info : test::parameter_infos()) {
         const std::size_t p = index(info.parameter);
-        EXPECT_LE(std::abs(result.error(info.parameter)), allowance(campaign, result, p))
+        EXPECT_LE(std::abs(result.error(index(info.parameter))), allowance(campaign, result, p))
             << what << ", run " << i << ", " << info.name;
       }
     }
@@ -113,9 +114,9 @@ class Stability : public testing::Test {
 
   /// Checks every value of a sweep whose first one is harmless and whose last one is not.
   static void expect_explained_sweep(const std::string& name, const std::vector<double>& values,
-                                     const std::function<void(Campaign&, double)>& set) {
+                                     const std::function<void(MicroscopeCampaign&, double)>& set) {
     for (const double value : values) {
-      Campaign campaign = short_campaign();
+      MicroscopeCampaign campaign = short_campaign();
       set(campaign, value);
       const std::size_t num_completed =
           expect_explained(campaign, name + " = " + std::to_string(value));
@@ -145,7 +146,7 @@ TEST_F(Stability, OfLowThrustGainIsKeptOrReported) {
 
 TEST_F(Stability, OfThrustAlongOneAxisIsKeptOrReported) {
   expect_explained_sweep("thrust gain along Y", {1.0, 22.0, 24.0, 25.0, 26.0, 40.0},
-                         [](Campaign& campaign, double gain) {
+                         [](MicroscopeCampaign& campaign, double gain) {
                            for (std::size_t i = 0; i < num_drawn; ++i) {
                              if (drawn_names()[i] != "thruster_scale_error.y") continue;
                              campaign.dispersions[i].law = Law::fixed;
@@ -157,7 +158,7 @@ TEST_F(Stability, OfThrustAlongOneAxisIsKeptOrReported) {
 // The slow integral makes the loop unstable where ω_I is above 2ζω.
 TEST_F(Stability, OfTheAttitudeIntegralIsKeptOrReported) {
   expect_explained_sweep("attitude integral", {0.001, 0.002, 0.0025, 0.003, 0.0035, 0.004, 0.0049},
-                         [](Campaign& campaign, double integral_hz) {
+                         [](MicroscopeCampaign& campaign, double integral_hz) {
                            campaign.scenario.attitude.bandwidth_hz = 0.005;
                            campaign.scenario.attitude.damping = 0.3;
                            campaign.scenario.attitude.integral_hz = integral_hz;
@@ -167,7 +168,7 @@ TEST_F(Stability, OfTheAttitudeIntegralIsKeptOrReported) {
 TEST_F(Stability, UnderNoiseIsKeptOrReported) {
   expect_explained_sweep(
       "noise", {1.0, 3.0, 5.0, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 30.0, 60.0, 100.0, 300.0, 1000.0},
-      [](Campaign& campaign, double scale) { campaign.scenario.noise.scale = scale; });
+      [](MicroscopeCampaign& campaign, double scale) { campaign.scenario.noise.scale = scale; });
 }
 
 }  // namespace

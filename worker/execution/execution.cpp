@@ -2,13 +2,12 @@
 
 #include <utility>
 
-#include "core/definition/campaign_definition.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::worker {
 
 std::shared_ptr<const Campaign> Execution::read(Definition definition) const {
-  return std::make_shared<const Campaign>(
-      campaign_of(std::move(definition), TableColumns::left_out));
+  return model().campaign_of(std::move(definition), TableColumns::left_out, "definition");
 }
 
 }  // namespace proofmass::worker

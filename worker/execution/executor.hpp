@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
-#include "core/simulation/run.hpp"
 #include "worker/execution/execution.hpp"
 #include "worker/execution/run_queue.hpp"
 

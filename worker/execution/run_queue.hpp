@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/simulation/run.hpp"
+#include "core/campaign/campaign.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::worker {

@@ -379,7 +379,7 @@ void Conversation::define(wire::CampaignId campaign, TimePoint now) {
   }
   const auto& definition = std::get<std::shared_ptr<const Campaign>>(read);
   wanted_.erase(campaign);
-  if (agrees_on_table(campaign, table_elements(definition->dispersions).size())) {
+  if (agrees_on_table(campaign, definition->table_quantities().size())) {
     execution_.define(campaign, definition);
   }
 }

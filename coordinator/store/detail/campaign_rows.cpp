@@ -2,15 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <string>
+#include <variant>
 
 #include "coordinator/store/detail/table_digest.hpp"
 #include "coordinator/store/store_error.hpp"
-#include "core/campaign/budget.hpp"
-#include "core/campaign/parameter.hpp"
-#include "core/simulation/run.hpp"
+#include "core/campaign/model.hpp"
+#include "core/error.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -21,34 +24,58 @@ std::uint64_t stored_num_runs(const Database& database) {
   return database.count("SELECT num_runs FROM campaign");
 }
 
-void insert_environment(Database& database, const EnvironmentTable& table) {
-  Statement insert =
-      database.prepare("INSERT INTO environment_row VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
-  std::uint64_t position = 0;
-  for (const EnvironmentRow& row : table) {
-    insert.run(++position, row.time_s, row.linear_m_s2[0], row.linear_m_s2[1], row.linear_m_s2[2],
-               row.angular_rad_s2[0], row.angular_rad_s2[1], row.angular_rad_s2[2]);
+void insert_data_tables(Database& database, const std::vector<DataTable>& tables) {
+  for (const DataTableSchema& schema : model().results().tables) {
+    const auto table = std::ranges::find(tables, schema.key, &DataTable::key);
+    if (table == tables.end()) continue;
+    const int num_columns = static_cast<int>(schema.columns.size());
+    PROOFMASS_EXPECT(static_cast<int>(table->num_columns) == num_columns);
+    Statement insert = database.prepare(
+        fmt::format("INSERT INTO {} VALUES ({})", schema.table, places(num_columns + 1)));
+    auto value = table->values.begin();
+    for (std::uint64_t position = 1; value != table->values.end(); ++position) {
+      insert.bind(1, position);
+      for (int column = 0; column < num_columns; ++column) insert.bind(column + 2, *value++);
+      insert.finish();
+    }
   }
+}
+
+/// The text at a key of a definition; empty if there is none.
+std::string text_at(const Campaign& campaign, std::string_view key) {
+  for (const DefinitionItem& item : campaign.items()) {
+    if (item.key == key) return std::get<std::string>(item.value);
+  }
+  return "";
+}
+
+/// Name of each quantity with values in a table, in the order of the campaign's columns.
+std::vector<std::string_view> table_quantity_names(const Campaign& campaign) {
+  std::vector<std::string_view> names;
+  for (const std::size_t quantity : campaign.table_quantities()) {
+    names.push_back(model().drawn()[quantity].name);
+  }
+  return names;
 }
 
 // Only runs of the campaign are stored: files may well hold values for more.
 void insert_dispersion_values(Database& database, const Campaign& campaign,
                               std::uint64_t first_run) {
   Statement insert = database.prepare("INSERT INTO dispersion_value VALUES (?, ?, ?)");
-  const std::vector<std::size_t> elements = table_elements(campaign.dispersions);
-  if (elements.size() != campaign.table_columns.size()) {
+  const std::vector<std::string_view> names = table_quantity_names(campaign);
+  if (names.size() != campaign.table_columns.size()) {
     throw StoreError(fmt::format("dispersion tables = {} (must be {}, one for each such quantity)",
-                                 campaign.table_columns.size(), elements.size()));
+                                 campaign.table_columns.size(), names.size()));
   }
-  for (std::size_t i = 0; i < elements.size(); ++i) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
     const std::vector<double>& values = campaign.table_columns[i];
     if (values.size() < campaign.num_runs) {
       throw StoreError(
-          fmt::format("dispersion.{} = table of {} values (must be {}, one for each run)",
-                      drawn_names()[elements[i]], values.size(), campaign.num_runs));
+          fmt::format("dispersion.{} = table of {} values (must be {}, one for each run)", names[i],
+                      values.size(), campaign.num_runs));
     }
     for (std::uint64_t run = first_run; run < campaign.num_runs; ++run) {
-      insert.run(drawn_names()[elements[i]], run, values[run]);
+      insert.run(names[i], run, values[run]);
     }
   }
 }
@@ -77,27 +104,37 @@ void check_same_values(std::string_view drawn_name, const std::vector<double>& g
   }
 }
 
-void insert_budget_coefficients(Database& database, const Scenario& scenario) {
+void insert_budget_coefficients(Database& database, const Campaign& campaign) {
+  const std::optional<ErrorBudget> budget = campaign.error_budget();
+  if (!budget) return;
   Statement insert = database.prepare("INSERT INTO budget_coefficient VALUES (?, ?, ?)");
-  const auto coefficients = budget_coefficients(scenario);
-  for (std::size_t i = 0; i < num_budget_entries; ++i) {
-    for (const ParameterInfo& info : parameter_infos()) {
-      const double value = coefficients[i][index(info.parameter)];
-      if (value != 0.0) insert.run(budget_entry_infos()[i].name, info.name, value);
+  const std::vector<Quantity>& quantities = model().results().quantities;
+  const auto coefficients = budget->coefficients(quantities.size());
+  for (std::size_t i = 0; i < coefficients.size(); ++i) {
+    for (std::size_t j = 0; j < quantities.size(); ++j) {
+      const double value = coefficients[i][j];
+      if (value != 0.0) insert.run(budget->infos[i].name, quantities[j].name, value);
     }
   }
 }
 
 }  // namespace
 
-void insert_parameters(Database& database, const Scenario& scenario) {
+void insert_parameters(Database& database, const Campaign& campaign) {
   Statement insert = database.prepare("INSERT INTO parameter VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
-  for (const ParameterInfo& info : parameter_infos()) {
-    const std::size_t i = index(info.parameter);
-    insert.run(i + 1, info.name, info.label, info.unit, scenario.objectives[i], info.paper.worst,
-               info.paper.mean, info.paper.standard_deviation);
+  const std::vector<double> objectives = campaign.objectives();
+  std::uint64_t position = 0;
+  for (const Quantity& quantity : model().results().quantities) {
+    const double objective = objectives[position++];
+    const auto published = [&](double PublishedAccuracy::*figure) {
+      return quantity.published ? std::optional((*quantity.published).*figure) : std::nullopt;
+    };
+    insert.run(position, quantity.name, quantity.symbol, quantity.unit,
+               std::isfinite(objective) ? std::optional(objective) : std::nullopt,
+               published(&PublishedAccuracy::worst), published(&PublishedAccuracy::mean),
+               published(&PublishedAccuracy::standard_deviation));
   }
-  insert_budget_coefficients(database, scenario);
+  insert_budget_coefficients(database, campaign);
 }
 
 void insert_campaign(Database& database, const Campaign& campaign, std::string_view definition) {
@@ -106,25 +143,28 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
           "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version,"
           " build, campaign_uid) VALUES (1, ?, ?, ?, ?, ?, ?, 1 + (random() & ?))")
       .run(campaign.name, std::to_string(campaign.seed), campaign.num_runs, definition,
-           model_version, std::string_view(PROOFMASS_BUILD), campaign_uid_max - 1);
-  insert_parameters(database, campaign.scenario);
-  insert_environment(database, campaign.environment_table);
+           model().version(), std::string_view(PROOFMASS_BUILD), campaign_uid_max - 1);
+  insert_parameters(database, campaign);
+  insert_data_tables(database, campaign.definition(TableColumns::left_out).tables);
   insert_dispersion_values(database, campaign, 0);
   write_table_digest(database);
 }
 
-EnvironmentTable read_environment_table(const Database& database) {
-  Statement select = database.prepare(
-      "SELECT time_s, linear_x_m_s2, linear_y_m_s2, linear_z_m_s2,"
-      " angular_x_rad_s2, angular_y_rad_s2, angular_z_rad_s2 FROM environment_row ORDER BY "
-      "position");
-  EnvironmentTable table;
-  while (select.step()) {
-    table.push_back({.time_s = select.real(0),
-                     .linear_m_s2 = {select.real(1), select.real(2), select.real(3)},
-                     .angular_rad_s2 = {select.real(4), select.real(5), select.real(6)}});
+std::vector<DataTable> read_data_tables(const Database& database) {
+  std::vector<DataTable> tables;
+  for (const DataTableSchema& schema : model().results().tables) {
+    DataTable table{.key = std::string(schema.key),
+                    .num_columns = static_cast<std::uint32_t>(schema.columns.size())};
+    Statement select = database.prepare(fmt::format("SELECT {} FROM {} ORDER BY position",
+                                                    fmt::join(schema.columns, ", "), schema.table));
+    while (select.step()) {
+      for (int column = 0; column < static_cast<int>(schema.columns.size()); ++column) {
+        table.values.push_back(select.real(column));
+      }
+    }
+    if (!table.values.empty()) tables.push_back(std::move(table));
   }
-  return table;
+  return tables;
 }
 
 std::vector<double> read_dispersion_values(const Database& database, std::string_view drawn_name) {
@@ -153,16 +193,17 @@ void check_extension(const Database& database, const Campaign& campaign) {
                     "file)",
                     campaign.num_runs, num_runs));
   }
-  if (read_environment_table(database) != campaign.environment_table) {
-    throw StoreError(
-        fmt::format("environment.file = {} (its rows are not those of the campaign file)",
-                    campaign.environment_file));
+  const std::vector<DataTable> stored = read_data_tables(database);
+  const std::vector<DataTable> given = campaign.definition(TableColumns::left_out).tables;
+  if (stored != given) {
+    const std::string& key = (given.empty() ? stored : given).front().key;
+    throw StoreError(fmt::format("{} = {} (its rows are not those of the campaign file)", key,
+                                 text_at(campaign, key)));
   }
-  const std::vector<std::size_t> elements = table_elements(campaign.dispersions);
-  for (std::size_t i = 0; i < elements.size(); ++i) {
-    const std::string& name = drawn_names()[elements[i]];
-    check_same_values(name, campaign.table_columns[i], read_dispersion_values(database, name),
-                      num_runs);
+  const std::vector<std::string_view> names = table_quantity_names(campaign);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    check_same_values(names[i], campaign.table_columns[i],
+                      read_dispersion_values(database, names[i]), num_runs);
   }
 }
 

@@ -9,13 +9,15 @@
 
 namespace proofmass::coordinator::detail {
 
-/// Fills the tables `campaign`, `parameter`, `environment_row` and `dispersion_value`.
+/// Fills the tables `campaign`, `parameter`, those of the data that all runs share, and
+/// `dispersion_value`.
 void insert_campaign(Database& database, const Campaign& campaign, std::string_view definition);
 
 /// Fills the tables `parameter` and `budget_coefficient`.
-void insert_parameters(Database& database, const Scenario& scenario);
+void insert_parameters(Database& database, const Campaign& campaign);
 
-[[nodiscard]] EnvironmentTable read_environment_table(const Database& database);
+/// The data that all runs share; none that has no rows.
+[[nodiscard]] std::vector<DataTable> read_data_tables(const Database& database);
 
 /// Values of one drawn quantity, run by run; empty if the file has none.
 [[nodiscard]] std::vector<double> read_dispersion_values(const Database& database,

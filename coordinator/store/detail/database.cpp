@@ -407,4 +407,10 @@ StepLimit::~StepLimit() {
   sqlite3_progress_handler(database_.connection_.get(), 0, nullptr, nullptr);
 }
 
+std::string places(int count) {
+  std::string text = "?";
+  for (int i = 1; i < count; ++i) text += ", ?";
+  return text;
+}
+
 }  // namespace proofmass::coordinator::detail

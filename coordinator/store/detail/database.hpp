@@ -212,4 +212,7 @@ class StepLimit {
   const Database& database_;
 };
 
+/// `?, ?, ?`: places for so many values in a statement.
+[[nodiscard]] std::string places(int count);
+
 }  // namespace proofmass::coordinator::detail

@@ -16,6 +16,7 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/standout_rows.hpp"
 #include "coordinator/store/detail/worker_rows.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -48,8 +49,9 @@ bool has_row(Statement& select, RunIndex run, std::uint64_t number) {
 
 // `overrun` and `worst_run` follow from the results.
 void check_standouts(const Database& database) {
-  const ParameterArray objectives = read_objectives(database);
-  WorstRunTable worst;
+  const std::vector<double> objectives = read_objectives(database);
+  const std::vector<Quantity>& quantities = model().results().quantities;
+  WorstRunTable worst(quantities.size());
   Statement overrun =
       database.prepare("SELECT run_index, parameters FROM overrun ORDER BY run_index");
   Statement row = select_results(database);
@@ -61,18 +63,16 @@ void check_standouts(const Database& database) {
                                   result.run.value));
     }
     if (!result.has_estimate()) continue;
-    for (const ParameterInfo& info : parameter_infos()) {
-      worst[index(info.parameter)].offer(
-          {.magnitude = std::abs(result.error(info.parameter)), .run = result.run});
+    for (std::size_t i = 0; i < worst.size(); ++i) {
+      worst[i].offer({.magnitude = std::abs(result.error(i)), .run = result.run});
     }
   }
   if (overrun.step()) database.refuse("is damaged: overrun has a run too many");
   const WorstRunTable stored = read_worst_runs(database);
-  for (const ParameterInfo& info : parameter_infos()) {
-    const std::size_t i = index(info.parameter);
+  for (std::size_t i = 0; i < worst.size(); ++i) {
     if (stored[i].runs() == worst[i].runs()) continue;
-    database.refuse(
-        fmt::format("is damaged: worst_run does not follow from the results of {}", info.name));
+    database.refuse(fmt::format("is damaged: worst_run does not follow from the results of {}",
+                                quantities[i].name));
   }
 }
 

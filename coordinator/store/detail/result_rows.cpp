@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -11,46 +11,55 @@
 #include <string>
 
 #include "coordinator/store/store_error.hpp"
+#include "core/campaign/model.hpp"
+#include "core/error.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
 
-// Columns before the parameters': run_index, status, num_draws, num_rounds.
+// Columns before the values: run_index, status, num_draws, num_rounds.
 constexpr int num_leading_columns = 4;
-// After them, from 0: those of LoopHealth, then loss_cause and loss_session.
-constexpr int first_health_column = num_leading_columns + 2 * static_cast<int>(num_parameters);
-constexpr int num_health_columns = static_cast<int>(num_health_values);
-constexpr int loss_cause_column = first_health_column + num_health_columns;
-constexpr int loss_session_column = loss_cause_column + 1;
-constexpr int num_columns = loss_session_column + 1;
 
-// Position of a parameter's truth among the columns, from 0; its estimate stands num_parameters on.
-int truth_column(const ParameterInfo& info) {
-  return num_leading_columns + static_cast<int>(index(info.parameter));
-}
-int estimate_column(const ParameterInfo& info) {
-  return truth_column(info) + static_cast<int>(num_parameters);
+/// Where the columns of the model's values stand, from 0.
+struct Columns {
+  explicit Columns(const ResultSchema& schema)
+      : num_quantities(static_cast<int>(schema.quantities.size())),
+        num_standard_errors(static_cast<int>(
+            std::ranges::count_if(schema.quantities, &Quantity::has_standard_error))),
+        num_health(static_cast<int>(schema.health.size())) {}
+
+  int num_quantities, num_standard_errors, num_health;
+  int truth = num_leading_columns;
+  int estimate = truth + num_quantities;
+  int standard_error = estimate + num_quantities;
+  int health = standard_error + num_standard_errors;
+  int loss_cause = health + num_health;
+  int loss_session = loss_cause + 1;
+  int count = loss_session + 1;
+};
+
+const Columns& columns() {
+  static const Columns columns(model().results());
+  return columns;
 }
 
 std::string column_list() {
-  std::string truths, estimates;
-  for (const ParameterInfo& info : parameter_infos()) {
-    truths += fmt::format(", truth_{}{}", info.name, info.unit_suffix);
-    estimates += fmt::format(", estimate_{}{}", info.name, info.unit_suffix);
+  std::string truths, estimates, standard_errors, health;
+  for (const Quantity& quantity : model().results().quantities) {
+    truths += ", truth_" + quantity.column();
+    estimates += ", estimate_" + quantity.column();
+    if (quantity.has_standard_error) standard_errors += ", standard_error_" + quantity.column();
   }
-  std::string health;
-  for (const HealthValue& value : health_values()) {
-    health += fmt::format(", health_{}{}", value.name, value.unit_suffix);
+  for (const HealthQuantity& quantity : model().results().health) {
+    health += ", health_" + quantity.column();
   }
-  return "run_index, status, num_draws, num_rounds" + truths + estimates + health +
-         ", loss_cause, loss_session";
+  return "run_index, status, num_draws, num_rounds" + truths + estimates + standard_errors +
+         health + ", loss_cause, loss_session";
 }
 
 std::string insert_sql() {
-  std::string values = "?";
-  for (int column = 1; column < num_columns; ++column) values += ", ?";
   return fmt::format("INSERT INTO run_result ({}) VALUES ({}) ON CONFLICT DO NOTHING",
-                     column_list(), values);
+                     column_list(), places(columns().count));
 }
 
 std::string select_sql(std::string_view clause) {
@@ -70,7 +79,7 @@ std::uint64_t digest_with(std::uint64_t digest, double value) {
   return digest_with(digest, std::bit_cast<std::uint64_t>(value + 0.0));  // -0 + 0 is +0.
 }
 
-std::uint64_t digest_with(std::uint64_t digest, const ParameterArray& values) {
+std::uint64_t digest_with(std::uint64_t digest, const std::vector<double>& values) {
   for (const double value : values) digest = digest_with(digest, value);
   return digest;
 }
@@ -91,51 +100,62 @@ RunStatus read_status(const Statement& row) {
   row.refuse_as_damaged(fmt::format("status = {} of run {}", status, row.count(0)));
 }
 
+// SQLite would read a missing number as 0.
+std::vector<double> read_values(const Statement& row, int first, int count) {
+  std::vector<double> values;
+  values.reserve(static_cast<std::size_t>(count));
+  for (int column = first; column < first + count; ++column) {
+    const std::optional<double> value = row.optional_real(column);
+    if (!value) {
+      row.refuse_as_damaged(
+          fmt::format("{} = NULL of run {}", row.column_name(column), row.count(0)));
+    }
+    values.push_back(*value);
+  }
+  return values;
+}
+
+bool has_value(const Statement& row, int column, int count) {
+  return count > 0 && row.optional_real(column).has_value();
+}
+
 // A run without a draw has none.
-std::optional<LoopHealth> read_health(const Statement& row) {
-  if (!row.optional_real(first_health_column)) return std::nullopt;
-  LoopHealth health;
-  for (std::size_t i = 0; i < num_health_values; ++i) {
-    const int column = first_health_column + static_cast<int>(i);
+std::vector<double> read_health(const Statement& row) {
+  if (!has_value(row, columns().health, columns().num_health)) return {};
+  std::vector<double> health;
+  for (int i = 0; i < columns().num_health; ++i) {
+    const int column = columns().health + i;
     const double value = row.optional_real(column).value_or(-1.0);
     if (!(value >= 0.0 && value <= magnitude_max)) {
       row.refuse_as_damaged(fmt::format("{} of run {} (must be in [0, {}])",
                                         row.column_name(column), row.count(0), magnitude_max));
     }
-    health.*health_values()[i].member = value;
+    health.push_back(value);
   }
   return health;
 }
 
-std::int64_t read_choice(const Statement& row, int column, std::size_t count) {
+std::uint32_t read_choice(const Statement& row, int column, std::size_t count) {
   const std::int64_t value = row.integer(column);
-  if (value >= 1 && value <= static_cast<std::int64_t>(count)) return value;
+  if (value >= 1 && value <= static_cast<std::int64_t>(count)) {
+    return static_cast<std::uint32_t>(value);
+  }
   row.refuse_as_damaged(
       fmt::format("{} = {} of run {}", row.column_name(column), value, row.count(0)));
 }
 
 Loss read_loss(const Statement& row, RunStatus status) {
   if (status != RunStatus::lost) {
-    for (const int column : {loss_cause_column, loss_session_column}) {
+    for (const int column : {columns().loss_cause, columns().loss_session}) {
       if (!row.optional_count(column)) continue;
       row.refuse_as_damaged(
           fmt::format("{} of run {}, which is not lost", row.column_name(column), row.count(0)));
     }
     return {};
   }
-  return {.cause = static_cast<LossCause>(read_choice(row, loss_cause_column, num_loss_causes)),
-          .session = static_cast<SessionTarget>(
-              read_choice(row, loss_session_column, num_session_targets))};
-}
-
-// SQLite would read a missing number as 0.
-double read_value(const Statement& row, int column, bool is_known) {
-  const std::optional<double> value = row.optional_real(column);
-  if (is_known && !value) {
-    row.refuse_as_damaged(
-        fmt::format("{} = NULL of run {}", row.column_name(column), row.count(0)));
-  }
-  return value.value_or(0.0);
+  const ResultSchema& schema = model().results();
+  return {.cause = read_choice(row, columns().loss_cause, schema.loss_causes.size()),
+          .session = read_choice(row, columns().loss_session, schema.loss_sessions.size())};
 }
 
 }  // namespace
@@ -150,26 +170,27 @@ bool ResultRows::insert(const RunResult& result) {
   insert_.bind(2, static_cast<std::int64_t>(result.status));
   insert_.bind(3, result.num_draws);
   insert_.bind(4, result.num_rounds);
-  for (const ParameterInfo& info : parameter_infos()) {
-    const std::size_t i = index(info.parameter);
-    const auto truth = result.has_truth() ? std::optional(result.truth[i]) : std::nullopt;
-    const auto estimate = result.has_estimate() ? std::optional(result.estimate[i]) : std::nullopt;
-    insert_.bind(truth_column(info) + 1, truth);
-    insert_.bind(estimate_column(info) + 1, estimate);
-  }
-  for (std::size_t i = 0; i < num_health_values; ++i) {
-    const auto value =
-        result.health ? std::optional((*result.health).*health_values()[i].member) : std::nullopt;
-    insert_.bind(first_health_column + static_cast<int>(i) + 1, value);
-  }
-  const auto choice = [&](auto value) {
-    return result.status == RunStatus::lost ? std::optional(static_cast<std::uint64_t>(value))
-                                            : std::nullopt;
+  bind(columns().truth, columns().num_quantities, result.truth, result.has_truth());
+  bind(columns().estimate, columns().num_quantities, result.estimate, result.has_estimate());
+  bind(columns().standard_error, columns().num_standard_errors, result.standard_error,
+       !result.standard_error.empty());
+  bind(columns().health, columns().num_health, result.health, !result.health.empty());
+  const bool is_lost = result.status == RunStatus::lost;
+  const auto choice = [&](std::uint32_t value) {
+    return is_lost ? std::optional(std::uint64_t{value}) : std::nullopt;
   };
-  insert_.bind(loss_cause_column + 1, choice(result.loss.cause));
-  insert_.bind(loss_session_column + 1, choice(result.loss.session));
+  insert_.bind(columns().loss_cause + 1, choice(result.loss.cause));
+  insert_.bind(columns().loss_session + 1, choice(result.loss.session));
   insert_.finish();
   return database_.num_changes() == 1;
+}
+
+void ResultRows::bind(int first, int count, const std::vector<double>& values, bool have_meaning) {
+  PROOFMASS_EXPECT(!have_meaning || values.size() == static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    insert_.bind(first + i + 1,
+                 have_meaning ? std::optional(values[static_cast<std::size_t>(i)]) : std::nullopt);
+  }
 }
 
 RunResult ResultRows::read(RunIndex run) {
@@ -195,10 +216,11 @@ RunResult read_result(const Statement& row) {
                    .status = read_status(row),
                    .num_draws = read_number(row, 2),
                    .num_rounds = read_number(row, 3)};
-  for (const ParameterInfo& info : parameter_infos()) {
-    result.truth[index(info.parameter)] = read_value(row, truth_column(info), result.has_truth());
-    result.estimate[index(info.parameter)] =
-        read_value(row, estimate_column(info), result.has_estimate());
+  const Columns& at = columns();
+  if (result.has_truth()) result.truth = read_values(row, at.truth, at.num_quantities);
+  if (result.has_estimate()) result.estimate = read_values(row, at.estimate, at.num_quantities);
+  if (has_value(row, at.standard_error, at.num_standard_errors)) {
+    result.standard_error = read_values(row, at.standard_error, at.num_standard_errors);
   }
   result.health = read_health(row);
   result.loss = read_loss(row, result.status);
@@ -210,8 +232,9 @@ bool are_equal(const RunResult& left, const RunResult& right) {
   return left.run == right.run && left.status == right.status &&
          left.num_draws == right.num_draws && left.num_rounds == right.num_rounds &&
          (!left.has_truth() || left.truth == right.truth) &&
-         (!left.has_estimate() || left.estimate == right.estimate) && left.health == right.health &&
-         left.loss == right.loss;
+         (!left.has_estimate() ||
+          (left.estimate == right.estimate && left.standard_error == right.standard_error)) &&
+         left.health == right.health && left.loss == right.loss;
 }
 
 std::uint64_t digest(const RunResult& result) {
@@ -224,13 +247,11 @@ std::uint64_t digest(const RunResult& result) {
   }
   if (result.has_truth()) digest = digest_with(digest, result.truth);
   if (result.has_estimate()) digest = digest_with(digest, result.estimate);
-  if (!result.health) return digest;
-  for (const HealthValue& value : health_values()) {
-    digest = digest_with(digest, (*result.health).*value.member);
-  }
+  digest = digest_with(digest, result.standard_error);
+  digest = digest_with(digest, result.health);
   if (result.status != RunStatus::lost) return digest;
-  digest = digest_with(digest, static_cast<std::uint64_t>(result.loss.cause));
-  return digest_with(digest, static_cast<std::uint64_t>(result.loss.session));
+  digest = digest_with(digest, std::uint64_t{result.loss.cause});
+  return digest_with(digest, std::uint64_t{result.loss.session});
 }
 
 void check_delivery(const Delivery& delivery, std::uint64_t num_runs) {
@@ -240,7 +261,7 @@ void check_delivery(const Delivery& delivery, std::uint64_t num_runs) {
                                  result.run.value, num_runs));
   }
   try {
-    require_in_range(result);
+    require_in_range(result, model().results());
   } catch (const Error& error) {
     throw StoreError(fmt::format("run_result.{}", error.what()));
   }

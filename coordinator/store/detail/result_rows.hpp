@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/records.hpp"
@@ -8,7 +9,7 @@
 
 namespace proofmass::coordinator::detail {
 
-/// Results as rows of `run_result`; the columns follow from parameter_infos().
+/// Results as rows of `run_result`; the columns follow from the model's ResultSchema.
 class ResultRows {
  public:
   explicit ResultRows(const Database& database);
@@ -20,6 +21,8 @@ class ResultRows {
   [[nodiscard]] RunResult read(RunIndex run);
 
  private:
+  void bind(int first, int count, const std::vector<double>& values, bool have_meaning);
+
   const Database& database_;
   Statement insert_;
   Statement select_;

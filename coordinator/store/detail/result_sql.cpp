@@ -5,89 +5,104 @@
 #include <algorithm>
 #include <cstddef>
 #include <map>
-#include <span>
 #include <vector>
 
-#include "core/campaign/loop_health.hpp"
-#include "core/campaign/parameter.hpp"
-#include "core/campaign/run_result.hpp"
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
-#include "core/session/session_names.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
 
 constexpr std::string_view next_column = ",\n  ";
 
-std::string column_name(const ParameterInfo& info) {
-  return fmt::format("{}{}", info.name, info.unit_suffix);
-}
+const std::vector<Quantity>& quantities() { return model().results().quantities; }
 
 /// What `text_of` yields for each parameter, one a line.
 template <typename TextOf>
 std::string for_each_parameter(std::string_view separator, const TextOf& text_of) {
   std::string text;
-  for (const ParameterInfo& info : parameter_infos()) {
+  for (const Quantity& quantity : quantities()) {
     if (!text.empty()) text += separator;
-    text += text_of(info);
+    text += text_of(quantity);
   }
   return text;
 }
 
 /// Columns that are NULL where `is_absent` holds.
 std::string value_columns(std::string_view prefix, std::string_view is_absent) {
-  return for_each_parameter(next_column, [&](const ParameterInfo& info) {
-    const std::string name = fmt::format("{}_{}", prefix, column_name(info));
+  return for_each_parameter(next_column, [&](const Quantity& quantity) {
+    const std::string name = fmt::format("{}_{}", prefix, quantity.column());
     return fmt::format("{0} REAL CHECK (({0} IS NULL) = ({1}))", name, is_absent);
   });
 }
 
 std::string error_columns() {
-  return for_each_parameter(next_column, [](const ParameterInfo& info) {
-    return fmt::format("error_{0} REAL AS (estimate_{0} - truth_{0})", column_name(info));
+  return for_each_parameter(next_column, [](const Quantity& quantity) {
+    return fmt::format("error_{0} REAL AS (estimate_{0} - truth_{0})", quantity.column());
   });
+}
+
+std::string standard_error_columns() {
+  std::string text;
+  for (const Quantity& quantity : quantities()) {
+    if (!quantity.has_standard_error) continue;
+    text += fmt::format("standard_error_{} REAL,\n  ", quantity.column());
+  }
+  return text;
 }
 
 std::string health_columns() {
   std::string text;
-  for (const HealthValue& value : health_values()) {
-    if (!text.empty()) text += next_column;
-    text += fmt::format("health_{}{} REAL", value.name, value.unit_suffix);
+  for (const HealthQuantity& quantity : model().results().health) {
+    text += fmt::format("health_{} REAL,\n  ", quantity.column());
   }
   return text;
 }
 
 std::string health_of_row() {
   std::string text;
-  for (const HealthValue& value : health_values()) {
-    if (!text.empty()) text += ",\n       ";
-    text += fmt::format("r.health_{0}{1} AS {0}{1}", value.name, value.unit_suffix);
+  for (const HealthQuantity& quantity : model().results().health) {
+    text += fmt::format("r.health_{0} AS {0},\n       ", quantity.column());
+  }
+  return text;
+}
+
+std::string data_tables() {
+  std::string text;
+  for (const DataTableSchema& table : model().results().tables) {
+    text += fmt::format("-- {}\nCREATE TABLE {} (\n  position INTEGER PRIMARY KEY", table.comment,
+                        table.table);
+    for (const std::string_view column : table.columns) {
+      text += fmt::format(",\n  {} REAL NOT NULL", column);
+    }
+    text += "\n) STRICT;\n";
   }
   return text;
 }
 
 std::string value_of_parameter(std::string_view prefix) {
+  int position = 0;
   return "CASE p.position" +
          for_each_parameter("",
-                            [&](const ParameterInfo& info) {
-                              return fmt::format("\n         WHEN {} THEN r.{}_{}",
-                                                 index(info.parameter) + 1, prefix,
-                                                 column_name(info));
+                            [&](const Quantity& quantity) {
+                              return fmt::format("\n         WHEN {} THEN r.{}_{}", ++position,
+                                                 prefix, quantity.column());
                             }) +
          " END";
 }
 
 std::string budget_total() {
-  return for_each_parameter("\n       + ", [](const ParameterInfo& info) {
+  return for_each_parameter("\n       + ", [](const Quantity& quantity) {
     return fmt::format(
         "abs(error_{}) * (SELECT ifnull(sum(value), 0.0) FROM budget_coefficient"
         " WHERE parameter = '{}')",
-        column_name(info), info.name);
+        quantity.column(), quantity.name);
   });
 }
 
 /// The names of choices that are stored as 1, 2, ...
 std::string name_of_choice(std::string_view column, const std::vector<std::string_view>& names) {
+  if (names.empty()) return "NULL";
   std::string text = fmt::format("CASE r.{}", column);
   std::size_t number = 0;
   for (const std::string_view name : names) {
@@ -96,33 +111,35 @@ std::string name_of_choice(std::string_view column, const std::vector<std::strin
   return text + " END";
 }
 
-template <typename Choice>
-std::vector<std::string_view> names_from_1(Choice last) {
+std::vector<std::string_view> status_names() {
   std::vector<std::string_view> names;
-  for (int value = 1; value <= static_cast<int>(last); ++value) {
-    names.push_back(name_of(static_cast<Choice>(value)));
+  for (int value = 1; value <= static_cast<int>(RunStatus::lost); ++value) {
+    names.push_back(name_of(static_cast<RunStatus>(value)));
   }
   return names;
 }
 
 std::map<std::string_view, std::string> texts() {
-  const std::span<const std::string_view> sessions = names_of(SessionTarget{});
-  const std::vector<std::string_view> session_names(sessions.begin(), sessions.end());
+  const ResultSchema& schema = model().results();
   return {
+      {"data_tables", data_tables()},
       {"truth_columns", value_columns("truth", "status = 4")},
       {"estimate_columns", value_columns("estimate", "status > 2")},
       {"error_columns", error_columns()},
+      {"standard_error_columns", standard_error_columns()},
       {"health_columns", health_columns()},
       {"health_values", health_of_row()},
-      {"status_name", name_of_choice("status", names_from_1(RunStatus::lost))},
-      {"loss_cause_name", name_of_choice("loss_cause", names_from_1(LossCause::square_noise))},
-      {"loss_session_name", name_of_choice("loss_session", session_names)},
+      {"status_name", name_of_choice("status", status_names())},
+      {"loss_cause_name", name_of_choice("loss_cause", schema.loss_causes)},
+      {"loss_session_name", name_of_choice("loss_session", schema.loss_sessions)},
       {"truth_of_parameter", value_of_parameter("truth")},
       {"estimate_of_parameter", value_of_parameter("estimate")},
       {"error_of_parameter", value_of_parameter("error")},
       {"budget_total", budget_total()},
-      {"num_sessions", std::to_string(sessions.size())},
-      {"session_names", fmt::format("{}", fmt::join(session_names, ", "))},
+      {"num_causes", std::to_string(schema.loss_causes.size())},
+      {"cause_names", fmt::format("{}", fmt::join(schema.loss_causes, ", "))},
+      {"num_sessions", std::to_string(schema.loss_sessions.size())},
+      {"session_names", fmt::format("{}", fmt::join(schema.loss_sessions, ", "))},
   };
 }
 

@@ -6,18 +6,19 @@
 namespace proofmass::coordinator::detail {
 
 /// The schema as SQL: replaces each word in braces of a file of schema/ by the text that follows
-/// from the quantities of a result, which are core's parameter_infos(), health_values() and the
-/// names of sessions.
+/// from the ResultSchema of the model.
 ///
+///     {data_tables}         the tables of data that all runs share
 ///     {truth_columns}       columns of run_result, one a line; also {estimate_columns},
-///                           {error_columns}, {health_columns}
+///                           {error_columns}; with a comma behind each {standard_error_columns},
+///                           {health_columns}
 ///     {status_name}         status of r, a row of run_result, as text; also {loss_cause_name},
 ///                           {loss_session_name}
-///     {health_values}       columns of r that begin with health_, without that
+///     {health_values}       columns of r that begin with health_, without that, likewise
 ///     {truth_of_parameter}  truth in r of the parameter p; also {estimate_of_parameter},
 ///                           {error_of_parameter}
 ///     {budget_total}        budget total that the errors of a row of run_result leave, m/s²
-///     {num_sessions}        also {session_names}
+///     {num_sessions}        also {session_names}, {num_causes}, {cause_names}
 [[nodiscard]] std::string with_quantities(std::string_view sql);
 
 }  // namespace proofmass::coordinator::detail

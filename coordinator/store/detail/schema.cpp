@@ -10,6 +10,7 @@
 
 #include "coordinator/store/detail/result_sql.hpp"
 #include "coordinator/store/store_error.hpp"
+#include "core/campaign/model.hpp"
 #include "proto/link/kill_point.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -74,9 +75,15 @@ std::int64_t version_of(const Database& database, const std::filesystem::path& p
 
 // Tables of as many rows as the campaign has runs, workers or lines of its environment: their pages
 // are checked when they are read.
-constexpr std::array<std::string_view, 9> large_tables{
-    "attempt",     "audit",      "delivery", "dispersion_value", "environment_row", "overrun",
-    "run_failure", "run_result", "worker"};
+constexpr std::array<std::string_view, 8> large_tables{"attempt",          "audit",   "delivery",
+                                                       "dispersion_value", "overrun", "run_failure",
+                                                       "run_result",       "worker"};
+
+bool is_large(const std::string& table) {
+  return std::ranges::find(large_tables, table) != large_tables.end() ||
+         std::ranges::find(model().results().tables, table, &DataTableSchema::table) !=
+             model().results().tables.end();
+}
 
 /// Names of the tables, those of SQLite's own among them.
 std::vector<std::string> table_names(const Database& database) {
@@ -95,7 +102,7 @@ std::uint64_t count_rows(const Database& database, const std::string& table) {
 // SQLite holds the size of the file against its header with the first page that it reads.
 void check_small_tables(const Database& database) {
   for (const std::string& table : table_names(database)) {
-    if (std::ranges::find(large_tables, table) == large_tables.end()) {
+    if (!is_large(table)) {
       (void)count_rows(database, table);
     } else {
       database.prepare(fmt::format("SELECT 1 FROM \"{}\" NOT INDEXED LIMIT 1", table)).finish();

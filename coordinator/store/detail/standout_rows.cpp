@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <string_view>
+
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -29,34 +33,33 @@ WorstRunTable read_worst_runs(const Database& database) {
   Statement select =
       database.prepare("SELECT magnitude, run_index FROM worst_run WHERE parameter = ?");
   WorstRunTable table;
-  for (const ParameterInfo& info : parameter_infos()) {
-    select.bind_all(info.name);
+  for (const Quantity& quantity : model().results().quantities) {
+    WorstRuns& worst = table.emplace_back();
+    select.bind_all(quantity.name);
     while (select.step()) {
-      table[index(info.parameter)].offer(
-          {.magnitude = select.real(0), .run = RunIndex{select.count(1)}});
+      worst.offer({.magnitude = select.real(0), .run = RunIndex{select.count(1)}});
     }
   }
   return table;
 }
 
-ParameterArray read_objectives(const Database& database) {
+std::vector<double> read_objectives(const Database& database) {
   Statement select = database.prepare("SELECT objective FROM parameter WHERE parameter = ?");
-  ParameterArray objectives{};
-  for (const ParameterInfo& info : parameter_infos()) {
-    select.bind_all(info.name);
+  std::vector<double> objectives;
+  for (const Quantity& quantity : model().results().quantities) {
+    select.bind_all(quantity.name);
     if (!select.step()) database.refuse("is damaged: it lacks a parameter");
-    objectives[index(info.parameter)] = select.real(0);
+    objectives.push_back(select.optional_real(0).value_or(std::numeric_limits<double>::infinity()));
     select.finish();
   }
   return objectives;
 }
 
-std::uint64_t exceeded_objectives(const RunResult& result, const ParameterArray& objectives) {
+std::uint64_t exceeded_objectives(const RunResult& result, std::span<const double> objectives) {
   std::uint64_t exceeded = 0;
   if (!result.has_estimate()) return exceeded;
-  for (const ParameterInfo& info : parameter_infos()) {
-    const std::size_t i = index(info.parameter);
-    const bool is_beyond = std::abs(result.error(info.parameter)) > objectives[i];
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    const bool is_beyond = std::abs(result.error(i)) > objectives[i];
     exceeded |= std::uint64_t{is_beyond} << i;
   }
   return exceeded;
@@ -74,12 +77,12 @@ void StandoutRows::add(const RunResult& result) {
   if (!result.has_estimate()) return;
   const std::uint64_t exceeded = exceeded_objectives(result, objectives_);
   if (exceeded != 0) insert_overrun_.run(result.run.value, exceeded);
-  for (const ParameterInfo& info : parameter_infos()) {
-    const double magnitude = std::abs(result.error(info.parameter));
-    const WorstRuns::Change change =
-        worst_[index(info.parameter)].offer({.magnitude = magnitude, .run = result.run});
-    if (change.dropped) delete_worst_.run(info.name, change.dropped->value);
-    if (change.is_taken) insert_worst_.run(info.name, result.run.value, magnitude);
+  for (std::size_t i = 0; i < worst_.size(); ++i) {
+    const double magnitude = std::abs(result.error(i));
+    const std::string_view name = model().results().quantities[i].name;
+    const WorstRuns::Change change = worst_[i].offer({.magnitude = magnitude, .run = result.run});
+    if (change.dropped) delete_worst_.run(name, change.dropped->value);
+    if (change.is_taken) insert_worst_.run(name, result.run.value, magnitude);
   }
 }
 

@@ -1,13 +1,12 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "coordinator/store/detail/database.hpp"
-#include "core/campaign/parameter.hpp"
 #include "core/campaign/run_result.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -43,17 +42,17 @@ class WorstRuns {
 };
 
 /// The worst runs of each parameter, by its index.
-using WorstRunTable = std::array<WorstRuns, num_parameters>;
+using WorstRunTable = std::vector<WorstRuns>;
 
 /// The rows of `worst_run`.
 [[nodiscard]] WorstRunTable read_worst_runs(const Database& database);
 
-/// Largest acceptable |error| of each parameter, SI.
-[[nodiscard]] ParameterArray read_objectives(const Database& database);
+/// Largest acceptable |error| of each parameter, SI; infinite if there is none.
+[[nodiscard]] std::vector<double> read_objectives(const Database& database);
 
 /// Which parameters have an |error| above their objective: bit i for the one with index i.
 [[nodiscard]] std::uint64_t exceeded_objectives(const RunResult& result,
-                                                const ParameterArray& objectives);
+                                                std::span<const double> objectives);
 
 /// Keeps `overrun` and `worst_run` in step with `run_result`. Knows the rows that are there: to be
 /// thrown away with a transaction that is rolled back.
@@ -65,7 +64,7 @@ class StandoutRows {
   void add(const RunResult& result);
 
  private:
-  ParameterArray objectives_;
+  std::vector<double> objectives_;
   WorstRunTable worst_;
   Statement insert_overrun_;
   Statement insert_worst_;

@@ -1,21 +1,24 @@
 #include "coordinator/store/detail/statistic_rows.hpp"
 
+#include <fmt/format.h>
+
 #include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
 
 double entry_of(const Budget& budget, std::size_t i) {
-  return i < num_budget_entries ? budget.entries[i] : budget.total;
+  return i < budget.entries.size() ? budget.entries[i] : budget.total;
 }
 
-std::optional<double> entry_of(const Budget* budget, std::size_t i) {
-  return budget == nullptr ? std::nullopt : std::optional(entry_of(*budget, i));
+std::optional<double> entry_of(const std::optional<Budget>& budget, std::size_t i) {
+  return budget ? std::optional(entry_of(*budget, i)) : std::nullopt;
 }
 
 constexpr int num_statistic_columns = 33;
@@ -76,13 +79,12 @@ class StatisticRow {
 void replace_statistics(Database& database, const CampaignStatistics& statistics) {
   database.execute("DELETE FROM statistic");
   if (statistics.num_estimated == 0) return;
-  std::string places = "?";
-  for (int column = 1; column < num_statistic_columns; ++column) places += ", ?";
-  StatisticRow row(database.prepare("INSERT INTO statistic VALUES (" + places + ")"));
-  for (const ParameterInfo& info : parameter_infos()) {
-    row.put(info.name);
+  StatisticRow row(database.prepare(
+      fmt::format("INSERT INTO statistic VALUES ({})", places(num_statistic_columns))));
+  for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
+    row.put(model().results().quantities[i].name);
     row.put(statistics.num_estimated);
-    row.put(statistics.accuracy[index(info.parameter)]);
+    row.put(statistics.accuracy[i]);
     row.insert();
   }
 }
@@ -135,16 +137,22 @@ std::optional<Summary> read_summary(const Database& database) {
                  .computed_utc = select.text(7)};
 }
 
-void replace_budgets(Database& database, const Budgets& budgets) {
+void replace_budgets(Database& database, const std::optional<ErrorBudget>& budget,
+                     const CampaignStatistics& statistics) {
   database.execute("DELETE FROM budget_entry");
+  if (!budget) return;
+  const auto after = [&](const std::vector<double>& errors) {
+    return statistics.num_estimated > 0 ? std::optional(budget->after(errors)) : std::nullopt;
+  };
+  const std::optional<Budget> after_worst = after(statistics.worst_errors());
+  const std::optional<Budget> after_mean = after(statistics.mean_errors());
   Statement insert =
       database.prepare("INSERT INTO budget_entry VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
-  for (std::size_t i = 0; i <= num_budget_entries; ++i) {
-    const BudgetEntryInfo& info =
-        i < num_budget_entries ? budget_entry_infos()[i] : budget_total_info;
-    insert.run(i + 1, info.name, info.label, entry_of(budgets.before, i),
-               entry_of(budgets.after_worst, i), entry_of(budgets.after_mean, i), info.paper_before,
-               info.paper_after_worst, info.paper_after_mean);
+  for (std::size_t i = 0; i <= budget->infos.size(); ++i) {
+    const BudgetEntryInfo& info = i < budget->infos.size() ? budget->infos[i] : budget->total_info;
+    insert.run(i + 1, info.name, info.label, entry_of(budget->before, i), entry_of(after_worst, i),
+               entry_of(after_mean, i), info.paper_before, info.paper_after_worst,
+               info.paper_after_mean);
   }
 }
 

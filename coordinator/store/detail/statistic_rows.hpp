@@ -4,7 +4,7 @@
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/records.hpp"
-#include "core/campaign/budget.hpp"
+#include "core/campaign/error_budget.hpp"
 #include "core/campaign/statistics.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -17,14 +17,9 @@ void replace_summary(const Database& database, const CampaignStatistics& statist
                      const ResultDigests& digests);
 [[nodiscard]] std::optional<Summary> read_summary(const Database& database);
 
-/// A campaign's three budgets; those after calibration are absent while no run has an estimate.
-struct Budgets {
-  const Budget& before;
-  const Budget* after_worst;
-  const Budget* after_mean;
-};
-
-/// Replaces the rows of `budget_entry`.
-void replace_budgets(Database& database, const Budgets& budgets);
+/// Replaces the rows of `budget_entry`; those after calibration are absent while no run has an
+/// estimate. Leaves none without a budget.
+void replace_budgets(Database& database, const std::optional<ErrorBudget>& budget,
+                     const CampaignStatistics& statistics);
 
 }  // namespace proofmass::coordinator::detail

@@ -1,11 +1,12 @@
 #include "coordinator/store/detail/table_digest.hpp"
 
+#include <fmt/format.h>
+
 #include "coordinator/store/sha256.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
-
-constexpr int num_environment_numbers = 7;
 
 // How the campaign is served is left out: it changes while a coordinator has the file.
 void add_campaign(const Database& database, Sha256& hash) {
@@ -16,15 +17,15 @@ void add_campaign(const Database& database, Sha256& hash) {
   for (int column = 0; column < row.num_columns(); ++column) hash.add(row.shown(column));
 }
 
-void add_environment(const Database& database, Sha256& hash) {
-  hash.add(database.count("SELECT count(*) FROM environment_row"));
-  Statement row = database.prepare(
-      "SELECT position, time_s, linear_x_m_s2, linear_y_m_s2, linear_z_m_s2,"
-      " angular_x_rad_s2, angular_y_rad_s2, angular_z_rad_s2 FROM environment_row"
-      " ORDER BY position");
-  while (row.step()) {
-    hash.add(row.count(0));
-    for (int column = 1; column <= num_environment_numbers; ++column) hash.add(row.real(column));
+void add_data_tables(const Database& database, Sha256& hash) {
+  for (const DataTableSchema& table : model().results().tables) {
+    hash.add(database.count(fmt::format("SELECT count(*) FROM {}", table.table)));
+    Statement row = database.prepare(fmt::format("SELECT position, {} FROM {} ORDER BY position",
+                                                 fmt::join(table.columns, ", "), table.table));
+    while (row.step()) {
+      hash.add(row.count(0));
+      for (int column = 1; column < row.num_columns(); ++column) hash.add(row.real(column));
+    }
   }
 }
 
@@ -44,7 +45,7 @@ void add_dispersions(const Database& database, Sha256& hash) {
 std::string compute_table_digest(const Database& database) {
   Sha256 hash;
   add_campaign(database, hash);
-  add_environment(database, hash);
+  add_data_tables(database, hash);
   add_dispersions(database, hash);
   return hash.finish();
 }

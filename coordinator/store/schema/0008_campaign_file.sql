@@ -43,24 +43,14 @@ CREATE TABLE parameter (
   parameter                 TEXT NOT NULL UNIQUE,
   label                     TEXT NOT NULL,
   unit                      TEXT NOT NULL,
-  objective                 REAL NOT NULL CHECK (objective > 0),  -- largest acceptable |error|
-  paper_worst               REAL NOT NULL,                        -- [Hardy2013], |error|
-  paper_mean                REAL NOT NULL,
-  paper_standard_deviation  REAL NOT NULL
+  objective                 REAL CHECK (objective > 0),  -- largest acceptable |error|; NULL: none
+  paper_worst               REAL,                        -- |error| as published; NULL: nothing is
+  paper_mean                REAL,
+  paper_standard_deviation  REAL
 ) STRICT;
 
--- The environment file; empty if the environment is harmonic. Accelerations in the satellite frame.
-CREATE TABLE environment_row (
-  position          INTEGER PRIMARY KEY,
-  time_s            REAL NOT NULL,  -- from perigee
-  linear_x_m_s2     REAL NOT NULL,
-  linear_y_m_s2     REAL NOT NULL,
-  linear_z_m_s2     REAL NOT NULL,
-  angular_x_rad_s2  REAL NOT NULL,
-  angular_y_rad_s2  REAL NOT NULL,
-  angular_z_rad_s2  REAL NOT NULL
-) STRICT;
-
+-- Data that all runs share, as the files that the definition names hold it; empty without a file.
+{data_tables}
 -- Values of the drawn quantities whose law is a table, one for each run; unit as in the definition.
 CREATE TABLE dispersion_value (
   quantity   TEXT NOT NULL,
@@ -109,10 +99,10 @@ CREATE TABLE run_result (
 
   {error_columns},
 
-  {health_columns},
-
-  -- 1 saturation, 2 attitude, 3 residual, 4 quadratic noise, 5 square noise
-  loss_cause    INTEGER CHECK (loss_cause BETWEEN 1 AND 5)
+  {standard_error_columns}
+  {health_columns}
+  -- 1 to {num_causes}: {cause_names}
+  loss_cause    INTEGER CHECK (loss_cause BETWEEN 1 AND {num_causes})
                         CHECK ((loss_cause IS NULL) = (status <> 5)),
   -- 1 to {num_sessions}: {session_names}
   loss_session  INTEGER CHECK (loss_session BETWEEN 1 AND {num_sessions})
@@ -356,8 +346,7 @@ FROM run_result AS r JOIN delivery AS d USING (run_index) JOIN worker AS w USING
 -- One row a run that has a draw.
 CREATE VIEW loop_health AS
 SELECT r.run_index, {status_name} AS status,
-       {health_values},
-       {loss_cause_name} AS loss_cause,
+       {health_values}{loss_cause_name} AS loss_cause,
        {loss_session_name} AS loss_session
 FROM run_result AS r
 WHERE r.status <> 4

@@ -20,18 +20,15 @@ std::string_view without_blanks_in_front(std::string_view text) {
   return text.substr(std::min(text.find_first_not_of(" \t"), text.size()));
 }
 
-std::string parameter_names() {
-  std::string names;
-  for (const ParameterInfo& info : parameter_infos()) {
-    names += fmt::format("{}{}", names.empty() ? "" : ", ", info.name);
-  }
-  return names;
-}
-
 }  // namespace
 
-Phrase::Phrase(std::string_view field, std::string_view text, std::string_view form)
-    : field_(field), text_(text), form_(form), rest_(without_blanks_in_front(text)) {}
+Phrase::Phrase(std::string_view field, std::string_view text, std::string_view form,
+               std::span<const std::string_view> parameters)
+    : field_(field),
+      text_(text),
+      form_(form),
+      parameters_(parameters),
+      rest_(without_blanks_in_front(text)) {}
 
 std::string_view Phrase::word() {
   const auto end = std::ranges::find_if_not(rest_, is_word_part);
@@ -41,12 +38,11 @@ std::string_view Phrase::word() {
   return word;
 }
 
-Parameter Phrase::parameter() {
+std::size_t Phrase::parameter() {
   const std::string_view name = word();
-  for (const ParameterInfo& info : parameter_infos()) {
-    if (info.name == name) return info.parameter;
-  }
-  refuse(fmt::format("{} is no parameter; they are {}", name, parameter_names()));
+  const auto found = std::ranges::find(parameters_, name);
+  if (found != parameters_.end()) return static_cast<std::size_t>(found - parameters_.begin());
+  refuse(fmt::format("{} is no parameter; they are {}", name, fmt::join(parameters_, ", ")));
 }
 
 double Phrase::positive_number() {

@@ -1,8 +1,8 @@
 #pragma once
 
+#include <cstddef>
+#include <span>
 #include <string_view>
-
-#include "core/campaign/parameter.hpp"
 
 namespace proofmass::detail {
 
@@ -12,14 +12,16 @@ namespace proofmass::detail {
 /// Each reader throws ConfigError, `field = phrase (rule)`, if something else follows.
 class Phrase {
  public:
-  /// @param form  How the whole phrase must read, for messages.
-  /// All three must outlive the object.
-  Phrase(std::string_view field, std::string_view text, std::string_view form);
+  /// @param form        How the whole phrase must read, for messages.
+  /// @param parameters  Names of the parameters.
+  /// All four must outlive the object.
+  Phrase(std::string_view field, std::string_view text, std::string_view form,
+         std::span<const std::string_view> parameters);
 
   /// Letters, digits and underscores.
   [[nodiscard]] std::string_view word();
-  /// The name of a parameter.
-  [[nodiscard]] Parameter parameter();
+  /// The name of a parameter, as its position among the names.
+  [[nodiscard]] std::size_t parameter();
   /// A finite number > 0.
   [[nodiscard]] double positive_number();
   /// A number and `%`, as a fraction in (0, 1).
@@ -39,6 +41,7 @@ class Phrase {
   [[noreturn]] void refuse_form() const;
 
   std::string_view field_, text_, form_;
+  std::span<const std::string_view> parameters_;
   std::string_view rest_;  ///< What is not yet read, without blanks in front.
 };
 

@@ -9,21 +9,22 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::test {
 
 /// The paper's campaign with sessions of five orbits at 1 Hz: a batch takes a tenth of a second.
-inline Campaign quick_campaign(std::uint64_t num_runs) {
-  Campaign campaign = campaign_of(num_runs);
+inline MicroscopeCampaign quick_campaign(std::uint64_t num_runs) {
+  MicroscopeCampaign campaign = campaign_of(num_runs);
   campaign.scenario.simulation.sample_period_s = 1.0;
   for (Session& session : campaign.scenario.sessions) session.num_orbits = 5;
   return campaign;
 }
 
 /// The results that the runs of a campaign have.
-inline std::vector<RunResult> simulated(const Campaign& campaign) {
+inline std::vector<RunResult> simulated(const MicroscopeCampaign& campaign) {
   const RunPlan plan(campaign);
   std::vector<RunResult> results;
   for (std::uint64_t run = 0; run < campaign.num_runs;) {
@@ -38,7 +39,8 @@ inline std::vector<RunResult> simulated(const Campaign& campaign) {
 }
 
 /// A file with these results of a campaign, without statistics.
-inline coordinator::Store store_of(const std::filesystem::path& file, const Campaign& campaign,
+inline coordinator::Store store_of(const std::filesystem::path& file,
+                                   const MicroscopeCampaign& campaign,
                                    const std::vector<RunResult>& results) {
   using namespace coordinator;
   Store store = Store::create(file, campaign, canonical_definition(campaign));

@@ -17,6 +17,7 @@
 #include "coordinator/report/summarise.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/coordinator/archive/damaged_file.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -39,7 +40,7 @@ class BitFlips : public test::StoreTest {
     (void)store.write(entries);
     store.set_stop_plan(
         {.stop_rule = "mean(k2c) within 90%", .num_runs_max = 20, .failures_max = {}});
-    (void)summarise_file(file(), Scenario{},
+    (void)summarise_file(file(), MicroscopeCampaign{},
                          [&](const std::function<void(Store&)>& action) { action(store); });
     const Entry finished = CampaignControl{.phase = wire::CampaignPhase::finished};
     (void)store.write({&finished, 1});
@@ -58,7 +59,7 @@ class BitFlips : public test::StoreTest {
   [[nodiscard]] std::string report_of(const std::filesystem::path& path) const {
     return printed([&] {
       const Store store = Store::open_read_only(path);
-      return report_text(store, stored_campaign(store).scenario);
+      return report_text(store, *stored_campaign(store));
     });
   }
 
@@ -153,15 +154,16 @@ class RowsOutOfOrder : public BitFlips {
     const Store store = Store::open_read_only(file());
     const std::string expected = "campaign file = " + file().string() + " (is damaged: " + reason +
                                  "; restore it from a copy)";
-    EXPECT_EQ(message([&] { (void)report_text(store, Scenario{}); }), expected);
-    EXPECT_EQ(message([&] { (void)read_results(store, Scenario{}); }), expected);
+    EXPECT_EQ(message([&] { (void)report_text(store, MicroscopeCampaign{}); }), expected);
+    EXPECT_EQ(message([&] { (void)read_results(store, MicroscopeCampaign{}); }), expected);
     EXPECT_EQ(message([&] {
                 TextOutput output(directory() / "export");
                 export_csv(store, output, test::never_stopped);
               }),
               expected);
     EXPECT_EQ(message([&] {
-                (void)summarise_file(file(), Scenario{}, [](const std::function<void(Store&)>&) {});
+                (void)summarise_file(file(), MicroscopeCampaign{},
+                                     [](const std::function<void(Store&)>&) {});
               }),
               expected);
   }

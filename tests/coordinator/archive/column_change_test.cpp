@@ -8,6 +8,7 @@
 
 #include "coordinator/report/summarise.hpp"
 #include "tests/coordinator/archive/verification_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -92,7 +93,7 @@ class ColumnChange : public test::VerificationTest {
     (void)store.write(entries);
     store.set_stop_plan(
         {.stop_rule = "mean(k2c) within 90%", .num_runs_max = 18, .failures_max = 5});
-    (void)summarise_file(file(), campaign_.scenario,
+    (void)summarise_file(file(), campaign_,
                          [&](const std::function<void(Store&)>& action) { action(store); });
     store.record_stop_check(17, "mean(k2c)", *first_check());
     const Entry finished = CampaignControl{.phase = wire::CampaignPhase::finished};
@@ -103,7 +104,7 @@ class ColumnChange : public test::VerificationTest {
   [[nodiscard]] std::optional<StopCheck> first_check() const {
     std::vector<double> errors;
     for (const RunResult& result : results_) {
-      errors.push_back(std::abs(result.error(Parameter::k2c)));
+      errors.push_back(std::abs(result.error(index(Parameter::k2c))));
     }
     return check_stop_rule(parse_stop_rule("mean(k2c) within 90%"), errors);
   }

@@ -9,9 +9,11 @@
 
 #include "coordinator/archive/comparison_text.hpp"
 #include "coordinator/report/text_cells.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "core/statistics/error_change.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/core/statistics/columns.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -20,7 +22,7 @@ using ::testing::HasSubstr;
 
 /// A campaign with its results.
 struct Side {
-  Campaign campaign;
+  MicroscopeCampaign campaign;
   std::string model_version = "model";
   std::string build = "build";
   std::vector<RunResult> results = {};
@@ -28,7 +30,7 @@ struct Side {
 };
 
 ComparedCampaign compared(const Side& side) {
-  return {.campaign = side.campaign,
+  return {.campaign = side.campaign.clone(),
           .model_version = side.model_version,
           .build = side.build,
           .num_given_up = side.num_given_up,
@@ -48,7 +50,7 @@ CampaignComparison compare_campaigns(const Side& first, const Side& second) {
 Side side(std::uint64_t count) {
   Side side{.campaign = test::campaign_of(count)};
   for (std::uint64_t run = 0; run < count; ++run) {
-    RunResult result{.run = RunIndex{run}, .num_draws = 1, .num_rounds = 2};
+    RunResult result = test::zero_result({.run = RunIndex{run}, .num_draws = 1, .num_rounds = 2});
     for (std::size_t i = 0; i < num_parameters; ++i) {
       result.truth[i] = static_cast<double>(run * i);
       const double error = static_cast<double>((i + 1) * (run + 1));
@@ -63,7 +65,7 @@ Side side(std::uint64_t count) {
 void worsen(Side& side, Parameter parameter, double change) {
   for (RunResult& result : side.results) {
     const double larger = change * static_cast<double>(result.run.value + 1);
-    result.estimate[index(parameter)] += std::copysign(larger, result.error(parameter));
+    result.estimate[index(parameter)] += std::copysign(larger, result.error(index(parameter)));
   }
 }
 
@@ -276,10 +278,10 @@ using ComparedFile = test::StoreTest;
 
 // Results that were changed are refused before anything is made of them.
 TEST_F(ComparedFile, IsHeldAgainstItsDigestWhenItIsReadFirst) {
-  const Campaign campaign = test::campaign_of(5);
+  const MicroscopeCampaign campaign = test::campaign_of(5);
   {
     Store store = test::store_of(file(), campaign, test::results_of_each_status(5));
-    update_statistics(store, campaign.scenario);
+    update_statistics(store, campaign);
   }
   test::change(file(), "UPDATE run_result SET num_rounds = num_rounds + 1 WHERE run_index = 0");
   const Store store = Store::open_read_only(file());
@@ -294,7 +296,7 @@ TEST_F(ComparedFile, IsReadWithAllThatCounts) {
   const auto results = test::results_of_each_status(5);
   const Store store = test::store_of(file(), test::campaign_of(9), results);
   const ComparedCampaign read = read_compared(store, test::never_stopped);
-  EXPECT_EQ(read.campaign.num_runs, 9U);
+  EXPECT_EQ(read.campaign->num_runs, 9U);
   EXPECT_EQ(read.model_version, model_version);
   EXPECT_EQ(read.build, store.build());
   for (int walk = 0; walk < 2; ++walk) {

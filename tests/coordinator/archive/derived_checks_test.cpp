@@ -178,7 +178,7 @@ TEST_F(DerivedChecks, HoldIfARunIsGivenUpLater) {
   results_.pop_back();
   {
     Store store = test::store_of(file(), campaign_, results_);
-    update_statistics(store, campaign_.scenario);
+    update_statistics(store, campaign_);
     const Entry given_up = GivenUpRun{.run = RunIndex{17}};
     (void)store.write({&given_up, 1});
   }
@@ -194,7 +194,7 @@ TEST_F(DerivedChecks, AreOfOneStateOfTheFile) {
     if (check.name != "results") return;
     const Delivery last{.result = results_[17], .worker = test::session_1, .attempt = {1}};
     (void)store.commit({&last, 1});
-    update_statistics(store, campaign_.scenario);
+    update_statistics(store, campaign_);
   };
   EXPECT_TRUE(verify(file(), {.fraction = 0.0}, end_campaign, test::never_stopped));
   EXPECT_EQ(check("statistics").finding,
@@ -218,7 +218,7 @@ TEST_F(DerivedChecks, HoldWorkersAgainstTheirDeliveries) {
 TEST_F(DerivedChecks, HoldIfASecondResultIsTheSame) {
   {
     Store store = test::store_of(file(), campaign_, results_);
-    update_statistics(store, campaign_.scenario);
+    update_statistics(store, campaign_);
     const Delivery again{.result = results_[5], .worker = {7}, .attempt = {2}, .compute_s = 9.0};
     (void)store.commit({&again, 1});
   }
@@ -229,7 +229,7 @@ TEST_F(DerivedChecks, HoldIfASecondResultIsTheSame) {
 TEST_F(DerivedChecks, FindResultsThatContradictEachOther) {
   {
     Store store = test::store_of(file(), campaign_, results_);
-    update_statistics(store, campaign_.scenario);
+    update_statistics(store, campaign_);
     Delivery second{.result = results_[5], .worker = {7}, .attempt = {2}};
     second.result.estimate[0] *= 2.0;
     const std::vector<Entry> entries{WorkerJoined{.session = {7}, .name = "liar", .host = "h"},
@@ -263,7 +263,7 @@ class DerivedStopChecks : public DerivedChecks {
   }
   void decide(Store& store, const std::string& rule) {
     store.set_stop_plan({.stop_rule = rule, .num_runs_max = 18, .failures_max = {}});
-    (void)summarise_file(file(), campaign_.scenario,
+    (void)summarise_file(file(), campaign_,
                          [&](const std::function<void(Store&)>& action) { action(store); });
     const Entry finished = CampaignControl{.phase = wire::CampaignPhase::finished};
     (void)store.write({&finished, 1});

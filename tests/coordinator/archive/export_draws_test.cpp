@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "coordinator/archive/export.hpp"
-#include "core/campaign/draw.hpp"
+#include "core/microscope/campaign/draw.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 
@@ -27,8 +27,8 @@ constexpr std::size_t table_element = 25;
 
 /// Laws of several kinds, two of them tables; wide misalignments, so that many a draw is rejected;
 /// a scale factor that is never accepted in one run.
-Campaign varied_campaign(std::uint64_t count = num_runs) {
-  Campaign campaign = test::campaign_of(count);
+MicroscopeCampaign varied_campaign(std::uint64_t count = num_runs) {
+  MicroscopeCampaign campaign = test::campaign_of(count);
   campaign.seed = 20260314;
   auto& laws = campaign.dispersions;
   for (std::size_t i = 6; i < 12; ++i) {
@@ -51,7 +51,7 @@ Campaign varied_campaign(std::uint64_t count = num_runs) {
 using Bits = std::map<std::pair<std::uint64_t, std::string>, std::optional<std::uint64_t>>;
 
 /// Drawn once more, by the laws and the rule of acceptance alone.
-Bits drawn_again(const Campaign& campaign, const std::vector<std::uint64_t>& runs) {
+Bits drawn_again(const MicroscopeCampaign& campaign, const std::vector<std::uint64_t>& runs) {
   Bits bits;
   for (const std::uint64_t run : runs) {
     std::optional<DrawnValues> accepted;
@@ -227,7 +227,7 @@ TEST_F(ExportDraws, AreOfTheStateThatTheRunsAreOf) {
   Store growing = Store::open(file());
   const auto grow = [&, is_first = true]() mutable {
     if (!std::exchange(is_first, false)) return false;
-    const Campaign more = varied_campaign(num_runs + 1);
+    const MicroscopeCampaign more = varied_campaign(num_runs + 1);
     growing.extend(more, canonical_definition(more));
     (void)growing.commit(test::deliveries_of(num_runs, num_runs + 1));
     return false;

@@ -10,6 +10,7 @@
 
 #include "coordinator/report/digest.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -126,9 +127,9 @@ Store store_with_health(const std::filesystem::path& file) {
   std::vector<Delivery> deliveries = test::deliveries_of(0, 3);
   RunResult& lost = deliveries[0].result;
   lost.status = RunStatus::lost;
-  lost.health = LoopHealth{2e-5, 1.0 / 3.0, 1e-12, 0.25, 1e90};
-  lost.loss = {LossCause::saturation, SessionTarget::k2_sensor_1};
-  deliveries[1].result.health = LoopHealth{1e-7, 2e-5, 1e-12, 0.25, 3e-4};
+  lost.health = test::values_of({2e-5, 1.0 / 3.0, 1e-12, 0.25, 1e90});
+  lost.loss = test::loss_of(LossCause::saturation, SessionTarget::k2_sensor_1);
+  deliveries[1].result.health = test::values_of({1e-7, 2e-5, 1e-12, 0.25, 3e-4});
   Store store = test::store_of(file, test::campaign_of(3), {});
   (void)store.commit(deliveries);
   return store;

@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -56,7 +57,7 @@ TEST(ChosenRuns, AreInTheMiddleOfEachPart) {
 TEST(ResultDifferences, AreOfBitsThatMeanSomething) {
   const RunResult stored = test::result_of(3, RunStatus::not_finite);
   RunResult computed = stored;
-  computed.estimate[0] = 99.0;  // Without a meaning.
+  computed.estimate = {99.0};  // Without a meaning.
   EXPECT_THAT(differences_of(stored, computed), IsEmpty());
   computed.truth[0] = 0.5;
   computed.num_rounds = 9;
@@ -92,7 +93,7 @@ TEST(ResultDifferences, CountDraws) {
 
 // More threads than batches, and a last batch that is not full.
 TEST(Resimulation, FindsTheSameWithAnyNumberOfThreads) {
-  const Campaign campaign = test::quick_campaign(35);
+  const MicroscopeCampaign campaign = test::quick_campaign(35);
   std::vector<RunResult> results = test::simulated(campaign);
   for (const std::size_t run : {std::size_t{34}, std::size_t{2}}) results[run].truth[1] += 1.0;
   for (const std::size_t num_threads : {std::size_t{1}, std::size_t{2}, std::size_t{5}}) {
@@ -105,7 +106,7 @@ TEST(Resimulation, FindsTheSameWithAnyNumberOfThreads) {
 
 // The threads that end because another one failed do not hide its reason.
 TEST(Resimulation, EndsWithTheFirstFailureOfAnyThread) {
-  const Campaign campaign = test::quick_campaign(48);
+  const MicroscopeCampaign campaign = test::quick_campaign(48);
   const std::vector<RunResult> results = test::simulated(campaign);
   for (const std::size_t num_threads : {std::size_t{1}, std::size_t{3}}) {
     std::atomic<int> num_questions = 0;
@@ -120,7 +121,7 @@ TEST(Resimulation, EndsWithTheFirstFailureOfAnyThread) {
 
 // Values of a table are those of the run, not of its place among those that are simulated.
 TEST(Resimulation, TakesTheTableValuesOfEachRun) {
-  Campaign campaign = test::quick_campaign(4);
+  MicroscopeCampaign campaign = test::quick_campaign(4);
   campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
   campaign.table_columns = {{1e-4, 2e-4, 3e-4, 4e-4}};
   const std::vector<RunResult> results = test::simulated(campaign);

@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "coordinator/archive/verification.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
 
@@ -24,7 +26,7 @@ class VerificationTest : public StoreTest {
   /// A finished campaign, and nobody who has it open.
   void make_file() {
     coordinator::Store store = store_of(file(), campaign_, results_);
-    coordinator::update_statistics(store, campaign_.scenario);
+    coordinator::update_statistics(store, campaign_);
   }
 
   bool verify_all(double fraction = 1.0) {
@@ -45,7 +47,7 @@ class VerificationTest : public StoreTest {
     return found;
   }
 
-  Campaign campaign_;
+  MicroscopeCampaign campaign_;
   std::vector<RunResult> results_;
   std::map<std::string, Check, std::less<>> checks_;
 };

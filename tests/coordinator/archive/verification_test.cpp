@@ -217,7 +217,7 @@ TEST_F(Verification, SaysWhatItCannotCheckWhileTheFileIsServed) {
   Store store = test::store_of(file(), campaign_, {results_.begin(), results_.begin() + 2});
   EXPECT_TRUE(verify_all());
   EXPECT_EQ(check("digest").finding, "none is stored: a coordinator has the file, or was killed");
-  update_statistics(store, campaign_.scenario);
+  update_statistics(store, campaign_);
   EXPECT_TRUE(verify_all());
   EXPECT_EQ(check("digest").verdict, Verdict::holds);
   const Delivery third{.result = results_[2], .worker = test::session_1, .attempt = {1}};

@@ -1,3 +1,5 @@
+#include "core/microscope/definition/campaign_definition.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,9 +10,15 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "tests/coordinator/campaign_file/scratch_folder.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+MicroscopeCampaign read_microscope(const std::filesystem::path& file,
+                                   const Overrides& overrides = {}) {
+  return test::microscope(*read_campaign(file, overrides));
+}
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -18,8 +26,8 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 
 // A campaign whose every part differs from the nominal one.
-Campaign unusual_campaign() {
-  Campaign campaign = hardy2013_campaign();
+MicroscopeCampaign unusual_campaign() {
+  MicroscopeCampaign campaign = hardy2013_campaign();
   campaign.name = "un-usual.2";
   campaign.seed = 9223372036854775807u;
   campaign.num_runs = 3;
@@ -57,7 +65,7 @@ Campaign unusual_campaign() {
   return campaign;
 }
 
-void expect_same(const Campaign& read, const Campaign& written) {
+void expect_same(const MicroscopeCampaign& read, const MicroscopeCampaign& written) {
   EXPECT_EQ(read.name, written.name);
   EXPECT_EQ(read.seed, written.seed);
   EXPECT_EQ(read.num_runs, written.num_runs);
@@ -72,17 +80,18 @@ void expect_same(const Campaign& read, const Campaign& written) {
 }
 
 TEST(CanonicalDefinition, ReadsBackToTheSameCampaign) {
-  for (const Campaign& campaign : {Campaign{}, hardy2013_campaign(), unusual_campaign()}) {
+  for (const MicroscopeCampaign& campaign :
+       {MicroscopeCampaign{}, hardy2013_campaign(), unusual_campaign()}) {
     const std::string definition = canonical_definition(campaign);
-    const Campaign read = parse_campaign("stored definition", definition,
-                                         campaign.environment_table, campaign.table_columns);
+    const MicroscopeCampaign read = parse_campaign(
+        "stored definition", definition, campaign.environment_table, campaign.table_columns);
     expect_same(read, campaign);
     EXPECT_EQ(canonical_definition(read), definition);
   }
 }
 
 TEST(CanonicalDefinition, StatesEveryField) {
-  const Campaign campaign;
+  const MicroscopeCampaign campaign;
   const std::string definition = canonical_definition(campaign);
   for_each_field(campaign.scenario, [&](const FieldInfo& field, const auto&) {
     const std::string path(field.path);
@@ -92,11 +101,11 @@ TEST(CanonicalDefinition, StatesEveryField) {
 }
 
 TEST(CommentedCampaign, ReadsBackToTheSameCampaign) {
-  for (const Campaign& campaign : {Campaign{}, hardy2013_campaign()}) {
+  for (const MicroscopeCampaign& campaign : {MicroscopeCampaign{}, hardy2013_campaign()}) {
     const test::ScratchFolder folder;
-    expect_same(read_campaign(folder.write("c.toml", commented_campaign(campaign))), campaign);
+    expect_same(read_microscope(folder.write("c.toml", commented_campaign(campaign))), campaign);
   }
-  const Campaign unusual = unusual_campaign();
+  const MicroscopeCampaign unusual = unusual_campaign();
   expect_same(parse_campaign("stored definition", commented_campaign(unusual),
                              unusual.environment_table, unusual.table_columns),
               unusual);
@@ -104,8 +113,9 @@ TEST(CommentedCampaign, ReadsBackToTheSameCampaign) {
 
 TEST(CommentedCampaign, LeavesThePresetInCharge) {
   const test::ScratchFolder folder;
-  const auto file = folder.write("c.toml", commented_campaign(Campaign{}));
-  const Campaign campaign = read_campaign(file, {.assignments = {"noise.preset=flight_suref"}});
+  const auto file = folder.write("c.toml", commented_campaign(MicroscopeCampaign{}));
+  const MicroscopeCampaign campaign =
+      read_microscope(file, {.assignments = {"noise.preset=flight_suref"}});
   EXPECT_EQ(campaign.scenario.noise.linear_x.white_asd, 4.49e-12);
 }
 
@@ -116,7 +126,7 @@ TEST(Hardy2013File, IsWhatTheGeneratorWrites) {
 }
 
 TEST(Hardy2013File, IsThePapersCampaign) {
-  const Campaign campaign = read_campaign(PROOFMASS_HARDY2013_FILE);
+  const MicroscopeCampaign campaign = read_microscope(PROOFMASS_HARDY2013_FILE);
   EXPECT_EQ(campaign.name, "hardy2013");
   EXPECT_EQ(campaign.num_runs, 100u);
   EXPECT_EQ(campaign.scenario.estimation.correction, Correction::hardy2013);
@@ -139,52 +149,54 @@ TEST(ParseStoredCampaign, RefusesWhatIsNoValidCampaign) {
             "(laws of kind table are 0)");
 }
 
-std::vector<std::string> differences_after(const std::function<void(Campaign&)>& change) {
-  Campaign wanted = unusual_campaign();
+std::vector<std::string> differences_after(const std::function<void(MicroscopeCampaign&)>& change) {
+  MicroscopeCampaign wanted = unusual_campaign();
   change(wanted);
   return definition_differences(unusual_campaign(), wanted);
 }
 
 TEST(DefinitionDifferences, NameFieldAndBothValues) {
-  EXPECT_THAT(differences_after([](Campaign& c) {
+  EXPECT_THAT(differences_after([](MicroscopeCampaign& c) {
                 c.seed = 2;
                 c.name = "other";
               }),
               ElementsAre("name: \"un-usual.2\" in the database, \"other\" asked for",
                           "seed: 9223372036854775807 in the database, 2 asked for"));
-  EXPECT_THAT(differences_after([](Campaign& c) { c.scenario.noise.scale = 0.0; }),
+  EXPECT_THAT(differences_after([](MicroscopeCampaign& c) { c.scenario.noise.scale = 0.0; }),
               ElementsAre("noise.scale: 1 in the database, 0 asked for"));
-  EXPECT_THAT(differences_after([](Campaign& c) { c.scenario.sessions[3].num_orbits = 2; }),
-              ElementsAre("session[3].orbits: 40 in the database, 2 asked for"));
-  EXPECT_THAT(differences_after([](Campaign& c) { c.scenario.sessions.pop_back(); }),
+  EXPECT_THAT(
+      differences_after([](MicroscopeCampaign& c) { c.scenario.sessions[3].num_orbits = 2; }),
+      ElementsAre("session[3].orbits: 40 in the database, 2 asked for"));
+  EXPECT_THAT(differences_after([](MicroscopeCampaign& c) { c.scenario.sessions.pop_back(); }),
               ElementsAre("session: 11 in the database, 10 asked for"));
   EXPECT_THAT(
       differences_after(
-          [](Campaign& c) { c.scenario.sessions[8].excitations[0].amplitude = 1e-8; }),
+          [](MicroscopeCampaign& c) { c.scenario.sessions[8].excitations[0].amplitude = 1e-8; }),
       ElementsAre(
           "session[8].excitations: [{ kind = \"drag_free\", axis = \"x\", amplitude_m_s2 = "
           "2e-8, frequency_hz = 0.00122847554 }] in the database, [{ kind = \"drag_free\", "
           "axis = \"x\", amplitude_m_s2 = 1e-8, frequency_hz = 0.00122847554 }] asked for"));
   EXPECT_THAT(
-      differences_after([](Campaign& c) { c.dispersions[7].value = 0.5; }),
+      differences_after([](MicroscopeCampaign& c) { c.dispersions[7].value = 0.5; }),
       ElementsAre(
           "dispersion.misalignment_rad.sensor_1_y: { law = \"fixed\", value = -0.0 } in the "
           "database, { law = \"fixed\", value = 0.5 } asked for"));
 }
 
 TEST(DefinitionDifferences, IncludeTheValuesOfDataFiles) {
-  EXPECT_THAT(differences_after([](Campaign& c) { c.table_columns[0][1] = 2.5; }),
+  EXPECT_THAT(differences_after([](MicroscopeCampaign& c) { c.table_columns[0][1] = 2.5; }),
               ElementsAre("dispersion.star_tracker_bias_rad.head_2_z of run 1: 2 in the database, "
                           "2.5 asked for"));
-  EXPECT_THAT(differences_after([](Campaign& c) { c.environment_table[1].linear_m_s2[2] = 0.0; }),
-              ElementsAre("environment.file: other values in row 2 in the database, those of air "
-                          "\"thin\".csv asked for"));
-  EXPECT_THAT(differences_after([](Campaign& c) { c.environment_table.pop_back(); }),
+  EXPECT_THAT(
+      differences_after([](MicroscopeCampaign& c) { c.environment_table[1].linear_m_s2[2] = 0.0; }),
+      ElementsAre("environment.file: other values in row 2 in the database, those of air "
+                  "\"thin\".csv asked for"));
+  EXPECT_THAT(differences_after([](MicroscopeCampaign& c) { c.environment_table.pop_back(); }),
               ElementsAre("environment.file: 2 rows in the database, 1 rows asked for"));
 }
 
 TEST(DefinitionDifferences, LetACampaignGrowAndItsFilesMove) {
-  EXPECT_THAT(differences_after([](Campaign& c) {
+  EXPECT_THAT(differences_after([](MicroscopeCampaign& c) {
                 c.num_runs = 4;
                 c.table_columns[0] = {1.0, 2.0, 3.0, 40.0, 50.0};
                 c.environment_file = "elsewhere/air.csv";

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/campaign_file/scratch_folder.hpp"
 
 namespace proofmass::coordinator {

@@ -5,7 +5,9 @@
 
 #include <string>
 
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/campaign_file/scratch_folder.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -13,20 +15,20 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-Campaign campaign_of(std::string_view text, const Overrides& overrides = {}) {
+MicroscopeCampaign campaign_of(std::string_view text, const Overrides& overrides = {}) {
   const test::ScratchFolder folder;
-  return read_campaign(folder.write("campaign.toml", text), overrides);
+  return test::microscope(*read_campaign(folder.write("campaign.toml", text), overrides));
 }
 
 TEST(ReadCampaign, CompletesAnEmptyFileWithTheNominalValues) {
-  const Campaign campaign = campaign_of("");
-  EXPECT_THAT(definition_differences(campaign, Campaign{}), IsEmpty());
+  const MicroscopeCampaign campaign = campaign_of("");
+  EXPECT_THAT(definition_differences(campaign, MicroscopeCampaign{}), IsEmpty());
   EXPECT_EQ(campaign.num_runs, 100u);
   EXPECT_EQ(campaign.scenario.estimation.correction, Correction::second_order);
 }
 
 TEST(ReadCampaign, TakesEveryKindOfValue) {
-  const Campaign campaign = campaign_of(R"(
+  const MicroscopeCampaign campaign = campaign_of(R"(
     [campaign]
     name = "mine"
     seed = 9223372036854775807
@@ -51,7 +53,7 @@ TEST(ReadCampaign, TakesEveryKindOfValue) {
 }
 
 TEST(ReadCampaign, AppliesThePresetBeforeTheOtherKeysOfNoise) {
-  const Campaign campaign = campaign_of(R"(
+  const MicroscopeCampaign campaign = campaign_of(R"(
     [noise.linear_x]
     white_asd_m_s2 = 1e-12
     [noise]
@@ -64,14 +66,14 @@ TEST(ReadCampaign, AppliesThePresetBeforeTheOtherKeysOfNoise) {
 }
 
 TEST(ReadCampaign, TakesSessionsInTheOrderOfTheFile) {
-  Campaign reversed = hardy2013_campaign();
+  MicroscopeCampaign reversed = hardy2013_campaign();
   std::ranges::reverse(reversed.scenario.sessions);
-  const Campaign campaign = campaign_of(commented_campaign(reversed));
+  const MicroscopeCampaign campaign = campaign_of(commented_campaign(reversed));
   EXPECT_EQ(campaign.scenario.sessions, reversed.scenario.sessions);
 }
 
 TEST(ReadCampaign, LetsAnElementOverrideItsGroup) {
-  const Campaign campaign = campaign_of(R"(
+  const MicroscopeCampaign campaign = campaign_of(R"(
     [dispersion.offcentring_m]
     minimum = -1e-6
     [dispersion.offcentring_m.y]
@@ -111,7 +113,8 @@ TEST(ReadCampaign, ReadsDataFilesBesideTheCampaignFile) {
                "angular_x_rad_s2,angular_y_rad_s2,angular_z_rad_s2\n"
                "0,1,2,3,4,5,6\n6000,1,2,3,4,5,6\n");
   folder.write("draws.csv", "a,b\n1,10\n2,20\n3,30\n");
-  const Campaign campaign = read_campaign(folder.write("campaign.toml", R"(
+  const MicroscopeCampaign campaign =
+      test::microscope(*read_campaign(folder.write("campaign.toml", R"(
     campaign.runs = 3
     [environment]
     kind = "file"
@@ -122,7 +125,7 @@ TEST(ReadCampaign, ReadsDataFilesBesideTheCampaignFile) {
     law = "table"
     file = "draws.csv"
     column = "b"
-  )"));
+  )")));
   ASSERT_EQ(campaign.environment_table.size(), 2u);
   EXPECT_EQ(campaign.environment_table[1].time_s, 6000.0);
   EXPECT_THAT(campaign.table_columns, ElementsAre(ElementsAre(10, 20, 30), ElementsAre(1, 2, 3)));
@@ -136,7 +139,7 @@ TEST(Overrides, WinOverTheFileAndTheLastOneWins) {
                       "dispersion.offcentring_m.x.maximum=1e-6"},
       .num_runs = 12,
       .seed = 34};
-  const Campaign campaign = campaign_of("campaign.runs = 3\nnoise.scale = 9", overrides);
+  const MicroscopeCampaign campaign = campaign_of("campaign.runs = 3\nnoise.scale = 9", overrides);
   EXPECT_EQ(campaign.scenario.noise.scale, 0.25);
   EXPECT_EQ(campaign.scenario.estimation.correction, Correction::first_order);
   EXPECT_EQ(campaign.name, "quoted");

@@ -11,6 +11,7 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/export_command.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 
 namespace proofmass::coordinator {
@@ -20,7 +21,7 @@ namespace {
 class ArchiveCommands : public testing::Test {
  protected:
   ArchiveCommands() {
-    const Campaign campaign = hardy2013_campaign();
+    const MicroscopeCampaign campaign = hardy2013_campaign();
     (void)Store::create(database_, campaign, canonical_definition(campaign));
   }
 

@@ -6,7 +6,9 @@
 
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -16,8 +18,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-Campaign campaign_of(const std::string& name, std::uint64_t num_runs = 10) {
-  Campaign campaign;
+MicroscopeCampaign campaign_of(const std::string& name, std::uint64_t num_runs = 10) {
+  MicroscopeCampaign campaign;
   campaign.name = name;
   campaign.num_runs = num_runs;
   return campaign;
@@ -131,7 +133,7 @@ TEST_F(CampaignFolderTest, WritesTheOwnerIntoANewFileAndAsksItOfOneThatIsThere) 
 TEST_F(CampaignFolderTest, SaysHowTheCampaignInAFileDiffers) {
   CampaignFolder folder(directory / "served");
   (void)folder.open(campaign_of("a"), {}, {});
-  Campaign other = campaign_of("a");
+  MicroscopeCampaign other = campaign_of("a");
   other.seed = 2;
   try {
     (void)folder.open(other, {}, {});
@@ -147,12 +149,12 @@ TEST_F(CampaignFolderTest, SaysHowTheCampaignInAFileDiffers) {
 TEST_F(CampaignFolderTest, BringsStatisticsUpToDateBesideTheWriter) {
   CampaignFolder folder(directory / "served");
   ServedCampaign campaign = folder.open(campaign_of("a", 1), {}, {});
-  Delivery delivery{.result = {}, .worker = {1}, .attempt = {1}};
+  Delivery delivery{.result = test::zero_result({}), .worker = {1}, .attempt = {1}};
   const std::vector<Entry> entries{
       WorkerJoined{.session = {1}, .name = "w", .host = "h", .process_id = 1}, delivery};
   (void)campaign.store.write(entries);
   int num_writes = 0;
-  folder.summarise(campaign.file, campaign.definition->scenario,
+  folder.summarise(campaign.file, *campaign.definition,
                    [&](const std::function<void(Store&)>& action) {
                      ++num_writes;
                      action(campaign.store);

@@ -4,19 +4,21 @@
 
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/store/detail/database.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-Campaign campaign_of(std::uint64_t num_runs) {
-  Campaign campaign;
+MicroscopeCampaign campaign_of(std::uint64_t num_runs) {
+  MicroscopeCampaign campaign;
   campaign.num_runs = num_runs;
   return campaign;
 }
 
-std::string refusal(const Campaign& wanted, const std::filesystem::path& database) {
+std::string refusal(const MicroscopeCampaign& wanted, const std::filesystem::path& database) {
   try {
     (void)open_or_create(wanted, {}, database);
   } catch (const UsageError& error) {
@@ -36,7 +38,7 @@ TEST(CampaignStart, RefusesAnotherCampaignAndSaysWhatDiffers) {
   const test::TemporaryDirectory directory;
   const auto database = directory / "a.db";
   (void)open_or_create(campaign_of(10), {}, database);
-  Campaign other = campaign_of(10);
+  MicroscopeCampaign other = campaign_of(10);
   other.seed = 2;
   EXPECT_EQ(refusal(other, database), database.string() +
                                           " holds another campaign:\n"
@@ -100,7 +102,7 @@ TEST(CampaignStart, DefinesAsManyRunsAsTheFileHasUntilAStopRuleIsChecked) {
 // Its tables have a row for each run, and nobody knows yet how many there will be.
 TEST(CampaignStart, RefusesAStopRuleWithTables) {
   const test::TemporaryDirectory directory;
-  Campaign campaign = campaign_of(2);
+  MicroscopeCampaign campaign = campaign_of(2);
   campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
   campaign.table_columns = {{1e-4, 2e-4}};
   const StopPlan plan{.stop_rule = "mean(k2c) within 5%", .num_runs_max = 2, .failures_max = {}};
@@ -115,12 +117,12 @@ TEST(CampaignStart, RefusesAStopRuleWithTables) {
 
 TEST(CampaignStart, ReadsACampaignWithTablesBack) {
   const test::TemporaryDirectory directory;
-  Campaign campaign = campaign_of(3);
+  MicroscopeCampaign campaign = campaign_of(3);
   campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
   campaign.dispersions[9] = {.law = Law::table, .file = "f.csv", .column = "b"};
   campaign.table_columns = {{1e-4, 2e-4, 3e-4}, {1e-3, -2e-3, 0.1}};
   const Store store = open_or_create(campaign, {}, directory / "a.db").store;
-  const Campaign stored = stored_campaign(store);
+  const MicroscopeCampaign stored = test::microscope(*stored_campaign(store));
   EXPECT_EQ(stored.table_columns, campaign.table_columns);
   EXPECT_EQ(stored.dispersions, campaign.dispersions);
   EXPECT_TRUE(definition_differences(stored, campaign).empty());

@@ -11,7 +11,7 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/keygen_command.hpp"
 #include "coordinator/cli/submit_command.hpp"
-#include "core/definition/campaign_definition.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 
 namespace proofmass::coordinator {

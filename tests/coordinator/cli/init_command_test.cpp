@@ -4,6 +4,7 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/exit_code.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 
 namespace proofmass::coordinator {
@@ -13,7 +14,7 @@ TEST(Init, WritesACampaignThatCanBeRead) {
   const test::TemporaryDirectory directory;
   const auto file = directory / "a.toml";
   EXPECT_EQ(write_campaign(file, IfFileExists::refuse), exit_done);
-  EXPECT_TRUE(definition_differences(hardy2013_campaign(), read_campaign(file)).empty());
+  EXPECT_TRUE(definition_differences(hardy2013_campaign(), *read_campaign(file)).empty());
 }
 
 TEST(Init, ReplacesAFileOnlyIfItMust) {

@@ -7,8 +7,10 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/message_of.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -21,13 +23,15 @@ class ReportCommand : public testing::Test {
   void SetUp() override { make(database_, 60); }
 
   static void make(const std::filesystem::path& database, std::uint64_t num_runs) {
-    Campaign campaign = hardy2013_campaign();
+    MicroscopeCampaign campaign = hardy2013_campaign();
     campaign.num_runs = num_runs;
     Store store = Store::create(database, campaign, canonical_definition(campaign));
     std::vector<Delivery> deliveries;
     for (std::uint64_t run = 0; run < campaign.num_runs; ++run) {
-      Delivery delivery{.result = {.run = {run}, .num_draws = 1}, .worker = {1}, .attempt = {1}};
-      delivery.result.estimate.fill(1e-6 * static_cast<double>(run + 1));
+      Delivery delivery{.result = test::zero_result({.run = {run}, .num_draws = 1}),
+                        .worker = {1},
+                        .attempt = {1}};
+      delivery.result.estimate.assign(num_parameters, 1e-6 * static_cast<double>(run + 1));
       deliveries.push_back(delivery);
     }
     store.commit(deliveries);

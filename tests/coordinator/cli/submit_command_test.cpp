@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "coordinator/cli/exit_code.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 
 namespace proofmass::coordinator {
@@ -22,8 +23,8 @@ class SubmitRequestOfAFile : public testing::Test {
 };
 
 TEST_F(SubmitRequestOfAFile, HasItsCampaign) {
-  const wire::SubmitRequest request = submit_request(options_, campaign_to_submit(options_));
-  const Campaign campaign = campaign_of(request.definition);
+  const wire::SubmitRequest request = submit_request(options_, *campaign_to_submit(options_));
+  const MicroscopeCampaign campaign = campaign_of(request.definition);
   EXPECT_EQ(campaign.name, "mine");
   EXPECT_EQ(campaign.num_runs, 7U);
   EXPECT_EQ(request.priority, 0);
@@ -37,8 +38,8 @@ TEST_F(SubmitRequestOfAFile, HasWhatTheArgumentsReplace) {
   options_.overrides.num_runs = 9;
   options_.overrides.seed = 5;
   options_.overrides.assignments = {"noise.scale=0.5"};
-  const wire::SubmitRequest request = submit_request(options_, campaign_to_submit(options_));
-  const Campaign campaign = campaign_of(request.definition);
+  const wire::SubmitRequest request = submit_request(options_, *campaign_to_submit(options_));
+  const MicroscopeCampaign campaign = campaign_of(request.definition);
   EXPECT_EQ(campaign.name, "other");
   EXPECT_EQ(campaign.num_runs, 9U);
   EXPECT_EQ(campaign.seed, 5U);

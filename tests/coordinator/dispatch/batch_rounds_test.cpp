@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "coordinator/dispatch/dispatch.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/simulation/run.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -39,11 +39,11 @@ class Rounds final : public Outbox {
  public:
   Rounds(std::uint64_t num_runs, std::size_t num_workers, std::size_t num_threads,
          std::vector<RunRange> finished = {}) {
-    Campaign campaign;
+    MicroscopeCampaign campaign;
     campaign.num_runs = num_runs;
     state_ = initial_state({}, {}, {});
     on_campaign(state_, id_,
-                {.definition = std::make_shared<const Campaign>(campaign),
+                {.definition = std::make_shared<const MicroscopeCampaign>(campaign),
                  .finished = std::move(finished),
                  .given_up = {},
                  .blamed = {}},

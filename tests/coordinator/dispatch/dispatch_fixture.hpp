@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "coordinator/dispatch/dispatch.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "tests/coordinator/dispatch/recording_outbox.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
 
@@ -41,9 +43,9 @@ class DispatchFixture : public testing::Test {
   }
 
   static StoredCampaign stored_campaign(std::uint64_t num_runs) {
-    Campaign campaign;
+    MicroscopeCampaign campaign;
     campaign.num_runs = num_runs;
-    return {.definition = std::make_shared<const Campaign>(campaign),
+    return {.definition = std::make_shared<const MicroscopeCampaign>(campaign),
             .finished = {},
             .given_up = {},
             .blamed = {}};
@@ -100,6 +102,7 @@ class DispatchFixture : public testing::Test {
     wire::ComputedRun result;
     result.result.run = {run};
     result.result.status = status;
+    result.result = zero_result(std::move(result.result));
     result.result.num_draws = status == RunStatus::no_draw ? num_draws_max : 1;
     if (status == RunStatus::not_converged) {
       result.result.num_rounds = static_cast<std::uint32_t>(EstimationConfig{}.num_rounds_max);

@@ -1,5 +1,6 @@
 // How much a worker is lent at a time.
 
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/dispatch/dispatch_fixture.hpp"
 
 namespace proofmass::test {
@@ -92,13 +93,13 @@ TEST_F(LendingTest, FillsAllSlotsOfAWorker) {
 }
 
 TEST_F(LendingTest, SendsTheTableValuesOfTheRuns) {
-  Campaign definition;
+  MicroscopeCampaign definition;
   definition.num_runs = 3;
   definition.dispersions[5] = {.law = Law::table, .file = "f", .column = "a"};
   definition.dispersions[9] = {.law = Law::table, .file = "f", .column = "b"};
   definition.table_columns = {{1.0, 2.0, 3.0}, {10.0, 20.0, 30.0}};
   StoredCampaign stored = stored_campaign(3);
-  stored.definition = std::make_shared<const Campaign>(definition);
+  stored.definition = std::make_shared<const MicroscopeCampaign>(definition);
   stored.finished = {{{0}, 1}};
   on_campaign(state, one, stored, now, outbox);
   add_worker(first, 2);

@@ -4,19 +4,19 @@
 
 #include <memory>
 
-#include "core/definition/campaign_definition.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 std::shared_ptr<const Campaign> definition(std::uint64_t num_runs) {
-  Campaign campaign;
+  MicroscopeCampaign campaign;
   campaign.num_runs = num_runs;
-  return std::make_shared<const Campaign>(campaign);
+  return std::make_shared<const MicroscopeCampaign>(campaign);
 }
 
 std::size_t encoded_size(const Campaign& campaign) {
-  return wire::encode_definition(definition_of(campaign)).size();
+  return wire::encode_definition(campaign.definition(TableColumns::included)).size();
 }
 
 TEST(DefinitionCache, EncodesADefinitionOnceForAllWorkers) {
@@ -38,12 +38,12 @@ TEST(DefinitionCache, EncodesAnExtendedCampaignAgain) {
 
 // Workers get the values of the tables with each lease.
 TEST(DefinitionCache, LeavesOutTheColumns) {
-  Campaign campaign;
+  MicroscopeCampaign campaign;
   campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
   campaign.table_columns = {std::vector<double>(campaign.num_runs, 1e-3)};
   DefinitionCache cache;
   const wire::DefinitionPart part =
-      cache.part({.campaign = {1}}, std::make_shared<const Campaign>(campaign));
+      cache.part({.campaign = {1}}, std::make_shared<const MicroscopeCampaign>(campaign));
   wire::IncomingDefinition incoming;
   ASSERT_EQ(incoming.add(part), wire::IncomingDefinition::Progress::complete);
   const auto taken = std::get<Definition>(incoming.take());

@@ -13,9 +13,11 @@
 
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/wire/codec.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
 
@@ -108,6 +110,7 @@ class PlayingWorker {
       result.status = status;
       result.num_draws = status == RunStatus::no_draw ? num_draws_max : 1;
       result.num_rounds = status == RunStatus::no_draw ? 0 : 1;
+      result = zero_result(std::move(result));
     }
     send(batch);
   }

@@ -6,14 +6,14 @@
 #include <string>
 #include <variant>
 
-#include "core/definition/campaign_definition.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/message_of.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 wire::SubmitRequest some_submit() {
-  Campaign campaign;
+  MicroscopeCampaign campaign;
   campaign.name = "tables";
   campaign.num_runs = 2;
   campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
@@ -27,8 +27,8 @@ wire::SubmitRequest some_submit() {
 
 TEST(RequestOf, HasTheCampaignThatTheDefinitionSays) {
   const auto submission = std::get<Submission>(request_of(some_submit()));
-  EXPECT_EQ(definition_of(submission.campaign), some_submit().definition);
-  EXPECT_EQ(submission.campaign.table_columns[0][1], -2.0 / 3.0);
+  EXPECT_EQ(submission.campaign->definition(TableColumns::included), some_submit().definition);
+  EXPECT_EQ(submission.campaign->table_columns[0][1], -2.0 / 3.0);
   EXPECT_EQ(submission.priority, -7);
   EXPECT_EQ(submission.audit_fraction, 0.1);
   EXPECT_EQ(submission.stop_rule, "std(a_c13) within 5%");

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "core/definition/campaign_definition.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "tests/coordinator/net/playing_client.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
@@ -20,7 +20,7 @@ class ServiceClients : public test::ServiceTest {
  protected:
   ServiceClients() { config.clients_endpoint = "tcp://127.0.0.1:*"; }
 
-  void start_with(const std::vector<Campaign>& campaigns) {
+  void start_with(const std::vector<MicroscopeCampaign>& campaigns) {
     start(campaigns);
     client.emplace(service->clients_endpoint());
   }
@@ -209,7 +209,7 @@ TEST_F(ServiceClients, SeeTheWorkers) {
 
 /// A submission of so many runs with a table, as bytes.
 std::string large_submission(std::uint64_t id, const std::string& name, std::size_t num_runs) {
-  Campaign campaign = test::campaign_of(name, num_runs);
+  MicroscopeCampaign campaign = test::campaign_of(name, num_runs);
   campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
   campaign.table_columns = {std::vector<double>(num_runs, 1e-3)};
   return wire::encode(
@@ -302,7 +302,7 @@ TEST_F(ServiceClients, OutliveAFileSystemThatThrows) {
 }
 
 TEST_F(ServiceClients, SeeAllCampaignsInPages) {
-  std::vector<Campaign> campaigns;
+  std::vector<MicroscopeCampaign> campaigns;
   for (std::size_t i = 0; i < 3; ++i) {
     campaigns.push_back(test::campaign_of("c" + std::to_string(i), 1));
   }

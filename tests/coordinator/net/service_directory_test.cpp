@@ -9,7 +9,7 @@
 #include <mutex>
 
 #include "coordinator/store/store_error.hpp"
-#include "core/definition/campaign_definition.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/net/playing_client.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 
@@ -50,7 +50,8 @@ class PlainDirectory final : public CampaignDirectory {
       before_load_(file);
     }
     Store store = Store::open(file);
-    auto campaign = std::make_shared<Campaign>(test::campaign_of(store.name(), store.num_runs()));
+    auto campaign =
+        std::make_shared<MicroscopeCampaign>(test::campaign_of(store.name(), store.num_runs()));
     return {.file = file, .store = std::move(store), .definition = std::move(campaign)};
   }
 

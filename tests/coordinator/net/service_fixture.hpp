@@ -18,13 +18,14 @@
 
 #include "coordinator/net/private_endpoint.hpp"
 #include "coordinator/net/service.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/coordinator/net/playing_worker.hpp"
 
 namespace proofmass::test {
 
-inline Campaign campaign_of(const std::string& name, std::uint64_t num_runs) {
-  Campaign campaign;
+inline MicroscopeCampaign campaign_of(const std::string& name, std::uint64_t num_runs) {
+  MicroscopeCampaign campaign;
   campaign.name = name;
   campaign.num_runs = num_runs;
   return campaign;
@@ -43,18 +44,16 @@ class PlainFiles final : public coordinator::CampaignFiles {
                                    ? coordinator::Store::open(file)
                                    : coordinator::Store::create(file, wanted, "definition");
     store.set_stop_plan(plan);
-    return {.file = file,
-            .store = std::move(store),
-            .definition = std::make_shared<const Campaign>(wanted)};
+    return {.file = file, .store = std::move(store), .definition = wanted.clone()};
   }
   std::shared_ptr<const Campaign> extend(coordinator::Store& store,
                                          const Campaign& wanted) override {
     if (wanted.num_runs < store.num_runs()) throw Error("runs = fewer (must be more)");
     if (wanted.num_runs > store.num_runs()) store.extend(wanted, "definition");
-    return std::make_shared<const Campaign>(wanted);
+    return wanted.clone();
   }
   std::optional<std::uint64_t> summarise(
-      const std::filesystem::path& file, const Scenario&,
+      const std::filesystem::path& file, const Campaign&,
       const std::function<void(const std::function<void(coordinator::Store&)>&)>& write) override {
     before_summary();
     std::uint64_t num_runs = 0;
@@ -90,9 +89,10 @@ class ServiceTest : public testing::Test {
   }
   ~ServiceTest() override { end(coordinator::StopRequest::now); }
 
-  void start(const std::vector<Campaign>& campaigns) {
+  void start(const std::vector<MicroscopeCampaign>& campaigns) {
     std::vector<coordinator::ServedCampaign> served;
-    for (const Campaign& campaign : campaigns) served.push_back(files.open(campaign, plan, {}));
+    for (const MicroscopeCampaign& campaign : campaigns)
+      served.push_back(files.open(campaign, plan, {}));
     stop = coordinator::StopRequest::none;
     service = std::make_unique<coordinator::Service>(
         std::move(served), config, [this](const coordinator::Event& event) { note(event); });

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 #include "tests/message_of.hpp"
 
@@ -30,13 +31,13 @@ class Attach : public QueryTest {
  protected:
   Attach() {
     make_file(campaign_of(3), 3);
-    Campaign other = campaign_of(5);
+    MicroscopeCampaign other = campaign_of(5);
     other.name = "other";
     other.seed = 77;
     make(other_file(), other, 4);
   }
 
-  static void make(const std::filesystem::path& path, const Campaign& campaign,
+  static void make(const std::filesystem::path& path, const MicroscopeCampaign& campaign,
                    std::uint64_t num_results) {
     Store store = Store::create(path, campaign, canonical_definition(campaign));
     const coordinator::Entry worker = worker_1();

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 
 namespace proofmass::test {
@@ -66,8 +67,8 @@ Pairs pairs_of(const std::string& definition) {
 }
 
 /// Laws of every kind, a file, a session that spins.
-Campaign varied_campaign() {
-  Campaign campaign = campaign_of(2);
+MicroscopeCampaign varied_campaign() {
+  MicroscopeCampaign campaign = campaign_of(2);
   campaign.name = "varied";
   campaign.seed = 9'223'372'036'854'775'807U;
   campaign.scenario.sessions[2].spin_rate_rad_s = 1.0 / 3000.0;
@@ -107,7 +108,7 @@ void expect_same(const OwnCell& cell, const std::string& text, const std::string
 }
 
 TEST_F(DefinitionTable, HasTheKeysAndValuesOfTheCampaignFile) {
-  const Campaign campaign = varied_campaign();
+  const MicroscopeCampaign campaign = varied_campaign();
   make_file(campaign);
   Pairs pairs = pairs_of(canonical_definition(campaign));
   const auto rows = rows_of("SELECT key, value FROM definition_entry ORDER BY key");
@@ -152,7 +153,7 @@ TEST_F(DefinitionTable, TakesTheNameOfItsCampaign) {
 
 TEST_F(DefinitionTable, IsThatOfTheAttachedFile) {
   make_file(varied_campaign());
-  Campaign other = campaign_of(2);
+  MicroscopeCampaign other = campaign_of(2);
   other.scenario.noise.scale = 0.5;
   const auto path = directory() / "other.db";
   (void)coordinator::Store::create(path, other, canonical_definition(other));

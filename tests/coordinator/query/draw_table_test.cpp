@@ -8,7 +8,7 @@
 #include <map>
 #include <string>
 
-#include "core/campaign/draw.hpp"
+#include "core/microscope/campaign/draw.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 
 namespace proofmass::test {
@@ -20,8 +20,8 @@ using testing::HasSubstr;
 std::uint64_t bits(double value) { return std::bit_cast<std::uint64_t>(value); }
 
 /// Laws of every kind; with wide misalignments many a draw is rejected.
-Campaign varied_campaign(std::uint64_t num_runs) {
-  Campaign campaign = campaign_of(num_runs);
+MicroscopeCampaign varied_campaign(std::uint64_t num_runs) {
+  MicroscopeCampaign campaign = campaign_of(num_runs);
   campaign.name = "varied";
   campaign.seed = 20260314;
   auto& laws = campaign.dispersions;
@@ -64,7 +64,7 @@ class DrawTable : public QueryTest {
 // The instrument that a simulation begins with is made of the values, each of which is part of it;
 // so equal bits of all that the instrument was made of are those of the simulation.
 TEST_F(DrawTable, HasTheBitsOfTheSimulationsDraws) {
-  const Campaign campaign = varied_campaign(40);
+  const MicroscopeCampaign campaign = varied_campaign(40);
   make_file(campaign);
   const auto rows = rows_of("SELECT run_index, quantity, value FROM draw");
   ASSERT_EQ(rows.size(), 40 * num_drawn);
@@ -164,7 +164,7 @@ TEST_F(DrawTable, TakesTheNameOfItsCampaign) {
 }
 
 TEST_F(DrawTable, HasNoValueForARunWhoseDrawsWereAllRejected) {
-  Campaign campaign = campaign_of(2);
+  MicroscopeCampaign campaign = campaign_of(2);
   campaign.scenario.acceptance.a_d11_max = 1e-12;
   make_file(campaign);
   EXPECT_EQ(integer_of("SELECT count(*) FROM draw"), 120);
@@ -173,7 +173,7 @@ TEST_F(DrawTable, HasNoValueForARunWhoseDrawsWereAllRejected) {
 
 // A scale factor that is far off is never accepted, however the rest is drawn.
 TEST_F(DrawTable, HasNoValueForTheOneRunWhoseDrawsWereAllRejected) {
-  Campaign campaign = campaign_of(3);
+  MicroscopeCampaign campaign = campaign_of(3);
   campaign.dispersions[0] = {.law = Law::table, .file = "scale.csv", .column = "x"};
   campaign.table_columns = {{0.0, 0.9, 0.0}};
   make_file(campaign);

@@ -16,6 +16,7 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/query/query.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::test {
@@ -55,7 +56,7 @@ class RecordingWriter : public coordinator::RowWriter {
 class QueryTest : public StoreTest {
  protected:
   /// Makes the file, with results of the first runs.
-  void make_file(const Campaign& campaign, std::uint64_t num_results = 0) {
+  void make_file(const MicroscopeCampaign& campaign, std::uint64_t num_results = 0) {
     coordinator::Store store =
         coordinator::Store::create(file(), campaign, canonical_definition(campaign));
     const coordinator::Entry worker = worker_1();

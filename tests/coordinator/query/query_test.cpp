@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "core/statistics/moments.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/microscope_results.hpp"
+
 namespace proofmass::coordinator {
 namespace {
 
@@ -18,7 +20,8 @@ constexpr const char* health_with_lost =
     "662fe94c7831e505adef1b9b28de61e22a86d931d155a97445bdb6716a4ea92c";
 
 RunResult first_result() {
-  RunResult result{.run = {7}, .status = RunStatus::not_converged, .num_draws = 3, .num_rounds = 5};
+  RunResult result = test::zero_result(
+      {.run = {7}, .status = RunStatus::not_converged, .num_draws = 3, .num_rounds = 5});
   for (std::size_t i = 0; i < num_parameters; ++i) {
     result.truth[i] = 0.5 + static_cast<double>(i);
     result.estimate[i] = -1.25 * static_cast<double>(i);  // The first one is a negative zero.
@@ -28,9 +31,10 @@ RunResult first_result() {
 
 /// A result without a draw, with numbers that mean nothing.
 RunResult second_result() {
-  RunResult result{.run = {8}, .status = RunStatus::no_draw, .num_draws = 1000, .num_rounds = 0};
-  result.truth.fill(1.0);
-  result.estimate.fill(2.0);
+  RunResult result = test::zero_result(
+      {.run = {8}, .status = RunStatus::no_draw, .num_draws = 1000, .num_rounds = 0});
+  result.truth.assign(num_parameters, 1.0);
+  result.estimate.assign(num_parameters, 2.0);
   return result;
 }
 
@@ -53,16 +57,17 @@ TEST(Digest, LeavesOutWhatMeansNothing) {
 
 TEST(Digest, OfHealthIsThatOfTheDocumentedBytesAndStandsAlone) {
   RunResult first = first_result();
-  first.health = LoopHealth{1e-7, 2e-5, -0.0, 0.25, 3e-4};
-  first.loss.session = SessionTarget::k2d;  // Means nothing: the run is not lost.
+  first.health = test::values_of({1e-7, 2e-5, -0.0, 0.25, 3e-4});
+  first.loss.session = 9;  // Means nothing: the run is not lost.
+
   Digest digest;
   digest.add(first);
   digest.add(second_result());
   EXPECT_EQ(digest.finish(), (ResultDigests{.results = digest_of_both, .health = health_of_first}));
 
-  RunResult lost{.run = {9}, .status = RunStatus::lost};
-  lost.health = LoopHealth{1e-5, 2e-5, 1e-12, 0.25, 3e-4};
-  lost.loss = {LossCause::saturation, SessionTarget::a_d11_prime};
+  RunResult lost = test::zero_result({.run = {9}, .status = RunStatus::lost});
+  lost.health = test::values_of({1e-5, 2e-5, 1e-12, 0.25, 3e-4});
+  lost.loss = test::loss_of(LossCause::saturation, SessionTarget::a_d11_prime);
   Digest with_lost;
   with_lost.add(first);
   with_lost.add(lost);

@@ -10,14 +10,14 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/digest.hpp"
-#include "core/simulation/run.hpp"
+#include "core/microscope/simulation/run.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 /// What `proofmass report` prints of the first `num_runs` runs; see Digest for the bytes.
 std::string digest_of_runs(Correction correction, std::uint64_t num_runs) {
-  Campaign campaign = hardy2013_campaign();
+  MicroscopeCampaign campaign = hardy2013_campaign();
   campaign.seed = 1;
   campaign.scenario.estimation.correction = correction;
   const RunPlan plan(campaign);

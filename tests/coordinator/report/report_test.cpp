@@ -15,6 +15,7 @@
 #include "coordinator/report/text_cells.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -35,13 +36,14 @@ MATCHER(FitsATerminal, "has at most 80 characters") { return text_width(arg) <= 
 /// Statistics with the paper's own errors and `num_runs` runs, all of them estimated.
 CampaignStatistics paper_statistics(std::uint64_t num_runs) {
   CampaignStatistics statistics;
+  statistics.accuracy.resize(num_parameters);
   statistics.num_runs = num_runs;
   statistics.num_estimated = num_runs;
-  for (const ParameterInfo& info : parameter_infos()) {
+  for (const test::ParameterInfo& info : test::parameter_infos()) {
     AccuracyStatistic& accuracy = statistics.accuracy[index(info.parameter)];
-    accuracy.worst = info.paper.worst;
-    accuracy.mean = info.paper.mean;
-    accuracy.standard_deviation = info.paper.standard_deviation;
+    accuracy.worst = info.published->worst;
+    accuracy.mean = info.published->mean;
+    accuracy.standard_deviation = info.published->standard_deviation;
     accuracy.beyond_objective = probability_interval(0.0, static_cast<double>(num_runs), 0.95);
   }
   statistics.num_within_objectives = num_runs;
@@ -66,7 +68,7 @@ TEST(GivenUpRuns, AreNamedAsFarAsTheLineHasRoom) {
 TEST(AccuracyTable, ShowsEachParameterBesideThePaper) {
   CampaignStatistics statistics = paper_statistics(100);
   statistics.accuracy[index(Parameter::a_c13)].num_beyond_objective = 3;
-  const std::vector<std::string> lines = lines_of(accuracy_table(Scenario{}, statistics));
+  const std::vector<std::string> lines = lines_of(accuracy_table(MicroscopeCampaign{}, statistics));
   // Figures of [Hardy2013] tab:perfo-numerical in the units of the table, left and right.
   EXPECT_THAT(lines, Contains("a_c11·Δx   nm             100    40.0    10.0    7.30      0 │"
                               "    40    10   7.3"));
@@ -81,19 +83,21 @@ TEST(AccuracyTable, ShowsEachParameterBesideThePaper) {
 }
 
 TEST(AccuracyTable, CountsTheRunsThatItIsAbout) {
-  EXPECT_THAT(accuracy_table(Scenario{}, paper_statistics(100)), HasSubstr(" of 100 runs\n"));
-  EXPECT_THAT(accuracy_table(Scenario{}, paper_statistics(1)), HasSubstr(" of 1 run\n"));
+  EXPECT_THAT(accuracy_table(MicroscopeCampaign{}, paper_statistics(100)),
+              HasSubstr(" of 100 runs\n"));
+  EXPECT_THAT(accuracy_table(MicroscopeCampaign{}, paper_statistics(1)), HasSubstr(" of 1 run\n"));
 }
 
 TEST(AccuracyTable, HasDashesWhileNoRunHasAnEstimate) {
-  const std::vector<std::string> lines = lines_of(accuracy_table(Scenario{}, CampaignStatistics{}));
+  const std::vector<std::string> lines =
+      lines_of(accuracy_table(MicroscopeCampaign{}, CampaignStatistics{}));
   EXPECT_THAT(lines, Contains("a_c12      1e-4 rad         9       -       -       -      - │"
                               "    10   2.6   2.3"));
 }
 
 TEST(BudgetTable, ShowsEachTermBesideThePaper) {
   const std::vector<std::string> lines =
-      lines_of(budget_table(Scenario{}, paper_statistics(100), {}));
+      lines_of(budget_table(MicroscopeCampaign{}, paper_statistics(100), {}));
   EXPECT_THAT(lines, Contains("a_c11·T_xx·Δx            8.4e-14  1.7e-16  4.2e-17 │"
                               "  8.4e-14  1.7e-16  4.2e-17"));
   EXPECT_THAT(lines, Contains("2·K2d·(Γ_d²+Γ_res,x²)    8.0e-16  7.1e-18  1.4e-18 │"
@@ -105,7 +109,7 @@ TEST(BudgetTable, ShowsEachTermBesideThePaper) {
 
 TEST(BudgetTable, HasDashesAfterCalibrationWhileNoRunHasAnEstimate) {
   const std::vector<std::string> lines =
-      lines_of(budget_table(Scenario{}, CampaignStatistics{}, {}));
+      lines_of(budget_table(MicroscopeCampaign{}, CampaignStatistics{}, {}));
   EXPECT_THAT(lines, Contains("Total                    2.0e-13        -        - │"
                               "  2.0e-13  1.1e-15  3.6e-16"));
 }
@@ -160,7 +164,7 @@ TEST(IntervalTable, HasNoFiguresThatSoFewRunsDoNotGive) {
   EXPECT_THAT(lines_of(interval_table(paper_statistics(1), 0)),
               Contains("a_c11·Δx       10.0       -       - │       -       -       - │"
                        "        0      -"));
-  EXPECT_THAT(lines_of(accuracy_table(Scenario{}, paper_statistics(1))),
+  EXPECT_THAT(lines_of(accuracy_table(MicroscopeCampaign{}, paper_statistics(1))),
               Contains("a_c11·Δx   nm             100    40.0    10.0       -      0 │"
                        "    40    10   7.3"));
 }
@@ -187,39 +191,39 @@ TEST(ErrorTable, ShowsBiasPercentilesAndHowOftenObjectivesHold) {
                               "  0.243    7.04"));
   EXPECT_THAT(lines, Contains("K2d/K1c²          -        - │       0       0       0       0 │"
                               "      0    3.62"));
-  EXPECT_EQ(lines.back(),
-            "all ten objectives together: 97 of 100 runs, 91.5 to 99.4 % of all draws");
+  EXPECT_EQ(lines.back(), "all objectives together: 97 of 100 runs, 91.5 to 99.4 % of all draws");
 }
 
 // Run 1 has the worst total of all, and no run has the worst error of both parameters.
 TEST(RunTotals, AreThoseOfSingleRuns) {
-  const Scenario scenario;
-  RunTotalPasses passes(scenario);
+  const MicroscopeCampaign campaign;
+  const ErrorBudget budget = *campaign.error_budget();
+  RunTotalPasses passes(budget);
   std::vector<double> totals;
   for (std::uint64_t run = 0; run < 3; ++run) {
-    RunResult result{.run = {run}};
-    ParameterArray errors{};
+    RunResult result = test::zero_result({.run = {run}});
+    std::vector<double> errors(num_parameters);
     errors[index(Parameter::a_c12)] = run == 0 ? 1e-3 : 1e-5;
     errors[index(Parameter::a_c13)] = run == 1 ? -2e-3 : 1e-5;
     result.estimate = errors;
     for (double& error : errors) error = std::abs(error);
-    totals.push_back(budget_after_calibration(scenario, errors).total);
+    totals.push_back(budget.after(errors).total);
     passes.add(result);
   }
-  RunResult without{.run = {3}, .status = RunStatus::no_draw};
-  without.estimate.fill(1.0);
+  RunResult without = test::zero_result({.run = {3}, .status = RunStatus::no_draw});
+  without.estimate.assign(num_parameters, 1.0);
   passes.add(without);
   ASSERT_FALSE(passes.end_pass());
   EXPECT_EQ(passes.totals()->worst, totals[1]);
   EXPECT_EQ(passes.totals()->worst_run, RunIndex{1});
   EXPECT_EQ(passes.totals()->median, totals[0]);
-  EXPECT_FALSE(RunTotalPasses(scenario).totals().has_value());
+  EXPECT_FALSE(RunTotalPasses(budget).totals().has_value());
 }
 
 TEST(BudgetTable, TellsTheTotalsOfSingleRuns) {
   const RunTotals totals{
       .worst = 6.4e-16, .worst_run = {57}, .median = 2.6e-16, .percentile_95 = 5.1e-16};
-  EXPECT_THAT(budget_table(Scenario{}, paper_statistics(100), totals),
+  EXPECT_THAT(budget_table(MicroscopeCampaign{}, paper_statistics(100), totals),
               testing::EndsWith("single runs: median 2.6e-16, 95 % below 5.1e-16, worst 6.4e-16 "
                                 "(run 57)\n"));
 }
@@ -271,12 +275,12 @@ TEST(Report, FitsATerminal) {
       for (PercentileStatistic& percentile : accuracy.percentiles) percentile.value = 1e-6 * factor;
       accuracy.error.skewness = -12.345;
     }
-    Scenario scenario;
-    for (double& objective : scenario.objectives) objective *= factor;
-    EXPECT_THAT(lines_of(accuracy_table(scenario, statistics)), Each(FitsATerminal()));
+    MicroscopeCampaign campaign;
+    for (double& objective : campaign.scenario.objectives) objective *= factor;
+    EXPECT_THAT(lines_of(accuracy_table(campaign, statistics)), Each(FitsATerminal()));
     EXPECT_THAT(lines_of(interval_table(statistics, 0)), Each(FitsATerminal()));
     EXPECT_THAT(lines_of(error_table(statistics, most)), Each(FitsATerminal()));
-    EXPECT_THAT(lines_of(budget_table(scenario, statistics, RunTotals{.worst_run = {most}})),
+    EXPECT_THAT(lines_of(budget_table(campaign, statistics, RunTotals{.worst_run = {most}})),
                 Each(FitsATerminal()));
   }
   EXPECT_THAT(lines_of(summary_text(std::string(64, 'n'), std::numeric_limits<std::uint64_t>::max(),
@@ -288,8 +292,8 @@ TEST(Report, FitsATerminal) {
 TEST(Report, AlignsEveryRow) {
   const CampaignStatistics statistics = paper_statistics(100);
   for (const std::string& table :
-       {accuracy_table(Scenario{}, statistics), interval_table(statistics, 0),
-        error_table(statistics, 0), budget_table(Scenario{}, statistics, RunTotals{})}) {
+       {accuracy_table(MicroscopeCampaign{}, statistics), interval_table(statistics, 0),
+        error_table(statistics, 0), budget_table(MicroscopeCampaign{}, statistics, RunTotals{})}) {
     const std::vector<std::string> lines = lines_of(table);
     const auto is_row = [](const std::string& line) { return line.find("│") != line.npos; };
     for (std::size_t i = 3; i < lines.size(); ++i) {
@@ -306,7 +310,7 @@ TEST_F(StoredReport, RefusesAnEstimateThatNoSimulationYields) {
   Store store = Store::create(file(), test::campaign_of(12), "");
   store.commit(test::deliveries_of(0, 12));
   test::change(file(), "UPDATE run_result SET estimate_k2d_s2_m = 1e200 WHERE run_index = 3");
-  EXPECT_EQ(test::message_of<Error>([&] { (void)read_results(store, {}); }),
+  EXPECT_EQ(test::message_of<Error>([&] { (void)read_results(store, MicroscopeCampaign{}); }),
             "estimate_k2d_s2_m of run 3 = 1e+200 (must be in [-1e+90, 1e+90])");
 }
 
@@ -315,21 +319,22 @@ TEST_F(StoredReport, IsThatOfTheResultsInTheFile) {
   std::vector<Delivery> deliveries = test::deliveries_of(0, 10);
   deliveries[4].result.status = RunStatus::no_draw;
   store.commit(deliveries);
-  const Scenario scenario;
+  const MicroscopeCampaign campaign;
 
-  const CampaignStatistics statistics = read_results(store, scenario).statistics;
+  const CampaignStatistics statistics = read_results(store, campaign).statistics;
 
   EXPECT_EQ(statistics.num_runs, 10u);
   EXPECT_EQ(statistics.num_estimated, 9u);
   // Errors grow with the run: the last is the worst.
   EXPECT_EQ(statistics.accuracy[0].worst_run, RunIndex{9});
-  EXPECT_EQ(statistics.accuracy[0].worst, test::result_of(9).error(Parameter::a_c11_delta_x));
+  EXPECT_EQ(statistics.accuracy[0].worst,
+            test::result_of(9).error(index(Parameter::a_c11_delta_x)));
   EXPECT_EQ(
-      report_text(store, scenario),
+      report_text(store, campaign),
       summary_text("hardy2013", 1, 12, statistics, digest_of(store), DigestCheck::not_checked) +
-          "\n" + accuracy_table(scenario, statistics) + "\n" + interval_table(statistics, 0) +
+          "\n" + accuracy_table(campaign, statistics) + "\n" + interval_table(statistics, 0) +
           "\n" + error_table(statistics, 0) + "\n" +
-          budget_table(scenario, statistics, read_results(store, scenario).totals));
+          budget_table(campaign, statistics, read_results(store, campaign).totals));
 }
 
 // One of nine finished runs has no estimate, nor has the one that was given up.
@@ -340,8 +345,9 @@ TEST_F(StoredReport, CountsWhatWasGivenUpAsWithoutAnEstimate) {
   store.commit(deliveries);
   const Entry given_up = GivenUpRun{.run = {9}};
   store.write({&given_up, 1});
-  EXPECT_THAT(report_text(store, Scenario{}), HasSubstr("worst of 8: "));
-  EXPECT_THAT(report_text(store, Scenario{}), HasSubstr(" have an estimate; 2 more have none\n"));
+  EXPECT_THAT(report_text(store, MicroscopeCampaign{}), HasSubstr("worst of 8: "));
+  EXPECT_THAT(report_text(store, MicroscopeCampaign{}),
+              HasSubstr(" have an estimate; 2 more have none\n"));
 }
 
 // Every number that is stored, as text of 17 digits, of results with errors that do not add up to
@@ -350,13 +356,14 @@ TEST_F(StoredReport, IsTheSameBitsInWhateverOrderResultsCome) {
   std::vector<Delivery> deliveries = test::deliveries_of(0, 500);
   for (Delivery& delivery : deliveries) {
     const auto run = static_cast<double>(delivery.result.run.value);
-    delivery.result.truth.fill(0.0);
-    delivery.result.estimate.fill(1e8 * std::sin(run) + 1e-8 * std::cos(1.7 * run));
+    delivery.result.truth.assign(num_parameters, 0.0);
+    delivery.result.estimate.assign(num_parameters,
+                                    1e8 * std::sin(run) + 1e-8 * std::cos(1.7 * run));
   }
   const auto stored = [&](const std::string& name) {
     Store store = Store::create(file().replace_filename(name), test::campaign_of(500), "");
     for (const Delivery& delivery : deliveries) store.commit({&delivery, 1});
-    update_statistics(store, Scenario{});
+    update_statistics(store, MicroscopeCampaign{});
     const detail::Database database(file().replace_filename(name), detail::Access::read_only);
     std::string numbers = store.summary()->digests.results;
     for (const char* const table : {"statistic", "budget_entry"}) {
@@ -377,25 +384,25 @@ TEST_F(StoredReport, IsTheSameBitsInWhateverOrderResultsCome) {
 TEST_F(StoredReport, IsStoredAgainAfterMoreRuns) {
   Store store = Store::create(file(), test::campaign_of(10), "");
   store.commit(test::deliveries_of(0, 5));
-  update_statistics(store, Scenario{});
+  update_statistics(store, MicroscopeCampaign{});
   store.commit(test::deliveries_of(5, 9));
-  update_statistics(store, Scenario{});
+  update_statistics(store, MicroscopeCampaign{});
   EXPECT_EQ(store.summary()->num_finished, 9U);
   EXPECT_EQ(store.summary()->digests.results, digest_of(store));
 
   const Entry given_up = GivenUpRun{.run = {9}};
   store.write({&given_up, 1});
-  update_statistics(store, Scenario{});
+  update_statistics(store, MicroscopeCampaign{});
   EXPECT_EQ(store.summary()->num_given_up, 1U);
 }
 
 TEST_F(StoredReport, IsStoredForSql) {
   Store store = Store::create(file(), test::campaign_of(10), "");
   store.commit(test::deliveries_of(0, 10));
-  const Scenario scenario;
-  update_statistics(store, scenario);
+  const MicroscopeCampaign campaign;
+  update_statistics(store, campaign);
 
-  const CampaignStatistics statistics = read_results(store, scenario).statistics;
+  const CampaignStatistics statistics = read_results(store, campaign).statistics;
   const detail::Database database(file(), detail::Access::read_only);
   detail::Statement row = database.prepare("SELECT worst, mean FROM parameter_accuracy");
   for (const AccuracyStatistic& accuracy : statistics.accuracy) {
@@ -406,9 +413,9 @@ TEST_F(StoredReport, IsStoredForSql) {
   detail::Statement total = database.prepare(
       "SELECT before_m_s2, after_worst_m_s2, after_mean_m_s2 FROM budget WHERE term = 'total'");
   ASSERT_TRUE(total.step());
-  EXPECT_EQ(total.real(0), budget_before_calibration(scenario).total);
-  EXPECT_EQ(total.real(1), budget_after_calibration(scenario, statistics.worst_errors()).total);
-  EXPECT_EQ(total.real(2), budget_after_calibration(scenario, statistics.mean_errors()).total);
+  EXPECT_EQ(total.real(0), campaign.error_budget()->before.total);
+  EXPECT_EQ(total.real(1), campaign.error_budget()->after(statistics.worst_errors()).total);
+  EXPECT_EQ(total.real(2), campaign.error_budget()->after(statistics.mean_errors()).total);
 }
 
 }  // namespace

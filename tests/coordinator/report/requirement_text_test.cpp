@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -144,7 +145,7 @@ TEST_F(StoredRequirement, CountsRunsWithoutAnEstimateAsExceeding) {
   store.write({&given_up, 1});
   const std::vector<std::string> texts{"k2c < 1e9 for 50% with 50%"};
 
-  const auto answers = check_requirements(store, Scenario{}.objectives, texts);
+  const auto answers = check_requirements(store, MicroscopeCampaign{}.objectives(), texts);
 
   ASSERT_EQ(answers.size(), 1U);
   EXPECT_EQ(answers[0].check.num_runs, 11U);
@@ -159,7 +160,7 @@ TEST_F(StoredRequirement, CountsRunsThatMissAnyObjectiveOnce) {
   std::vector<Delivery> deliveries = test::deliveries_of(0, 10);
   for (Delivery& delivery : deliveries) delivery.result.estimate = delivery.result.truth;
   deliveries[4].result.status = RunStatus::no_draw;
-  const ParameterArray objectives = Scenario{}.objectives;
+  const std::vector<double> objectives = MicroscopeCampaign{}.objectives();
   const auto miss = [&](std::size_t run, Parameter parameter) {
     deliveries[run].result.estimate[index(parameter)] -= 2.0 * objectives[index(parameter)];
   };
@@ -178,12 +179,14 @@ TEST_F(StoredRequirement, IsOfErrorsOfEitherSign) {
   Store store = Store::create(file(), test::campaign_of(10), "");
   std::vector<Delivery> deliveries = test::deliveries_of(0, 10);
   for (Delivery& delivery : deliveries) {
-    delivery.result.truth.fill(0.0);
-    delivery.result.estimate.fill(delivery.result.run.value < 4 ? -2.0 : 0.5);
+    delivery.result.truth.assign(num_parameters, 0.0);
+    delivery.result.estimate.assign(num_parameters, delivery.result.run.value < 4 ? -2.0 : 0.5);
   }
   store.commit(deliveries);
   const std::vector<std::string> texts{"k2c < 1 for 50% with 50%"};
-  EXPECT_EQ(check_requirements(store, Scenario{}.objectives, texts)[0].check.num_exceedances, 4U);
+  EXPECT_EQ(
+      check_requirements(store, MicroscopeCampaign{}.objectives(), texts)[0].check.num_exceedances,
+      4U);
 }
 
 }  // namespace

@@ -11,8 +11,9 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/campaign/draw.hpp"
 #include "core/error.hpp"
+#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -39,6 +40,7 @@ DrawnRuns made_up_runs() {
   DrawnRuns drawn;
   drawn.names.assign(drawn_names().begin(), drawn_names().end());
   drawn.columns.resize(num_drawn);
+  drawn.errors.resize(num_parameters);
   for (std::uint64_t run = 0; run < 1000; ++run) {
     drawn.runs.push_back({run});
     for (auto& column : drawn.columns) {
@@ -55,7 +57,7 @@ DrawnRuns made_up_runs() {
 }
 
 TEST(SensitivityText, NamesTheQuantityThatDrivesAnError) {
-  const auto lines = lines_of(sensitivity_text(made_up_runs(), Parameter::k2c, 2));
+  const auto lines = lines_of(sensitivity_text(made_up_runs(), index(Parameter::k2c), 2));
   ASSERT_EQ(lines.size(), 19U);
   EXPECT_EQ(lines[0], "K2c/K1c²: 1000 runs");
   EXPECT_THAT(lines[2], StartsWith("drives |error|"));
@@ -67,7 +69,7 @@ TEST(SensitivityText, NamesTheQuantityThatDrivesAnError) {
 
 TEST(SensitivityText, SaysWhatItsFiguresAre) {
   EXPECT_THAT(
-      sensitivity_text(made_up_runs(), Parameter::k2c, 2),
+      sensitivity_text(made_up_runs(), index(Parameter::k2c), 2),
       HasSubstr("\n% of variance: with its 95 % interval; rank: rank correlation; p: that "
                 "chance\nalone makes one of 60 quantities look so influential (Kruskal-Wallis, "
                 "Holm)\n"));
@@ -75,7 +77,7 @@ TEST(SensitivityText, SaysWhatItsFiguresAre) {
 
 // Of 59 quantities without influence none is called significant.
 TEST(SensitivityText, CorrectsForAllQuantitiesTried) {
-  const auto lines = lines_of(sensitivity_text(made_up_runs(), Parameter::k2c, num_drawn));
+  const auto lines = lines_of(sensitivity_text(made_up_runs(), index(Parameter::k2c), num_drawn));
   const auto table = std::span(lines).subspan(4, num_drawn);
   EXPECT_THAT(table[0], EndsWith("  <1e-09"));
   for (const std::string& line : table.subspan(1)) {
@@ -89,30 +91,30 @@ TEST(SensitivityText, NamesTheProductThatMakesAnError) {
   for (std::size_t i = 0; i < drawn.runs.size(); ++i) {
     drawn.errors[index(Parameter::k2c)][i] = -3.03 * drawn.columns[7][i] * drawn.columns[40][i];
   }
-  const auto lines = lines_of(sensitivity_text(drawn, Parameter::k2c, 1));
+  const auto lines = lines_of(sensitivity_text(drawn, index(Parameter::k2c), 1));
   EXPECT_THAT(lines[12], StartsWith("error as a sum of "));
   EXPECT_EQ(lines[14], drawn_names()[7] + " × " + drawn_names()[40]);
   EXPECT_EQ(lines[15], std::string(51, ' ') + "-3.03      100.0 %     <1e-09");
 }
 
 TEST(SensitivityText, NamesASquareAndSaysWhenNothingExplainsTheError) {
-  const auto lines = lines_of(sensitivity_text(made_up_runs(), Parameter::a_c12, 1));
+  const auto lines = lines_of(sensitivity_text(made_up_runs(), index(Parameter::a_c12), 1));
   EXPECT_THAT(lines[14], StartsWith("(" + drawn_names()[20] + ")²  "));
   EXPECT_THAT(lines[14], EndsWith(" 1      100.0 %     <1e-09"));
-  EXPECT_THAT(sensitivity_text(made_up_runs(), Parameter::k2d, 1),
+  EXPECT_THAT(sensitivity_text(made_up_runs(), index(Parameter::k2d), 1),
               EndsWith("\n\nNo quantity and no product of two explains the error.\n"));
 }
 
 TEST(SensitivityText, SaysHowManyRunsItIsComputedFrom) {
   DrawnRuns drawn = made_up_runs();
-  const std::string none = sensitivity_text(drawn, Parameter::k2c, 1);
+  const std::string none = sensitivity_text(drawn, index(Parameter::k2c), 1);
   EXPECT_THAT(none, ::testing::Not(HasSubstr("Computed from")));
   drawn.num_with_estimate = 5000;
-  EXPECT_THAT(sensitivity_text(drawn, Parameter::k2c, 1),
+  EXPECT_THAT(sensitivity_text(drawn, index(Parameter::k2c), 1),
               StartsWith("K2c/K1c²: 1000 runs\nComputed from 1000 of 5000 runs with an estimate: "
                          "the first 1000\n\n"));
   drawn.num_first = 999;
-  EXPECT_THAT(explanation_text(drawn, Parameter::k2c, {999}, 1),
+  EXPECT_THAT(explanation_text(drawn, index(Parameter::k2c), {999}, 1),
               HasSubstr(" of 1000\nComputed from 1000 of 5000 runs with an estimate: the "
                         "first 999 and this one\n\n"))
       << "rank";
@@ -123,14 +125,15 @@ TEST(SensitivityText, CountsTheRunsThatItLeavesOut) {
   drawn.missing = {.num_not_finite = 2, .num_no_draw = 11, .num_given_up = 1};
   const std::string left_out =
       "\nLeft out, without an estimate: 2 not finite, 11 without draw, 1 given up\n\n";
-  EXPECT_THAT(sensitivity_text(drawn, Parameter::k2c, 1),
+  EXPECT_THAT(sensitivity_text(drawn, index(Parameter::k2c), 1),
               StartsWith("K2c/K1c²: 1000 runs" + left_out));
-  EXPECT_THAT(explanation_text(drawn, Parameter::k2c, {42}, 1), HasSubstr(" of 1000" + left_out));
+  EXPECT_THAT(explanation_text(drawn, index(Parameter::k2c), {42}, 1),
+              HasSubstr(" of 1000" + left_out));
 }
 
 // |error| goes as the square, which no correlation sees.
 TEST(SensitivityText, FindsWhatActsThroughItsSquare) {
-  const auto lines = lines_of(sensitivity_text(made_up_runs(), Parameter::a_c12, 1));
+  const auto lines = lines_of(sensitivity_text(made_up_runs(), index(Parameter::a_c12), 1));
   EXPECT_THAT(lines[4], StartsWith(drawn_names()[20]));
   double share_percent = 0.0;  // Behind the name, as in ` 98.1 (97.6, 98.5)`.
   std::istringstream(lines[4].substr(drawn_names()[20].size())) >> share_percent;
@@ -139,13 +142,14 @@ TEST(SensitivityText, FindsWhatActsThroughItsSquare) {
 
 TEST(SensitivityText, FitsATerminal) {
   const DrawnRuns drawn = made_up_runs();
-  EXPECT_THAT(lines_of(sensitivity_text(drawn, Parameter::k2c, num_drawn)), Each(FitsATerminal()));
-  EXPECT_THAT(lines_of(explanation_text(drawn, Parameter::k2c, {3}, num_drawn)),
+  EXPECT_THAT(lines_of(sensitivity_text(drawn, index(Parameter::k2c), num_drawn)),
+              Each(FitsATerminal()));
+  EXPECT_THAT(lines_of(explanation_text(drawn, index(Parameter::k2c), {3}, num_drawn)),
               Each(FitsATerminal()));
 }
 
 TEST(SensitivityText, SaysNothingOfAnErrorThatDoesNotVary) {
-  const auto lines = lines_of(sensitivity_text(made_up_runs(), Parameter::k2d, 5));
+  const auto lines = lines_of(sensitivity_text(made_up_runs(), index(Parameter::k2d), 5));
   EXPECT_EQ(lines.size(), 9U);
 }
 
@@ -153,11 +157,12 @@ TEST(ExplanationText, ShowsTheRunsValuesOfWhatDrivesTheError) {
   DrawnRuns drawn = made_up_runs();
   drawn.columns[7][42] = 1.5;
   drawn.errors[index(Parameter::k2c)][42] = 1.5;
-  const auto lines = lines_of(explanation_text(drawn, Parameter::k2c, {42}, 1));
+  const auto lines = lines_of(explanation_text(drawn, index(Parameter::k2c), {42}, 1));
   EXPECT_EQ(lines[0], "Run 42: error of K2c/K1c² 1.5 s²/m, rank 1 of 1000");
   EXPECT_THAT(lines[4], StartsWith(drawn_names()[7]));
   EXPECT_THAT(lines[4], HasSubstr("      1.5       99.9"));
-  EXPECT_EQ(worst_parameter_of(drawn, {42}), Parameter::a_c11_delta_x);  // All are equal there.
+  EXPECT_EQ(worst_quantity_of(drawn, {42}),
+            index(Parameter::a_c11_delta_x));  // All are equal there.
 }
 
 // An error whose sign is that of one quantity and whose magnitude grows with another.
@@ -167,7 +172,7 @@ TEST(ExplanationText, ShowsWhatDrivesTheMagnitudeBeforeWhatDrivesTheError) {
     drawn.errors[index(Parameter::k2c)][i] =
         std::copysign(2.0 + drawn.columns[20][i], drawn.columns[7][i]);
   }
-  const auto lines = lines_of(explanation_text(drawn, Parameter::k2c, {42}, 1));
+  const auto lines = lines_of(explanation_text(drawn, index(Parameter::k2c), {42}, 1));
   EXPECT_THAT(lines[2], StartsWith("drives |error|"));
   EXPECT_THAT(lines[4], StartsWith(drawn_names()[20]));
   EXPECT_THAT(lines[6], StartsWith("drives error"));
@@ -177,7 +182,7 @@ TEST(ExplanationText, ShowsWhatDrivesTheMagnitudeBeforeWhatDrivesTheError) {
 TEST(ExplanationText, HasTheUnitsOfTheTables) {
   DrawnRuns drawn = made_up_runs();
   drawn.errors[index(Parameter::a_c12)][42] = -3.5;
-  EXPECT_THAT(explanation_text(drawn, Parameter::a_c12, {42}, 1),
+  EXPECT_THAT(explanation_text(drawn, index(Parameter::a_c12), {42}, 1),
               StartsWith("Run 42: error of a_c12 -3.5e+04 1e-4 rad, rank 1 of 1000\n"));
 }
 
@@ -185,19 +190,19 @@ TEST(ExplanationText, IsOfTheParameterInWhichTheRunIsWorst) {
   DrawnRuns drawn = made_up_runs();
   for (auto& errors : drawn.errors) errors[42] = 0.0;
   drawn.errors[index(Parameter::k2c)][42] = -9.0;
-  EXPECT_EQ(worst_parameter_of(drawn, {42}), Parameter::k2c);
+  EXPECT_EQ(worst_quantity_of(drawn, {42}), index(Parameter::k2c));
 }
 
 TEST(ExplanationText, RefusesARunBetweenThoseThatAreThere) {
   DrawnRuns drawn = made_up_runs();
   for (RunIndex& run : drawn.runs) run.value *= 2;
   drawn.last_with_estimate = drawn.runs.back();
-  EXPECT_THROW((void)explanation_text(drawn, Parameter::k2c, {5}, 1), InvalidArgument);
+  EXPECT_THROW((void)explanation_text(drawn, index(Parameter::k2c), {5}, 1), InvalidArgument);
 }
 
 TEST(ExplanationText, RefusesARunThatIsNotThere) {
   try {
-    (void)explanation_text(made_up_runs(), Parameter::k2c, {1000}, 1);
+    (void)explanation_text(made_up_runs(), index(Parameter::k2c), {1000}, 1);
     FAIL();
   } catch (const InvalidArgument& error) {
     EXPECT_STREQ(error.what(), "run = 1000 (must have an estimate, as 1000 runs up to 999 have)");
@@ -208,7 +213,7 @@ using DrawnRunsTest = test::StoreTest;
 
 // Run by run what the simulation draws, those that were rejected first included.
 TEST_F(DrawnRunsTest, AreThoseOfTheSimulation) {
-  Campaign campaign = hardy2013_campaign();
+  MicroscopeCampaign campaign = hardy2013_campaign();
   campaign.num_runs = 51;
   Store store = Store::create(file(), campaign, canonical_definition(campaign));
   std::vector<Delivery> deliveries = test::deliveries_of(0, 50);
@@ -239,7 +244,7 @@ TEST_F(DrawnRunsTest, AreThoseOfTheSimulation) {
 
 // Run 7 lies beyond the first four; run 4 has no estimate.
 TEST_F(DrawnRunsTest, HoldARunBeyondTheFirst) {
-  Campaign campaign = hardy2013_campaign();
+  MicroscopeCampaign campaign = hardy2013_campaign();
   campaign.num_runs = 10;
   Store store = Store::create(file(), campaign, canonical_definition(campaign));
   std::vector<Delivery> deliveries = test::deliveries_of(0, 10);

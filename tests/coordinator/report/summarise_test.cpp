@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -19,8 +20,9 @@ class Summarise : public test::StoreTest {
     store.set_stop_plan(plan);
     std::vector<Delivery> deliveries = test::deliveries_of(0, num_runs);
     for (Delivery& delivery : deliveries) {
-      delivery.result.truth.fill(0.0);
-      delivery.result.estimate.fill(delivery.result.run.value % 2 == 0 ? even : -odd);
+      delivery.result.truth.assign(num_parameters, 0.0);
+      delivery.result.estimate.assign(num_parameters,
+                                      delivery.result.run.value % 2 == 0 ? even : -odd);
     }
     deliveries[3].result.status = RunStatus::no_draw;
     store.commit(deliveries);
@@ -28,7 +30,7 @@ class Summarise : public test::StoreTest {
   }
 
   std::optional<std::uint64_t> next_runs(Store& store) {
-    return summarise_file(file(), Scenario{},
+    return summarise_file(file(), MicroscopeCampaign{},
                           [&](const std::function<void(Store&)>& action) { action(store); });
   }
 
@@ -72,7 +74,7 @@ TEST_F(Summarise, DecidesARequirement) {
             "Stopping  k2c < 2 for 90% with 95% decided\n"
             "          met after 128 runs; exceeding: 1\n"
             "          at most 5.083 % of all draws, with 95 %\n");
-  EXPECT_TRUE(stop_check_differences(store, Scenario{}.objectives).empty());
+  EXPECT_TRUE(stop_check_differences(store, MicroscopeCampaign{}.objectives()).empty());
 }
 
 // The same of all objectives, which hold in all runs but run 3: 1 − 5.0833 %.
@@ -113,7 +115,7 @@ TEST_F(Summarise, CountsWhereAllObjectivesHold) {
             "Stopping  all objectives within 17.9 %, half its 95 % interval\n"
             "          in 64 of 128 runs, 41 to 59 % of all draws\n"
             "          after 128 runs; all objectives within 50%: reached\n");
-  EXPECT_TRUE(stop_check_differences(store, Scenario{}.objectives).empty());
+  EXPECT_TRUE(stop_check_differences(store, MicroscopeCampaign{}.objectives()).empty());
 }
 
 TEST_F(Summarise, AsksForNoMoreRunsThanThereMayBe) {

@@ -19,8 +19,9 @@
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/campaign/campaign.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/message_of.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::test {
 
@@ -59,17 +60,20 @@ inline std::string content_of(const std::filesystem::path& file) {
 }
 
 /// Harmonic environment, no tables.
-inline Campaign campaign_of(std::uint64_t num_runs) {
-  Campaign campaign;
+inline MicroscopeCampaign campaign_of(std::uint64_t num_runs) {
+  MicroscopeCampaign campaign;
   campaign.num_runs = num_runs;
   return campaign;
 }
 
 /// A result whose every number depends on the run; 1/3 needs all bits of a double.
 inline RunResult result_of(std::uint64_t run, RunStatus status = RunStatus::completed) {
-  RunResult result{.run = RunIndex{run}, .status = status, .num_draws = 2, .num_rounds = 3};
-  for (std::size_t i = 0; i < num_parameters; ++i) {
+  RunResult result =
+      zero_result({.run = RunIndex{run}, .status = status, .num_draws = 2, .num_rounds = 3});
+  for (std::size_t i = 0; i < result.truth.size(); ++i) {
     result.truth[i] = (static_cast<double>(run) + 1.0) / 3.0 * std::pow(10.0, -double(i));
+  }
+  for (std::size_t i = 0; i < result.estimate.size(); ++i) {
     result.estimate[i] = result.truth[i] * (1.0 + 1e-3);
   }
   return result;

@@ -7,6 +7,7 @@
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -83,7 +84,7 @@ TEST_F(StoreIntegrity, IsMissedByAResultThatWasChanged) {
 
 TEST_F(StoreIntegrity, IsMissedByAnOverrunThatIsNone) {
   std::string all_exact = "run_index = run_index";
-  for (const ParameterInfo& info : parameter_infos()) {
+  for (const test::ParameterInfo& info : test::parameter_infos()) {
     const std::string name = std::string(info.name) + std::string(info.unit_suffix);
     all_exact += ", estimate_" + name + " = truth_" + name;
   }

@@ -11,10 +11,11 @@
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/campaign/budget.hpp"
-#include "core/campaign/parameter.hpp"
+#include "core/microscope/campaign/budget.hpp"
+#include "core/microscope/campaign/parameter.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -30,7 +31,7 @@ void make_older(const std::filesystem::path& path) {
   old.execute(
       "INSERT INTO campaign (campaign_uid, name, seed, num_runs, definition, model_version, build)"
       " VALUES (7, 'old', '42', 5, 'text', 'hardy2013-3', 'b')");
-  for (const ParameterInfo& info : parameter_infos()) {
+  for (const test::ParameterInfo& info : test::parameter_infos()) {
     old.execute("INSERT INTO parameter VALUES (" + std::to_string(index(info.parameter) + 1) +
                 ", '" + std::string(info.name) + "', '', '', 1, 0, 0, 0)");
   }

@@ -6,6 +6,7 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/store.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -274,7 +275,7 @@ TEST_F(StoreRefusal, OfAResultWithAStatusThatThereIsNot) {
 
 TEST_F(StoreRefusal, OfAResultWithHealthThatThereIsNot) {
   std::vector<Delivery> deliveries = deliveries_of(0, 1);
-  deliveries[0].result.health = LoopHealth{1e-7, 2e-5, 1e-12, 0.25, 3e-4};
+  deliveries[0].result.health = test::values_of({1e-7, 2e-5, 1e-12, 0.25, 3e-4});
   Store::create(file(), campaign_of(1), "").commit(deliveries);
   const auto refusal_after = [&](const std::string& change) {
     Database(file(), Access::read_write).execute("UPDATE run_result SET " + change);

@@ -9,6 +9,7 @@
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -32,8 +33,8 @@ class StoreStandout : public test::StoreTest {
 /// A delivery with this estimate − truth of the parameter with index 4, a_c13, and of no other.
 Delivery delivery_with_error(std::uint64_t run, double error) {
   Delivery delivery = delivery_of(run);
-  delivery.result.truth.fill(0.0);
-  delivery.result.estimate.fill(0.0);
+  delivery.result.truth.assign(num_parameters, 0.0);
+  delivery.result.estimate.assign(num_parameters, 0.0);
   delivery.result.estimate[4] = error;
   return delivery;
 }
@@ -52,7 +53,7 @@ TEST_F(StoreStandout, ErrorsInLongFormAreThoseOfTheResults) {
       "SELECT run_index, e.parameter, e.unit, truth, estimate, error FROM error_long AS e"
       " JOIN parameter AS p USING (parameter) ORDER BY run_index, position");
   for (const std::uint64_t run : {0u, 2u}) {
-    for (const ParameterInfo& info : parameter_infos()) {
+    for (const test::ParameterInfo& info : test::parameter_infos()) {
       const RunResult& result = deliveries[run].result;
       ASSERT_TRUE(row.step());
       EXPECT_EQ(row.count(0), run);
@@ -60,7 +61,7 @@ TEST_F(StoreStandout, ErrorsInLongFormAreThoseOfTheResults) {
       EXPECT_EQ(row.text(2), info.unit);
       EXPECT_EQ(row.real(3), result.truth[index(info.parameter)]);
       EXPECT_EQ(row.real(4), result.estimate[index(info.parameter)]);
-      EXPECT_EQ(row.real(5), result.error(info.parameter));
+      EXPECT_EQ(row.real(5), result.error(index(info.parameter)));
     }
   }
   EXPECT_FALSE(row.step());
@@ -123,7 +124,7 @@ TEST_F(StoreStandout, WorstRunsAreNoMoreThanTenAfterAFileIsOpened) {
 }
 
 TEST_F(StoreStandout, OverrunsAreErrorsAboveTheObjectiveOnly) {
-  const double objective = Scenario{}.objectives[4];
+  const double objective = MicroscopeCampaign{}.objectives()[4];
   Store store = Store::create(file(), campaign_of(10), "");
   std::vector<Delivery> deliveries{
       delivery_with_error(3, -2.0 * objective), delivery_with_error(1, objective),

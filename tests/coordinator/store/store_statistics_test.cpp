@@ -4,7 +4,10 @@
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/microscope/campaign/budget.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -18,7 +21,8 @@ using StoreStatistics = test::StoreTest;
 
 /// Statistics in which every number is another: parameter i has worst i + 1, and so on.
 CampaignStatistics distinct_statistics() {
-  CampaignStatistics statistics{.num_runs = 9, .num_estimated = 7};
+  CampaignStatistics statistics{.num_runs = 9, .num_estimated = 7, .accuracy = {}};
+  statistics.accuracy.resize(num_parameters);
   for (std::size_t i = 0; i < num_parameters; ++i) {
     const double level = static_cast<double>(i) + 1.0;
     AccuracyStatistic& accuracy = statistics.accuracy[i];
@@ -49,23 +53,29 @@ CampaignStatistics distinct_statistics() {
 const ResultDigests digest{.results = std::string(64, '5'), .health = std::string(64, '6')};
 
 Budget constant_budget(double entry) {
-  Budget budget;
-  budget.entries.fill(entry);
-  budget.total = 10.0 * entry;
+  return {.entries = std::vector<double>(num_budget_entries, entry), .total = 10.0 * entry};
+}
+
+/// A budget whose entries are 2 after the worst and 3 after the mean of distinct_statistics().
+ErrorBudget constant_budgets(double before) {
+  ErrorBudget budget = microscope_budget(Scenario{});
+  budget.before = constant_budget(before);
+  budget.after = [](std::span<const double> errors) {
+    return constant_budget(errors[0] == 1.0 ? 2.0 : 3.0);
+  };
   return budget;
 }
 
 TEST_F(StoreStatistics, AppearInParameterAccuracyInThePapersOrder) {
   Store store = Store::create(file(), campaign_of(9), "");
-  store.write_statistics(distinct_statistics(), constant_budget(1), constant_budget(2),
-                         constant_budget(3), digest);
+  store.write_statistics(distinct_statistics(), constant_budgets(1), digest);
   const Database database(file(), Access::read_only);
   Statement row = database.prepare(
       "SELECT parameter, unit, objective, worst, mean, standard_deviation, num_beyond_objective,"
       " num_runs, worst_run_index, paper_worst, paper_mean, paper_standard_deviation"
       " FROM parameter_accuracy");
-  const ParameterArray objectives = Scenario{}.objectives;
-  for (const ParameterInfo& info : parameter_infos()) {
+  const std::vector<double> objectives = MicroscopeCampaign{}.objectives();
+  for (const test::ParameterInfo& info : test::parameter_infos()) {
     const std::size_t i = index(info.parameter);
     const double level = static_cast<double>(i) + 1.0;
     ASSERT_TRUE(row.step());
@@ -78,17 +88,16 @@ TEST_F(StoreStatistics, AppearInParameterAccuracyInThePapersOrder) {
     EXPECT_EQ(row.count(6), i);
     EXPECT_EQ(row.integer(7), 7);
     EXPECT_EQ(row.count(8), i + 100);
-    EXPECT_EQ(row.real(9), info.paper.worst);
-    EXPECT_EQ(row.real(10), info.paper.mean);
-    EXPECT_EQ(row.real(11), info.paper.standard_deviation);
+    EXPECT_EQ(row.real(9), info.published->worst);
+    EXPECT_EQ(row.real(10), info.published->mean);
+    EXPECT_EQ(row.real(11), info.published->standard_deviation);
   }
   EXPECT_FALSE(row.step());
 }
 
 TEST_F(StoreStatistics, AppearWithTheirIntervals) {
   Store store = Store::create(file(), campaign_of(9), "");
-  store.write_statistics(distinct_statistics(), constant_budget(1), constant_budget(2),
-                         constant_budget(3), digest);
+  store.write_statistics(distinct_statistics(), constant_budgets(1), digest);
   const Database database(file(), Access::read_only);
   Statement row = database.prepare(
       "SELECT mean_lower, mean_upper, standard_deviation_lower, standard_deviation_upper,"
@@ -118,9 +127,9 @@ TEST_F(StoreStatistics, AppearWithTheirIntervals) {
 
 TEST_F(StoreStatistics, HaveNoIntervalWhereRunsAreTooFew) {
   Store store = Store::create(file(), campaign_of(9), "");
-  CampaignStatistics statistics{.num_runs = 1, .num_estimated = 1};
-  store.write_statistics(statistics, constant_budget(1), constant_budget(2), constant_budget(3),
-                         digest);
+  CampaignStatistics statistics{.num_runs = 1, .num_estimated = 1, .accuracy = {}};
+  statistics.accuracy.resize(num_parameters);
+  store.write_statistics(statistics, constant_budgets(1), digest);
   const Database database(file(), Access::read_only);
   EXPECT_EQ(database.integer(
                 "SELECT count(mean) + count(percentile_99) + count(bias) FROM parameter_accuracy"),
@@ -142,10 +151,9 @@ TEST_F(StoreStatistics, ComeWithASummary) {
   statistics.num_no_draw = 2;
   statistics.num_lost = 4;
   statistics.num_within_objectives = 5;
-  const Budget budget = constant_budget(1);
-  store.write_statistics(statistics, budget, budget, budget,
-                         {.results = std::string(64, 'a'), .health = ""});
-  store.write_statistics(statistics, budget, budget, budget, digest);
+  const ErrorBudget budget = constant_budgets(1);
+  store.write_statistics(statistics, budget, {.results = std::string(64, 'a'), .health = ""});
+  store.write_statistics(statistics, budget, digest);
   const std::optional<Summary> summary = Store::open_read_only(file()).summary();
   ASSERT_TRUE(summary);
   EXPECT_THAT(summary->computed_utc, ::testing::MatchesRegex("20[0-9-]+T[0-9:]+Z"));
@@ -168,8 +176,7 @@ TEST_F(StoreStatistics, TellHowOftenAllObjectivesHoldTogether) {
   store.write(std::vector<Entry>{GivenUpRun{.run = RunIndex{8}}});
   CampaignStatistics statistics = distinct_statistics();
   statistics.num_within_objectives = 5;
-  store.write_statistics(statistics, constant_budget(1), constant_budget(2), constant_budget(3),
-                         digest);
+  store.write_statistics(statistics, constant_budgets(1), digest);
   const Database database(file(), Access::read_only);
   Statement row = database.prepare(
       "SELECT num_runs, num_within_objectives, within_objectives, within_objectives_lower,"
@@ -185,7 +192,7 @@ TEST_F(StoreStatistics, TellHowOftenAllObjectivesHoldTogether) {
 
 // SQL adds up in another order than budget_after_calibration().
 TEST_F(StoreStatistics, ComeWithTheBudgetOfEachRun) {
-  const Campaign campaign = campaign_of(6);
+  const MicroscopeCampaign campaign = campaign_of(6);
   Store store = Store::create(file(), campaign, "");
   std::vector<Delivery> deliveries = test::deliveries_of(0, 6);
   deliveries[2].result = test::result_of(2, RunStatus::no_draw);
@@ -194,11 +201,11 @@ TEST_F(StoreStatistics, ComeWithTheBudgetOfEachRun) {
   Statement row = database.prepare("SELECT run_index, total_m_s2 FROM run_budget");
   for (const Delivery& delivery : deliveries) {
     if (!delivery.result.has_estimate()) continue;
-    ParameterArray errors{};
-    for (const ParameterInfo& info : parameter_infos()) {
-      errors[index(info.parameter)] = std::abs(delivery.result.error(info.parameter));
+    std::vector<double> errors(num_parameters);
+    for (const test::ParameterInfo& info : test::parameter_infos()) {
+      errors[index(info.parameter)] = std::abs(delivery.result.error(index(info.parameter)));
     }
-    const double total = budget_after_calibration(campaign.scenario, errors).total;
+    const double total = microscope_budget(campaign.scenario).after(errors).total;
     ASSERT_TRUE(row.step());
     EXPECT_EQ(row.count(0), delivery.result.run.value);
     EXPECT_NEAR(row.real(1), total, 1e-14 * total);
@@ -209,8 +216,7 @@ TEST_F(StoreStatistics, ComeWithTheBudgetOfEachRun) {
 
 TEST_F(StoreStatistics, AppearInBudgetWithItsTotalLast) {
   Store store = Store::create(file(), campaign_of(9), "");
-  store.write_statistics(distinct_statistics(), constant_budget(1), constant_budget(2),
-                         constant_budget(3), digest);
+  store.write_statistics(distinct_statistics(), constant_budgets(1), digest);
   const Database database(file(), Access::read_only);
   Statement row = database.prepare(
       "SELECT label, before_m_s2, after_worst_m_s2, after_mean_m_s2, paper_before_m_s2,"
@@ -235,11 +241,9 @@ TEST_F(StoreStatistics, AppearInBudgetWithItsTotalLast) {
 TEST_F(StoreStatistics, ReplaceTheOlderOnes) {
   Store store = Store::create(file(), campaign_of(9), "");
   CampaignStatistics statistics = distinct_statistics();
-  store.write_statistics(statistics, constant_budget(1), constant_budget(2), constant_budget(3),
-                         digest);
+  store.write_statistics(statistics, constant_budgets(1), digest);
   statistics.accuracy[0].worst = 44.0;
-  store.write_statistics(statistics, constant_budget(5), constant_budget(2), constant_budget(3),
-                         digest);
+  store.write_statistics(statistics, constant_budgets(5), digest);
   const Database database(file(), Access::read_only);
   EXPECT_EQ(database.integer("SELECT count(*) FROM parameter_accuracy"), 10);
   EXPECT_EQ(database.integer("SELECT worst = 44 FROM parameter_accuracy LIMIT 1"), 1);
@@ -257,7 +261,7 @@ TEST_F(StoreStatistics, AreNullWhileNoRunHasAnEstimate) {
         database.integer("SELECT count(after_worst_m_s2) + count(after_mean_m_s2) FROM budget"), 0);
   };
   expect_nulls();
-  store.write_statistics({.num_runs = 2, .num_no_draw = 2}, constant_budget(1), Budget{}, Budget{},
+  store.write_statistics({.num_runs = 2, .num_no_draw = 2, .accuracy = {}}, constant_budgets(1),
                          digest);
   expect_nulls();
 }

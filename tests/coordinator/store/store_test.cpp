@@ -10,7 +10,9 @@
 
 #include "coordinator/store/detail/database.hpp"
 #include "core/campaign/dispersion.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -36,14 +38,18 @@ void expect_same_bits(const RunResult& left, const RunResult& right) {
   EXPECT_EQ(left.status, right.status);
   EXPECT_EQ(left.num_draws, right.num_draws);
   EXPECT_EQ(left.num_rounds, right.num_rounds);
-  using Bits = std::array<std::uint64_t, num_parameters>;
-  EXPECT_EQ(std::bit_cast<Bits>(left.truth), std::bit_cast<Bits>(right.truth));
-  EXPECT_EQ(std::bit_cast<Bits>(left.estimate), std::bit_cast<Bits>(right.estimate));
+  const auto bits_of = [](const std::vector<double>& values) {
+    std::vector<std::uint64_t> bits;
+    for (const double value : values) bits.push_back(std::bit_cast<std::uint64_t>(value));
+    return bits;
+  };
+  EXPECT_EQ(bits_of(left.truth), bits_of(right.truth));
+  EXPECT_EQ(bits_of(left.estimate), bits_of(right.estimate));
 }
 
 /// A campaign with two rows of environment and two drawn quantities from tables.
-Campaign campaign_with_data(std::uint64_t num_runs) {
-  Campaign campaign = campaign_of(num_runs);
+MicroscopeCampaign campaign_with_data(std::uint64_t num_runs) {
+  MicroscopeCampaign campaign = campaign_of(num_runs);
   campaign.environment_table = {
       {.time_s = -0.1, .linear_m_s2 = {1e-7, 1.0 / 3.0, 0.0}, .angular_rad_s2 = {1, -2, 3e-300}},
       {.time_s = 6000.0, .linear_m_s2 = {0.1, 0.2, 0.3}, .angular_rad_s2 = {0, 0, 1e-9}}};
@@ -59,7 +65,7 @@ Campaign campaign_with_data(std::uint64_t num_runs) {
 }
 
 TEST_F(StoreTest, HoldsTheCampaignThatItWasCreatedWith) {
-  Campaign campaign = campaign_with_data(3);
+  MicroscopeCampaign campaign = campaign_with_data(3);
   campaign.name = "naïve";
   campaign.seed = std::numeric_limits<std::uint64_t>::max();
   Store::create(file(), campaign, "name = \"naïve\"\n");
@@ -69,9 +75,8 @@ TEST_F(StoreTest, HoldsTheCampaignThatItWasCreatedWith) {
   EXPECT_EQ(store.seed(), 18446744073709551615u);
   EXPECT_EQ(store.num_runs(), 3u);
   EXPECT_EQ(store.definition(), "name = \"naïve\"\n");
-  EXPECT_EQ(store.environment_table(), campaign.environment_table);
-  const std::vector<std::size_t> elements = table_elements(campaign.dispersions);
-  const std::vector<std::vector<double>> columns = store.table_columns(elements);
+  EXPECT_EQ(environment_of(store.data_tables()), campaign.environment_table);
+  const std::vector<std::vector<double>> columns = store.table_columns();
   ASSERT_EQ(columns.size(), 2u);
   EXPECT_THAT(columns[0], ElementsAre(3.0, 3.0 + 1.0 / 7.0, 3.0 + 2.0 / 7.0));
   EXPECT_THAT(columns[1], ElementsAre(17.0, 17.0 + 1.0 / 7.0, 17.0 + 2.0 / 7.0));
@@ -81,7 +86,7 @@ TEST_F(StoreTest, OfANewCampaignHasNoResults) {
   const Store store = Store::create(file(), campaign_of(5), "");
   EXPECT_THAT(store.finished_runs(), IsEmpty());
   EXPECT_THAT(results_in(store), IsEmpty());
-  EXPECT_THAT(store.environment_table(), IsEmpty());
+  EXPECT_THAT(store.data_tables(), IsEmpty());
 }
 
 TEST_F(StoreTest, ReturnsResultsBitForBit) {
@@ -121,8 +126,9 @@ TEST_F(StoreTest, KeepsHealthAndWhereARunWasLost) {
   for (const auto status : {RunStatus::completed, RunStatus::lost, RunStatus::no_draw}) {
     RunResult result = result_of(deliveries.size(), status);
     if (result.has_truth())
-      result.health = LoopHealth{1e-7, 1.0 / 3.0, 1.1e-12, 3e-4, magnitude_max};
-    if (status == RunStatus::lost) result.loss = {LossCause::residual, SessionTarget::a_c12};
+      result.health = test::values_of({1e-7, 1.0 / 3.0, 1.1e-12, 3e-4, magnitude_max});
+    if (status == RunStatus::lost)
+      result.loss = test::loss_of(LossCause::residual, SessionTarget::a_c12);
     deliveries.push_back({result, session_1, {1}, 1.0});
   }
   EXPECT_EQ(Store::create(file(), campaign_of(3), "").commit(deliveries).num_new, 3u);
@@ -144,7 +150,7 @@ TEST_F(StoreTest, KeepsThatARunWasLostInAnySession) {
   std::vector<Delivery> deliveries;
   for (std::size_t i = 0; i < num_session_targets; ++i) {
     RunResult result = result_of(i, RunStatus::lost);
-    result.loss = {LossCause::attitude, static_cast<SessionTarget>(i + 1)};
+    result.loss = test::loss_of(LossCause::attitude, static_cast<SessionTarget>(i + 1));
     deliveries.push_back({result, session_1, {1}, 1.0});
   }
   Store store = Store::create(file(), campaign_of(num_session_targets), "");
@@ -163,8 +169,10 @@ TEST_F(StoreTest, HasNullWhereAResultHasNoMeaning) {
   for (const auto status : {RunStatus::completed, RunStatus::not_converged, RunStatus::not_finite,
                             RunStatus::no_draw}) {
     RunResult result = result_of(deliveries.size(), status);
-    if (!result.has_estimate()) result.estimate.fill(std::numeric_limits<double>::quiet_NaN());
-    if (!result.has_truth()) result.truth.fill(std::numeric_limits<double>::infinity());
+    if (!result.has_estimate())
+      result.estimate.assign(num_parameters, std::numeric_limits<double>::quiet_NaN());
+    if (!result.has_truth())
+      result.truth.assign(num_parameters, std::numeric_limits<double>::infinity());
     deliveries.push_back({result, session_1, {1}, 1.0});
   }
   EXPECT_EQ(Store::create(file(), campaign_of(4), "").commit(deliveries).num_new, 4u);
@@ -173,7 +181,7 @@ TEST_F(StoreTest, HasNullWhereAResultHasNoMeaning) {
   const auto count = [&](const std::string& column) {
     return database.integer("SELECT count(" + column + ") FROM run_result");
   };
-  for (const ParameterInfo& info : parameter_infos()) {
+  for (const test::ParameterInfo& info : test::parameter_infos()) {
     const std::string name = std::string(info.name) + std::string(info.unit_suffix);
     EXPECT_EQ(count("truth_" + name), 3);
     EXPECT_EQ(count("estimate_" + name), 2);
@@ -184,12 +192,12 @@ TEST_F(StoreTest, HasNullWhereAResultHasNoMeaning) {
 TEST_F(StoreTest, ShowsEachErrorAsEstimateMinusTruth) {
   Store::create(file(), campaign_of(1), "").commit(deliveries_of(0, 1));
   const Database database(file(), Access::read_only);
-  for (const ParameterInfo& info : parameter_infos()) {
+  for (const test::ParameterInfo& info : test::parameter_infos()) {
     Statement select = database.prepare("SELECT error_" + std::string(info.name) +
                                         std::string(info.unit_suffix) + " FROM run_result");
     ASSERT_TRUE(select.step());
     EXPECT_EQ(std::bit_cast<std::uint64_t>(select.real(0)),
-              std::bit_cast<std::uint64_t>(result_of(0).error(info.parameter)));
+              std::bit_cast<std::uint64_t>(result_of(0).error(index(info.parameter))));
   }
 }
 
@@ -254,41 +262,40 @@ TEST_F(StoreTest, RefusesANumberThatIsNotFinite) {
 TEST_F(StoreTest, ExtendsToMoreRunsAndTheirTableValues) {
   Store store = Store::create(file(), campaign_with_data(2), "num_runs = 2\n");
   store.commit(deliveries_of(0, 2));
-  const Campaign larger = campaign_with_data(4);
+  const MicroscopeCampaign larger = campaign_with_data(4);
 
   store.extend(larger, "num_runs = 4\n");
 
   EXPECT_EQ(store.num_runs(), 4u);
   EXPECT_EQ(store.definition(), "num_runs = 4\n");
-  const std::vector<std::size_t> elements = table_elements(larger.dispersions);
-  const std::vector<double> first_column = store.table_columns(elements)[0];
+  const std::vector<double> first_column = store.table_columns()[0];
   EXPECT_THAT(first_column, ElementsAre(3.0, 3.0 + 1.0 / 7.0, 3.0 + 2.0 / 7.0, 3.0 + 3.0 / 7.0));
   EXPECT_EQ(store.commit(deliveries_of(0, 4)).num_new, 2u);
 }
 
 TEST_F(StoreTest, RefusesToExtendToAnotherCampaign) {
   Store store = Store::create(file(), campaign_with_data(3), "");
-  const auto error_after = [&](const std::function<void(Campaign&)>& change) {
-    Campaign campaign = campaign_with_data(3);
+  const auto error_after = [&](const std::function<void(MicroscopeCampaign&)>& change) {
+    MicroscopeCampaign campaign = campaign_with_data(3);
     change(campaign);
     return store_error_of([&] { store.extend(campaign, ""); });
   };
-  EXPECT_EQ(error_after([](Campaign& campaign) { campaign.name = "other"; }),
+  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.name = "other"; }),
             "campaign.name = other (the campaign file has hardy2013)");
-  EXPECT_EQ(error_after([](Campaign& campaign) { campaign.seed = 2; }),
+  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.seed = 2; }),
             "campaign.seed = 2 (the campaign file has 1)");
-  EXPECT_EQ(error_after([](Campaign& campaign) { campaign.num_runs = 2; }),
+  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.num_runs = 2; }),
             "campaign.runs = 2 (must be at least 3, as in the campaign file)");
-  EXPECT_EQ(error_after([](Campaign& campaign) {
+  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) {
               campaign.environment_file = "e.csv";
               campaign.environment_table[0].linear_m_s2[0] *= 2.0;
             }),
             "environment.file = e.csv (its rows are not those of the campaign file)");
-  EXPECT_EQ(error_after([](Campaign& campaign) { campaign.table_columns[1][2] = 0.5; }),
+  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.table_columns[1][2] = 0.5; }),
             "dispersion." + drawn_names()[17] +
                 " = 0.5 (for run 2 the campaign file has 17.285714285714285)");
   EXPECT_EQ(
-      error_after([](Campaign& campaign) {
+      error_after([](MicroscopeCampaign& campaign) {
         campaign.dispersions[18] = campaign.dispersions[17];
         campaign.table_columns.push_back(campaign.table_columns[1]);
       }),

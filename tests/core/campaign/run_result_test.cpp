@@ -8,13 +8,14 @@
 namespace proofmass {
 namespace {
 
+constexpr std::uint32_t draws_max = 1000;
 constexpr std::int64_t rounds_max = 10;
 
 /// The first rule that such a result breaks.
 std::string broken(RunStatus status, std::uint32_t num_draws, std::uint32_t num_rounds) {
   const RunResult result{
       .run = {0}, .status = status, .num_draws = num_draws, .num_rounds = num_rounds};
-  const std::vector<std::string> rules = broken_count_rules(result, rounds_max);
+  const std::vector<std::string> rules = broken_count_rules(result, draws_max, rounds_max);
   return rules.empty() ? "" : rules.front();
 }
 
@@ -37,11 +38,11 @@ TEST(RunResult, OfImpossibleCountsBreaksARuleThatIsNamed) {
   EXPECT_EQ(broken(RunStatus::no_draw, 999, 0),
             "num_draws = 999 (must be 1000 to 1000 if no_draw)");
   EXPECT_EQ(broken(RunStatus::no_draw, 1000, 1), "num_rounds = 1 (must be 0 to 0 if no_draw)");
-  EXPECT_EQ(
-      broken_count_rules(
-          {.run = {0}, .status = RunStatus::no_draw, .num_draws = 7, .num_rounds = 5}, rounds_max)
-          .size(),
-      2U);
+  EXPECT_EQ(broken_count_rules(
+                {.run = {0}, .status = RunStatus::no_draw, .num_draws = 7, .num_rounds = 5},
+                draws_max, rounds_max)
+                .size(),
+            2U);
 }
 
 }  // namespace

@@ -10,12 +10,14 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/microscope_results.hpp"
+
 namespace proofmass {
 namespace {
 
 /// Run `run` of a campaign whose errors have a long tail, and of which some have no estimate.
 RunResult result_of(std::uint64_t run) {
-  RunResult result{.run = RunIndex{3 * run}, .num_draws = 1, .num_rounds = 1};
+  RunResult result = test::zero_result({.run = RunIndex{3 * run}, .num_draws = 1, .num_rounds = 1});
   if (run % 11 == 5) result.status = RunStatus::not_finite;
   if (run % 13 == 6) result.status = RunStatus::no_draw;
   if (run % 7 == 2) result.status = RunStatus::not_converged;
@@ -29,9 +31,9 @@ RunResult result_of(std::uint64_t run) {
   return result;
 }
 
-ParameterArray objectives() {
-  ParameterArray objectives;
-  objectives.fill(2e-3);
+std::vector<double> objectives() {
+  std::vector<double> objectives;
+  objectives.assign(num_parameters, 2e-3);
   return objectives;
 }
 

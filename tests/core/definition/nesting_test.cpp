@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/definition/campaign_definition.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 
 namespace proofmass::detail {
 namespace {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "core/campaign/scenario.hpp"
+#include "core/microscope/campaign/scenario.hpp"
 
 namespace proofmass {
 namespace {

@@ -10,9 +10,9 @@
 #include <unsupported/Eigen/FFT>
 #include <vector>
 
-#include "core/campaign/scenario.hpp"
+#include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/simulation/sample_noise.hpp"
 #include "core/signal/noise_shape.hpp"
-#include "core/simulation/sample_noise.hpp"
 
 namespace proofmass {
 namespace {

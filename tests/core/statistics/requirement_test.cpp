@@ -9,11 +9,12 @@
 #include "core/statistics/distribution.hpp"
 #include "tests/core/statistics/columns.hpp"
 #include "tests/message_of.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass {
 namespace {
 
-const Requirement a_c12_99_95{Parameter::a_c12, 9e-4, {0.99, 0.95}};
+const Requirement a_c12_99_95{index(Parameter::a_c12), 9e-4, {0.99, 0.95}};
 
 /// So many errors below the limit of 9e-4, then so many on it.
 std::vector<double> errors_with(std::size_t num_below, std::size_t num_on_limit) {
@@ -28,7 +29,7 @@ std::string refusal(std::string_view text) {
 
 TEST(ParseRequirement, ReadsEveryPart) {
   const Requirement requirement = parse_requirement("a_c12 < 9e-4 for 99% with 95%");
-  EXPECT_EQ(requirement.parameter, Parameter::a_c12);
+  EXPECT_EQ(requirement.parameter, index(Parameter::a_c12));
   EXPECT_EQ(requirement.limit, 9e-4);
   EXPECT_EQ(requirement.tolerance.coverage, 0.99);
   EXPECT_EQ(requirement.tolerance.confidence, 0.95);
@@ -43,7 +44,7 @@ TEST(ParseRequirement, ReadsAllObjectives) {
 
 TEST(ParseRequirement, TakesBlanksAsTheyCome) {
   const Requirement requirement = parse_requirement("  k2d<1000 for 99.9 %  with 90% ");
-  EXPECT_EQ(requirement.parameter, Parameter::k2d);
+  EXPECT_EQ(requirement.parameter, index(Parameter::k2d));
   EXPECT_EQ(requirement.limit, 1000.0);
   EXPECT_DOUBLE_EQ(requirement.tolerance.coverage, 0.999);
 }
@@ -128,11 +129,11 @@ TEST(CheckRequirement, AgreesWithItsBounds) {
 }
 
 TEST(Exceeds, IsAboutOneParameterOrAll) {
-  ParameterArray objectives{};
-  objectives.fill(2.0);
-  ParameterArray errors{};
+  std::vector<double> objectives(num_parameters);
+  objectives.assign(num_parameters, 2.0);
+  std::vector<double> errors(num_parameters);
   errors[index(Parameter::k2c)] = -2.0;
-  const Requirement one{.parameter = Parameter::k2c, .limit = 2.0, .tolerance = {0.9, 0.9}};
+  const Requirement one{.parameter = index(Parameter::k2c), .limit = 2.0, .tolerance = {0.9, 0.9}};
   const Requirement all{.tolerance = {0.9, 0.9}, .subject = Requirement::Subject::all_objectives};
   EXPECT_TRUE(exceeds(one, errors, objectives));   // On the limit exceeds it.
   EXPECT_FALSE(exceeds(all, errors, objectives));  // On the objective holds.
@@ -165,7 +166,7 @@ TEST(CheckRequirement, DecidesWithTheRunsThatItSaysIfTheRateStays) {
 // The same for other rates and tolerances, on either side.
 TEST(CheckRequirement, FulfilsWhatItForetells) {
   for (const Tolerance tolerance : {Tolerance{0.99, 0.95}, Tolerance{0.9, 0.9}}) {
-    const Requirement requirement{Parameter::a_c12, 9e-4, tolerance};
+    const Requirement requirement{index(Parameter::a_c12), 9e-4, tolerance};
     for (std::size_t num_runs = 10; num_runs < 200; num_runs += 13) {
       for (std::size_t num_on_limit = 1; num_on_limit < 8; ++num_on_limit) {
         const auto check =
@@ -214,7 +215,7 @@ TEST(CheckRequirement, OfNoRunsSaysHowManyItTakes) {
 TEST(CheckRequirement, IsMetIfAndOnlyIfTheBoundIsBelowTheLimit) {
   const std::vector<double> errors = test::half_normal_column(700, {.seed = 31});
   for (double limit = 1.0; limit < 3.5; limit += 0.01) {
-    const Requirement requirement{Parameter::k2c, limit, {0.95, 0.9}};
+    const Requirement requirement{index(Parameter::k2c), limit, {0.95, 0.9}};
     const RequirementCheck check = check_requirement(requirement, errors, 5);
     EXPECT_EQ(check.verdict == Verdict::met, check.bound->value < limit) << limit;
     EXPECT_EQ(check.verdict == Verdict::met, check.num_exceedances <= check.num_allowed) << limit;

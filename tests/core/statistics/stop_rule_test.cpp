@@ -12,6 +12,7 @@
 #include "core/statistics/order.hpp"
 #include "tests/core/statistics/columns.hpp"
 #include "tests/message_of.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass {
 namespace {
@@ -23,7 +24,7 @@ std::string refusal(std::string_view text) {
 TEST(ParseStopRule, ReadsEveryStatistic) {
   const StopRule spread = parse_stop_rule("std(a_c13) within 5%");
   EXPECT_EQ(spread.statistic, StopRule::Statistic::standard_deviation);
-  EXPECT_EQ(spread.parameter, Parameter::a_c13);
+  EXPECT_EQ(spread.parameter, index(Parameter::a_c13));
   EXPECT_EQ(spread.relative_half_width, 0.05);
   EXPECT_EQ(parse_stop_rule(" mean ( k2d )within 0.5 %").statistic, StopRule::Statistic::mean);
   const StopRule percentile = parse_stop_rule("p95(k2c) within 10%");
@@ -54,7 +55,7 @@ TEST(ParseStopRule, RefusesAnotherForm) {
 TEST(ParseStopRule, ReadsARequirement) {
   const StopRule rule = parse_stop_rule("a_c12 < 9e-4 for 99% with 95% decided ");
   EXPECT_EQ(rule.statistic, StopRule::Statistic::verdict);
-  EXPECT_EQ(rule.requirement.parameter, Parameter::a_c12);
+  EXPECT_EQ(rule.requirement.parameter, index(Parameter::a_c12));
   EXPECT_EQ(rule.requirement.limit, 9e-4);
   const StopRule joint = parse_stop_rule("all objectives for 95% with 90% decided");
   EXPECT_EQ(joint.requirement.subject, Requirement::Subject::all_objectives);

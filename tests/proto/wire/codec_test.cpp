@@ -8,9 +8,10 @@
 #include <random>
 #include <variant>
 
-#include "core/definition/campaign_definition.hpp"
 #include "core/error.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/wire/definition_codec.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -41,12 +42,14 @@ RunResult some_result(RunIndex run, RunStatus status) {
   result.status = status;
   result.num_draws = 3;
   result.num_rounds = 7;
+  result = test::zero_result(std::move(result));
   for (std::size_t i = 0; i < num_parameters; ++i) {
     if (result.has_truth()) result.truth[i] = hard_numbers[i % hard_numbers.size()];
     if (result.has_estimate()) result.estimate[i] = 1.0 / (3.0 + static_cast<double>(i));
   }
-  if (result.has_truth()) result.health = LoopHealth{1e-7, 2e-5, 1.1e-12, 3e-4, 1e90};
-  if (status == RunStatus::lost) result.loss = {LossCause::residual, SessionTarget::k2_sensor_2};
+  if (result.has_truth()) result.health = test::values_of({1e-7, 2e-5, 1.1e-12, 3e-4, 1e90});
+  if (status == RunStatus::lost)
+    result.loss = test::loss_of(LossCause::residual, SessionTarget::k2_sensor_2);
   return result;
 }
 
@@ -64,8 +67,8 @@ std::vector<std::uint64_t> field_bits(const Scenario& scenario) {
   return all;
 }
 
-Campaign unusual_campaign() {
-  Campaign campaign;
+MicroscopeCampaign unusual_campaign() {
+  MicroscopeCampaign campaign;
   campaign.name = "unusual";
   campaign.seed = seed_max - 1;
   campaign.num_runs = 12345;
@@ -122,18 +125,18 @@ TEST(Codec, KeepsAWelcome) {
   EXPECT_EQ(bits(welcome.heartbeat_interval_s), bits(0.1));
 }
 
-Campaign definition_round_trip(const Campaign& campaign) {
+MicroscopeCampaign definition_round_trip(const MicroscopeCampaign& campaign) {
   const Definition sent = definition_of(campaign, TableColumns::left_out);
   return campaign_of(std::get<Definition>(decode_definition(encode_definition(sent))),
                      TableColumns::left_out);
 }
 
 TEST(Codec, KeepsEveryBitOfACampaign) {
-  Campaign sent = unusual_campaign();
+  MicroscopeCampaign sent = unusual_campaign();
   Session& shaken_twice = sent.scenario.sessions[7];
   shaken_twice.excitations.push_back({ExcitationKind::attitude, Axis::z, 1e-3, 7e-4});
   shaken_twice.known_lines.push_back({.orbital = 1.0, .further = {2.5, 0.0, 0.0}});
-  const Campaign got = definition_round_trip(sent);
+  const MicroscopeCampaign got = definition_round_trip(sent);
   EXPECT_EQ(got.name, sent.name);
   EXPECT_EQ(got.seed, sent.seed);
   EXPECT_EQ(got.num_runs, sent.num_runs);
@@ -146,7 +149,7 @@ TEST(Codec, KeepsEveryBitOfACampaign) {
 }
 
 TEST(Codec, LeavesTableColumnsOut) {
-  Campaign campaign = unusual_campaign();
+  MicroscopeCampaign campaign = unusual_campaign();
   campaign.table_columns = {std::vector<double>(12345, 1e-3)};
   EXPECT_TRUE(definition_round_trip(campaign).table_columns.empty());
 }
@@ -224,8 +227,10 @@ TEST(Codec, KeepsEveryBitOfResultsOfEachStatus) {
     EXPECT_EQ(a.num_rounds, 7U);
     EXPECT_EQ(got.results[run].compute_s, 2.5);
     EXPECT_EQ(got.results[run].elapsed_s, 40.0);
-    for (std::size_t i = 0; i < num_parameters; ++i) {
-      EXPECT_EQ(bits(a.truth[i]), bits(b.truth[i]));
+    ASSERT_EQ(a.truth.size(), b.truth.size());
+    ASSERT_EQ(a.estimate.size(), b.estimate.size());
+    for (std::size_t i = 0; i < a.truth.size(); ++i) EXPECT_EQ(bits(a.truth[i]), bits(b.truth[i]));
+    for (std::size_t i = 0; i < a.estimate.size(); ++i) {
       EXPECT_EQ(bits(a.estimate[i]), bits(b.estimate[i]));
     }
   }

@@ -1,6 +1,7 @@
 // What a peer may not send: each rule of the decoder, broken by one change of a good message.
 
 #include "tests/proto/wire/refusal.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -25,7 +26,9 @@ const RunLease good_lease{.campaign = {1},
 const Welcome good_welcome{.worker = {1}, .heartbeat_interval_s = 1.0};
 const DefinitionPart good_part{
     .campaign = {1}, .offset = 2, .total_size = 5, .checksum = 1, .content = "abc"};
-const ResultBatch good_batch{.campaign = {1}, .attempt = {1}, .results = {ComputedRun{}}};
+const ResultBatch good_batch{.campaign = {1},
+                             .attempt = {1},
+                             .results = {ComputedRun{.result = proofmass::test::zero_result({})}}};
 const HeldRuns good_runs{.campaign = {1}, .attempt = {1}, .ranges = {{.first = {0}, .count = 1}}};
 const GiveBack good_give_back{.reason = LossReason::drained, .runs = {good_runs}};
 const Heartbeat good_heartbeat{
@@ -91,7 +94,7 @@ TEST(MalformedEnvelope, OfAnotherVersionIsRefused) {
   envelope.mutable_bye();
   const DecodeError error = refusal_of(envelope.SerializeAsString());
   EXPECT_EQ(error.fault, DecodeFault::wrong_version);
-  EXPECT_EQ(error.text, "protocol_version = 1 (must be 6)");
+  EXPECT_EQ(error.text, "protocol_version = 1 (must be 7)");
 }
 
 TEST(MalformedEnvelope, WithoutAMessageIsRefused) {
@@ -345,12 +348,12 @@ TEST(MalformedResultBatch, HasAttemptAndResults) {
 
 TEST(MalformedComputedRun, HasHealthInRangeAndACauseIfLost) {
   EXPECT_EQ(refusal_of_run([](auto& run) { run.clear_health(); }),
-            "health = none (must be there unless the status is no_draw)");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.mutable_health()->set_attitude_rad(nan); }),
+            "health = 0 entries (must be 5 with this status)");
+  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_health(1, nan); }),
             "health.attitude_rad = nan (must be in [0, 1e+90])");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.mutable_health()->set_residual_m_s2(-1.0); }),
+  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_health(2, -1.0); }),
             "health.residual_m_s2 = -1 (must be in [0, 1e+90])");
-  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_loss_cause(proto::LOSS_CAUSE_ATTITUDE); }),
+  EXPECT_EQ(refusal_of_run([](auto& run) { run.set_loss_cause(2); }),
             "loss_cause = 2 (must be in [0, 0])");
   const auto lose = [](auto& run) {
     run.set_status(proto::RUN_STATUS_LOST);
@@ -359,7 +362,7 @@ TEST(MalformedComputedRun, HasHealthInRangeAndACauseIfLost) {
   EXPECT_EQ(refusal_of_run(lose), "loss_cause = 0 (must be in [1, 5])");
   EXPECT_EQ(refusal_of_run([&](auto& run) {
               lose(run);
-              run.set_loss_cause(proto::LOSS_CAUSE_SATURATION);
+              run.set_loss_cause(1);
             }),
             "loss_session = 0 (must be in [1, 12])");
 }

@@ -8,6 +8,9 @@
 #include <semaphore>
 #include <stdexcept>
 
+#include "core/microscope/campaign/microscope_campaign.hpp"
+#include "tests/support/microscope_results.hpp"
+
 namespace proofmass::worker {
 namespace {
 
@@ -16,7 +19,9 @@ using Indices = std::vector<std::uint64_t>;
 constexpr wire::CampaignId first_campaign{1};
 constexpr wire::CampaignId second_campaign{2};
 
-std::shared_ptr<const Campaign> definition() { return std::make_shared<const Campaign>(); }
+std::shared_ptr<const Campaign> definition() {
+  return std::make_shared<const MicroscopeCampaign>();
+}
 
 wire::RunLease lease(std::uint64_t first, std::uint64_t count,
                      wire::CampaignId campaign = first_campaign) {
@@ -28,8 +33,7 @@ wire::RunLease lease(std::uint64_t first, std::uint64_t count,
 std::vector<RunResult> results_of(std::span<const RunRequest> requests) {
   std::vector<RunResult> results;
   for (const RunRequest& request : requests) {
-    RunResult result;
-    result.run = request.run;
+    RunResult result = test::zero_result({.run = request.run});
     result.num_draws = static_cast<std::uint32_t>(request.run.value);
     result.num_rounds = static_cast<std::uint32_t>(requests.size());
     result.truth[0] = request.table_values.empty() ? 0.0 : request.table_values.front();
@@ -345,9 +349,9 @@ Prepare prepare_by_seed(std::atomic<int>& num_prepared) {
 }
 
 std::shared_ptr<const Campaign> definition_with(std::uint64_t seed) {
-  Campaign campaign;
+  MicroscopeCampaign campaign;
   campaign.seed = seed;
-  return std::make_shared<const Campaign>(campaign);
+  return std::make_shared<const MicroscopeCampaign>(campaign);
 }
 
 TEST(Executor, ComputesRunsOfSeveralCampaigns) {

@@ -1,6 +1,6 @@
 // How a worker gets the definitions of campaigns of which it was lent runs.
 
-#include "core/definition/campaign_definition.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/worker/net/conversation_fixture.hpp"
 
 namespace proofmass::worker {
@@ -87,7 +87,7 @@ TEST_F(ConversationTest, BeginsADefinitionAnewThatHasChanged) {
   register_here();
   receive(lease(0, 1));
   (void)take_sent<wire::CampaignRequest>();
-  Campaign extended;
+  MicroscopeCampaign extended;
   extended.num_runs += 1;
   const auto old_parts = split(definition(campaign_1));
   const auto new_parts = split(definition(campaign_1, extended));
@@ -136,7 +136,7 @@ TEST_F(ConversationTest, RefusesADefinitionThatIsNotCanonical) {
   register_here();
   receive(lease(0, 1));
   (void)take_sent<wire::CampaignRequest>();
-  Definition other = definition_of(Campaign{});
+  Definition other = definition_of(MicroscopeCampaign{});
   other.text.insert(0, "# \u00e9\n");
   receive(wire::EncodedDefinition(other).part({.campaign = campaign_1}));
   EXPECT_FALSE(execution.is_defined(campaign_1));
@@ -145,7 +145,7 @@ TEST_F(ConversationTest, RefusesADefinitionThatIsNotCanonical) {
                                      "line = \"# \u00e9\" (must be \"[campaign]\", as the "
                                      "definition has one spelling)"});
   // Its name stands in the refusal, which is cut.
-  other = definition_of(Campaign{});
+  other = definition_of(MicroscopeCampaign{});
   const std::string table = "[environment]\n";
   other.text.insert(other.text.find(table) + table.size(),
                     "file = \"" + std::string(1000, 'x') + "\"\n");
@@ -157,8 +157,8 @@ TEST_F(ConversationTest, RefusesADefinitionThatIsNotCanonical) {
   EXPECT_TRUE(execution.is_defined(campaign_1));
 }
 
-Campaign definition_with_table() {
-  Campaign campaign;
+MicroscopeCampaign definition_with_table() {
+  MicroscopeCampaign campaign;
   campaign.dispersions[0] = {.law = Law::table, .file = "f", .column = "c"};
   return campaign;
 }

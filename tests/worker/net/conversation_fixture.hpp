@@ -11,7 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/definition/campaign_definition.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/support/microscope_results.hpp"
 #include "worker/execution/run_ranges.hpp"
 #include "worker/net/conversation.hpp"
 
@@ -94,7 +95,7 @@ class FakeExecution final : public Execution {
   void finish(wire::CampaignId campaign, const std::vector<RunRange>& ranges) {
     for (const RunIndex run : indices_of(ranges)) {
       FinishedRun done{.campaign = campaign, .computed = {}};
-      done.computed.result.run = run;
+      done.computed.result = test::zero_result({.run = run});
       finished.push_back(done);
     }
   }
@@ -111,7 +112,8 @@ inline wire::RunLease lease(std::uint64_t first, std::uint64_t count, std::uint3
 }
 
 /// A definition of one part.
-inline wire::DefinitionPart definition(wire::CampaignId campaign, const Campaign& content = {}) {
+inline wire::DefinitionPart definition(wire::CampaignId campaign,
+                                       const MicroscopeCampaign& content = {}) {
   return wire::EncodedDefinition(definition_of(content, TableColumns::left_out))
       .part({.campaign = campaign});
 }

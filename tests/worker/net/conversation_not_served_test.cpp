@@ -1,5 +1,6 @@
 // What a worker does with runs and results of campaigns that the coordinator does not serve.
 
+#include "tests/support/microscope_results.hpp"
 #include "tests/worker/net/conversation_fixture.hpp"
 
 namespace proofmass::worker {
@@ -31,7 +32,7 @@ class NotServedTest : public ConversationTest {
     std::vector<KeptResult> results;
     for (std::uint64_t run = first; run < first + count; ++run) {
       KeptResult result{.campaign = campaign, .attempt = {1}, .computed = {}};
-      result.computed.result.run = {run};
+      result.computed.result = test::zero_result({.run = {run}});
       results.push_back(result);
     }
     conversation->restore(std::move(results));

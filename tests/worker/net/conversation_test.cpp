@@ -1,5 +1,6 @@
 #include "worker/net/conversation.hpp"
 
+#include "tests/support/microscope_results.hpp"
 #include "tests/worker/net/conversation_fixture.hpp"
 
 namespace proofmass::worker {
@@ -313,7 +314,7 @@ TEST_F(ConversationTest, IgnoresAnAcknowledgementOfAnotherCampaign) {
 TEST_F(ConversationTest, DeliversTheResultsOfAFormerProcess) {
   start();
   KeptResult result{campaign_2, {3}, {}};
-  result.computed.result.run = {9};
+  result.computed.result = test::zero_result({.run = {9}});
   conversation->restore({result});
   (void)take_sent<wire::Hello>();
   receive(welcome);
@@ -329,7 +330,7 @@ TEST_F(ConversationTest, SendsManyResultsOneMessageATick) {
   std::vector<KeptResult> results(2 * wire::runs_per_lease_max + 1);
   for (std::size_t i = 0; i < results.size(); ++i) {
     results[i].campaign = campaign_1;
-    results[i].computed.result.run = {i};
+    results[i].computed.result = test::zero_result({.run = {i}});
   }
   conversation->restore(results);
   (void)take_sent<wire::Hello>();

@@ -8,10 +8,11 @@
 #include <thread>
 #include <zmq.hpp>
 
-#include "core/definition/campaign_definition.hpp"
 #include "core/error.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/wire/codec.hpp"
 #include "proto/wire/definition_codec.hpp"
+#include "tests/support/microscope_results.hpp"
 #include "tests/worker/temporary_directory.hpp"
 #include "worker/execution/executor.hpp"
 #include "worker/spool/spool.hpp"
@@ -63,7 +64,7 @@ class Coordinator {
     send(
         wire::RunLease{.campaign = campaign, .runs = {{0}, 2}, .attempt = {1}, .table_values = {}});
     (void)receive<wire::CampaignRequest>();
-    send(wire::EncodedDefinition(definition_of(Campaign{})).part({.campaign = campaign}));
+    send(wire::EncodedDefinition(definition_of(MicroscopeCampaign{})).part({.campaign = campaign}));
     return receive<wire::ResultBatch>();
   }
 
@@ -79,7 +80,9 @@ PreparedCampaign prepare(const Campaign&) {
               [](std::span<const RunRequest> requests, const std::function<void(int)>& progress) {
                 progress(1);
                 std::vector<RunResult> results;
-                for (const RunRequest& request : requests) results.push_back({.run = request.run});
+                for (const RunRequest& request : requests) {
+                  results.push_back(test::zero_result({.run = request.run}));
+                }
                 return results;
               },
           .num_orbits = 1};
@@ -249,7 +252,7 @@ TEST_F(ServeTest, DeliversAlthoughMessagesAreLost) {
   (void)coordinator.receive<wire::CampaignRequest>();
   for (int i = 0; i < 20; ++i) {
     coordinator.send(
-        wire::EncodedDefinition(definition_of(Campaign{})).part({.campaign = campaign}));
+        wire::EncodedDefinition(definition_of(MicroscopeCampaign{})).part({.campaign = campaign}));
   }
   EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 1U);
   for (int i = 0; i < 20; ++i) coordinator.send(wire::Stop{});

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "core/error.hpp"
+#include "tests/support/microscope_results.hpp"
 #include "tests/worker/temporary_directory.hpp"
 
 namespace proofmass::worker {
@@ -17,7 +18,7 @@ namespace {
 
 KeptResult result(std::uint64_t run, std::uint64_t campaign = 1, std::uint32_t attempt = 1) {
   KeptResult kept{{campaign}, {attempt}, {}};
-  kept.computed.result.run = {run};
+  kept.computed.result = test::zero_result({.run = {run}});
   kept.computed.result.truth[3] = 0.1 * static_cast<double>(run);
   kept.computed.compute_s = 1.5;
   kept.computed.elapsed_s = 24.0;

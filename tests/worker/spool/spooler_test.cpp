@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/microscope_results.hpp"
 #include "tests/worker/temporary_directory.hpp"
 
 namespace proofmass::worker {
@@ -11,7 +12,7 @@ std::vector<KeptResult> results(const std::vector<std::uint64_t>& runs) {
   std::vector<KeptResult> kept;
   for (const std::uint64_t run : runs) {
     kept.push_back({{1}, {1}, {}});
-    kept.back().computed.result.run = {run};
+    kept.back().computed.result = test::zero_result({.run = {run}});
   }
   return kept;
 }

@@ -6,14 +6,16 @@
 #include <set>
 
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
 
 RunResult known_result(RunStatus status) {
-  RunResult result{.run = RunIndex{7}, .status = status, .num_draws = 2, .num_rounds = 3};
+  RunResult result =
+      test::zero_result({.run = RunIndex{7}, .status = status, .num_draws = 2, .num_rounds = 3});
   result.truth = {1.0, -0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-300};
-  result.estimate.fill(2.0);
+  result.estimate.assign(num_parameters, 2.0);
   return result;
 }
 
@@ -26,18 +28,18 @@ TEST(ResultDigest, IsFnv1aOfAllThatMeansSomething) {
 
 TEST(ResultDigest, HasHealthAndLossAtItsEnd) {
   RunResult completed = known_result(RunStatus::completed);
-  completed.health = LoopHealth{1e-7, 2e-5, 1e-12, 0.25, 3e-4};
+  completed.health = test::values_of({1e-7, 2e-5, 1e-12, 0.25, 3e-4});
   EXPECT_EQ(digest(completed), 0xeec8560525c74118u);
   RunResult lost = known_result(RunStatus::lost);
   lost.health = completed.health;
-  lost.loss = {LossCause::residual, SessionTarget::k2d};
+  lost.loss = test::loss_of(LossCause::residual, SessionTarget::k2d);
   EXPECT_EQ(digest(lost), 0xcc77843cddfcfc4eu);
 }
 
 TEST(ResultDigest, DoesNotDependOnTheSignOfAZeroOrOnWhatMeansNothing) {
   RunResult result = known_result(RunStatus::not_finite);
   result.truth[3] = -0.0;
-  result.estimate.fill(std::numeric_limits<double>::quiet_NaN());
+  result.estimate.assign(num_parameters, std::numeric_limits<double>::quiet_NaN());
   EXPECT_EQ(digest(result), digest(known_result(RunStatus::not_finite)));
   EXPECT_TRUE(are_equal(result, known_result(RunStatus::not_finite)));
 }
@@ -65,10 +67,10 @@ TEST(ResultDigest, DependsOnEveryNumber) {
 TEST(AreEqual, ComparesHealthAndLoss) {
   const RunResult known = known_result(RunStatus::lost);
   RunResult other = known;
-  other.health.emplace().square_noise = 1e-9;
+  other.health = test::values_of({.square_noise = 1e-9});
   EXPECT_FALSE(are_equal(other, known));
   other = known;
-  other.loss = {LossCause::attitude, SessionTarget::k2d};
+  other.loss = test::loss_of(LossCause::attitude, SessionTarget::k2d);
   EXPECT_FALSE(are_equal(other, known));
 }
 

@@ -2,8 +2,9 @@
 
 #include <gmock/gmock.h>
 
-#include "core/campaign/parameter.hpp"
+#include "core/microscope/campaign/parameter.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -26,12 +27,13 @@ TEST_F(SchemaTest, HasThreeColumnsForEachParameterAndThoseOfHealth) {
   database.execute(migrations()[0]);
   std::string expected = "run_index,status,num_draws,num_rounds";
   for (const std::string kind : {"truth", "estimate", "error"}) {
-    for (const ParameterInfo& info : parameter_infos()) {
+    for (const test::ParameterInfo& info : test::parameter_infos()) {
       expected += "," + kind + "_" + std::string(info.name) + std::string(info.unit_suffix);
     }
   }
   for (const HealthValue& value : health_values()) {
-    expected += ",health_" + std::string(value.name) + std::string(value.unit_suffix);
+    expected +=
+        ",health_" + std::string(value.quantity.name) + std::string(value.quantity.unit_suffix);
   }
   expected += ",loss_cause,loss_session";
   EXPECT_EQ(database.text("SELECT group_concat(name) FROM pragma_table_xinfo('run_result')"),
@@ -50,7 +52,7 @@ TEST_F(SchemaTest, HasStrictTablesOnly) {
 TEST_F(SchemaTest, TiesEveryNumberToTheStatus) {
   Store::create(file(), test::campaign_of(10), "").commit(test::deliveries_of(0, 1));
   Database database(file(), Access::read_write);
-  for (const ParameterInfo& info : parameter_infos()) {
+  for (const test::ParameterInfo& info : test::parameter_infos()) {
     const std::string name = std::string(info.name) + std::string(info.unit_suffix);
     for (const std::string kind : {"truth_", "estimate_"}) {
       const std::string column = kind + name;

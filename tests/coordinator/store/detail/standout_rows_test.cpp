@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/microscope_results.hpp"
+
 namespace proofmass::coordinator::detail {
 namespace {
 
@@ -36,9 +38,9 @@ TEST(WorstRuns, PreferTheFirstOfEqualOnes) {
 }
 
 TEST(ExceededObjectives, AreThoseOfRunsThatHaveAnEstimate) {
-  ParameterArray objectives;
-  objectives.fill(1.0);
-  RunResult result{.run = RunIndex{1}, .status = RunStatus::completed};
+  std::vector<double> objectives;
+  objectives.assign(num_parameters, 1.0);
+  RunResult result = test::zero_result({.run = RunIndex{1}, .status = RunStatus::completed});
   EXPECT_EQ(exceeded_objectives(result, objectives), 0u);
   result.estimate[0] = -1.5;
   result.estimate[1] = 1.0;

@@ -1,0 +1,116 @@
+#include "coordinator/bench/bench_command.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "coordinator/bench/bench_bits.hpp"
+#include "coordinator/bench/bench_parts.hpp"
+#include "coordinator/bench/bench_report.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "core/microscope/session/session_signals.hpp"
+#include "proto/command_line/option_checks.hpp"
+#include "proto/command_line/standard_error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::uint64_t bench_runs_max = 1'000'000;
+
+Machine this_machine() {
+  std::ifstream file("/proc/cpuinfo");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  return {.processor = processor_name(text),
+          .num_processors = std::max(1U, std::thread::hardware_concurrency()),
+          .compiler = "GCC " __VERSION__,
+          .build_type = PROOFMASS_BUILD_TYPE};
+}
+
+std::uint64_t num_steps_of_a_run(const MicroscopeCampaign& campaign) {
+  const Scenario& scenario = campaign.scenario;
+  const KeplerOrbit orbit(scenario.orbit);
+  const Environment environment(scenario.environment, campaign.environment_table,
+                                scenario.orbit.period_s);
+  std::int64_t num_steps = 0;
+  for (const Session& session : scenario.sessions) {
+    const SessionSignals signals(scenario, session, orbit, environment);
+    num_steps += signals.num_settling() + signals.num_record();
+  }
+  return static_cast<std::uint64_t>(num_steps);
+}
+
+std::vector<RunResult> simulate(const RunPlan& plan, std::uint64_t num_runs, InstructionSet set) {
+  std::vector<RunResult> results;
+  for (std::uint64_t first = 0; first < num_runs; first += batch_lanes) {
+    std::vector<RunRequest> requests;
+    const std::uint64_t end = std::min<std::uint64_t>(first + batch_lanes, num_runs);
+    for (std::uint64_t run = first; run < end; ++run)
+      requests.push_back({.run = {run}, .table_values = {}});
+    const std::vector<RunResult> of_batch = plan.simulate_batch(requests, set);
+    results.insert(results.end(), of_batch.begin(), of_batch.end());
+  }
+  return results;
+}
+
+SetCost measure_set(const MicroscopeCampaign& campaign, const RunPlan& plan, std::uint64_t num_runs,
+                    InstructionSet set, std::vector<RunResult>& known) {
+  const auto start = std::chrono::steady_clock::now();
+  const std::vector<RunResult> results = simulate(plan, num_runs, set);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  return {.set = set,
+          .run_s = elapsed.count() / static_cast<double>(num_runs),
+          .noise = measure_noise(campaign, set),
+          .has_reference_bits = agree_with_known(results, known)};
+}
+
+BenchFigures measure(const MicroscopeCampaign& campaign, std::uint64_t num_runs) {
+  const RunPlan plan(campaign);
+  BenchFigures figures{.machine = this_machine(),
+                       .num_runs = num_runs,
+                       .num_orbits = plan.num_orbits(),
+                       .num_steps = num_steps_of_a_run(campaign),
+                       .sets = {},
+                       .scalar_step = measure_step_parts(campaign)};
+  std::vector<RunResult> known;
+  for (const InstructionSet set : available_instruction_sets()) {
+    // One scalar run is long enough to be timed.
+    const std::uint64_t count = set == InstructionSet::scalar ? 1 : num_runs;
+    figures.sets.push_back(measure_set(campaign, plan, count, set, known));
+  }
+  const SetCost& scalar = figures.sets.front();
+  figures.scalar_step.noise_ns = scalar.noise.step_ns;
+  figures.scalar_step.whole_ns = 1e9 * scalar.run_s / static_cast<double>(figures.num_steps);
+  return figures;
+}
+
+}  // namespace
+
+int run_bench(const BenchOptions& options) {
+  const BenchFigures figures = measure(MicroscopeCampaign{}, options.num_runs);
+  const bool is_table = options.format == BenchFormat::table;
+  fmt::print("{}", is_table ? bench_table(figures) : bench_json(figures));
+  if (all_bits_agree(figures)) return exit_done;
+  wire::say("proofmass: error: instruction sets give different results\n");
+  return exit_cannot_be_done;
+}
+
+void add_bench_command(CLI::App& app, Command& chosen) {
+  const auto options = std::make_shared<BenchOptions>();
+  CLI::App& bench = *app.add_subcommand("bench", "Measure the speed of this machine");
+  bench.add_option("--runs", options->num_runs, "Runs of each instruction set")
+      ->check(wire::in_range(std::uint64_t{1}, bench_runs_max))
+      ->capture_default_str();
+  bench.add_flag_callback(
+      "--json", [options] { options->format = BenchFormat::json; }, "Print JSON");
+  bench.callback([options, &chosen] { chosen = [options] { return run_bench(*options); }; });
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/campaign/campaign.hpp"
+#include "core/campaign/definition.hpp"
+#include "core/campaign/result_schema.hpp"
+#include "core/math/instruction_set.hpp"
+
+namespace proofmass {
+
+class Document;
+
+/// A quantity that a model draws for each run.
+struct DrawnQuantity {
+  std::string_view name;  ///< `offcentring_m.x`, in files and in SQL.
+  std::string_view unit;  ///< For people: `m`.
+};
+
+/// Reads the data files that a campaign file names.
+class DataFiles {
+ public:
+  virtual ~DataFiles() = default;
+
+  /// All bytes of a file.
+  /// @param file  As it is named in the campaign file.
+  /// @param path  Of the key that names it, for messages.
+  /// @throws DefinitionError
+  virtual const std::string& text_of(const std::string& file, const std::string& path) = 0;
+  /// Where the file is, for messages.
+  [[nodiscard]] virtual std::string name_of(const std::string& file) const = 0;
+};
+
+/// All that coordinator, workers and reports know of what a campaign simulates. Neither sees the
+/// other: a model has no socket, file or worker, and what runs campaigns names no parameter.
+class Model {
+ public:
+  virtual ~Model() = default;
+
+  /// Name and version, [A-Za-z0-9._-]{1,128}: changes with what may change a result's bits.
+  /// Coordinator and workers must agree on it; a campaign is finished by the model that began it.
+  [[nodiscard]] virtual std::string_view version() const = 0;
+
+  /// What the results of every campaign of this model are.
+  [[nodiscard]] virtual const ResultSchema& results() const = 0;
+
+  /// What is drawn for a run, in the order of RunDraw::values.
+  [[nodiscard]] virtual std::span<const DrawnQuantity> drawn() const = 0;
+
+  /// Runs that one call of Plan::simulate_batch() takes at most; fewer cost as much.
+  [[nodiscard]] virtual std::size_t batch_size() const = 0;
+
+  /// Digest of the results of a short fixed campaign: the same number from every sound build and
+  /// processor of one version. Takes some tenths of a second.
+  /// @param set  One of available_instruction_sets().
+  [[nodiscard]] virtual std::uint64_t reference_digest(InstructionSet set) const = 0;
+
+  /// The campaign of a definition that another program sent or stored.
+  ///
+  /// @param definition  Anything at all. Time and memory are in proportion to its size.
+  /// @param source      For messages: where it is from.
+  /// @throws DefinitionError unless it is, to the byte, the definition of a valid campaign.
+  [[nodiscard]] virtual std::unique_ptr<Campaign> campaign_of(Definition definition,
+                                                              TableColumns columns,
+                                                              std::string_view source) const = 0;
+
+  /// The campaign of a campaign file, completed with the nominal values and checked.
+  /// @throws DefinitionError naming file, line, field, value and rule.
+  [[nodiscard]] virtual std::unique_ptr<Campaign> read_campaign(Document& document,
+                                                                DataFiles& files) const = 0;
+
+  /// A campaign file with every key at its nominal value, its meaning and its rule.
+  [[nodiscard]] virtual std::string example() const = 0;
+};
+
+/// The model that this program runs campaigns of. It is chosen where the program is linked: each
+/// program is linked with exactly one library that defines this function.
+[[nodiscard]] const Model& model();
+
+}  // namespace proofmass

@@ -1,0 +1,95 @@
+#include "core/definition/csv.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "core/campaign/definition.hpp"
+#include "core/definition/nearest_name.hpp"
+
+namespace proofmass {
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(" \t");
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(" \t") - begin + 1);
+}
+
+std::size_t find_heading(const CsvReader& reader, std::string_view heading) {
+  const std::vector<std::string_view>& headings = reader.cells();
+  const auto match = std::ranges::find(headings, heading);
+  if (match == headings.end()) {
+    const std::optional<std::string> nearest =
+        nearest_name(heading, std::set<std::string>(headings.begin(), headings.end()));
+    reader.refuse(fmt::format("no column \"{}\"{}", heading,
+                              nearest ? "; nearest is \"" + *nearest + "\"" : ""));
+  }
+  if (std::ranges::count(headings, heading) > 1) {
+    reader.refuse(fmt::format("two columns \"{}\"", heading));
+  }
+  return static_cast<std::size_t>(match - headings.begin());
+}
+
+}  // namespace
+
+bool CsvReader::next_row() {
+  if (rest_.empty()) return false;
+  const std::size_t end = std::min(rest_.find('\n'), rest_.size());
+  std::string_view line = rest_.substr(0, end);
+  rest_.remove_prefix(std::min(end + 1, rest_.size()));
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  ++line_;
+  split(line);
+  return true;
+}
+
+double CsvReader::number(std::size_t position, std::string_view heading) const {
+  const std::string_view cell = cells_[position];
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  if (error != std::errc() || end != cell.data() + cell.size()) {
+    refuse(fmt::format("{} = \"{}\" (must be a number)", heading, cell.substr(0, 40)));
+  }
+  if (!std::isfinite(value)) refuse(fmt::format("{} = {} (must be finite)", heading, cell));
+  return value;
+}
+
+void CsvReader::expect_cells(std::size_t num_cells) const {
+  if (cells_.size() == num_cells) return;
+  refuse(fmt::format("{} cells (must be {})", cells_.size(), num_cells));
+}
+
+void CsvReader::refuse(std::string_view reason) const {
+  throw DefinitionError(fmt::format("{}:{}: {}", name_, std::max<std::size_t>(line_, 1), reason));
+}
+
+void CsvReader::split(std::string_view line) {
+  cells_.clear();
+  for (;;) {
+    const std::size_t comma = std::min(line.find(','), line.size());
+    cells_.push_back(trimmed(line.substr(0, comma)));
+    if (comma == line.size()) return;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+std::vector<double> parse_column(std::string_view text, const std::string& name,
+                                 std::string_view heading) {
+  CsvReader reader(text, name);
+  if (!reader.next_row()) reader.refuse("the file is empty; its first line must hold the headings");
+  const std::size_t num_cells = reader.cells().size();
+  const std::size_t position = find_heading(reader, heading);
+  std::vector<double> values;
+  while (reader.next_row()) {
+    reader.expect_cells(num_cells);
+    values.push_back(reader.number(position, heading));
+  }
+  return values;
+}
+
+}  // namespace proofmass

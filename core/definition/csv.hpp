@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace proofmass {
+
+/// Goes through lines of comma-separated text; cells are trimmed, carriage returns at line ends
+/// dropped. Text and name outlive it.
+class CsvReader {
+ public:
+  /// @param name  For messages: path of the file that has the text.
+  CsvReader(std::string_view text, const std::string& name) : rest_(text), name_(name) {}
+
+  /// Moves to the next line, false behind the last.
+  bool next_row();
+  [[nodiscard]] const std::vector<std::string_view>& cells() const { return cells_; }
+  /// The number in a cell of the line.
+  /// @throws DefinitionError naming file, line, heading and rule; so do the next two.
+  [[nodiscard]] double number(std::size_t position, std::string_view heading) const;
+  void expect_cells(std::size_t num_cells) const;
+  [[noreturn]] void refuse(std::string_view reason) const;
+
+ private:
+  void split(std::string_view line);
+
+  std::string_view rest_;
+  const std::string& name_;
+  std::size_t line_ = 0;
+  std::vector<std::string_view> cells_;
+};
+
+/// One column, by its heading, of comma-separated text whose first line holds the headings.
+/// @throws DefinitionError naming file, line and reason.
+[[nodiscard]] std::vector<double> parse_column(std::string_view text, const std::string& name,
+                                               std::string_view heading);
+
+}  // namespace proofmass

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/campaign/dispersion.hpp"
+#include "core/campaign/identifiers.hpp"
+
+namespace proofmass {
+
+/// Quantities that are drawn together by nature, such as the six scale factors.
+struct DrawGroup {
+  std::string_view name;     ///< `scale_factor_error`.
+  std::string_view comment;  ///< One line: meaning and unit.
+  double bound;              ///< Nominal law: uniform on ±bound.
+  std::size_t first;         ///< Index of its first element among all.
+  std::size_t count;
+};
+
+inline constexpr std::size_t num_draw_groups = 12;
+inline constexpr std::size_t num_drawn = 60;
+
+/// The groups in file order; together they cover all drawn quantities once.
+[[nodiscard]] const std::array<DrawGroup, num_draw_groups>& draw_groups();
+
+/// Names of all drawn quantities: `scale_factor_error.sensor_1_x`. The name is that of the random
+/// stream, so it must never change.
+[[nodiscard]] const std::array<std::string, num_drawn>& drawn_names();
+
+/// A value for each drawn quantity, indexed like drawn_names().
+using DrawnValues = std::array<double, num_drawn>;
+using DispersionSet = std::array<Dispersion, num_drawn>;
+
+/// Uniform laws inside the construction bounds of MICROSCOPE.
+[[nodiscard]] DispersionSet nominal_dispersions();
+
+/// Indices of the quantities with law `table`, ascending.
+[[nodiscard]] std::vector<std::size_t> table_elements(const DispersionSet& dispersions);
+
+/// The values of a run's draw number `draw` (from 0), before any acceptance rule: a pure function
+/// of its arguments.
+///
+/// @param table_values  The run's values of the `table` quantities, in the order of
+/// table_elements().
+[[nodiscard]] DrawnValues draw_values(const DispersionSet& dispersions, std::uint64_t seed,
+                                      RunIndex run, std::uint32_t draw,
+                                      std::span<const double> table_values);
+
+/// Unit of a drawn quantity, for people: `rad`, `m`, `s²/m`, `m/s²`, `rad/s²` or `1`.
+/// @param quantity  Index into drawn_names().
+[[nodiscard]] std::string_view drawn_unit(std::size_t quantity);
+
+}  // namespace proofmass

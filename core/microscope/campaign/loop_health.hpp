@@ -1,0 +1,67 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "core/campaign/result_schema.hpp"
+#include "core/microscope/session/target.hpp"
+
+namespace proofmass {
+
+/// How well the loops held the satellite and the sensors in a run; the largest over its sessions.
+/// No number is beyond magnitude_max of a RunResult.
+struct LoopHealth {
+  /// Largest measured acceleration of a sensor along an axis before the sensor's range cuts it off,
+  /// |Γ_mes,k|, m/s².
+  double acceleration_m_s2 = 0.0;
+  /// Largest angle about an axis that the attitude loop has to remove, rad.
+  double attitude_rad = 0.0;
+  /// Largest amplitude of Γ_mes,c along an axis at f_EP in the sessions without excitation, m/s².
+  double residual_m_s2 = 0.0;
+  /// Noise of the quadratic terms of Γ_mes,dx in those sessions, over that which the sensors have
+  /// at the quietest line of a session; a ratio of densities of power.
+  double quadratic_noise = 0.0;
+  /// Noise of the squared measurement over its line, in power, in a session that finds a quadratic
+  /// factor. The part of it in the line's phase scales the estimate of that factor by 1 + x, where
+  /// x has the variance of half this number.
+  double square_noise = 0.0;
+
+  bool operator==(const LoopHealth&) const = default;
+};
+
+/// One of the numbers of a LoopHealth.
+struct HealthValue {
+  double LoopHealth::*member;
+  HealthQuantity quantity;
+};
+
+inline constexpr std::size_t num_health_values = 5;
+
+/// All of them, in the order of LoopHealth.
+[[nodiscard]] const std::array<HealthValue, num_health_values>& health_values();
+
+/// Why a run is lost: the first of these that is beyond its limit. The values are stored and sent:
+/// never renumber.
+enum class LossCause : std::uint8_t {
+  none = 0,
+  saturation = 1,       ///< A sensor's range.
+  attitude = 2,         ///< HealthConfig::attitude_max_rad.
+  residual = 3,         ///< HealthConfig::residual_max_m_s2.
+  quadratic_noise = 4,  ///< HealthConfig::quadratic_noise_max.
+  square_noise = 5,     ///< HealthConfig::square_noise_max.
+};
+
+inline constexpr std::size_t num_loss_causes = 5;
+
+/// `saturation`, for people and files.
+[[nodiscard]] std::string_view name_of(LossCause cause);
+
+/// In which session a run was first lost, and why.
+struct LoopLoss {
+  LossCause cause = LossCause::none;
+  SessionTarget session = SessionTarget::a_c11_delta_x;  ///< Meaningful unless cause is none.
+};
+
+}  // namespace proofmass

@@ -1,0 +1,63 @@
+#include "core/microscope/campaign/microscope_campaign.hpp"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "core/error.hpp"
+
+namespace proofmass {
+namespace {
+
+void check_environment(const MicroscopeCampaign& campaign) {
+  const bool wants_file = campaign.scenario.environment.kind == EnvironmentKind::file;
+  const std::string value = fmt::format("\"{}\"", campaign.environment_file);
+  if (campaign.environment_file.size() > data_name_size_max) {
+    throw ConfigError("environment.file", fmt::format("{} bytes", campaign.environment_file.size()),
+                      fmt::format("must be at most {}", data_name_size_max));
+  }
+  if (wants_file && campaign.environment_file.empty()) {
+    throw ConfigError("environment.file", value, "environment.kind = \"file\" needs one");
+  }
+  if (!wants_file && !(campaign.environment_file.empty() && campaign.environment_table.empty())) {
+    throw ConfigError("environment.file", value, "only with environment.kind = \"file\"");
+  }
+  if (wants_file) {
+    validate_environment_table(campaign.environment_table, campaign.scenario.orbit.period_s);
+  }
+}
+
+std::string path_of(std::size_t drawn) { return "dispersion." + drawn_names()[drawn]; }
+
+std::vector<TableSource> table_sources(const MicroscopeCampaign& campaign) {
+  std::vector<TableSource> sources;
+  for (const std::size_t element : campaign.table_quantities()) {
+    sources.push_back({.path = path_of(element), .column = campaign.dispersions[element].column});
+  }
+  return sources;
+}
+
+}  // namespace
+
+void MicroscopeCampaign::validate() const {
+  validate_without_columns();
+  check_table_columns(*this, table_sources(*this));
+}
+
+void MicroscopeCampaign::validate_without_columns() const {
+  check_identity(*this);
+  scenario.validate();
+  check_environment(*this);
+  for (std::size_t i = 0; i < num_drawn; ++i) dispersions[i].validate(path_of(i));
+}
+
+MicroscopeCampaign hardy2013_campaign() {
+  MicroscopeCampaign campaign;
+  campaign.name = "hardy2013";
+  campaign.seed = 1;
+  campaign.num_runs = 100;
+  campaign.scenario.estimation.correction = Correction::hardy2013;
+  return campaign;
+}
+
+}  // namespace proofmass

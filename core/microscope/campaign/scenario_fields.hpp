@@ -1,0 +1,209 @@
+#pragma once
+
+// The one list of a scenario's fields: campaign files, definitions and the comparison of two
+// campaigns all walk it. Included by core/microscope/campaign/scenario.hpp, which documents it.
+
+#include "core/microscope/campaign/scenario.hpp"
+
+namespace proofmass {
+namespace detail {
+
+template <typename AxisConfig, typename Visitor>
+void visit_harmonic(AxisConfig& axis, std::array<std::string_view, 5> paths, Visitor& visit) {
+  visit(FieldInfo{paths[0], "Constant part."}, axis.mean);
+  visit(FieldInfo{paths[1], "Amplitude at f_orb.", range::not_negative}, axis.orbital);
+  visit(FieldInfo{paths[2], "Phase at f_orb; cosine from perigee."}, axis.orbital_phase_rad);
+  visit(FieldInfo{paths[3], "Amplitude at 2 f_orb.", range::not_negative}, axis.twice_orbital);
+  visit(FieldInfo{paths[4], "Phase at 2 f_orb."}, axis.twice_orbital_phase_rad);
+}
+
+#define PROOFMASS_HARMONIC(axis, unit)                                                       \
+  {                                                                                          \
+    "environment." axis ".mean" unit, "environment." axis ".orbital" unit,                   \
+        "environment." axis ".orbital_phase_rad", "environment." axis ".twice_orbital" unit, \
+        "environment." axis ".twice_orbital_phase_rad"                                       \
+  }
+
+template <typename Config, typename Visitor>
+void visit_environment(Config& environment, Visitor& visit) {
+  visit(FieldInfo{"environment.kind", "\"harmonic\" (below) or \"file\" (environment.file)."},
+        environment.kind);
+  visit(FieldInfo{"environment.scale", "Multiplies every external acceleration; 0 is off.",
+                  range::not_negative},
+        environment.scale);
+  visit_harmonic(environment.linear_x, PROOFMASS_HARMONIC("linear_x", "_m_s2"), visit);
+  visit_harmonic(environment.linear_y, PROOFMASS_HARMONIC("linear_y", "_m_s2"), visit);
+  visit_harmonic(environment.linear_z, PROOFMASS_HARMONIC("linear_z", "_m_s2"), visit);
+  visit_harmonic(environment.angular_x, PROOFMASS_HARMONIC("angular_x", "_rad_s2"), visit);
+  visit_harmonic(environment.angular_y, PROOFMASS_HARMONIC("angular_y", "_rad_s2"), visit);
+  visit_harmonic(environment.angular_z, PROOFMASS_HARMONIC("angular_z", "_rad_s2"), visit);
+}
+
+#undef PROOFMASS_HARMONIC
+
+template <typename Noise, typename Visitor>
+void visit_sensor_noise(Noise& noise, std::array<std::string_view, 5> paths, Visitor& visit) {
+  visit(FieldInfo{paths[0], "White level, unit/√Hz, one-sided.", range::positive}, noise.white_asd);
+  visit(FieldInfo{paths[1], "1/f part equals the white one here.", range::between(0.0, 0.1)},
+        noise.pink_corner_hz);
+  visit(FieldInfo{paths[2], "Level of the f² rise at its corner; 0 for none.", range::not_negative},
+        noise.rise_asd);
+  visit(FieldInfo{paths[3], "Corner of the f² rise.", range::between(1e-3, 1.0)},
+        noise.rise_corner_hz);
+  visit(FieldInfo{paths[4], "The rise ends here; 0 for never.", range::between(0.0, 0.6)},
+        noise.rise_limit_hz);
+}
+
+#define PROOFMASS_SENSOR_NOISE(axis, unit)                               \
+  {                                                                      \
+    "noise." axis ".white_asd" unit, "noise." axis ".pink_corner_hz",    \
+        "noise." axis ".rise_asd" unit, "noise." axis ".rise_corner_hz", \
+        "noise." axis ".rise_limit_hz"                                   \
+  }
+
+template <typename Config, typename Visitor>
+void visit_noise(Config& noise, Visitor& visit) {
+  visit(FieldInfo{"noise.preset", "\"design_2013\" or \"flight_suref\"; sets what follows."},
+        noise.preset);
+  visit(FieldInfo{"noise.scale", "Multiplies every noise; 0 is off.", range::not_negative},
+        noise.scale);
+  visit_sensor_noise(noise.linear_x, PROOFMASS_SENSOR_NOISE("linear_x", "_m_s2"), visit);
+  visit_sensor_noise(noise.linear_yz, PROOFMASS_SENSOR_NOISE("linear_yz", "_m_s2"), visit);
+  visit_sensor_noise(noise.angular, PROOFMASS_SENSOR_NOISE("angular", "_rad_s2"), visit);
+  visit(FieldInfo{"noise.star_tracker_across_asd_rad", "One head, across its boresight, rad/√Hz.",
+                  range::positive},
+        noise.star_tracker_across_asd_rad);
+  visit(FieldInfo{"noise.star_tracker_boresight_asd_rad", "One head, about its boresight, rad/√Hz.",
+                  range::positive},
+        noise.star_tracker_boresight_asd_rad);
+  visit(
+      FieldInfo{"noise.thrust_asd_m_s2", "Propulsion, each axis, (m/s²)/√Hz.", range::not_negative},
+      noise.thrust_asd_m_s2);
+  visit(FieldInfo{"noise.torque_asd_rad_s2", "Attitude actuation, each axis, (rad/s²)/√Hz.",
+                  range::not_negative},
+        noise.torque_asd_rad_s2);
+}
+
+#undef PROOFMASS_SENSOR_NOISE
+
+template <typename Config, typename Visitor>
+void visit_control(Config& scenario, Visitor& visit) {
+  auto& linear = scenario.drag_free;
+  visit(FieldInfo{"drag_free.bandwidth_hz", "Crossover of the linear loop.",
+                  range::between(1e-3, 0.2)},
+        linear.bandwidth_hz);
+  visit(FieldInfo{"drag_free.integral_hz", "Corner of its integral.", range::between(0.0, 0.05)},
+        linear.integral_hz);
+  visit(FieldInfo{"drag_free.bias_compensation_error_x_m_s2", "Error of the subtracted bias, X."},
+        linear.bias_compensation_error_x_m_s2);
+  visit(FieldInfo{"drag_free.bias_compensation_error_y_m_s2", "Error of the subtracted bias, Y."},
+        linear.bias_compensation_error_y_m_s2);
+  visit(FieldInfo{"drag_free.bias_compensation_error_z_m_s2", "Error of the subtracted bias, Z."},
+        linear.bias_compensation_error_z_m_s2);
+  auto& attitude = scenario.attitude;
+  visit(FieldInfo{"attitude.bandwidth_hz", "Natural frequency of the attitude loop.",
+                  range::between(1e-3, 0.1)},
+        attitude.bandwidth_hz);
+  visit(FieldInfo{"attitude.damping", "Its damping ratio.", range::between(0.3, 2.0)},
+        attitude.damping);
+  visit(
+      FieldInfo{"attitude.integral_hz", "Corner of its slow integral.", range::between(0.0, 5e-3)},
+      attitude.integral_hz);
+  visit(FieldInfo{"attitude.blending_hz", "Star tracker below, angular accelerometer above.",
+                  range::between(1e-4, 0.1)},
+        attitude.blending_hz);
+}
+
+template <typename Config, typename Visitor>
+void visit_limits(Config& scenario, Visitor& visit) {
+  visit(FieldInfo{"sensor.range_m_s2", "Largest acceleration that a sensor reports.",
+                  range::positive},
+        scenario.sensor.range_m_s2);
+  auto& health = scenario.health;
+  visit(FieldInfo{"health.attitude_max_rad", "Angle that the attitude loop has to remove.",
+                  range::positive},
+        health.attitude_max_rad);
+  visit(FieldInfo{"health.residual_max_m_s2", "Measured acceleration at the test frequency.",
+                  range::positive},
+        health.residual_max_m_s2);
+  visit(FieldInfo{"health.quadratic_noise_max",
+                  "Noise of quadratic terms over the sensors', power.", range::positive},
+        health.quadratic_noise_max);
+  visit(FieldInfo{"health.square_noise_max", "Noise of a squared measurement over its line, power.",
+                  range::positive},
+        health.square_noise_max);
+}
+
+template <typename Config, typename Visitor>
+void visit_estimation(Config& estimation, Visitor& visit) {
+  visit(FieldInfo{"estimation.method", "\"hardy2013\": one parameter a session, iterated."},
+        estimation.method);
+  visit(FieldInfo{"estimation.correction",
+                  "\"hardy2013\" (the paper's), \"first_order\" or \"second_order\"."},
+        estimation.correction);
+  visit(FieldInfo{"estimation.transient_s", "Filtered record dropped at a session's start.",
+                  range::not_negative},
+        estimation.transient_s);
+  visit(FieldInfo{"estimation.band_ratio", "Band-pass from f/ratio to f·ratio.",
+                  range::between(1.1, 20.0)},
+        estimation.band_ratio);
+  visit(FieldInfo{"estimation.convergence", "Done when estimates move by less, in objectives.",
+                  range::between(1e-12, 1.0)},
+        estimation.convergence);
+  visit(FieldInfo{"estimation.num_rounds_max", "Rounds at most.", range::between(1, 1000)},
+        estimation.num_rounds_max);
+}
+
+template <typename Config, typename Visitor>
+void visit_tables(Config& scenario, Visitor& visit) {
+  auto& acceptance = scenario.acceptance;
+  visit(FieldInfo{"acceptance.a_d11_max", "Bound of |a_d11|.", range::positive},
+        acceptance.a_d11_max);
+  visit(FieldInfo{"acceptance.a_d1j_max_rad", "Bound of |a_d12| and |a_d13|.", range::positive},
+        acceptance.a_d1j_max_rad);
+  visit(FieldInfo{"acceptance.a_c1j_max_rad", "Bound of |a_c12| and |a_c13|.", range::positive},
+        acceptance.a_c1j_max_rad);
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    visit(FieldInfo{objective_path(i), "Largest acceptable |error|.", range::positive},
+          scenario.objectives[i]);
+  }
+  auto& budget = scenario.budget;
+  visit(FieldInfo{"budget.t_xy_s2", "T_xy at the test frequency.", range::positive},
+        budget.t_xy_s2);
+  visit(FieldInfo{"budget.residual_m_s2", "Drag-free residue at the test frequency.",
+                  range::positive},
+        budget.residual_m_s2);
+  visit(
+      FieldInfo{"budget.differential_m_s2", "Constant differential acceleration.", range::positive},
+      budget.differential_m_s2);
+  visit(FieldInfo{"budget.offcentring_max_m", "Bound before calibration.", range::positive},
+        budget.offcentring_max_m);
+  visit(FieldInfo{"budget.scale_factor_error_max", "Bound before calibration.", range::positive},
+        budget.scale_factor_error_max);
+  visit(FieldInfo{"budget.quadratic_factor_max_s2_m", "Bound before calibration.", range::positive},
+        budget.quadratic_factor_max_s2_m);
+}
+
+}  // namespace detail
+
+template <typename Config, typename Visitor>
+void for_each_field(Config& scenario, Visitor&& visit) {
+  visit(FieldInfo{"orbit.period_s", "Orbital period.", range::between(5000.0, 100000.0)},
+        scenario.orbit.period_s);
+  visit(FieldInfo{"orbit.eccentricity", "Perigee is on +X.", range::between(0.0, 0.5)},
+        scenario.orbit.eccentricity);
+  visit(FieldInfo{"simulation.sample_period_s", "Rate of instrument and control.",
+                  range::between(0.05, 1.0)},
+        scenario.simulation.sample_period_s);
+  visit(FieldInfo{"simulation.settling_s", "Loops run this long before a record begins.",
+                  range::between(0.0, 50000.0)},
+        scenario.simulation.settling_s);
+  detail::visit_environment(scenario.environment, visit);
+  detail::visit_noise(scenario.noise, visit);
+  detail::visit_control(scenario, visit);
+  detail::visit_limits(scenario, visit);
+  detail::visit_estimation(scenario.estimation, visit);
+  detail::visit_tables(scenario, visit);
+}
+
+}  // namespace proofmass

@@ -1,0 +1,72 @@
+#pragma once
+
+#include "core/math/inline.hpp"
+#include "core/math/vector3.hpp"
+#include "core/microscope/campaign/scenario.hpp"
+
+namespace proofmass {
+
+/// Gains of the attitude estimator and controller at the sample rate.
+struct AttitudeGains {
+  double sample_period_s = 0.0;
+  double blend_angle = 0.0;        ///< 1 − r³
+  double blend_rate_per_s = 0.0;   ///< (3/2)(1 − r)²(1 + r)/T
+  double blend_bias_per_s2 = 0.0;  ///< (1 − r)³/T², with r = e^(−ω_h T).
+  double stiffness_per_s2 = 0.0;   ///< ω²
+  double damping_per_s = 0.0;      ///< 2ζω
+  double integral_per_s3 = 0.0;    ///< ω²·ω_I
+};
+
+[[nodiscard]] AttitudeGains attitude_gains(const AttitudeConfig& config, double sample_period_s);
+
+/// Hybridisation of star tracker and angular accelerometer.
+///
+/// The double integral of the measured acceleration is corrected by its distance from the star
+/// tracker, which makes two complementary filters with a triple pole at r:
+///
+///     θ̂ = LP(z) θ_st + HP(z) α_mes/s²,    LP + HP = 1
+///
+/// LP has unit gain at rest; HP has three zeros at rest, so it removes the accelerometer's bias,
+/// which the third state takes up. In continuous time LP = (3ω_h s² + 3ω_h² s + ω_h³)/(s + ω_h)³.
+template <typename T>
+struct AttitudeEstimator {
+  Vector3<T> angle;  ///< θ̂, error against the reference attitude, rad.
+  Vector3<T> rate;   ///< Rate against the reference, rad/s.
+  Vector3<T> bias;   ///< Of the angular accelerometer, rad/s².
+
+  /// Takes up the star tracker's angles of this sample.
+  PROOFMASS_INLINE void correct(const AttitudeGains& gains, const Vector3<T>& star_tracker) {
+    const Vector3<T> innovation = star_tracker - angle;
+    angle += T(gains.blend_angle) * innovation;
+    rate += T(gains.blend_rate_per_s) * innovation;
+    bias += T(-gains.blend_bias_per_s2) * innovation;
+  }
+
+  /// Carries the estimate to the next sample with the measured acceleration of this one, which acts
+  /// until then.
+  /// @param reference_rate  Ω of the rotating reference, in S.
+  PROOFMASS_INLINE void predict(const AttitudeGains& gains, const Vector3<T>& acceleration,
+                                const Vector3<T>& reference_rate) {
+    const T period = T(gains.sample_period_s);
+    const Vector3<T> corrected = acceleration - bias;
+    const Vector3<T> rotation = rate - cross(reference_rate, angle) + (T(0.5) * period) * corrected;
+    angle += period * rotation;
+    rate += period * corrected;
+  }
+};
+
+/// Proportional-derivative control of the estimated angle with a slow integral.
+template <typename T>
+struct AttitudeController {
+  Vector3<T> integral;  ///< ∫θ̂ dt, rad·s.
+
+  /// @returns Angular acceleration to be applied from the next sample on, rad/s².
+  PROOFMASS_INLINE Vector3<T> advance(const AttitudeGains& gains,
+                                      const AttitudeEstimator<T>& estimate) {
+    integral += T(gains.sample_period_s) * estimate.angle;
+    return -(T(gains.stiffness_per_s2) * estimate.angle + T(gains.damping_per_s) * estimate.rate +
+             T(gains.integral_per_s3) * integral);
+  }
+};
+
+}  // namespace proofmass

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/campaign/definition.hpp"
+#include "core/error.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
+
+namespace proofmass {
+
+class DataFiles;
+class Document;
+
+/// The campaign that a document defines, without the values of its data files. What is absent keeps
+/// its nominal value; what is wrong is remembered by the document.
+[[nodiscard]] MicroscopeCampaign read_definition(Document& document);
+
+/// The campaign that a document and its data files define, checked.
+/// @throws DefinitionError naming file, line, field, value and rule.
+[[nodiscard]] MicroscopeCampaign read_campaign(Document& document, DataFiles& files);
+
+/// The campaign of a text and of data that have been read before; opens no file.
+///
+/// @param name               For messages: where the text is from.
+/// @param text               TOML; what it leaves out keeps its nominal value.
+/// @param environment_table  Rows of the environment file; empty if harmonic.
+/// @param table_columns      As in MicroscopeCampaign::table_columns.
+/// @throws DefinitionError if the text or the data are not those of a valid campaign.
+[[nodiscard]] MicroscopeCampaign parse_campaign(const std::string& name, std::string_view text,
+                                                EnvironmentTable environment_table,
+                                                std::vector<std::vector<double>> table_columns);
+
+/// The definition of a valid campaign.
+[[nodiscard]] Definition definition_of(const MicroscopeCampaign& campaign,
+                                       TableColumns columns = TableColumns::included);
+
+/// The campaign of a definition that another program sent.
+///
+/// @param definition  Anything at all. Time and memory are in proportion to its size.
+/// @param source      For messages: where it is from.
+/// @throws DefinitionError unless it is, to the byte, the definition of a valid campaign.
+[[nodiscard]] MicroscopeCampaign campaign_of(Definition definition,
+                                             TableColumns columns = TableColumns::included,
+                                             std::string_view source = "definition");
+
+/// Every value of a campaign as TOML, in a fixed order and with the shortest numbers that read back
+/// to the same bits. Rows of data files are not in it.
+[[nodiscard]] std::string canonical_definition(const MicroscopeCampaign& campaign);
+
+/// The same for people: each field with its meaning and rule, dispersions by group.
+[[nodiscard]] std::string commented_campaign(const MicroscopeCampaign& campaign);
+
+/// Everything but the number of runs that two campaigns do not share, in the order of a campaign
+/// file. The name of a data file whose values are the same is no difference.
+[[nodiscard]] std::vector<DefinitionDifference> compare_definitions(
+    const MicroscopeCampaign& first, const MicroscopeCampaign& second);
+
+}  // namespace proofmass

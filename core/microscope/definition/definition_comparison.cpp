@@ -1,0 +1,147 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/definition/definition_entries.hpp"
+
+namespace proofmass {
+namespace {
+
+using detail::Entry;
+
+/// Collects the differences between two campaigns, part by part.
+class Comparison {
+ public:
+  Comparison(const MicroscopeCampaign& first, const MicroscopeCampaign& second)
+      : first_(first), second_(second) {}
+
+  std::vector<DefinitionDifference> run() {
+    compare_entries("", fields_of(first_), fields_of(second_));
+    compare_sessions();
+    compare_environment();
+    compare_dispersions();
+    return std::move(differences_);
+  }
+
+ private:
+  void differ(std::string_view path, std::string_view first, std::string_view second) {
+    differences_.push_back(
+        {.field = std::string(path), .first = std::string(first), .second = std::string(second)});
+  }
+
+  // More runs extend a campaign; the values of data files are compared, not their names.
+  static std::vector<Entry> fields_of(const MicroscopeCampaign& campaign) {
+    std::vector<Entry> entries = detail::scenario_entries(campaign);
+    std::erase_if(entries, [](const Entry& entry) {
+      return entry.path == "campaign.runs" || entry.path == "environment.file";
+    });
+    for (Entry& entry : entries) {
+      constexpr std::string_view table = "campaign.";
+      if (entry.path.starts_with(table)) entry.path.erase(0, table.size());
+    }
+    return entries;
+  }
+
+  void compare_entries(const std::string& prefix, const std::vector<Entry>& first,
+                       const std::vector<Entry>& second) {
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      if (first[i].text != second[i].text) {
+        differ(prefix + first[i].path, first[i].text, second[i].text);
+      }
+    }
+  }
+
+  static std::string excitations_text(const Session& session) {
+    std::string text;
+    for (const Excitation& excitation : session.excitations) {
+      text += (text.empty() ? "" : ", ") + detail::excitation_text(excitation);
+    }
+    return "[" + text + "]";
+  }
+
+  void compare_sessions() {
+    const std::vector<Session>& first = first_.scenario.sessions;
+    const std::vector<Session>& second = second_.scenario.sessions;
+    if (first.size() != second.size()) {
+      differ("session", fmt::format("{}", first.size()), fmt::format("{}", second.size()));
+      return;
+    }
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      const std::string prefix = fmt::format("session[{}].", i);
+      compare_entries(prefix, detail::session_entries(first[i]),
+                      detail::session_entries(second[i]));
+      if (first[i].excitations != second[i].excitations) {
+        differ(prefix + "excitations", excitations_text(first[i]), excitations_text(second[i]));
+      }
+    }
+  }
+
+  void compare_environment() {
+    const EnvironmentTable& first = first_.environment_table;
+    const EnvironmentTable& second = second_.environment_table;
+    if (first.size() != second.size()) {
+      differ("environment.file", fmt::format("{} rows", first.size()),
+             fmt::format("{} rows", second.size()));
+      return;
+    }
+    const auto position = std::ranges::mismatch(first, second).in1;
+    if (position == first.end()) return;
+    differ("environment.file", fmt::format("other values in row {}", position - first.begin() + 1),
+           fmt::format("those of {}", second_.environment_file));
+  }
+
+  void compare_dispersions() {
+    for (std::size_t i = 0; i < num_drawn; ++i) {
+      const Dispersion& first = first_.dispersions[i];
+      const Dispersion& second = second_.dispersions[i];
+      if (first.law == Law::table && second.law == Law::table) {
+        compare_column(i);
+      } else if (detail::dispersion_text(first) != detail::dispersion_text(second)) {
+        differ("dispersion." + drawn_names()[i], detail::dispersion_text(first),
+               detail::dispersion_text(second));
+      }
+    }
+  }
+
+  // Values of the runs that both campaigns have.
+  void compare_column(std::size_t element) {
+    const std::vector<double>& first = column_of(first_, element);
+    const std::vector<double>& second = column_of(second_, element);
+    const std::uint64_t num_shared =
+        std::min({std::min(first_.num_runs, second_.num_runs), std::uint64_t{first.size()},
+                  std::uint64_t{second.size()}});
+    for (std::size_t run = 0; run < num_shared; ++run) {
+      if (std::bit_cast<std::uint64_t>(first[run]) == std::bit_cast<std::uint64_t>(second[run])) {
+        continue;
+      }
+      differ(fmt::format("dispersion.{} of run {}", drawn_names()[element], run),
+             fmt::format("{}", first[run]), fmt::format("{}", second[run]));
+      return;
+    }
+  }
+
+  static const std::vector<double>& column_of(const MicroscopeCampaign& campaign,
+                                              std::size_t element) {
+    const std::vector<std::size_t> elements = table_elements(campaign.dispersions);
+    const auto position = std::ranges::find(elements, element) - elements.begin();
+    return campaign.table_columns[static_cast<std::size_t>(position)];
+  }
+
+  const MicroscopeCampaign& first_;
+  const MicroscopeCampaign& second_;
+  std::vector<DefinitionDifference> differences_;
+};
+
+}  // namespace
+
+std::vector<DefinitionDifference> compare_definitions(const MicroscopeCampaign& first,
+                                                      const MicroscopeCampaign& second) {
+  return Comparison(first, second).run();
+}
+
+}  // namespace proofmass

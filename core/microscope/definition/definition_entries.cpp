@@ -1,0 +1,136 @@
+#include "core/microscope/definition/definition_entries.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <utility>
+
+#include "core/definition/definition_text.hpp"
+#include "core/microscope/definition/dispersion_keys.hpp"
+#include "core/microscope/session/session_names.hpp"
+
+namespace proofmass::detail {
+namespace {
+
+Entry text_entry(std::string_view path, std::string_view text, std::string comment = {}) {
+  return {std::string(path), quoted_text(text), std::move(comment), std::string(text)};
+}
+
+Entry real_entry(std::string_view path, double value, std::string comment = {}) {
+  return {std::string(path), number_text(value), std::move(comment), value};
+}
+
+Entry whole_entry(std::string_view path, std::int64_t value, std::string comment = {}) {
+  return {std::string(path), fmt::format("{}", value), std::move(comment), value};
+}
+
+template <typename Choice>
+Entry choice_entry(std::string_view path, Choice choice, std::string comment = {}) {
+  return text_entry(path, names_of(choice)[static_cast<std::size_t>(choice) - 1],
+                    std::move(comment));
+}
+
+Entry lines_entry(std::string_view path, const std::vector<LineMultiple>& lines) {
+  std::string text = "[";
+  for (const LineMultiple& line : lines) {
+    if (text.size() > 1) text += ", ";
+    text += text_of(line);
+  }
+  text += "]";
+  return {std::string(path), text, "", text};
+}
+
+std::string inline_table(const std::vector<Entry>& entries) {
+  std::string text = "{ ";
+  for (const Entry& entry : entries) {
+    if (text.size() > 2) text += ", ";
+    text += fmt::format("{} = {}", entry.path, entry.text);
+  }
+  return text + " }";
+}
+
+// `Orbital period.` and `must be in [1, 2]` make `Orbital period; in [1, 2].`
+std::string comment_of(const FieldInfo& field) {
+  constexpr std::string_view verb = "must be ";
+  std::string comment(field.comment);
+  const std::string rule = field.range.rule();
+  if (rule == range::any.rule()) return comment;
+  if (comment.ends_with('.')) comment.pop_back();
+  return fmt::format("{}; {}.", comment, rule.substr(verb.size()));
+}
+
+struct FieldWriter {
+  std::vector<Entry>& entries;
+
+  void operator()(const FieldInfo& field, const double& value) const {
+    entries.push_back(real_entry(field.path, value, comment_of(field)));
+  }
+  void operator()(const FieldInfo& field, const std::int64_t& value) const {
+    entries.push_back(whole_entry(field.path, value, comment_of(field)));
+  }
+  template <typename Choice>
+  void operator()(const FieldInfo& field, const Choice& value) const {
+    entries.push_back(choice_entry(field.path, value, std::string(field.comment)));
+  }
+};
+
+}  // namespace
+
+std::vector<Entry> scenario_entries(const MicroscopeCampaign& campaign) {
+  std::vector<Entry> entries{
+      text_entry("campaign.name", campaign.name, "Letters, digits, _, - or ."),
+      whole_entry("campaign.seed", static_cast<std::int64_t>(campaign.seed),
+                  "All randomness follows from it."),
+      whole_entry("campaign.runs", static_cast<std::int64_t>(campaign.num_runs), "May grow later."),
+  };
+  if (!campaign.environment_file.empty()) {
+    entries.push_back(text_entry("environment.file", campaign.environment_file,
+                                 "External accelerations, relative to this file."));
+  }
+  for_each_field(campaign.scenario, FieldWriter{entries});
+  return entries;
+}
+
+std::vector<Entry> session_entries(const Session& session) {
+  return {
+      text_entry("name", session.name),
+      choice_entry("target", session.target),
+      whole_entry("orbits", session.num_orbits),
+      real_entry("spin_rate_rad_s", session.spin_rate_rad_s),
+      choice_entry("drag_free", session.drag_free),
+      lines_entry("fit_lines", session.fit_lines),
+      lines_entry("known_lines", session.known_lines),
+  };
+}
+
+std::vector<Entry> excitation_entries(const Excitation& excitation) {
+  std::vector<Entry> entries{choice_entry("kind", excitation.kind),
+                             choice_entry("axis", excitation.axis)};
+  if (excitation.kind == ExcitationKind::test_mass) {
+    entries.push_back(choice_entry("moves", excitation.motion));
+  }
+  entries.push_back(real_entry(amplitude_key(excitation.kind), excitation.amplitude));
+  entries.push_back(real_entry("frequency_hz", excitation.frequency_hz));
+  return entries;
+}
+
+std::string excitation_text(const Excitation& excitation) {
+  return inline_table(excitation_entries(excitation));
+}
+
+std::vector<Entry> dispersion_entries(const Dispersion& dispersion) {
+  Dispersion fields = dispersion;
+  std::vector<Entry> entries{choice_entry("law", dispersion.law)};
+  for (const std::string_view key : keys_of(dispersion.law)) {
+    const double* const number = number_at(fields, key);
+    entries.push_back(number != nullptr ? real_entry(key, *number)
+                                        : text_entry(key, *text_at(fields, key)));
+  }
+  return entries;
+}
+
+std::string dispersion_text(const Dispersion& dispersion) {
+  return inline_table(dispersion_entries(dispersion));
+}
+
+}  // namespace proofmass::detail

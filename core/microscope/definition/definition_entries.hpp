@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/microscope/definition/definition_items.hpp"
+
+namespace proofmass::detail {
+
+/// A key of a campaign file, with its value as TOML.
+struct Entry {
+  std::string path;            ///< `estimation.transient_s`; for a session or a law the key alone.
+  std::string text;            ///< `1000`.
+  std::string comment;         ///< Meaning and rule; may be empty.
+  DefinitionValue value = {};  ///< What the text says.
+};
+
+/// Everything outside sessions and dispersions, in file order.
+[[nodiscard]] std::vector<Entry> scenario_entries(const MicroscopeCampaign& campaign);
+
+/// All keys of one session but its excitations.
+[[nodiscard]] std::vector<Entry> session_entries(const Session& session);
+
+/// All keys of one excitation.
+[[nodiscard]] std::vector<Entry> excitation_entries(const Excitation& excitation);
+
+/// `{ kind = "drag_free", axis = "x", ... }`.
+[[nodiscard]] std::string excitation_text(const Excitation& excitation);
+
+/// The law and its own keys.
+[[nodiscard]] std::vector<Entry> dispersion_entries(const Dispersion& dispersion);
+
+/// `{ law = "uniform", minimum = -0.01, maximum = 0.01 }`.
+[[nodiscard]] std::string dispersion_text(const Dispersion& dispersion);
+
+}  // namespace proofmass::detail

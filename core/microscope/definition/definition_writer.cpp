@@ -1,0 +1,241 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/definition/definition_entries.hpp"
+
+namespace proofmass {
+namespace {
+
+using detail::Entry;
+
+constexpr std::size_t line_length_max = 100;
+
+struct Table {
+  std::string path;
+  std::vector<Entry> entries;  // Their paths are the keys alone.
+};
+
+// A table may stand in a TOML file only once, however its fields are ordered.
+std::vector<Table> tables_of(const std::vector<Entry>& entries) {
+  std::vector<Table> tables;
+  for (const Entry& entry : entries) {
+    const std::size_t dot = entry.path.rfind('.');
+    const std::string path = entry.path.substr(0, dot);
+    auto table = std::ranges::find(tables, path, &Table::path);
+    if (table == tables.end()) table = tables.insert(tables.end(), {path, {}});
+    table->entries.push_back({entry.path.substr(dot + 1), entry.text, entry.comment});
+  }
+  return tables;
+}
+
+std::string assignment(const Entry& entry) {
+  return fmt::format("{} = {}\n", entry.path, entry.text);
+}
+
+std::string excitations_text(const std::vector<Excitation>& excitations) {
+  if (excitations.empty()) return "excitations = []\n";
+  std::string text = "excitations = [\n";
+  for (const Excitation& excitation : excitations) {
+    text += fmt::format("  {},\n", detail::excitation_text(excitation));
+  }
+  return text + "]\n";
+}
+
+std::string_view element_of(std::size_t drawn) {
+  const std::string_view name = drawn_names()[drawn];
+  return name.substr(name.find('.') + 1);
+}
+
+// Code points: the bytes of UTF-8 that do not continue another.
+std::size_t width(std::string_view text) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      text, [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+}
+
+/// Writes a campaign file for people.
+class CommentedWriter {
+ public:
+  explicit CommentedWriter(const MicroscopeCampaign& campaign) : campaign_(campaign) {}
+
+  std::string write() {
+    write_head();
+    for (const Table& table : tables_of(detail::scenario_entries(campaign_))) write_table(table);
+    write_sessions();
+    write_dispersions();
+    return std::move(text_);
+  }
+
+ private:
+  void write_head() {
+    text_ =
+        "# A Proofmass campaign: run it with `proofmass run FILE`.\n"
+        "#\n"
+        "# Names carry their units, all SI. What is left out keeps its nominal value, which is the "
+        "one\n"
+        "# shown here unless this file was changed. Citations are of [Hardy2013]: Hardy, Levy,\n"
+        "# Rodrigues, Touboul, Métris, Validation of the in-flight calibration procedures for the\n"
+        "# MICROSCOPE space mission, Advances in Space Research (2013).\n";
+  }
+
+  // What a preset sets is shown but not stated: a stated value would win over another preset.
+  [[nodiscard]] bool is_from_preset(const std::string& path) const {
+    return std::ranges::any_of(preset_entries_,
+                               [&](const Entry& entry) { return entry.path == path; });
+  }
+
+  void write_table(const Table& table) {
+    text_ += '\n';
+    for (const auto& [path, note] : table_notes) {
+      if (path == table.path) text_ += note;
+    }
+    text_ += fmt::format("[{}]\n", table.path);
+    std::vector<std::string> lines;
+    std::size_t column = 0;
+    for (const Entry& entry : table.entries) {
+      std::string line = fmt::format("{} = {}", entry.path, entry.text);
+      if (is_from_preset(table.path + "." + entry.path)) line.insert(0, "# ");
+      column = std::max(column, width(line) + 2);
+      lines.push_back(std::move(line));
+    }
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      write_line(lines[i], table.entries[i].comment, column);
+    }
+  }
+
+  void write_line(const std::string& line, const std::string& comment, std::size_t column) {
+    if (comment.empty()) {
+      text_ += line + "\n";
+    } else if (column + 2 + width(comment) > line_length_max) {
+      text_ += fmt::format("# {}\n{}\n", comment, line);
+    } else {
+      text_ += line + std::string(column - width(line), ' ') + "# " + comment + "\n";
+    }
+  }
+
+  void write_sessions() {
+    text_ +=
+        "\n# The sessions, in the order in which they are flown. Each starts at perigee and lasts "
+        "whole\n"
+        "# orbits. Lines are [i, j] or [i, j, k]: the frequency i f_orb + j f + k f_spin, f being "
+        "that\n"
+        "# of the excitation; i, j and k need not be whole, and j is a list where the session has\n"
+        "# several excitations. Those of fit_lines give the estimate, those of known_lines are "
+        "fitted\n"
+        "# beside them. Every target needs a session; several share it. Further keys:\n"
+        "# spin_rate_rad_s = 0 (2π f_spin, of the frame that the attitude loop holds, about Y) "
+        "and\n"
+        "# drag_free = \"common\" (\"sensor_1\", \"sensor_2\").\n";
+    const std::vector<Entry> plain = detail::session_entries(Session{});
+    for (const Session& session : campaign_.scenario.sessions) {
+      text_ += "\n[[session]]\n";
+      for (const Entry& entry : detail::session_entries(session)) {
+        if (entry.path == "fit_lines" && !session.excitations.empty()) {
+          text_ += excitations_text(session.excitations);
+        }
+        if (!is_left_out(entry, plain)) text_ += assignment(entry);
+      }
+    }
+  }
+
+  [[nodiscard]] static bool is_left_out(const Entry& entry, const std::vector<Entry>& plain) {
+    if (entry.path != "spin_rate_rad_s" && entry.path != "drag_free") return false;
+    const auto same = std::ranges::find(plain, entry.path, &Entry::path);
+    return same != plain.end() && same->text == entry.text;
+  }
+
+  void write_dispersions() {
+    text_ +=
+        "\n# What is drawn for each run, by its law: uniform (minimum, maximum), normal (mean,\n"
+        "# standard_deviation), truncated_normal (all four), fixed (value), or table (file, "
+        "column: a\n"
+        "# comma-separated file with headings, one row a run). A table such as\n"
+        "# [dispersion.offcentring_m.x] changes the law of one element.\n";
+    for (const DrawGroup& group : draw_groups()) write_group(group);
+  }
+
+  void write_group(const DrawGroup& group) {
+    const Dispersion& of_group = campaign_.dispersions[group.first];
+    text_ += fmt::format("\n# {}\n# Elements: {}", group.comment, element_of(group.first));
+    for (std::size_t i = group.first + 1; i < group.first + group.count; ++i) {
+      text_ += fmt::format(", {}", element_of(i));
+    }
+    text_ += fmt::format("\n[dispersion.{}]\n", group.name);
+    for (const Entry& entry : detail::dispersion_entries(of_group)) text_ += assignment(entry);
+    for (std::size_t i = group.first + 1; i < group.first + group.count; ++i) {
+      if (campaign_.dispersions[i] == of_group) continue;
+      text_ += fmt::format("{} = {}\n", element_of(i),
+                           detail::dispersion_text(campaign_.dispersions[i]));
+    }
+  }
+
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 6> table_notes{{
+      {"environment",
+       "# External accelerations of the satellite, each axis mean + a1 cos(n t + phase) +\n"
+       "# a2 cos(2 n t + phase), n being the mean motion; or rows of a file (kind = \"file\",\n"
+       "# file = \"environment.csv\") with the columns time_s,linear_x_m_s2,linear_y_m_s2,\n"
+       "# linear_z_m_s2,angular_x_rad_s2,angular_y_rad_s2,angular_z_rad_s2.\n"},
+      {"health",
+       "# Beyond one of these, or at the end of a sensor's range, a run is lost: it has no "
+       "estimates.\n"},
+      {"noise",
+       "# Sensor noise has the one-sided density white²(1 + f_p/f) + rise²(f/f_r)⁴/(1 + "
+       "(f/f_l)⁴).\n"
+       "# The preset sets what is commented out below; uncomment a line to replace its value.\n"},
+      {"acceptance", "# Draws outside the bounds of [Hardy2013] tab:Budget are drawn again.\n"},
+      {"objective", "# Largest acceptable errors, [Hardy2013] tab:perfo-numerical.\n"},
+      {"budget", "# Levels and bounds of [Hardy2013] tab:Budget and tab:Budget_cali.\n"},
+  }};
+
+  const MicroscopeCampaign& campaign_;
+  std::vector<Entry> preset_entries_ = preset_entries(campaign_);
+  std::string text_;
+
+  // The entries of noise that equal those of its preset.
+  static std::vector<Entry> preset_entries(const MicroscopeCampaign& campaign) {
+    MicroscopeCampaign preset = campaign;
+    preset.scenario.noise = noise_preset(campaign.scenario.noise.preset);
+    const std::vector<Entry> stated = detail::scenario_entries(campaign);
+    const std::vector<Entry> set = detail::scenario_entries(preset);
+    std::vector<Entry> same;
+    for (std::size_t i = 0; i < stated.size(); ++i) {
+      const bool is_set = stated[i].path.starts_with("noise.") &&
+                          stated[i].path != "noise.preset" && stated[i].path != "noise.scale";
+      if (is_set && stated[i].text == set[i].text) same.push_back(stated[i]);
+    }
+    return same;
+  }
+};
+
+}  // namespace
+
+std::string canonical_definition(const MicroscopeCampaign& campaign) {
+  std::string text;
+  for (const Table& table : tables_of(detail::scenario_entries(campaign))) {
+    text += fmt::format("[{}]\n", table.path);
+    for (const Entry& entry : table.entries) text += assignment(entry);
+  }
+  for (const Session& session : campaign.scenario.sessions) {
+    text += "[[session]]\n";
+    for (const Entry& entry : detail::session_entries(session)) text += assignment(entry);
+    text += excitations_text(session.excitations);
+  }
+  for (const DrawGroup& group : draw_groups()) {
+    text += fmt::format("[dispersion.{}]\n", group.name);
+    for (std::size_t i = group.first; i < group.first + group.count; ++i) {
+      text +=
+          fmt::format("{} = {}\n", element_of(i), detail::dispersion_text(campaign.dispersions[i]));
+    }
+  }
+  return text;
+}
+
+std::string commented_campaign(const MicroscopeCampaign& campaign) {
+  return CommentedWriter(campaign).write();
+}
+
+}  // namespace proofmass

@@ -1,0 +1,57 @@
+#include "core/microscope/definition/environment_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+#include "core/campaign/definition.hpp"
+#include "core/definition/csv.hpp"
+
+namespace proofmass::detail {
+namespace {
+
+constexpr std::array<std::string_view, 7> environment_headings{
+    "time_s",           "linear_x_m_s2",    "linear_y_m_s2",   "linear_z_m_s2",
+    "angular_x_rad_s2", "angular_y_rad_s2", "angular_z_rad_s2"};
+
+// Row i of an environment table stands in line i + 1, below the headings.
+DefinitionError located_in_table(const ConfigError& error, const std::string& name) {
+  constexpr std::string_view row_prefix = "environment.file row ";
+  std::size_t row = 0;
+  if (error.field().starts_with(row_prefix)) {
+    const char* const digits = error.field().data() + row_prefix.size();
+    std::from_chars(digits, error.field().data() + error.field().size(), row);
+  }
+  return DefinitionError(fmt::format("{}:{}: {}", name, row + 1, error.what()));
+}
+
+}  // namespace
+
+EnvironmentTable parse_environment(std::string_view text, const std::string& name,
+                                   double orbit_period_s) {
+  CsvReader reader(text, name);
+  if (!reader.next_row() || !std::ranges::equal(reader.cells(), environment_headings)) {
+    reader.refuse(fmt::format("the first line must be {}", fmt::join(environment_headings, ",")));
+  }
+  EnvironmentTable table;
+  while (reader.next_row()) {
+    if (table.size() == environment_rows_max) {
+      reader.refuse(fmt::format("more than {} rows", environment_rows_max));
+    }
+    reader.expect_cells(environment_headings.size());
+    const auto number = [&](std::size_t i) { return reader.number(i, environment_headings[i]); };
+    table.push_back({.time_s = number(0),
+                     .linear_m_s2 = {number(1), number(2), number(3)},
+                     .angular_rad_s2 = {number(4), number(5), number(6)}});
+  }
+  try {
+    validate_environment_table(table, orbit_period_s);
+  } catch (const ConfigError& error) {
+    throw located_in_table(error, name);
+  }
+  return table;
+}
+
+}  // namespace proofmass::detail

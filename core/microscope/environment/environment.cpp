@@ -1,0 +1,76 @@
+#include "core/microscope/environment/environment.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.hpp"
+#include "core/math/elementary.hpp"
+
+namespace proofmass {
+namespace {
+
+Vector3<double> lerp(const std::array<double, 3>& a, const std::array<double, 3>& b, double part) {
+  const auto between = [part](double from, double to) { return from + part * (to - from); };
+  return {between(a[0], b[0]), between(a[1], b[1]), between(a[2], b[2])};
+}
+
+}  // namespace
+
+Environment::Environment(const EnvironmentConfig& config, const EnvironmentTable& table,
+                         double orbit_period_s)
+    : kind_(config.kind), scale_(config.scale), orbit_period_s_(orbit_period_s), table_(&table) {
+  const std::array<const HarmonicAxis*, 6> axes{&config.linear_x,  &config.linear_y,
+                                                &config.linear_z,  &config.angular_x,
+                                                &config.angular_y, &config.angular_z};
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const HarmonicAxis& axis = *axes[i];
+    const SineCosine once = sincos(axis.orbital_phase_rad);
+    const SineCosine twice = sincos(axis.twice_orbital_phase_rad);
+    harmonics_[i] = {scale_ * axis.mean, scale_ * axis.orbital * once.cosine,
+                     -scale_ * axis.orbital * once.sine, scale_ * axis.twice_orbital * twice.cosine,
+                     -scale_ * axis.twice_orbital * twice.sine};
+  }
+}
+
+bool Environment::is_periodic(double end_s) const {
+  return kind_ == EnvironmentKind::file && table_->back().time_s < end_s;
+}
+
+ExternalAcceleration Environment::at(double time_s, const OrbitPoint& point) const {
+  if (kind_ == EnvironmentKind::file) return interpolate(time_s);
+  const double c = point.mean_anomaly.cosine;
+  const double s = point.mean_anomaly.sine;
+  const double c2 = c * c - s * s;
+  const double s2 = 2.0 * s * c;
+  const auto value = [&](std::size_t i) {
+    const Harmonic& h = harmonics_[i];
+    return h.mean + h.cosine * c + h.sine * s + h.twice_cosine * c2 + h.twice_sine * s2;
+  };
+  return {{value(0), value(1), value(2)}, {value(3), value(4), value(5)}};
+}
+
+ExternalAcceleration Environment::interpolate(double time_s) const {
+  // Before a session's record the loops settle on the orbit before: that part repeats the first
+  // one.
+  double t = time_s;
+  if (periodic_ || t < table_->front().time_s) {
+    // Rounding may leave the remainder just below 0.
+    t = std::fmax(t - std::floor(t / orbit_period_s_) * orbit_period_s_, table_->front().time_s);
+  }
+  const auto after =
+      std::upper_bound(table_->begin(), table_->end(), t,
+                       [](double value, const EnvironmentRow& row) { return value < row.time_s; });
+  if (after == table_->end()) {
+    const EnvironmentRow& last = table_->back();
+    return {scale_ * lerp(last.linear_m_s2, last.linear_m_s2, 0.0),
+            scale_ * lerp(last.angular_rad_s2, last.angular_rad_s2, 0.0)};
+  }
+  PROOFMASS_EXPECT(after != table_->begin());
+  const EnvironmentRow& next = *after;
+  const EnvironmentRow& row = *(after - 1);
+  const double part = (t - row.time_s) / (next.time_s - row.time_s);
+  return {scale_ * lerp(row.linear_m_s2, next.linear_m_s2, part),
+          scale_ * lerp(row.angular_rad_s2, next.angular_rad_s2, part)};
+}
+
+}  // namespace proofmass

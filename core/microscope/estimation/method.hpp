@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "core/microscope/campaign/parameter.hpp"
+#include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/session/session.hpp"
+#include "core/microscope/session/signals.hpp"
+
+namespace proofmass {
+
+/// What the sessions of a run left: one entry for each of scenario.sessions, in their order.
+using RunPhasors = std::vector<SessionPhasors>;
+
+/// A number that tells how an estimation went.
+struct Diagnostic {
+  std::string_view name;  ///< With its unit; of a constant string.
+  double value = 0.0;
+};
+
+/// What a method makes of a run.
+struct Estimation {
+  ParameterArray values{};                          ///< SI.
+  std::optional<ParameterArray> standard_errors{};  ///< SI; nothing if the method has none.
+  std::uint32_t num_rounds = 0;
+  bool converged = false;  ///< False if values still moved in the last allowed round.
+  std::vector<Diagnostic> diagnostics{};
+};
+
+enum class RecordedLines : std::uint8_t { fitted, all };
+
+/// What a method wants recorded of a session. Known lines are many and cost as much as those that
+/// are fitted; so they are recorded for the methods that use them.
+struct RecordNeeds {
+  RecordedLines lines = RecordedLines::fitted;
+  SignalSet signals = SignalSet::common;
+};
+
+/// A way to get the parameters from the phasors of a run; `estimation.method` chooses one.
+struct EstimationMethodInfo {
+  std::string_view name;  ///< In campaign files: `hardy2013`.
+
+  RecordNeeds (*needs)(const Session& session);
+
+  /// @throws ConfigError if the method cannot estimate all parameters from these sessions.
+  void (*check)(const std::vector<Session>& sessions);
+
+  /// A pure function of its arguments.
+  /// @param records   Of scenario.sessions, with what `needs` asks for.
+  /// @param scenario  For which `check` passed.
+  Estimation (*estimate)(const RunPhasors& records, const Scenario& scenario);
+};
+
+}  // namespace proofmass

@@ -1,0 +1,33 @@
+#include "core/microscope/estimation/methods.hpp"
+
+#include <array>
+#include <span>
+
+#include "core/error.hpp"
+#include "core/microscope/estimation/hardy2013/hardy2013.hpp"
+
+namespace proofmass {
+namespace {
+
+// Positions are sent and stored: add at the end.
+constexpr std::array methods{
+    hardy2013_method,
+};
+
+constexpr std::array<std::string_view, methods.size()> method_names = [] {
+  std::array<std::string_view, methods.size()> names{};
+  for (std::size_t i = 0; i < methods.size(); ++i) names[i] = methods[i].name;
+  return names;
+}();
+
+}  // namespace
+
+const EstimationMethodInfo& estimation_method(EstimationMethod method) {
+  const auto position = static_cast<std::size_t>(method) - 1;
+  PROOFMASS_EXPECT(position < methods.size());
+  return methods[position];
+}
+
+std::span<const std::string_view> names_of(EstimationMethod) { return method_names; }
+
+}  // namespace proofmass

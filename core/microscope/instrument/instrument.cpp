@@ -1,0 +1,134 @@
+#include "core/microscope/instrument/instrument.hpp"
+
+#include <Eigen/LU>
+#include <cstddef>
+#include <string_view>
+
+#include "core/error.hpp"
+
+namespace proofmass {
+namespace {
+
+/// Reads the values of a group one after the other.
+class GroupReader {
+ public:
+  GroupReader(const DrawnValues& values, std::string_view group) : values_(values) {
+    for (const DrawGroup& candidate : draw_groups()) {
+      if (candidate.name != group) continue;
+      next_ = candidate.first;
+      end_ = candidate.first + candidate.count;
+    }
+    PROOFMASS_EXPECT(end_ > 0);
+  }
+
+  double scalar() {
+    PROOFMASS_EXPECT(next_ < end_);
+    return values_[next_++];
+  }
+  Eigen::Vector3d vector() {
+    const double x = scalar();
+    const double y = scalar();
+    const double z = scalar();
+    return {x, y, z};
+  }
+
+ private:
+  const DrawnValues& values_;
+  std::size_t next_ = 0;
+  std::size_t end_ = 0;
+};
+
+}  // namespace
+
+Eigen::Matrix3d Sensor::symmetric_part() const {
+  const Eigen::Vector3d& k = scale_factor;
+  const Eigen::Vector3d& eta = coupling_rad;
+  Eigen::Matrix3d m;
+  m << k.x(), eta.z(), eta.y(),  //
+      eta.z(), k.y(), eta.x(),   //
+      eta.y(), eta.x(), k.z();
+  return m;
+}
+
+Eigen::Matrix3d Sensor::alignment() const {
+  const Eigen::Vector3d& theta = misalignment_rad;
+  Eigen::Matrix3d m;
+  m << 1.0, theta.z(), -theta.y(),  //
+      -theta.z(), 1.0, theta.x(),   //
+      theta.y(), -theta.x(), 1.0;
+  return m;
+}
+
+Eigen::Matrix3d Sensor::sensitivity() const {
+  return symmetric_part() + alignment() - Eigen::Matrix3d::Identity();
+}
+
+Instrument make_instrument(const DrawnValues& values) {
+  GroupReader scale_factor_error(values, "scale_factor_error");
+  GroupReader misalignment(values, "misalignment_rad");
+  GroupReader coupling(values, "coupling_rad");
+  GroupReader quadratic(values, "quadratic_factor_s2_m");
+  GroupReader read_out_bias(values, "read_out_bias_m_s2");
+  GroupReader parasitic(values, "parasitic_acceleration_m_s2");
+  GroupReader star_tracker_bias(values, "star_tracker_bias_rad");
+  Instrument instrument;
+  for (std::size_t k = 0; k < 2; ++k) {
+    Sensor& sensor = instrument.sensors[k];
+    sensor.scale_factor = Eigen::Vector3d::Ones() + scale_factor_error.vector();
+    sensor.misalignment_rad = misalignment.vector();
+    sensor.coupling_rad = coupling.vector();
+    sensor.quadratic_s2_m = quadratic.vector();
+    sensor.read_out_bias_m_s2 = read_out_bias.vector();
+    sensor.parasitic_m_s2 = parasitic.vector();
+    instrument.star_tracker_bias_rad[k] = star_tracker_bias.vector();
+  }
+  instrument.offcentring_m = GroupReader(values, "offcentring_m").vector();
+  instrument.centre_offset_m = GroupReader(values, "centre_of_mass_offset_m").vector();
+  instrument.angular_bias_rad_s2 = GroupReader(values, "angular_bias_rad_s2").vector();
+
+  const Eigen::Vector3d thrust = GroupReader(values, "thruster_scale_error").vector();
+  GroupReader thrust_coupling(values, "thruster_coupling_rad");  // xy xz yx yz zx zy
+  for (Eigen::Index row = 0; row < 3; ++row) {
+    for (Eigen::Index column = 0; column < 3; ++column) {
+      instrument.thrust_matrix(row, column) =
+          row == column ? 1.0 + thrust[row] : thrust_coupling.scalar();
+    }
+  }
+  return instrument;
+}
+
+SensitivityMatrices sensitivity_matrices(const Instrument& instrument) {
+  const Eigen::Matrix3d m1 = instrument.sensors[0].sensitivity();
+  const Eigen::Matrix3d m2 = instrument.sensors[1].sensitivity();
+  const Eigen::Matrix3d common = 0.5 * (m1 + m2);
+  const Eigen::Matrix3d difference = 0.5 * (m1 - m2);
+  const Eigen::Matrix3d ratio = difference * common.inverse();
+  return {.common = common - ratio * difference, .differential = ratio};
+}
+
+ParameterArray true_parameters(const Instrument& instrument, double bias_error_x_m_s2) {
+  const auto [a_c, a_d] = sensitivity_matrices(instrument);
+  const Sensor& inner = instrument.sensors[0];
+  const Sensor& outer = instrument.sensors[1];
+  const double k1c = 0.5 * (inner.scale_factor.x() + outer.scale_factor.x());
+  const double k2c = 0.5 * (inner.quadratic_s2_m.x() + outer.quadratic_s2_m.x());
+  const double k2d = 0.5 * (inner.quadratic_s2_m.x() - outer.quadratic_s2_m.x());
+  const double b1d = -0.5 * (inner.parasitic_m_s2.x() - outer.parasitic_m_s2.x());
+
+  ParameterArray truth{};
+  const auto at = [&truth](Parameter parameter) -> double& { return truth[index(parameter)]; };
+  at(Parameter::a_c11_delta_x) = a_c(0, 0) * instrument.offcentring_m.x();
+  at(Parameter::a_c11_delta_z) = a_c(0, 0) * instrument.offcentring_m.z();
+  at(Parameter::a_c11_delta_y) = a_c(0, 0) * instrument.offcentring_m.y();
+  at(Parameter::a_c12) = a_c(0, 1);
+  at(Parameter::a_c13) = a_c(0, 2);
+  at(Parameter::a_d11_prime) =
+      a_d(0, 0) + 2.0 * (k2c / k1c) * b1d + 2.0 * (k2d / k1c) * bias_error_x_m_s2;
+  at(Parameter::a_d12) = a_d(0, 1);
+  at(Parameter::a_d13) = a_d(0, 2);
+  at(Parameter::k2d) = k2d / (k1c * k1c);
+  at(Parameter::k2c) = k2c / (k1c * k1c);
+  return truth;
+}
+
+}  // namespace proofmass

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <array>
+
+#include "core/math/inline.hpp"
+#include "core/math/vector3.hpp"
+#include "core/microscope/instrument/instrument.hpp"
+#include "core/microscope/orbit/gradient.hpp"
+
+namespace proofmass {
+
+/// Satellite motion that both test masses feel, in S.
+template <typename T>
+struct SatelliteMotion {
+  Vector3<T> acceleration;          ///< Γ_sat: non-gravitational acceleration of O_sat, m/s².
+  double gradient_s2 = 0.0;         ///< μ/r³.
+  Vector3<T> earth_direction;       ///< û_S: from the Earth to the satellite.
+  Vector3<T> rate;                  ///< Ω, rad/s.
+  Vector3<T> angular_acceleration;  ///< Ω̇, rad/s².
+};
+
+/// Factors of the motion q(t) = direction·(position, velocity, acceleration) of a test mass.
+struct MassMotionPhase {
+  double position_m = 0.0;
+  double velocity_m_s = 0.0;
+  double acceleration_m_s2 = 0.0;
+};
+
+/// Constants of a sensor and its mass, in S unless said otherwise.
+template <typename T>
+struct SensorModel {
+  Vector3<T> rest_position_m;   ///< r_k without excitation: from O_sat to O_k.
+  Vector3<T> motion_direction;  ///< [θ_k]ᵀ e_a s_k.
+  Vector3<T> parasitic_m_s2;    ///< p_k.
+  Vector3<T> offset_m_s2;       ///< b0_k − ([K1_k] + [η_k]) p_k.
+  Matrix3<T> sensitivity;       ///< [M_k].
+  Vector3<T> quadratic_s2_m;    ///< [K2_k].
+};
+
+/// Γ_App,k + p_k, the applied acceleration without the parasitic one ([Hardy2013]
+/// eq:instrument-dynamics with O_kO_sat = −r_k): Γ_sat − ([T] − [In]) r + [Cor] ṙ + r̈.
+template <typename T>
+PROOFMASS_INLINE Vector3<T> kinematic_acceleration(const SensorModel<T>& sensor,
+                                                   const SatelliteMotion<T>& satellite,
+                                                   const MassMotionPhase& motion) {
+  const Vector3<T> r = sensor.rest_position_m + T(motion.position_m) * sensor.motion_direction;
+  const Vector3<T> velocity = T(motion.velocity_m_s) * sensor.motion_direction;
+  const Vector3<T> acceleration = T(motion.acceleration_m_s2) * sensor.motion_direction;
+  return satellite.acceleration -
+         gravity_gradient(satellite.gradient_s2, satellite.earth_direction, r) +
+         inertia_gradient(satellite.rate, satellite.angular_acceleration, r) +
+         T(2.0) * cross(satellite.rate, velocity) + acceleration;
+}
+
+/// Γ_mes,k without noise ([Hardy2013] eq:measurement):
+/// b0 + [M](Γ_App + p) − ([K1] + [η]) p + [K2] Γ_App².
+template <typename T>
+PROOFMASS_INLINE Vector3<T> measured_acceleration(const SensorModel<T>& sensor,
+                                                  const Vector3<T>& kinematic) {
+  const Vector3<T> applied = kinematic - sensor.parasitic_m_s2;
+  return sensor.offset_m_s2 + sensor.sensitivity * kinematic +
+         scaled(sensor.quadratic_s2_m, scaled(applied, applied));
+}
+
+}  // namespace proofmass

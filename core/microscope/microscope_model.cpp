@@ -1,0 +1,117 @@
+#include <array>
+#include <memory>
+#include <utility>
+
+#include "core/campaign/model.hpp"
+#include "core/error.hpp"
+#include "core/microscope/campaign/budget.hpp"
+#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/definition/definition_items.hpp"
+#include "core/microscope/instrument/instrument.hpp"
+#include "core/microscope/simulation/reference_digest.hpp"
+#include "core/microscope/simulation/run.hpp"
+
+namespace proofmass {
+
+std::unique_ptr<Campaign> MicroscopeCampaign::clone() const {
+  return std::make_unique<MicroscopeCampaign>(*this);
+}
+
+std::unique_ptr<const Plan> MicroscopeCampaign::prepare() const {
+  return std::make_unique<const RunPlan>(*this);
+}
+
+Definition MicroscopeCampaign::definition(TableColumns columns) const {
+  return definition_of(*this, columns);
+}
+
+std::vector<DefinitionItem> MicroscopeCampaign::items() const { return definition_items(*this); }
+
+std::vector<DefinitionDifference> MicroscopeCampaign::differences_from(
+    const Campaign& other) const {
+  const auto* const second = dynamic_cast<const MicroscopeCampaign*>(&other);
+  PROOFMASS_EXPECT(second != nullptr);
+  return compare_definitions(*this, *second);
+}
+
+std::vector<double> MicroscopeCampaign::objectives() const {
+  return {scenario.objectives.begin(), scenario.objectives.end()};
+}
+
+std::int64_t MicroscopeCampaign::num_rounds_max() const {
+  return scenario.estimation.num_rounds_max;
+}
+
+std::vector<std::size_t> MicroscopeCampaign::table_quantities() const {
+  return table_elements(dispersions);
+}
+
+RunDraw MicroscopeCampaign::draw(RunIndex run) const {
+  PROOFMASS_EXPECT(run.value < num_runs);
+  const std::vector<double> of_table = table_values(run);
+  const AcceptedDraw accepted = draw_instrument(*this, run, of_table);
+  RunDraw draw{.num_draws = accepted.num_draws};
+  if (!accepted.instrument) return draw;
+  const DrawnValues values = draw_values(dispersions, seed, run, accepted.num_draws - 1, of_table);
+  const ParameterArray truth =
+      true_parameters(*accepted.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
+  draw.values.assign(values.begin(), values.end());
+  draw.truth.assign(truth.begin(), truth.end());
+  return draw;
+}
+
+std::optional<ErrorBudget> MicroscopeCampaign::error_budget() const {
+  return microscope_budget(scenario);
+}
+
+namespace {
+
+std::array<DrawnQuantity, num_drawn> make_drawn() {
+  std::array<DrawnQuantity, num_drawn> drawn;
+  for (std::size_t i = 0; i < num_drawn; ++i) drawn[i] = {drawn_names()[i], drawn_unit(i)};
+  return drawn;
+}
+
+class MicroscopeModel final : public Model {
+ public:
+  [[nodiscard]] std::string_view version() const override { return model_version; }
+
+  [[nodiscard]] const ResultSchema& results() const override { return microscope_results(); }
+
+  [[nodiscard]] std::span<const DrawnQuantity> drawn() const override {
+    static const std::array<DrawnQuantity, num_drawn> drawn = make_drawn();
+    return drawn;
+  }
+
+  [[nodiscard]] std::size_t batch_size() const override { return batch_lanes; }
+
+  [[nodiscard]] std::uint64_t reference_digest(InstructionSet set) const override {
+    return proofmass::reference_digest(set);
+  }
+
+  [[nodiscard]] std::unique_ptr<Campaign> campaign_of(Definition definition, TableColumns columns,
+                                                      std::string_view source) const override {
+    return std::make_unique<MicroscopeCampaign>(
+        proofmass::campaign_of(std::move(definition), columns, source));
+  }
+
+  [[nodiscard]] std::unique_ptr<Campaign> read_campaign(Document& document,
+                                                        DataFiles& files) const override {
+    return std::make_unique<MicroscopeCampaign>(proofmass::read_campaign(document, files));
+  }
+
+  [[nodiscard]] std::string example() const override {
+    return commented_campaign(hardy2013_campaign());
+  }
+};
+
+}  // namespace
+
+const Model& model() {
+  static const MicroscopeModel microscope;
+  return microscope;
+}
+
+}  // namespace proofmass

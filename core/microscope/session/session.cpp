@@ -1,0 +1,156 @@
+#include "core/microscope/session/session.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "core/error.hpp"
+#include "core/microscope/session/session_names.hpp"
+
+namespace proofmass {
+
+std::span<const std::string_view> names_of(Axis) {
+  static constexpr std::array<std::string_view, 3> names{"x", "y", "z"};
+  return names;
+}
+
+std::span<const std::string_view> names_of(ExcitationKind) {
+  static constexpr std::array<std::string_view, 3> names{"attitude", "drag_free", "test_mass"};
+  return names;
+}
+
+std::span<const std::string_view> names_of(MassMotion) {
+  static constexpr std::array<std::string_view, 3> names{"opposition", "mass_1", "mass_2"};
+  return names;
+}
+
+std::span<const std::string_view> names_of(DragFreeSource) {
+  static constexpr std::array<std::string_view, 3> names{"common", "sensor_1", "sensor_2"};
+  return names;
+}
+
+std::string_view amplitude_key(ExcitationKind kind) {
+  static constexpr std::array<std::string_view, 3> keys{"amplitude_rad", "amplitude_m_s2",
+                                                        "amplitude_m"};
+  const auto position = static_cast<std::size_t>(kind) - 1;
+  PROOFMASS_EXPECT(position < keys.size());
+  return keys[position];
+}
+
+std::string text_of(const LineMultiple& line) {
+  std::size_t num_further = line.further.size();
+  while (num_further > 0 && line.further[num_further - 1] == 0.0) --num_further;
+  std::string excitations = fmt::format("{}", line.excitation);
+  if (num_further > 0) {
+    for (std::size_t i = 0; i < num_further; ++i) {
+      excitations += fmt::format(", {}", line.further[i]);
+    }
+    excitations = "[" + excitations + "]";
+  }
+  if (line.spin == 0.0) return fmt::format("[{}, {}]", line.orbital, excitations);
+  return fmt::format("[{}, {}, {}]", line.orbital, excitations, line.spin);
+}
+
+double line_frequency_hz(const Session& session, const LineMultiple& line, double orbit_period_s) {
+  PROOFMASS_EXPECT(line.excitation == 0.0 || !session.excitations.empty());
+  const double excitation_hz =
+      line.excitation == 0.0 ? 0.0 : session.excitations.front().frequency_hz;
+  const double spin_hz = session.spin_rate_rad_s / (2.0 * std::numbers::pi);
+  double frequency_hz =
+      line.orbital / orbit_period_s + line.excitation * excitation_hz + line.spin * spin_hz;
+  for (std::size_t i = 0; i < line.further.size(); ++i) {
+    if (line.further[i] == 0.0) continue;
+    PROOFMASS_EXPECT(i + 1 < session.excitations.size());
+    frequency_hz += line.further[i] * session.excitations[i + 1].frequency_hz;
+  }
+  return frequency_hz;
+}
+
+const Excitation* mass_excitation(const Session& session) {
+  const auto found =
+      std::ranges::find(session.excitations, ExcitationKind::test_mass, &Excitation::kind);
+  return found == session.excitations.end() ? nullptr : &*found;
+}
+
+double test_frequency_hz(const Session& session, double orbit_period_s) {
+  return std::abs(1.0 / orbit_period_s + session.spin_rate_rad_s / (2.0 * std::numbers::pi));
+}
+
+namespace {
+
+using Lines = std::vector<LineMultiple>;
+
+// Calibration signals of model and mission: [Hardy2013] section 4.2 gives their kinds, the
+// frequencies are those flown, the amplitudes reach the paper's accuracies.
+constexpr Excitation attitude_z{ExcitationKind::attitude, Axis::z, 3.5e-3, 1.0e-3,
+                                MassMotion::opposition};
+
+constexpr Excitation drag_free(Axis axis) {
+  return {ExcitationKind::drag_free, axis, 2e-8, 1.22847554e-3, MassMotion::opposition};
+}
+
+constexpr Excitation test_mass(Axis axis, MassMotion motion) {
+  return {ExcitationKind::test_mass, axis, 10e-6, 9.88e-3, motion};
+}
+
+Session session_of(SessionTarget target, Lines fit_lines, Lines known_lines) {
+  Session session;
+  session.name = name_of(target);
+  session.target = target;
+  session.fit_lines = std::move(fit_lines);
+  session.known_lines = std::move(known_lines);
+  return session;
+}
+
+Session excited(Session session, const Excitation& excitation) {
+  session.excitations = {excitation};
+  return session;
+}
+
+Session locked_on(Session session, DragFreeSource source) {
+  session.drag_free = source;
+  return session;
+}
+
+Session lasting(Session session, int num_orbits) {
+  session.num_orbits = num_orbits;
+  return session;
+}
+
+}  // namespace
+
+std::vector<Session> hardy2013_sessions() {
+  using enum SessionTarget;
+  using enum MassMotion;
+  const Lines gradient{{2, 0}};
+  const Lines orbital{{1, 0}, {3, 0}, {4, 0}};
+  const Lines sidebands{{2, 1}, {-2, 1}};
+  const Lines all_sidebands{{1, 0}, {2, 0}, {2, 1}, {-2, 1}, {1, 1}, {-1, 1}};
+  // At eccentricity e the gradient has a line 7e/2 as strong as that at 2 f_orb, at 3 f_orb;
+  // unfitted, its sideband leaks 3e-5 rad into a_c13.
+  const Lines carrier{{0, 1}, {1, 0}, {2, 0}, {1, 1}, {-1, 1}, {3, 1}, {-3, 1}};
+  const Lines with_harmonic{{1, 0}, {2, 0}, {0, 2}};
+  const Lines with_carrier{{0, 1}, {1, 0}, {2, 0}};
+  const Lines quadratic{{0, 1}, {1, 0}, {2, 0}, {2, 1}, {-2, 1}, {1, 1}, {-1, 1}};
+  return {
+      session_of(a_c11_delta_x, gradient, orbital),
+      session_of(a_c11_delta_z, gradient, orbital),
+      excited(session_of(a_c11_delta_y, {{0, 1}}, all_sidebands), attitude_z),
+      lasting(excited(session_of(a_c12, sidebands, carrier), test_mass(Axis::y, opposition)), 40),
+      excited(session_of(a_c13, sidebands, carrier), test_mass(Axis::z, opposition)),
+      excited(session_of(a_d11_prime, {{0, 1}}, with_harmonic), drag_free(Axis::x)),
+      excited(session_of(a_d12, {{0, 1}}, with_harmonic), drag_free(Axis::y)),
+      excited(session_of(a_d13, {{0, 1}}, with_harmonic), drag_free(Axis::z)),
+      excited(session_of(k2d, {{0, 2}}, with_carrier), drag_free(Axis::x)),
+      locked_on(excited(session_of(k2_sensor_1, {{0, 2}}, quadratic), test_mass(Axis::x, mass_1)),
+                DragFreeSource::sensor_2),
+      locked_on(excited(session_of(k2_sensor_2, {{0, 2}}, quadratic), test_mass(Axis::x, mass_2)),
+                DragFreeSource::sensor_1),
+  };
+}
+
+}  // namespace proofmass

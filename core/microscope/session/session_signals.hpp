@@ -1,0 +1,122 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <optional>
+#include <span>
+
+#include "core/math/elementary.hpp"
+#include "core/math/inline.hpp"
+#include "core/math/quaternion.hpp"
+#include "core/math/vector3.hpp"
+#include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/control/attitude_loop.hpp"
+#include "core/microscope/environment/environment.hpp"
+#include "core/microscope/instrument/sensor_model.hpp"
+#include "core/microscope/orbit/kepler_orbit.hpp"
+
+namespace proofmass {
+
+/// What every run of a campaign sees alike at one sample of a session.
+struct SharedSample {
+  double gradient_s2 = 0.0;           ///< μ/r³.
+  Vector3<double> earth_direction_I;  ///< û.
+  Vector3<double> earth_direction_R;  ///< The same in the frame that the attitude loop holds.
+  Quaternion<double> reference_IR;    ///< Attitude of that frame.
+  Vector3<double> reference_rate;     ///< Its Ω, rad/s.
+  ExternalAcceleration external;
+  Vector3<double> drag_free_command_m_s2;  ///< C_cal.
+  Vector3<double> attitude_command_rad;    ///< Added to the star tracker's output.
+  AttitudeEstimator<double> commanded;     ///< What that command alone makes of the estimate.
+  MassMotionPhase mass_motion;             ///< Of the moving test masses.
+};
+
+/// What a sample takes from sines and cosines: functions of its time alone.
+template <typename T>
+struct SamplePhasesOf {
+  OrbitPointOf<T> orbit;
+  SineCosineOf<T> reference;  ///< Of half the angle that the rotating frame has turned.
+  /// Of the phase of each excitation; nothing beyond the session's own.
+  std::array<SineCosineOf<T>, num_excitations_max> excitation;
+};
+using SamplePhases = SamplePhasesOf<double>;
+
+/// Generates the samples of a session in order, from the start of settling on.
+class SessionSignals {
+ public:
+  SessionSignals(const Scenario& scenario, const Session& session, const KeplerOrbit& orbit,
+                 const Environment& environment);
+
+  [[nodiscard]] std::size_t num_excitations() const { return num_excitations_; }
+
+  /// Samples before the record: the first record sample has t = 0.
+  [[nodiscard]] std::int64_t num_settling() const { return num_settling_; }
+  [[nodiscard]] std::int64_t num_record() const { return num_record_; }
+
+  /// Attitude and rate of the reference at the first sample.
+  struct Reference {
+    Quaternion<double> attitude_IR;
+    Vector3<double> rate;
+  };
+  [[nodiscard]] Reference reference_at_start() const;
+
+  /// The next sample; the first call yields t = −num_settling()·T.
+  [[nodiscard]] SharedSample next();
+
+  /// Writes the next samples from their phases, which phases_at() computes for many at once.
+  /// @param samples  As many as phases; what no sample of the session sets is left alone.
+  void next(std::span<const SamplePhases> phases, std::span<SharedSample> samples);
+
+  /// Time of sample `ahead` of those that come next, s.
+  [[nodiscard]] double time_s(std::size_t ahead) const {
+    return static_cast<double>(next_ + static_cast<std::int64_t>(ahead)) * sample_period_s_;
+  }
+
+  /// Phases of a batch of times, one a lane; nothing if the orbit cannot, see
+  /// KeplerOrbit::at_lanes().
+  template <typename T>
+  [[nodiscard]] PROOFMASS_INLINE std::optional<SamplePhasesOf<T>> phases_at(const T& time_s) const {
+    const std::optional<OrbitPointOf<T>> orbit = orbit_->at_lanes(time_s);
+    if (!orbit) return std::nullopt;
+    SamplePhasesOf<T> phases{*orbit, reference_phase(time_s), {}};
+    set_excitation_phases(time_s, phases);
+    return phases;
+  }
+
+ private:
+  template <typename T>
+  PROOFMASS_INLINE SineCosineOf<T> reference_phase(const T& time_s) const {
+    if (spin_rate_rad_s_ == 0.0) return {T(0.0), T(1.0)};
+    return sincos_turns(T(0.5 * spin_rate_rad_s_) * time_s / T(2.0 * std::numbers::pi));
+  }
+  template <typename T>
+  PROOFMASS_INLINE void set_excitation_phases(const T& time_s, SamplePhasesOf<T>& phases) const {
+    for (std::size_t i = 0; i < num_excitations_; ++i) {
+      phases.excitation[i] = sincos_turns(T(excitations_[i].frequency_hz) * time_s);
+    }
+  }
+
+  void advance(const SamplePhases& phases, SharedSample& sample);
+  [[nodiscard]] Reference reference_from(const SineCosine& phase) const;
+  void excite(const SamplePhases& phases, SharedSample& sample) const;
+
+  const KeplerOrbit* orbit_;
+  Environment environment_;
+  bool turns_environment_;
+  AttitudeGains gains_;
+  double sample_period_s_;
+  double spin_rate_rad_s_;
+  std::int64_t num_settling_;
+  std::int64_t num_record_;
+  std::int64_t next_;
+  std::size_t num_excitations_ = 0;
+  std::array<Excitation, num_excitations_max> excitations_{};
+  AttitudeEstimator<double> commanded_;
+};
+
+/// Samples of a session's record: a whole number, the last orbit cut at the last full sample.
+[[nodiscard]] std::int64_t num_record_samples(const Scenario& scenario, const Session& session);
+
+}  // namespace proofmass

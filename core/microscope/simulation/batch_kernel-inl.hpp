@@ -1,0 +1,209 @@
+#pragma once
+
+// The kernel of one instruction set. Included once by each batch_kernel_<set>.cpp, which is
+// compiled with that set's flags and defines PROOFMASS_KERNEL_SET, the ending of the names of the
+// functions to be made.
+//
+// Everything over `Batch` has internal linkage, because `Batch` has: no symbol of this file can be
+// taken for another translation unit's, so no code of a faster processor reaches a slower one.
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <utility>
+
+#include "core/microscope/simulation/batch-inl.hpp"
+#include "core/microscope/simulation/batch_kernel.hpp"
+#include "core/microscope/simulation/batch_noise-inl.hpp"
+#include "core/microscope/simulation/batch_signals-inl.hpp"
+
+namespace proofmass {
+namespace {
+
+/// Gathers one number of each lane.
+template <typename Get>
+HWY_INLINE Batch gather(const Get& get) {
+  alignas(64) double values[num_lanes];
+  for (std::size_t lane = 0; lane < num_lanes; ++lane) values[lane] = get(lane);
+  return load(values);
+}
+
+template <typename Get>
+HWY_INLINE Vector3<Batch> gather_vector(const Get& get) {
+  return {gather([&](std::size_t lane) { return get(lane).x; }),
+          gather([&](std::size_t lane) { return get(lane).y; }),
+          gather([&](std::size_t lane) { return get(lane).z; })};
+}
+
+template <typename Get>
+HWY_INLINE Matrix3<Batch> gather_matrix(const Get& get) {
+  return {{{gather_vector([&](std::size_t lane) { return get(lane).row[0]; }),
+            gather_vector([&](std::size_t lane) { return get(lane).row[1]; }),
+            gather_vector([&](std::size_t lane) { return get(lane).row[2]; })}}};
+}
+
+using ConstantsOfLanes = std::span<const LoopConstants<double>, num_lanes>;
+
+HWY_INLINE SensorModel<Batch> gather_sensor(ConstantsOfLanes constants, std::size_t k) {
+  const auto sensor = [&](std::size_t lane) -> const SensorModel<double>& {
+    return constants[lane].sensors[k];
+  };
+  return {gather_vector([&](std::size_t lane) { return sensor(lane).rest_position_m; }),
+          gather_vector([&](std::size_t lane) { return sensor(lane).motion_direction; }),
+          gather_vector([&](std::size_t lane) { return sensor(lane).parasitic_m_s2; }),
+          gather_vector([&](std::size_t lane) { return sensor(lane).offset_m_s2; }),
+          gather_matrix([&](std::size_t lane) { return sensor(lane).sensitivity; }),
+          gather_vector([&](std::size_t lane) { return sensor(lane).quadratic_s2_m; })};
+}
+
+HWY_INLINE LoopConstants<Batch> gather_constants(ConstantsOfLanes of) {
+  return {{gather_sensor(of, 0), gather_sensor(of, 1)},
+          {gather([&](std::size_t lane) { return of[lane].drag_free_weight[0]; }),
+           gather([&](std::size_t lane) { return of[lane].drag_free_weight[1]; })},
+          gather_vector([&](std::size_t lane) { return of[lane].subtracted_bias_m_s2; }),
+          gather_matrix([&](std::size_t lane) { return of[lane].thrust_matrix; }),
+          gather_vector([&](std::size_t lane) { return of[lane].angular_bias_rad_s2; }),
+          gather_vector([&](std::size_t lane) { return of[lane].star_tracker_bias_rad; }),
+          of[0].sensor_range_m_s2};
+}
+
+HWY_INLINE NoiseStates<Batch> gather_states(
+    std::span<const NoiseStates<double>, num_lanes> states) {
+  NoiseStates<Batch> gathered;
+  for (std::size_t channel = 0; channel < num_coloured_channels; ++channel) {
+    const auto of = [&](std::size_t lane) -> const NoiseState<double>& {
+      return states[lane][channel];
+    };
+    NoiseState<Batch>& state = gathered[channel];
+    for (std::size_t i = 0; i < NoiseShape::num_poles_max; ++i) {
+      state.real[i] = gather([&](std::size_t lane) { return of(lane).real[i]; });
+    }
+    state.pair_real = gather([&](std::size_t lane) { return of(lane).pair_real; });
+    state.pair_imaginary = gather([&](std::size_t lane) { return of(lane).pair_imaginary; });
+  }
+  return gathered;
+}
+
+/// The session's lanes from one on.
+template <typename T>
+HWY_INLINE std::span<T, num_lanes> lanes_of(std::span<T, batch_lanes> all, std::size_t first_lane) {
+  return all.subspan(first_lane).template first<num_lanes>();
+}
+
+HWY_INLINE BatchNoise make_noise(const BatchSession& session, std::size_t first_lane) {
+  return {session, first_lane,
+          gather_states(lanes_of(std::span(session.noise_states), first_lane))};
+}
+
+using Group = LaneGroup<Batch, BatchNoise>;
+
+template <std::size_t... g>
+HWY_INLINE std::array<Group, num_groups> make_groups(const BatchSession& session,
+                                                     std::index_sequence<g...> /*groups*/) {
+  return {Group{gather_constants(lanes_of(std::span(session.constants), g * num_lanes)),
+                make_noise(session, g * num_lanes)}...};
+}
+
+using OutcomesOfLanes = std::span<SessionOutcome, num_lanes>;
+
+/// Gives each lane its number; place(outcome) is where it belongs.
+template <typename Place>
+HWY_INLINE void scatter_number(const Batch& numbers, OutcomesOfLanes outcomes, const Place& place) {
+  const Lanes values(numbers);
+  for (std::size_t lane = 0; lane < num_lanes; ++lane) place(outcomes[lane]) = values[lane];
+}
+
+HWY_INLINE void scatter_health(const Group& group, OutcomesOfLanes outcomes) {
+  const auto put = [&](const Batch& numbers, const auto& place) {
+    scatter_number(numbers, outcomes,
+                   [&](SessionOutcome& outcome) -> double& { return place(outcome.health); });
+  };
+  const LoopMonitor<Batch>& monitor = group.monitor;
+  put(group.loop.largest_acceleration,
+      [](SessionHealth& h) -> double& { return h.acceleration_m_s2; });
+  put(group.loop.largest_angle, [](SessionHealth& h) -> double& { return h.attitude_rad; });
+  put(monitor.quadratic.squares, [](SessionHealth& h) -> double& { return h.quadratic_squares; });
+  put(monitor.common_square.squares, [](SessionHealth& h) -> double& { return h.common_squares; });
+  for (std::size_t k = 0; k < 2; ++k) {
+    put(monitor.sensor_square[k].squares,
+        [k](SessionHealth& h) -> double& { return h.sensor_squares[k]; });
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      put(monitor.residual[axis][i],
+          [=](SessionHealth& h) -> double& { return h.residual[axis][i]; });
+    }
+  }
+}
+
+/// @param sums_of  Where an outcome keeps these sums.
+template <typename SumsOf>
+HWY_INLINE void scatter_sums(const SignalSums<Batch>& sums, OutcomesOfLanes outcomes,
+                             const SumsOf& sums_of) {
+  for (std::size_t s = 0; s < num_signals; ++s) {
+    for (std::size_t i = 0; i < 2 * num_fit_lines_max; ++i) {
+      scatter_number(sums[s][i], outcomes,
+                     [&](SessionOutcome& outcome) -> double& { return sums_of(outcome)[s][i]; });
+    }
+  }
+}
+
+HWY_INLINE void scatter(const Group& group, std::size_t num_known_readers,
+                        OutcomesOfLanes outcomes) {
+  scatter_sums(group.sums, outcomes,
+               [](SessionOutcome& outcome) -> SignalSums<double>& { return outcome.sums; });
+  for (std::size_t k = 0; k < num_known_readers; ++k) {
+    scatter_sums(
+        group.known_sums[k], outcomes,
+        [k](SessionOutcome& outcome) -> SignalSums<double>& { return outcome.known_sums[k]; });
+  }
+  scatter_health(group, outcomes);
+}
+
+}  // namespace
+
+#define PROOFMASS_JOIN(a, b) a##b
+#define PROOFMASS_NAME(stem, set) PROOFMASS_JOIN(stem, set)
+
+void PROOFMASS_NAME(record_batch_,
+                    PROOFMASS_KERNEL_SET)(const BatchSession& session,
+                                          std::span<SessionOutcome, batch_lanes> outcomes) {
+  BatchSignals signals(*session.signals);
+  auto groups = make_groups(session, std::make_index_sequence<num_groups>());
+  const auto progress = [&](std::size_t num_samples) {
+    session.progress(session.progress_context, num_samples);
+  };
+  const std::size_t num_used = (session.num_runs + num_lanes - 1) / num_lanes;
+  const auto used = std::span(groups).first(num_used);
+  record_session(signals, session.setup, used, session.weights_buffer, progress, NoObserver{});
+  for (std::size_t g = 0; g < num_used; ++g) {
+    scatter(groups[g], session.setup.known_readers.size(), lanes_of(outcomes, g * num_lanes));
+  }
+}
+
+double PROOFMASS_NAME(make_noise_, PROOFMASS_KERNEL_SET)(const BatchSession& session,
+                                                         std::size_t num_samples, NoiseWork work) {
+  Batch sum;
+  for (std::size_t first_lane = 0; first_lane < batch_lanes; first_lane += num_lanes) {
+    BatchNoise noise = make_noise(session, first_lane);
+    for (std::size_t k = 0; k < num_samples; ++k) {
+      if (work == NoiseWork::deviates) {
+        sum = sum + noise.next_deviate();
+        continue;
+      }
+      const SampleNoise<Batch> sample = noise.next();
+      const Vector3<Batch> total = sample.sensor[0] + sample.sensor[1] + sample.angular +
+                                   sample.star_tracker + sample.thrust + sample.torque;
+      sum = sum + total.x + total.y + total.z;
+    }
+  }
+  const Lanes values(sum);
+  double result = 0.0;
+  for (std::size_t lane = 0; lane < num_lanes; ++lane) result += values[lane];
+  return result;
+}
+
+#undef PROOFMASS_NAME
+#undef PROOFMASS_JOIN
+
+}  // namespace proofmass

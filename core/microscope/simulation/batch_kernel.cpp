@@ -1,0 +1,21 @@
+#include "core/microscope/simulation/batch_kernel.hpp"
+
+#include "core/error.hpp"
+
+namespace proofmass {
+
+BatchKernel batch_kernel(InstructionSet set) {
+  PROOFMASS_EXPECT(set != InstructionSet::scalar);
+  if (set == InstructionSet::sse4) return record_batch_sse4;
+  if (set == InstructionSet::avx2) return record_batch_avx2;
+  return record_batch_avx512;
+}
+
+BatchNoiseKernel batch_noise_kernel(InstructionSet set) {
+  PROOFMASS_EXPECT(set != InstructionSet::scalar);
+  if (set == InstructionSet::sse4) return make_noise_sse4;
+  if (set == InstructionSet::avx2) return make_noise_avx2;
+  return make_noise_avx512;
+}
+
+}  // namespace proofmass

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/math/instruction_set.hpp"
+#include "core/microscope/simulation/run.hpp"
+#include "core/microscope/simulation/session_record.hpp"
+
+namespace proofmass {
+
+/// What one session of a batch of runs is computed from. Lanes that no run fills repeat another's.
+struct BatchSession {
+  SessionSignals* signals = nullptr;
+  SessionSetup setup;
+  const NoiseModel* noise = nullptr;
+  const NoiseStreams* streams = nullptr;
+  std::uint64_t seed = 0;
+  std::size_t num_runs = batch_lanes;  ///< At least 1; in the first lanes.
+  std::array<RunIndex, batch_lanes> runs{};
+  std::array<LoopConstants<double>, batch_lanes> constants{};
+  std::array<NoiseStates<double>, batch_lanes> noise_states{};
+  std::span<double> weights_buffer;  ///< Room for a block of weights.
+  void (*progress)(const void* context, std::size_t num_samples) = nullptr;
+  const void* progress_context = nullptr;
+};
+
+/// record_session() for batch_lanes runs at once, into one outcome a lane, the same bits as for
+/// each alone.
+using BatchKernel = void (*)(const BatchSession& session,
+                             std::span<SessionOutcome, batch_lanes> outcomes);
+
+// One for each instruction set that has more than one lane; compiled with that set's flags, to be
+// called only where available_instruction_sets() holds it.
+void record_batch_sse4(const BatchSession& session,
+                       std::span<SessionOutcome, batch_lanes> outcomes);
+void record_batch_avx2(const BatchSession& session,
+                       std::span<SessionOutcome, batch_lanes> outcomes);
+void record_batch_avx512(const BatchSession& session,
+                         std::span<SessionOutcome, batch_lanes> outcomes);
+
+/// @pre set is not `scalar`.
+[[nodiscard]] BatchKernel batch_kernel(InstructionSet set);
+
+/// What to make of a batch's noise, for measuring: its deviates alone, or all of it.
+enum class NoiseWork : std::uint8_t { deviates, shaped };
+
+/// Makes the noise of `num_samples` samples of a batch and nothing else. Of the session it uses
+/// noise, streams, seed, runs and noise_states.
+/// @returns A number that depends on all of it, so that none of the work can be left out.
+using BatchNoiseKernel = double (*)(const BatchSession& session, std::size_t num_samples,
+                                    NoiseWork work);
+double make_noise_sse4(const BatchSession& session, std::size_t num_samples, NoiseWork work);
+double make_noise_avx2(const BatchSession& session, std::size_t num_samples, NoiseWork work);
+double make_noise_avx512(const BatchSession& session, std::size_t num_samples, NoiseWork work);
+
+/// @pre set is not `scalar`.
+[[nodiscard]] BatchNoiseKernel batch_noise_kernel(InstructionSet set);
+
+}  // namespace proofmass

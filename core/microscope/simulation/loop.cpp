@@ -1,0 +1,90 @@
+#include "core/microscope/simulation/loop.hpp"
+
+#include "core/microscope/control/star_tracker.hpp"
+
+namespace proofmass {
+namespace {
+
+Vector3<double> vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Matrix3<double> matrix(const Eigen::Matrix3d& m) {
+  return {{vector(m.row(0)), vector(m.row(1)), vector(m.row(2))}};
+}
+
+/// s of q(t) = [θ]ᵀ e_a s Δ_TM sin(2π f t) for each mass.
+std::array<double, 2> motion_factors(const Session& session) {
+  const Excitation* const excitation = mass_excitation(session);
+  if (excitation == nullptr) return {0.0, 0.0};
+  switch (excitation->motion) {
+    case MassMotion::opposition:
+      return {-0.5, 0.5};
+    case MassMotion::mass_1:
+      return {1.0, 0.0};
+    case MassMotion::mass_2:
+      return {0.0, 1.0};
+  }
+  return {0.0, 0.0};
+}
+
+SensorModel<double> make_sensor_model(const Sensor& sensor, const Eigen::Vector3d& rest_position_m,
+                                      const Eigen::Vector3d& motion_direction) {
+  // measured_acceleration() applies [M] to Γ_App + p, so only the last two terms with p are
+  // constant.
+  const Eigen::Vector3d& p = sensor.parasitic_m_s2;
+  return {.rest_position_m = vector(rest_position_m),
+          .motion_direction = vector(motion_direction),
+          .parasitic_m_s2 = vector(p),
+          .offset_m_s2 = vector(sensor.read_out_bias_m_s2 - sensor.symmetric_part() * p),
+          .sensitivity = matrix(sensor.sensitivity()),
+          .quadratic_s2_m = vector(sensor.quadratic_s2_m)};
+}
+
+std::array<double, 2> drag_free_weights(DragFreeSource source) {
+  switch (source) {
+    case DragFreeSource::sensor_1:
+      return {1.0, 0.0};
+    case DragFreeSource::sensor_2:
+      return {0.0, 1.0};
+    case DragFreeSource::common:
+      break;
+  }
+  return {0.5, 0.5};
+}
+
+}  // namespace
+
+LoopConstants<double> make_loop_constants(const Instrument& instrument, const Scenario& scenario,
+                                          const Session& session) {
+  const std::array<double, 2> factors = motion_factors(session);
+  const std::array<double, 2> weights = drag_free_weights(session.drag_free);
+  const Eigen::Vector3d bias_error(scenario.drag_free.bias_compensation_error_x_m_s2,
+                                   scenario.drag_free.bias_compensation_error_y_m_s2,
+                                   scenario.drag_free.bias_compensation_error_z_m_s2);
+  LoopConstants<double> constants;
+  Eigen::Vector3d subtracted_bias = bias_error;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Sensor& sensor = instrument.sensors[k];
+    // r_1 = r_c − ½Δ, r_2 = r_c + ½Δ
+    const double side = k == 0 ? -0.5 : 0.5;
+    Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+    if (factors[k] != 0.0) {
+      const auto axis = static_cast<Eigen::Index>(index(mass_excitation(session)->axis));
+      direction = factors[k] * sensor.alignment().transpose().col(axis);
+    }
+    constants.sensors[k] = make_sensor_model(
+        sensor, instrument.centre_offset_m + side * instrument.offcentring_m, direction);
+    subtracted_bias += weights[k] * sensor.read_out_bias_m_s2;
+  }
+  constants.sensor_range_m_s2 = scenario.sensor.range_m_s2;
+  constants.drag_free_weight = weights;
+  constants.subtracted_bias_m_s2 = vector(subtracted_bias);
+  constants.thrust_matrix = matrix(instrument.thrust_matrix);
+  constants.angular_bias_rad_s2 = vector(instrument.angular_bias_rad_s2);
+  const StarTracker star_tracker =
+      make_star_tracker(scenario.noise, scenario.simulation.sample_period_s);
+  constants.star_tracker_bias_rad =
+      vector(star_tracker.fused_bias(instrument.star_tracker_bias_rad));
+  return constants;
+}
+
+}  // namespace proofmass

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/math/instruction_set.hpp"
+
+namespace proofmass {
+
+/// Digest of the results of a short fixed campaign: the same number from every sound build and
+/// processor of one model_version. A coordinator refuses workers that come to another one, before
+/// they compute anything that counts. Takes some tenths of a second.
+///
+/// @param set  One of available_instruction_sets().
+[[nodiscard]] std::uint64_t reference_digest(InstructionSet set);
+
+}  // namespace proofmass

@@ -1,0 +1,374 @@
+#include "core/microscope/simulation/run.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "core/error.hpp"
+#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/estimation/methods.hpp"
+#include "core/microscope/simulation/batch_kernel.hpp"
+#include "core/microscope/simulation/run_health.hpp"
+#include "core/microscope/simulation/session_record.hpp"
+
+namespace proofmass {
+namespace {
+
+LineFit line_fit(const Scenario& scenario, const Session& session) {
+  const double period_s = scenario.simulation.sample_period_s;
+  LineFit fit;
+  fit.num_samples = static_cast<std::size_t>(num_record_samples(scenario, session));
+  fit.num_dropped = static_cast<std::size_t>(std::ceil(scenario.estimation.transient_s / period_s));
+  fit.sample_period_s = period_s;
+  double centre_hz = 0.0;
+  for (const LineMultiple& line : session.fit_lines) {
+    fit.fit_hz.push_back(line_frequency_hz(session, line, scenario.orbit.period_s));
+    centre_hz += fit.fit_hz.back() / static_cast<double>(session.fit_lines.size());
+  }
+  for (const LineMultiple& line : session.known_lines) {
+    fit.known_hz.push_back(line_frequency_hz(session, line, scenario.orbit.period_s));
+  }
+  const double ratio = scenario.estimation.band_ratio;
+  fit.filter = band_pass(centre_hz / ratio, centre_hz * ratio, period_s);
+  return fit;
+}
+
+/// The same fit with one or two of the known lines as those whose phasors are wanted, for all of
+/// them in turn.
+std::vector<LineFit> known_line_fits(const LineFit& of_session) {
+  std::vector<LineFit> fits;
+  const std::vector<double>& known_hz = of_session.known_hz;
+  for (std::size_t first = 0; first < known_hz.size(); first += num_fit_lines_max) {
+    LineFit fit = of_session;
+    fit.fit_hz.clear();
+    fit.known_hz = of_session.fit_hz;
+    for (std::size_t i = 0; i < known_hz.size(); ++i) {
+      const bool is_wanted = i >= first && i < first + num_fit_lines_max;
+      (is_wanted ? fit.fit_hz : fit.known_hz).push_back(known_hz[i]);
+    }
+    fits.push_back(std::move(fit));
+  }
+  return fits;
+}
+
+void append_lines(const SignalSums<double>& sums, std::size_t num_lines, SessionPhasors& phasors) {
+  for (std::size_t s = 0; s < num_signals; ++s) {
+    for (std::size_t i = 0; i < num_lines; ++i) {
+      phasors.amplitude[s][phasors.num_lines + i] = {sums[s][2 * i], sums[s][2 * i + 1]};
+    }
+  }
+  phasors.num_lines += num_lines;
+}
+
+SessionHealth to_health(const LaneGroup<double, SessionNoise>& run) {
+  const LoopMonitor<double>& monitor = run.monitor;
+  return {.acceleration_m_s2 = run.loop.largest_acceleration,
+          .attitude_rad = run.loop.largest_angle,
+          .quadratic_squares = monitor.quadratic.squares,
+          .common_squares = monitor.common_square.squares,
+          .sensor_squares = {monitor.sensor_square[0].squares, monitor.sensor_square[1].squares},
+          .residual = monitor.residual};
+}
+
+/// What is known of a run before it is simulated.
+RunRecord drawn_record(const Scenario& scenario, RunIndex run, const AcceptedDraw& draw) {
+  RunRecord record{
+      .run = run, .num_draws = draw.num_draws, .has_draw = draw.instrument.has_value()};
+  record.phasors.resize(scenario.sessions.size());
+  record.health.resize(scenario.sessions.size());
+  if (draw.instrument) {
+    record.truth =
+        true_parameters(*draw.instrument, scenario.drag_free.bias_compensation_error_x_m_s2);
+  }
+  return record;
+}
+
+/// Turns the samples done in a session into the orbits done in the run.
+class SessionProgress {
+ public:
+  SessionProgress(const Scenario& scenario, const std::function<void(int)>& report)
+      : scenario_(scenario), report_(report) {}
+
+  void operator()(std::size_t num_samples) const {
+    if (!report_) return;
+    const double elapsed_s =
+        static_cast<double>(num_samples) * scenario_.simulation.sample_period_s;
+    report_(orbits_before_ + static_cast<int>(elapsed_s / scenario_.orbit.period_s));
+  }
+  static void report_to(const void* progress, std::size_t num_samples) {
+    (*static_cast<const SessionProgress*>(progress))(num_samples);
+  }
+  void end_session(std::size_t i) { orbits_before_ += scenario_.sessions[i].num_orbits; }
+
+ private:
+  const Scenario& scenario_;
+  const std::function<void(int)>& report_;
+  int orbits_before_ = 0;
+};
+
+/// A run of a batch.
+struct Lane {
+  RunIndex run;
+  Instrument instrument;
+  std::size_t index = 0;  ///< Of its record.
+};
+
+bool are_in_range(const ParameterArray& values) { return std::ranges::all_of(values, is_in_range); }
+
+}  // namespace
+
+struct RunPlan::Parts {
+  Parts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
+      : campaign(c),
+        method(m),
+        orbit(c.scenario.orbit),
+        environment(campaign.scenario.environment, campaign.environment_table,
+                    c.scenario.orbit.period_s),
+        noise(make_noise_model(c.scenario.noise, c.scenario.simulation.sample_period_s)),
+        drag_free(drag_free_gains(c.scenario.drag_free, c.scenario.simulation.sample_period_s)),
+        attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)) {
+    weights.reserve(campaign.scenario.sessions.size());
+    known_weights.resize(campaign.scenario.sessions.size());
+    residual_weights.resize(campaign.scenario.sessions.size());
+    for (std::size_t i = 0; i < campaign.scenario.sessions.size(); ++i) {
+      const Session& session = campaign.scenario.sessions[i];
+      const LineFit fit = line_fit(campaign.scenario, session);
+      weights.emplace_back(fit);
+      if (method.needs(session).lines == RecordedLines::all) {
+        for (const LineFit& known : known_line_fits(fit)) known_weights[i].emplace_back(known);
+      }
+      if (!session.excitations.empty() || is_monitored_before(i)) continue;
+      residual_weights[i].emplace(residual_fit(campaign.scenario, session));
+    }
+  }
+
+  /// True if the loops of a session without excitation are those of one before, which tells enough.
+  [[nodiscard]] bool is_monitored_before(std::size_t i) const {
+    const Session& session = campaign.scenario.sessions[i];
+    for (std::size_t k = 0; k < i; ++k) {
+      const Session& before = campaign.scenario.sessions[k];
+      if (is_quiet(k) && before.spin_rate_rad_s == session.spin_rate_rad_s &&
+          before.drag_free == session.drag_free) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  [[nodiscard]] bool is_quiet(std::size_t i) const { return residual_weights[i].has_value(); }
+
+  /// Makes the weights of a session, block by block.
+  struct Readers {
+    explicit Readers(const Parts& parts, std::size_t i)
+        : lines(parts.weights[i]),
+          known(parts.known_weights[i].begin(), parts.known_weights[i].end()),
+          buffer(weights_buffer_size(lines.weights().num_fit_lines(), known.size())) {
+      if (parts.is_quiet(i)) residual.emplace(*parts.residual_weights[i]);
+    }
+    WeightReader lines;
+    std::vector<WeightReader> known;  ///< Of the known lines, if the method wants them.
+    std::vector<double> buffer;
+    std::optional<WeightReader> residual;  ///< Of a session that is monitored.
+  };
+
+  [[nodiscard]] SessionSetup setup(std::size_t i, Readers& readers) const {
+    const Session& session = campaign.scenario.sessions[i];
+    return {.reader = &readers.lines,
+            .drag_free = drag_free,
+            .attitude = attitude,
+            .product = target_info(session.target).product,
+            .signals = method.needs(session).signals,
+            .known_readers = readers.known,
+            .residual_reader = readers.residual ? &*readers.residual : nullptr};
+  }
+
+  /// @param observer  Null if nobody observes the run.
+  void record_session_of_run(std::size_t i, const Instrument& instrument,
+                             const SampleObserver* observer, const SessionProgress& progress,
+                             RunRecord& record) const {
+    const Scenario& scenario = campaign.scenario;
+    const Session& session = scenario.sessions[i];
+    SessionSignals signals(scenario, session, orbit, environment);
+    LaneGroup<double, SessionNoise> alone{
+        .constants = make_loop_constants(instrument, scenario, session),
+        .noise = SessionNoise(noise, campaign.seed, record.run, session.name)};
+    Readers readers(*this, i);
+    const auto record_with = [&](const auto& session_observer) {
+      record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
+                     session_observer);
+    };
+    if (observer == nullptr) {
+      record_with(NoObserver{});
+    } else {
+      record_with(SessionObserver{.observe = *observer,
+                                  .session = i,
+                                  .next = -signals.num_settling(),
+                                  .sample_period_s = scenario.simulation.sample_period_s});
+    }
+    keep(i, {alone.sums, to_health(alone), alone.known_sums}, record);
+  }
+
+  /// Keeps what a session left of a run.
+  void keep(std::size_t i, const SessionOutcome& outcome, RunRecord& record) const {
+    SessionPhasors& phasors = record.phasors[i];
+    append_lines(outcome.sums, weights[i].num_fit_lines(), phasors);
+    phasors.num_fit_lines = phasors.num_lines;
+    for (std::size_t k = 0; k < known_weights[i].size(); ++k) {
+      append_lines(outcome.known_sums[k], known_weights[i][k].num_fit_lines(), phasors);
+    }
+    record.health[i] = outcome.health;
+    record.health[i].is_quiet = is_quiet(i);
+  }
+
+  void record_session_batch(std::size_t i, std::span<const Lane> lanes, BatchKernel kernel,
+                            const SessionProgress& progress,
+                            std::vector<RunRecord>& records) const {
+    const Scenario& scenario = campaign.scenario;
+    const Session& session = scenario.sessions[i];
+    SessionSignals signals(scenario, session, orbit, environment);
+    const NoiseStreams streams = noise_streams(session.name);
+    Readers readers(*this, i);
+    BatchSession batch{.signals = &signals,
+                       .setup = setup(i, readers),
+                       .noise = &noise,
+                       .streams = &streams,
+                       .seed = campaign.seed,
+                       .num_runs = lanes.size(),
+                       .weights_buffer = readers.buffer,
+                       .progress = SessionProgress::report_to,
+                       .progress_context = &progress};
+    for (std::size_t l = 0; l < batch_lanes; ++l) {
+      const Lane& lane = lanes[std::min(l, lanes.size() - 1)];
+      batch.runs[l] = lane.run;
+      batch.constants[l] = make_loop_constants(lane.instrument, scenario, session);
+      batch.noise_states[l] = stationary_states(noise, campaign.seed, lane.run, session.name);
+    }
+    std::array<SessionOutcome, batch_lanes> outcomes{};
+    kernel(batch, outcomes);
+    for (std::size_t l = 0; l < lanes.size(); ++l) keep(i, outcomes[l], records[lanes[l].index]);
+  }
+
+  MicroscopeCampaign campaign;
+  EstimationMethodInfo method;
+  KeplerOrbit orbit;
+  Environment environment;
+  NoiseModel noise;
+  DragFreeGains drag_free;
+  AttitudeGains attitude;
+  std::vector<LineWeights> weights;                     ///< Of each session.
+  std::vector<std::vector<LineWeights>> known_weights;  ///< Empty unless the method wants them.
+  std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
+};
+
+RunPlan::RunPlan(const MicroscopeCampaign& campaign)
+    : RunPlan(campaign, estimation_method(campaign.scenario.estimation.method)) {}
+RunPlan::RunPlan(const MicroscopeCampaign& campaign, const EstimationMethodInfo& method)
+    : parts_(std::make_unique<Parts>(campaign, method)) {}
+RunPlan::~RunPlan() = default;
+RunPlan::RunPlan(RunPlan&&) noexcept = default;
+RunPlan& RunPlan::operator=(RunPlan&&) noexcept = default;
+
+int RunPlan::num_orbits() const {
+  int total = 0;
+  for (const Session& session : parts_->campaign.scenario.sessions) total += session.num_orbits;
+  return total;
+}
+
+RunRecord RunPlan::record(RunIndex run, std::span<const double> table_values,
+                          const std::function<void(int)>& progress) const {
+  return record_alone(run, table_values, nullptr, progress);
+}
+
+RunRecord RunPlan::observe(RunIndex run, std::span<const double> table_values,
+                           const SampleObserver& observer,
+                           const std::function<void(int)>& progress) const {
+  return record_alone(run, table_values, &observer, progress);
+}
+
+RunRecord RunPlan::record_alone(RunIndex run, std::span<const double> table_values,
+                                const SampleObserver* observer,
+                                const std::function<void(int)>& progress) const {
+  const Scenario& scenario = parts_->campaign.scenario;
+  const AcceptedDraw draw = draw_instrument(parts_->campaign, run, table_values);
+  RunRecord recorded = drawn_record(scenario, run, draw);
+  if (!draw.instrument) return recorded;
+  SessionProgress sessions(scenario, progress);
+  for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
+    parts_->record_session_of_run(i, *draw.instrument, observer, sessions, recorded);
+    sessions.end_session(i);
+  }
+  return recorded;
+}
+
+std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> requests,
+                                               InstructionSet set,
+                                               const std::function<void(int)>& progress) const {
+  PROOFMASS_EXPECT(requests.size() <= batch_lanes);
+  std::vector<RunResult> results;
+  if (set == InstructionSet::scalar) {
+    for (const RunRequest& request : requests) {
+      results.push_back(simulate(request.run, request.table_values, progress));
+    }
+    return results;
+  }
+  for (const RunRecord& record : record_batch(requests, set, progress)) {
+    results.push_back(estimate(record));
+  }
+  return results;
+}
+
+std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> requests,
+                                             InstructionSet set,
+                                             const std::function<void(int)>& progress) const {
+  std::vector<RunRecord> records;
+  std::vector<Lane> lanes;
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    const auto& [run, table_values] = requests[i];
+    const AcceptedDraw draw = draw_instrument(parts_->campaign, run, table_values);
+    records.push_back(drawn_record(parts_->campaign.scenario, run, draw));
+    if (draw.instrument) lanes.push_back({.run = run, .instrument = *draw.instrument, .index = i});
+  }
+  if (lanes.empty()) return records;
+  SessionProgress sessions(parts_->campaign.scenario, progress);
+  for (std::size_t i = 0; i < parts_->weights.size(); ++i) {
+    parts_->record_session_batch(i, lanes, batch_kernel(set), sessions, records);
+    sessions.end_session(i);
+  }
+  return records;
+}
+
+Estimation RunPlan::estimation(const RunRecord& record) const {
+  return parts_->method.estimate(record.phasors, parts_->campaign.scenario);
+}
+
+RunResult RunPlan::estimate(const RunRecord& record) const {
+  const Scenario& scenario = parts_->campaign.scenario;
+  RunResult result{.run = record.run, .num_draws = record.num_draws};
+  if (!record.has_draw) {
+    result.status = RunStatus::no_draw;
+    return result;
+  }
+  result.truth.assign(record.truth.begin(), record.truth.end());
+  const Estimation found = estimation(record);
+  result.num_rounds = found.num_rounds;
+  const HealthFinding finding = judge_health(scenario, record.health, record.phasors);
+  for (const HealthValue& value : health_values()) {
+    result.health.push_back(finding.health.*value.member);
+  }
+  if (finding.loss.cause != LossCause::none) {
+    result.status = RunStatus::lost;
+    result.loss = {.cause = static_cast<std::uint32_t>(finding.loss.cause),
+                   .session = static_cast<std::uint32_t>(finding.loss.session)};
+    return result;
+  }
+  if (!are_in_range(found.values)) {
+    result.status = RunStatus::not_finite;
+    return result;
+  }
+  result.status = found.converged ? RunStatus::completed : RunStatus::not_converged;
+  result.estimate.assign(found.values.begin(), found.values.end());
+  return result;
+}
+
+}  // namespace proofmass

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "core/campaign/campaign.hpp"
+#include "core/campaign/run_result.hpp"
+#include "core/math/instruction_set.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/microscope/estimation/method.hpp"
+#include "core/microscope/simulation/observer.hpp"
+#include "core/microscope/simulation/run_health.hpp"
+
+namespace proofmass {
+
+/// Changes with every change of core that may change a result's bits. Coordinator and workers must
+/// agree on it, and a campaign is finished by the model that began it.
+inline constexpr std::string_view model_version = "hardy2013-3";
+
+/// Runs that one batch advances together at most.
+inline constexpr std::size_t batch_lanes = 16;
+
+/// What a run's simulation leaves for the estimation, and the truth to compare with. Lists are of
+/// the scenario's sessions, in their order.
+struct RunRecord {
+  RunIndex run;
+  std::uint32_t num_draws = 0;
+  bool has_draw = false;  ///< False if no draw was accepted; then the rest means nothing.
+  ParameterArray truth{};
+  RunPhasors phasors{};
+  HealthRecord health{};
+};
+
+/// Everything that the runs of a campaign share: filters, weights, orbit, environment. Made once,
+/// used for any run, by any number of threads.
+class RunPlan final : public Plan {
+ public:
+  /// @pre campaign.validate() passed.
+  explicit RunPlan(const MicroscopeCampaign& campaign);
+
+  /// A plan that estimates by another method than the campaign's.
+  /// @pre method.check() passed for the campaign's sessions.
+  RunPlan(const MicroscopeCampaign& campaign, const EstimationMethodInfo& method);
+  ~RunPlan() override;
+  RunPlan(RunPlan&&) noexcept;
+  RunPlan& operator=(RunPlan&&) noexcept;
+
+  /// Draws an instrument and simulates all sessions. A pure function of the campaign and the
+  /// arguments.
+  ///
+  /// @param table_values  campaign.table_values(run).
+  /// @param progress      Called several times an orbit with the number of orbits done.
+  [[nodiscard]] RunRecord record(RunIndex run, std::span<const double> table_values,
+                                 const std::function<void(int)>& progress = {}) const;
+
+  /// record(), bit for bit, with an observer that gets every sample of every session. It makes no
+  /// other call any slower.
+  [[nodiscard]] RunRecord observe(RunIndex run, std::span<const double> table_values,
+                                  const SampleObserver& observer,
+                                  const std::function<void(int)>& progress = {}) const;
+
+  /// record() for several runs at once; arguments as for simulate_batch(), `set` not `scalar`.
+  [[nodiscard]] std::vector<RunRecord> record_batch(
+      std::span<const RunRequest> requests, InstructionSet set,
+      const std::function<void(int)>& progress = {}) const;
+
+  /// All that the method makes of a record.
+  /// @pre record.has_draw.
+  [[nodiscard]] Estimation estimation(const RunRecord& record) const;
+
+  /// The result of a record: its estimation, unless its loops left their limits.
+  [[nodiscard]] RunResult estimate(const RunRecord& record) const;
+
+  /// record(), then estimate(): all of a run.
+  [[nodiscard]] RunResult simulate(RunIndex run, std::span<const double> table_values,
+                                   const std::function<void(int)>& progress = {}) const {
+    return estimate(record(run, table_values, progress));
+  }
+
+  /// simulate() for several runs at once, bit for bit the same results.
+  ///
+  /// @param requests  At most batch_lanes; a batch that is not full costs no more than a full one.
+  [[nodiscard]] std::vector<RunResult> simulate_batch(
+      std::span<const RunRequest> requests, InstructionSet set,
+      const std::function<void(int)>& progress = {}) const override;
+
+  /// Of all sessions together.
+  [[nodiscard]] int num_orbits() const override;
+
+ private:
+  struct Parts;
+  [[nodiscard]] RunRecord record_alone(RunIndex run, std::span<const double> table_values,
+                                       const SampleObserver* observer,
+                                       const std::function<void(int)>& progress) const;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace proofmass

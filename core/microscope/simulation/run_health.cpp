@@ -1,0 +1,186 @@
+#include "core/microscope/simulation/run_health.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/campaign/run_result.hpp"
+#include "core/error.hpp"
+#include "core/microscope/session/session_signals.hpp"
+#include "core/signal/band_pass.hpp"
+#include "core/signal/noise_shape.hpp"
+
+namespace proofmass {
+namespace {
+
+/// Without noise the quadratic terms still change a little from block to block: as noise of less
+/// than this, m/s²/√Hz. The largest of them is 2 K2d b_1d Γ_app,d with 2 K2d b_1d ≤ 4e-4 and lines
+/// of Γ_app,d of ½·1.7e-6 s⁻² × 20 µm along two axes: A = 9e-15 m/s². The steps of a line between
+/// blocks of n samples are at most those of white noise of density A √(nT), 2.1e-13. Noise of the
+/// density below moves a_c11Δx by 1.5 nm in ten orbits (one standard deviation).
+constexpr double quiet_asd_m_s2 = 3e-13;
+
+constexpr std::size_t block = LineWeights::block_size;
+
+/// Squared steps of the sums of all blocks, over the sessions without excitation.
+struct QuietSums {
+  double common_squares = 0.0;
+  std::array<double, 2> sensor_squares{};
+  double num_steps = 0.0;
+};
+
+double num_steps(const Scenario& scenario, const Session& session) {
+  const auto num_blocks = static_cast<std::size_t>(num_record_samples(scenario, session)) / block;
+  return num_blocks < 2 ? 1.0 : static_cast<double>(num_blocks - 1);
+}
+
+/// One-sided density at low frequency of a signal whose block sums took these steps: a sum of n
+/// samples has the variance n S/(2T), a step twice as much.
+double density(double squares, double steps, double period_s) {
+  return squares / (2.0 * steps) * 2.0 * period_s / static_cast<double>(block);
+}
+
+/// Density of the noise of ½(Γ_mes,1x − Γ_mes,2x) where it is least among the lines of all
+/// sessions.
+double least_density(const Scenario& scenario) {
+  double least = std::numeric_limits<double>::max();
+  for (const Session& session : scenario.sessions) {
+    for (const LineMultiple& line : session.fit_lines) {
+      const double frequency_hz = line_frequency_hz(session, line, scenario.orbit.period_s);
+      least = std::min(least, 0.5 * nominal_psd(scenario.noise.linear_x, frequency_hz));
+    }
+  }
+  const double scale = scenario.noise.scale;
+  return std::max(scale * scale * least, quiet_asd_m_s2 * quiet_asd_m_s2);
+}
+
+/// Γ_mes,c at f_EP; the band-pass takes r⁴/(1 + r⁴) of a line at its centre.
+double residual_amplitude(const Scenario& scenario, const SessionHealth& session) {
+  const double ratio = scenario.estimation.band_ratio;
+  const double fourth = ratio * ratio * ratio * ratio;
+  double largest = 0.0;
+  for (const auto& [cosine, sine] : session.residual) {
+    largest = std::max(largest, std::sqrt(cosine * cosine + sine * sine));
+  }
+  return largest * (1.0 + fourth) / fourth;
+}
+
+/// Power of the noise at the session's lines over that of the squared signal there: cosine and sine
+/// of a line each have the variance S/duration.
+double square_noise_of(const Scenario& scenario, const Session& session,
+                       const SessionPhasors& phasors, const QuietSums& quiet) {
+  double squares = 0.0;
+  switch (target_info(session.target).product) {
+    case Product::common_squared:
+      squares = quiet.common_squares;
+      break;
+    case Product::sensor_1_squared:
+      squares = quiet.sensor_squares[0];
+      break;
+    case Product::sensor_2_squared:
+      squares = quiet.sensor_squares[1];
+      break;
+    default:
+      return 0.0;
+  }
+  if (quiet.num_steps == 0.0) return 0.0;
+  const double duration_s =
+      session.num_orbits * scenario.orbit.period_s - scenario.estimation.transient_s;
+  double signal = 0.0;
+  for (std::size_t i = 0; i < phasors.num_fit_lines; ++i) {
+    signal += std::norm(phasors.amplitude[index(Signal::product)][i]);
+  }
+  const double noise = 2.0 *
+                       density(squares, quiet.num_steps, scenario.simulation.sample_period_s) /
+                       duration_s * static_cast<double>(phasors.num_fit_lines);
+  return noise / signal;
+}
+
+/// What is not a number counts as too large to be stored.
+double bounded(double value) { return value <= magnitude_max ? value : magnitude_max; }
+
+/// Health of one session.
+LoopHealth session_health(const Scenario& scenario, const Session& session,
+                          const SessionHealth& record, const SessionPhasors& phasors,
+                          const QuietSums& quiet) {
+  LoopHealth health{.acceleration_m_s2 = bounded(record.acceleration_m_s2),
+                    .attitude_rad = bounded(record.attitude_rad)};
+  // Loops that grew beyond all numbers left none to look at.
+  const auto& differential = phasors.amplitude[index(Signal::differential_x)];
+  if (!std::isfinite(differential[0].real())) health.acceleration_m_s2 = magnitude_max;
+  health.square_noise = bounded(square_noise_of(scenario, session, phasors, quiet));
+  if (!record.is_quiet) return health;
+  health.residual_m_s2 = bounded(residual_amplitude(scenario, record));
+  health.quadratic_noise = bounded(density(record.quadratic_squares, num_steps(scenario, session),
+                                           scenario.simulation.sample_period_s) /
+                                   least_density(scenario));
+  return health;
+}
+
+LossCause cause_of(const Scenario& scenario, const LoopHealth& health) {
+  const HealthConfig& limit = scenario.health;
+  if (health.acceleration_m_s2 > scenario.sensor.range_m_s2) return LossCause::saturation;
+  if (health.attitude_rad > limit.attitude_max_rad) return LossCause::attitude;
+  if (health.residual_m_s2 > limit.residual_max_m_s2) return LossCause::residual;
+  if (health.quadratic_noise > limit.quadratic_noise_max) return LossCause::quadratic_noise;
+  if (health.square_noise > limit.square_noise_max) return LossCause::square_noise;
+  return LossCause::none;
+}
+
+void take_larger(LoopHealth& largest, const LoopHealth& health) {
+  largest.acceleration_m_s2 = std::max(largest.acceleration_m_s2, health.acceleration_m_s2);
+  largest.attitude_rad = std::max(largest.attitude_rad, health.attitude_rad);
+  largest.residual_m_s2 = std::max(largest.residual_m_s2, health.residual_m_s2);
+  largest.quadratic_noise = std::max(largest.quadratic_noise, health.quadratic_noise);
+  largest.square_noise = std::max(largest.square_noise, health.square_noise);
+}
+
+}  // namespace
+
+LineFit residual_fit(const Scenario& scenario, const Session& session) {
+  const double period_s = scenario.orbit.period_s;
+  const double resolution_hz = 1.0 / (session.num_orbits * period_s);
+  const double ratio = scenario.estimation.band_ratio;
+  LineFit fit;
+  fit.sample_period_s = scenario.simulation.sample_period_s;
+  fit.num_samples = static_cast<std::size_t>(num_record_samples(scenario, session));
+  fit.num_dropped =
+      static_cast<std::size_t>(std::ceil(scenario.estimation.transient_s / fit.sample_period_s));
+  double frequency_hz = test_frequency_hz(session, period_s);
+  if (frequency_hz < 0.99 * resolution_hz) frequency_hz = 1.0 / period_s;
+  fit.fit_hz = {frequency_hz};
+  for (const auto* const lines : {&session.fit_lines, &session.known_lines}) {
+    for (const LineMultiple& line : *lines) {
+      const double other_hz = line_frequency_hz(session, line, period_s);
+      if (std::abs(other_hz - frequency_hz) < 0.99 * resolution_hz) continue;
+      if (fit.known_hz.size() + 1 < LineWeights::num_lines_max) fit.known_hz.push_back(other_hz);
+    }
+  }
+  fit.filter = band_pass(frequency_hz / ratio, frequency_hz * ratio, fit.sample_period_s);
+  return fit;
+}
+
+HealthFinding judge_health(const Scenario& scenario, const HealthRecord& record,
+                           const RunPhasors& phasors) {
+  PROOFMASS_EXPECT(record.size() == scenario.sessions.size() && phasors.size() == record.size());
+  QuietSums quiet;
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const SessionHealth& of_session = record[i];
+    if (!of_session.is_quiet) continue;
+    quiet.common_squares += of_session.common_squares;
+    quiet.sensor_squares[0] += of_session.sensor_squares[0];
+    quiet.sensor_squares[1] += of_session.sensor_squares[1];
+    quiet.num_steps += num_steps(scenario, scenario.sessions[i]);
+  }
+  HealthFinding finding;
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const Session& session = scenario.sessions[i];
+    const LoopHealth health = session_health(scenario, session, record[i], phasors[i], quiet);
+    take_larger(finding.health, health);
+    if (finding.loss.cause != LossCause::none) continue;
+    finding.loss = {.cause = cause_of(scenario, health), .session = session.target};
+  }
+  return finding;
+}
+
+}  // namespace proofmass

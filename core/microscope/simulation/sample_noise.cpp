@@ -1,0 +1,118 @@
+#include "core/microscope/simulation/sample_noise.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "core/microscope/control/star_tracker.hpp"
+#include "core/random/normal.hpp"
+
+namespace proofmass {
+namespace {
+
+NoiseShape scaled_shape(const SensorNoise& noise, double scale, double sample_period_s) {
+  NoiseShape shape = shape_noise(noise, sample_period_s);
+  shape.gain *= scale;
+  for (double& coefficient : shape.coefficient) coefficient *= scale;
+  shape.pair_coefficient *= scale;
+  return shape;
+}
+
+}  // namespace
+
+NoiseModel make_noise_model(const NoiseConfig& config, double sample_period_s) {
+  const double per_sample = config.scale / std::sqrt(2.0 * sample_period_s);
+  const Eigen::Matrix3d star = make_star_tracker(config, sample_period_s).noise_factor;
+  return {.linear_x = scaled_shape(config.linear_x, config.scale, sample_period_s),
+          .linear_yz = scaled_shape(config.linear_yz, config.scale, sample_period_s),
+          .angular = scaled_shape(config.angular, config.scale, sample_period_s),
+          .star_tracker_factor = {star(0, 0), star(1, 0), star(1, 1), star(2, 0), star(2, 1),
+                                  star(2, 2)},
+          .thrust_deviation = config.thrust_asd_m_s2 * per_sample,
+          .torque_deviation = config.torque_asd_rad_s2 * per_sample};
+}
+
+const std::array<std::string_view, num_noise_channels>& noise_channel_names() {
+  static constexpr std::array<std::string_view, num_noise_channels> names{
+      "sensor_1_x",     "sensor_1_y",     "sensor_1_z",      //
+      "sensor_2_x",     "sensor_2_y",     "sensor_2_z",      //
+      "angular_x",      "angular_y",      "angular_z",       //
+      "star_tracker_x", "star_tracker_y", "star_tracker_z",  //
+      "thrust_x",       "thrust_y",       "thrust_z",        //
+      "torque_x",       "torque_y",       "torque_z"};
+  return names;
+}
+
+NoiseStreams noise_streams(std::string_view session_name) {
+  NoiseStreams streams{};
+  for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
+    streams[channel] =
+        stream_id(fmt::format("session/{}/{}", session_name, noise_channel_names()[channel]));
+  }
+  return streams;
+}
+
+namespace {
+
+const NoiseShape& shape_of(const NoiseModel& model, std::size_t channel) {
+  if (channel >= 6) return model.angular;
+  return channel % 3 == 0 ? model.linear_x : model.linear_yz;
+}
+
+NoiseState<double> stationary_state(const NoiseShape& shape, const RandomStream& stream) {
+  const std::size_t n = shape.num_states();
+  std::array<double, NoiseShape::num_poles_max> normals{};
+  for (std::size_t i = 0; i < n; ++i) {
+    const RandomBlock block = stream.block(static_cast<std::uint32_t>(i / 4));
+    normals[i] = static_cast<double>(normal_deviates(block)[i % 4]);
+  }
+  NoiseState<double> state;
+  for (std::size_t i = 0; i < n; ++i) {
+    double value = 0.0;
+    for (std::size_t j = 0; j <= i; ++j) value += shape.start_factor[i * n + j] * normals[j];
+    if (i < shape.num_real) {
+      state.real[i] = value;
+    } else {
+      (i == shape.num_real ? state.pair_real : state.pair_imaginary) = value;
+    }
+  }
+  return state;
+}
+
+}  // namespace
+
+NoiseStates<double> stationary_states(const NoiseModel& model, std::uint64_t seed, RunIndex run,
+                                      std::string_view session_name) {
+  NoiseStates<double> states;
+  for (std::size_t channel = 0; channel < num_coloured_channels; ++channel) {
+    const std::uint32_t id =
+        stream_id(fmt::format("session/{}/{}/start", session_name, noise_channel_names()[channel]));
+    states[channel] = stationary_state(shape_of(model, channel), RandomStream(seed, run, id));
+  }
+  return states;
+}
+
+SessionNoise::SessionNoise(const NoiseModel& model, std::uint64_t seed, RunIndex run,
+                           std::string_view session_name)
+    : model_(&model),
+      seed_(seed),
+      run_(run),
+      streams_(noise_streams(session_name)),
+      states_(stationary_states(model, seed, run, session_name)) {}
+
+SampleNoise<double> SessionNoise::next() {
+  if (next_in_block_ == samples_per_noise_block) {
+    for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
+      deviates_[channel] =
+          normal_deviates(RandomStream(seed_, run_, streams_[channel]).block(num_blocks_));
+    }
+    ++num_blocks_;
+    next_in_block_ = 0;
+  }
+  const std::size_t i = next_in_block_++;
+  return shape_sample<double>(*model_, states_, [&](std::size_t channel) {
+    return static_cast<double>(deviates_[channel][i]);
+  });
+}
+
+}  // namespace proofmass

@@ -1,0 +1,233 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/math/inline.hpp"
+#include "core/microscope/session/session_signals.hpp"
+#include "core/microscope/session/signals.hpp"
+#include "core/microscope/simulation/loop.hpp"
+#include "core/microscope/simulation/loop_monitor.hpp"
+#include "core/microscope/simulation/observer.hpp"
+#include "core/signal/line_weights.hpp"
+
+namespace proofmass {
+
+/// Weighted sums over a record for one or two lines: [signal][2·line: cosine, 2·line + 1: sine].
+template <typename T>
+using SignalSums = std::array<std::array<T, 2 * num_fit_lines_max>, num_signals>;
+
+/// The signals of one sample, in the order of `Signal`.
+template <typename T>
+PROOFMASS_INLINE std::array<T, num_signals> ground_signals(const Observation<T>& observation,
+                                                           const SharedSample& shared,
+                                                           Product kind) {
+  const Vector3<T>& m1 = observation.measured[0];
+  const Vector3<T>& m2 = observation.measured[1];
+  const T half = T(0.5);
+  const T differential_x = half * (m1.x - m2.x);
+  const Vector3<T> common = half * (m1 + m2);
+
+  // The ground knows what was commanded and takes it out of the on-board estimate, which followed
+  // the star tracker with the command in it.
+  const Vector3<T> angle = observation.attitude.angle - broadcast<T>(shared.commanded.angle);
+  const Vector3<T> rate = observation.attitude.rate - broadcast<T>(shared.commanded.rate) +
+                          broadcast<T>(shared.reference_rate);
+  const Vector3<T> direction =
+      to_target(from_error_angles(angle), broadcast<T>(shared.earth_direction_R));
+  const auto [g] =
+      gradient_matrix(shared.gradient_s2, direction, rate, observation.measured_angular);
+
+  T product = T(0.0);
+  const T motion = T(0.5 * shared.mass_motion.position_m);
+  switch (kind) {
+    case Product::none:
+      break;
+    case Product::common_squared:
+      product = common.x * common.x;
+      break;
+    case Product::sensor_1_squared:
+      product = m1.x * m1.x;
+      break;
+    case Product::sensor_2_squared:
+      product = m2.x * m2.x;
+      break;
+    case Product::modulated_yy:
+      product = (g[1].y - g[0].x) * motion;
+      break;
+    case Product::modulated_zz:
+      product = (g[2].z - g[0].x) * motion;
+      break;
+  }
+  return {differential_x, common.x, common.y, common.z, g[0].x, g[0].y, g[0].z,
+          product,        g[1].x,   g[1].y,   g[1].z,   g[2].x, g[2].y, g[2].z};
+}
+
+/// What the runs of a batch share in one session.
+struct SessionSetup {
+  WeightReader* reader = nullptr;
+  DragFreeGains drag_free;
+  AttitudeGains attitude;
+  Product product = Product::none;
+  SignalSet signals = SignalSet::all;
+  /// Weights of the known lines, one or two a reader; none if these are not recorded.
+  std::span<WeightReader> known_readers;
+  /// Weights of the line at f_EP; null in a session that is not monitored.
+  WeightReader* residual_reader = nullptr;
+};
+
+/// Weights of a block of samples.
+struct BlockWeights {
+  const double* lines = nullptr;     ///< Of the lines to be fitted; null while the loops settle.
+  const double* residual = nullptr;  ///< Of the line at f_EP; null where it is not monitored.
+  const double* known = nullptr;     ///< Of all known readers; null where these are none.
+};
+
+/// Adds one sample's signals to the sums of one output of the line weights.
+template <std::size_t first, std::size_t last, typename T>
+PROOFMASS_INLINE void add_weighted(const std::array<T, num_signals>& values, const T& weight,
+                                   std::size_t output, SignalSums<T>& sums) {
+  for (std::size_t s = first; s < last; ++s) {
+    sums[s][output] = sums[s][output] + weight * values[s];
+  }
+}
+
+/// Adds one sample's signals to the sums of every output.
+template <typename T>
+PROOFMASS_INLINE void add_sample(const std::array<T, num_signals>& values, const double* weights,
+                                 std::size_t num_outputs, SignalSet signals, SignalSums<T>& sums) {
+  for (std::size_t i = 0; i < num_outputs; ++i) {
+    const T weight = T(weights[i]);
+    add_weighted<0, num_common_signals>(values, weight, i, sums);
+    if (signals == SignalSet::all) {
+      add_weighted<num_common_signals, num_signals>(values, weight, i, sums);
+    }
+  }
+}
+
+/// Known lines take a reader for every two.
+inline constexpr std::size_t num_known_readers_max = num_session_lines_max / 2;
+
+/// Weights of a block of one reader of known lines.
+inline constexpr std::size_t known_block_size = LineWeights::block_size * 2 * num_fit_lines_max;
+
+/// Weights of a block for the session's lines, for that at f_EP and for the known ones.
+[[nodiscard]] constexpr std::size_t weights_buffer_size(std::size_t num_fit_lines,
+                                                        std::size_t num_known_readers) {
+  return LineWeights::block_size * 2 * (num_fit_lines + 1) + known_block_size * num_known_readers;
+}
+
+template <typename T>
+using KnownSums = std::array<SignalSums<T>, num_known_readers_max>;
+
+/// Adds one sample's signals to the sums of the known lines.
+/// @param weights  Of the block's first sample; `k` samples later is the one to be added.
+template <typename T>
+__attribute__((noinline)) void add_known_lines(const std::array<T, num_signals> values,
+                                               const SessionSetup& setup, const double* weights,
+                                               std::size_t k, KnownSums<T>& sums) {
+  for (std::size_t i = 0; i < setup.known_readers.size(); ++i) {
+    const std::size_t num_outputs = 2 * setup.known_readers[i].weights().num_fit_lines();
+    add_sample(values, weights + i * known_block_size + k * num_outputs, num_outputs, setup.signals,
+               sums[i]);
+  }
+}
+
+/// The runs that one T holds, in one session.
+template <typename T, typename Noise>
+struct LaneGroup {
+  LoopConstants<T> constants;
+  Noise noise;  ///< next() yields the SampleNoise<T> of each sample, settling included.
+  Loop<T> loop{};
+  SignalSums<T> sums{};
+  LoopMonitor<T> monitor{};
+  KnownSums<T> known_sums{};
+};
+
+/// What a session leaves of a run.
+struct SessionOutcome {
+  SignalSums<double> sums{};
+  SessionHealth health;
+  KnownSums<double> known_sums{};
+};
+
+/// Advances all groups by some samples.
+/// @param weights   Of these samples; none while the loops settle, when nothing is summed.
+/// @param observer  NoObserver or, for a run alone, SessionObserver.
+template <typename Signals, typename Group, typename Observer>
+__attribute__((noinline)) void advance_groups(Signals& signals, const SessionSetup& setup,
+                                              std::span<Group> groups, std::size_t num_samples,
+                                              const BlockWeights& weights, Observer& observer) {
+  const std::size_t num_outputs = 2 * setup.reader->weights().num_fit_lines();
+  for (std::size_t k = 0; k < num_samples; ++k) {
+    const SharedSample& shared = signals.next();
+    for (auto& [constants, noise, loop, sums, monitor, known_sums] : groups) {
+      const auto observation = loop.advance(constants, setup.drag_free, setup.attitude, shared,
+                                            noise.next(), k % 4 == 0 ? Watch::yes : Watch::no);
+      if constexpr (Observer::is_active) {
+        observer(shared, observation, ground_signals(observation, shared, setup.product));
+      }
+      if (weights.lines == nullptr) continue;
+      const auto values = ground_signals(observation, shared, setup.product);
+      add_sample(values, weights.lines + k * num_outputs, num_outputs, setup.signals, sums);
+      if (weights.known != nullptr) [[unlikely]]
+        add_known_lines(values, setup, weights.known, k, known_sums);
+      if (weights.residual == nullptr) continue;
+      monitor.add(constants.sensors, observation, weights.residual + 2 * k);
+    }
+  }
+}
+
+/// Writes the weights of a block: first those of the lines to be fitted, then those at f_EP if the
+/// session is monitored, then those of the known lines if they are recorded.
+/// @param buffer  Room for weights_buffer_size() weights.
+[[nodiscard]] inline BlockWeights fill_block(const SessionSetup& setup, std::size_t block,
+                                             std::span<double> buffer) {
+  setup.reader->fill_block(block, buffer);
+  BlockWeights weights{.lines = buffer.data()};
+  buffer = buffer.subspan(LineWeights::block_size * 2 * setup.reader->weights().num_fit_lines());
+  if (setup.residual_reader != nullptr) {
+    setup.residual_reader->fill_block(block, buffer);
+    weights.residual = buffer.data();
+  }
+  buffer = buffer.subspan(2 * LineWeights::block_size);
+  if (setup.known_readers.empty()) return weights;
+  weights.known = buffer.data();
+  for (WeightReader& reader : setup.known_readers) {
+    reader.fill_block(block, buffer);
+    buffer = buffer.subspan(known_block_size);
+  }
+  return weights;
+}
+
+/// Runs one session from settling to its last sample and sums its signals.
+///
+/// @param signals   Like SessionSignals, not yet asked for any sample.
+/// @param groups    With zero sums and a loop that has not begun.
+/// @param buffer    Room for weights_buffer_size() weights.
+/// @param progress  Called with the number of record samples done after each block.
+/// @param observer  Gets every sample, settling included.
+template <typename Signals, typename Group, typename Progress, typename Observer>
+inline void record_session(Signals& signals, const SessionSetup& setup, std::span<Group> groups,
+                           std::span<double> buffer, const Progress& progress, Observer observer) {
+  for (Group& group : groups) group.loop.begin(signals.reference_at_start());
+  const auto num_settling = static_cast<std::size_t>(signals.num_settling());
+  advance_groups(signals, setup, groups, num_settling, {}, observer);
+  for (Group& group : groups) group.loop.begin_record();
+  const LineWeights& weights = setup.reader->weights();
+  std::size_t num_done = 0;
+  for (std::size_t block = 0; block < weights.num_blocks(); ++block) {
+    const BlockWeights block_weights = fill_block(setup, block, buffer);
+    const std::size_t num_samples = weights.samples_in(block);
+    advance_groups(signals, setup, groups, num_samples, block_weights, observer);
+    // A block that is not full has a sum of its own size.
+    if (num_samples == LineWeights::block_size) {
+      for (Group& group : groups) group.monitor.end_block(block == 0);
+    }
+    num_done += num_samples;
+    progress(num_done);
+  }
+}
+
+}  // namespace proofmass

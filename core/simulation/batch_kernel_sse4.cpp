@@ -1,2 +1,0 @@
-#define PROOFMASS_KERNEL_SET sse4
-#include "core/simulation/batch_kernel-inl.hpp"

@@ -1,0 +1,286 @@
+#include "core/microscope/campaign/draw.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/microscope/instrument/instrument.hpp"
+
+namespace proofmass {
+namespace {
+
+constexpr std::uint64_t seed = 99;
+constexpr std::size_t num_runs = 20'000;
+
+Dispersion uniform_law(double minimum, double maximum) {
+  Dispersion law;
+  law.minimum = minimum;
+  law.maximum = maximum;
+  return law;
+}
+
+Dispersion normal_law(double mean, double standard_deviation) {
+  Dispersion law;
+  law.law = Law::normal;
+  law.mean = mean;
+  law.standard_deviation = standard_deviation;
+  return law;
+}
+
+Dispersion truncated(Dispersion law, double minimum, double maximum) {
+  law.law = Law::truncated_normal;
+  law.minimum = minimum;
+  law.maximum = maximum;
+  return law;
+}
+
+/// A law for each of the first five elements, a table for the last, the nominal ones for the
+/// others.
+DispersionSet mixed_laws() {
+  DispersionSet laws = nominal_dispersions();
+  laws[0] = uniform_law(-2.0, 6.0);
+  laws[1] = normal_law(3.0, 0.5);
+  laws[2] = truncated(normal_law(1.0, 2.0), 0.5, 3.0);
+  laws[3].law = Law::fixed;
+  laws[3].value = -7.25;
+  laws[4].law = laws[59].law = Law::table;
+  return laws;
+}
+
+/// The element's values over all runs of a campaign.
+std::vector<double> values_of(std::size_t element) {
+  const DispersionSet laws = mixed_laws();
+  const std::vector<double> table_values{1.0, 2.0};
+  std::vector<double> values;
+  for (std::uint64_t run = 0; run < num_runs; ++run) {
+    values.push_back(draw_values(laws, seed, RunIndex{run}, 0, table_values)[element]);
+  }
+  return values;
+}
+
+/// Largest distance between the empirical distribution of values and F.
+double kolmogorov_smirnov(std::vector<double> values, const std::function<double(double)>& law) {
+  std::sort(values.begin(), values.end());
+  const auto n = static_cast<double>(values.size());
+  double distance = 0.0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double p = law(values[i]);
+    const auto below = static_cast<double>(i);
+    distance = std::fmax(distance, std::fmax(p - below / n, (below + 1.0) / n - p));
+  }
+  return distance;
+}
+
+// P(√n D > x) → 2 e^(−2x²) [Kolmogorov1933]; 2.69 is exceeded once in a million.
+const double critical_distance = 2.69 / std::sqrt(static_cast<double>(num_runs));
+
+double normal_distribution(double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); }
+
+TEST(DrawValues, FollowAUniformLaw) {
+  const double distance =
+      kolmogorov_smirnov(values_of(0), [](double x) { return (x + 2.0) / 8.0; });
+  EXPECT_LT(distance, critical_distance);
+}
+
+TEST(DrawValues, FollowANormalLaw) {
+  const double distance = kolmogorov_smirnov(
+      values_of(1), [](double x) { return normal_distribution((x - 3.0) / 0.5); });
+  EXPECT_LT(distance, critical_distance);
+}
+
+TEST(DrawValues, FollowATruncatedNormalLaw) {
+  const std::vector<double> values = values_of(2);
+  EXPECT_GE(*std::min_element(values.begin(), values.end()), 0.5);
+  EXPECT_LE(*std::max_element(values.begin(), values.end()), 3.0);
+  const double low = normal_distribution(-0.25);
+  const double high = normal_distribution(1.0);
+  const double distance = kolmogorov_smirnov(values, [low, high](double x) {
+    return (normal_distribution((x - 1.0) / 2.0) - low) / (high - low);
+  });
+  EXPECT_LT(distance, critical_distance);
+}
+
+TEST(DrawValues, TakeFixedAndTabulatedValuesAsTheyAre) {
+  const std::vector<double> table_values{0.125, -8.0};
+  const DrawnValues values = draw_values(mixed_laws(), seed, RunIndex{5}, 0, table_values);
+  EXPECT_EQ(values[3], -7.25);
+  EXPECT_EQ(values[4], 0.125);
+  EXPECT_EQ(values[59], -8.0);
+}
+
+// Sixty streams of 20,000 uniform numbers: all pairs' correlations within 5.5 standard errors 1/√n,
+// which one of 1770 exceeds once in 15,000 seeds.
+TEST(DrawValues, OfDifferentElementsAreUncorrelated) {
+  const DispersionSet laws = nominal_dispersions();
+  Eigen::MatrixXd values(static_cast<Eigen::Index>(num_runs), static_cast<Eigen::Index>(num_drawn));
+  for (std::uint64_t run = 0; run < num_runs; ++run) {
+    const DrawnValues drawn = draw_values(laws, seed, RunIndex{run}, 0, {});
+    for (std::size_t i = 0; i < num_drawn; ++i) {
+      values(static_cast<Eigen::Index>(run), static_cast<Eigen::Index>(i)) =
+          drawn[i] / laws[i].maximum * std::numbers::sqrt3;  // Unit variance.
+    }
+  }
+  Eigen::MatrixXd correlation = values.transpose() * values / static_cast<double>(num_runs);
+  // E x⁴ − 1 = 9/5 − 1: the variances have the standard error √(0.8/n).
+  correlation.diagonal().array() -= 1.0;
+  EXPECT_LT(correlation.cwiseAbs().maxCoeff(), 5.5 / std::sqrt(static_cast<double>(num_runs)));
+}
+
+TEST(DrawValues, OfOneElementDoNotDependOnTheLawsOfOthers) {
+  const DrawnValues nominal = draw_values(nominal_dispersions(), seed, RunIndex{17}, 3, {});
+  const std::vector<double> table_values{1.0, 2.0};
+  const DrawnValues mixed = draw_values(mixed_laws(), seed, RunIndex{17}, 3, table_values);
+  for (std::size_t i = 5; i < 59; ++i) EXPECT_EQ(mixed[i], nominal[i]) << drawn_names()[i];
+}
+
+TEST(DrawValues, DifferWithSeedRunAndDraw) {
+  const DispersionSet laws = nominal_dispersions();
+  const DrawnValues values = draw_values(laws, seed, RunIndex{17}, 0, {});
+  EXPECT_EQ(draw_values(laws, seed, RunIndex{17}, 0, {}), values);
+  for (std::size_t i = 0; i < num_drawn; ++i) {
+    EXPECT_NE(draw_values(laws, seed + 1, RunIndex{17}, 0, {})[i], values[i]);
+    EXPECT_NE(draw_values(laws, seed, RunIndex{18}, 0, {})[i], values[i]);
+    EXPECT_NE(draw_values(laws, seed, RunIndex{17}, 1, {})[i], values[i]);
+  }
+}
+
+// A law at the edge of what validation accepts: the mean on a bound, a sliver 1/100 σ wide, which
+// one block in 250 hits.
+TEST(DrawValues, FollowATruncatedNormalLawOnASliver) {
+  DispersionSet laws = nominal_dispersions();
+  laws[0] = truncated(normal_law(0.0, 1.0), 0.0, 0.01);
+  std::vector<double> values;
+  for (std::uint64_t run = 0; run < 2000; ++run) {
+    values.push_back(draw_values(laws, seed, RunIndex{run}, 0, {})[0]);
+  }
+  const double distance = kolmogorov_smirnov(values, [](double x) { return x / 0.01; });
+  EXPECT_LT(distance, 2.69 / std::sqrt(2000.0));
+}
+
+/// [M] of a sensor with the nominal laws, from a generator of the test's own; written out as
+/// printed after [Hardy2013] eq:measurement.
+Eigen::Matrix3d random_sensitivity(std::mt19937_64& bits) {
+  const auto within = [&bits](double bound) {
+    return bound * (static_cast<double>(bits() >> 11) * 0x1p-52 - 1.0);
+  };
+  const double kx = 1.0 + within(1e-2), ky = 1.0 + within(1e-2), kz = 1.0 + within(1e-2);
+  const double tx = within(2.5e-3), ty = within(2.5e-3), tz = within(2.5e-3);
+  const double hx = within(1e-4), hy = within(1e-4), hz = within(1e-4);
+  Eigen::Matrix3d m;
+  m << kx, hz + tz, hy - ty,  //
+      hz - tz, ky, hx + tx,   //
+      hy + ty, hx - tx, kz;
+  return m;
+}
+
+bool accepts(const Eigen::Matrix3d& m1, const Eigen::Matrix3d& m2) {
+  const Eigen::Matrix3d common = 0.5 * (m1 + m2);
+  const Eigen::Matrix3d a_d = 0.5 * (m1 - m2) * common.inverse();
+  const Eigen::Matrix3d a_c = common - 0.5 * a_d * (m1 - m2);
+  return std::abs(a_d(0, 0)) <= 1e-2 && std::abs(a_d(0, 1)) <= 1.6e-3 &&
+         std::abs(a_d(0, 2)) <= 1.6e-3 && std::abs(a_c(0, 1)) <= 2.6e-3 &&
+         std::abs(a_c(0, 2)) <= 2.6e-3;
+}
+
+// n accepted runs in m draws estimate the rate p with the standard error √(p(1 − p)/m), the test's
+// own 10⁶ draws with a smaller one.
+TEST(DrawInstrument, AcceptsAsManyDrawsAsTheBoundsSay) {
+  std::mt19937_64 bits(1);
+  constexpr double num_own = 1e6;
+  double num_accepted = 0.0;
+  for (int i = 0; i < static_cast<int>(num_own); ++i) {
+    const Eigen::Matrix3d m1 = random_sensitivity(bits);
+    const Eigen::Matrix3d m2 = random_sensitivity(bits);
+    if (accepts(m1, m2)) num_accepted += 1.0;
+  }
+  const double expected = num_accepted / num_own;
+
+  const MicroscopeCampaign campaign;
+  double num_draws = 0.0;
+  for (std::uint64_t run = 0; run < num_runs; ++run) {
+    num_draws += draw_instrument(campaign, RunIndex{run}, {}).num_draws;
+  }
+  const double rate = static_cast<double>(num_runs) / num_draws;
+  const double error = std::sqrt(expected * (1.0 - expected) * (1.0 / num_draws + 1.0 / num_own));
+  EXPECT_NEAR(rate, expected, 5.0 * error);
+}
+
+TEST(DrawInstrument, KeepsTheBounds) {
+  const MicroscopeCampaign campaign;
+  for (std::uint64_t run = 0; run < 5000; ++run) {
+    const AcceptedDraw draw = draw_instrument(campaign, RunIndex{run}, {});
+    ASSERT_TRUE(draw.instrument.has_value());
+    ASSERT_TRUE(accepts(draw.instrument->sensors[0].sensitivity(),
+                        draw.instrument->sensors[1].sensitivity()));
+  }
+}
+
+// The draws before the accepted one are rejected ones, and the accepted one is the draw of its
+// number.
+TEST(DrawInstrument, TakesTheFirstDrawThatIsAccepted) {
+  const MicroscopeCampaign campaign;
+  int num_redrawn = 0;
+  for (std::uint64_t run = 0; run < 200; ++run) {
+    const AcceptedDraw draw = draw_instrument(campaign, RunIndex{run}, {});
+    for (std::uint32_t i = 0; i < draw.num_draws; ++i) {
+      const Instrument instrument =
+          make_instrument(draw_values(campaign.dispersions, campaign.seed, RunIndex{run}, i, {}));
+      const bool is_last = i + 1 == draw.num_draws;
+      ASSERT_EQ(is_accepted(instrument, campaign.scenario.acceptance), is_last);
+      if (!is_last) continue;
+      EXPECT_EQ(instrument.offcentring_m, draw.instrument->offcentring_m);
+    }
+    if (draw.num_draws > 1) ++num_redrawn;
+  }
+  EXPECT_GT(num_redrawn, 20);
+}
+
+TEST(DrawInstrument, OfARunDoesNotDependOnOtherRuns) {
+  const MicroscopeCampaign campaign;
+  const AcceptedDraw alone = draw_instrument(campaign, RunIndex{42}, {});
+  for (std::uint64_t run = 0; run < 42; ++run) {
+    static_cast<void>(draw_instrument(campaign, RunIndex{run}, {}));
+  }
+  const AcceptedDraw after = draw_instrument(campaign, RunIndex{42}, {});
+  EXPECT_EQ(alone.num_draws, after.num_draws);
+  EXPECT_EQ(alone.instrument->sensors[0].scale_factor, after.instrument->sensors[0].scale_factor);
+  EXPECT_EQ(alone.instrument->thrust_matrix, after.instrument->thrust_matrix);
+}
+
+// One bound at a time, just below and just above the value it bounds.
+TEST(IsAccepted, ComparesEachEntryWithItsBound) {
+  const MicroscopeCampaign campaign;
+  const Instrument instrument =
+      make_instrument(draw_values(campaign.dispersions, campaign.seed, RunIndex{0}, 0, {}));
+  const Eigen::Matrix3d m1 = instrument.sensors[0].sensitivity();
+  const Eigen::Matrix3d m2 = instrument.sensors[1].sensitivity();
+  const Eigen::Matrix3d a_d = (m1 - m2) * (m1 + m2).inverse();
+  const Eigen::Matrix3d a_c = 0.5 * (m1 + m2) - 0.5 * a_d * (m1 - m2);
+  const double differential = std::fmax(std::abs(a_d(0, 1)), std::abs(a_d(0, 2)));
+  const double common = std::fmax(std::abs(a_c(0, 1)), std::abs(a_c(0, 2)));
+  const double scale = std::abs(a_d(0, 0));
+  EXPECT_TRUE(is_accepted(instrument, {1.001 * scale, 1.001 * differential, 1.001 * common}));
+  EXPECT_FALSE(is_accepted(instrument, {0.999 * scale, 1.001 * differential, 1.001 * common}));
+  EXPECT_FALSE(is_accepted(instrument, {1.001 * scale, 0.999 * differential, 1.001 * common}));
+  EXPECT_FALSE(is_accepted(instrument, {1.001 * scale, 1.001 * differential, 0.999 * common}));
+}
+
+TEST(DrawInstrument, GivesUpAfterAThousandDraws) {
+  MicroscopeCampaign campaign;
+  campaign.scenario.acceptance.a_d11_max = 1e-30;
+  const AcceptedDraw draw = draw_instrument(campaign, RunIndex{0}, {});
+  EXPECT_FALSE(draw.instrument.has_value());
+  EXPECT_EQ(draw.num_draws, num_draws_max);
+}
+
+}  // namespace
+}  // namespace proofmass

@@ -1,0 +1,146 @@
+#include "core/microscope/campaign/microscope_campaign.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "core/error.hpp"
+
+namespace proofmass {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+std::string refusal_after(const std::function<void(MicroscopeCampaign&)>& change) {
+  MicroscopeCampaign campaign;
+  change(campaign);
+  try {
+    campaign.validate();
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// The law of offcentring_m.y becomes a table of these values.
+void use_table(MicroscopeCampaign& campaign, std::vector<double> column) {
+  campaign.num_runs = 3;
+  campaign.dispersions[25] = Dispersion{};
+  campaign.dispersions[25].law = Law::table;
+  campaign.dispersions[25].file = "draws.csv";
+  campaign.dispersions[25].column = "dy";
+  campaign.table_columns = {std::move(column)};
+}
+
+void use_environment(MicroscopeCampaign& campaign, EnvironmentTable table) {
+  campaign.scenario.environment.kind = EnvironmentKind::file;
+  campaign.environment_file = "env.csv";
+  campaign.environment_table = std::move(table);
+}
+
+TEST(MicroscopeCampaign, IsValidByDefault) {
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign&) {}), "");
+}
+
+TEST(MicroscopeCampaign, RefusesABadName) {
+  const std::string rule = " (must be 1 to 64 letters, digits, _, - or .)";
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.name = ""; }),
+            "campaign.name = \"\"" + rule);
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.name = "a/b"; }),
+            "campaign.name = \"a/b\"" + rule);
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.name = std::string(65, 'a'); }),
+            "campaign.name = \"" + std::string(65, 'a') + "\"" + rule);
+}
+
+TEST(MicroscopeCampaign, RefusesASeedThatNoFileCanHold) {
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.seed = 9223372036854775807u; }), "");
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.seed = 9223372036854775808u; }),
+            "campaign.seed = 9223372036854775808 (must be in [0, 9223372036854775807])");
+}
+
+TEST(MicroscopeCampaign, RefusesTooFewOrTooManyRuns) {
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.num_runs = 0; }),
+            "campaign.runs = 0 (must be in [1, 1000000000])");
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.num_runs = num_runs_max + 1; }),
+            "campaign.runs = 1000000001 (must be in [1, 1000000000])");
+}
+
+TEST(MicroscopeCampaign, ChecksScenarioAndDispersions) {
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.scenario.noise.scale = -1.0; }),
+            "noise.scale = -1 (must be >= 0)");
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.dispersions[24].minimum = 1.0; }),
+            "dispersion.offcentring_m.x.maximum = 2e-05 (must be > minimum, 1)");
+}
+
+TEST(MicroscopeCampaign, WantsAnEnvironmentFileIfAndOnlyIfTheKindIsFile) {
+  EXPECT_EQ(refusal_after(
+                [](MicroscopeCampaign& c) { c.scenario.environment.kind = EnvironmentKind::file; }),
+            "environment.file = \"\" (environment.kind = \"file\" needs one)");
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.environment_file = "env.csv"; }),
+            "environment.file = \"env.csv\" (only with environment.kind = \"file\")");
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.environment_table.emplace_back(); }),
+            "environment.file = \"\" (only with environment.kind = \"file\")");
+  const EnvironmentRow start{0.0, {}, {}}, end{5950.0, {}, {}};
+  EXPECT_EQ(refusal_after([&](MicroscopeCampaign& c) { use_environment(c, {start, end}); }), "");
+}
+
+TEST(MicroscopeCampaign, WantsEnvironmentRowsThatAscendOverAnOrbit) {
+  const auto refusal = [](EnvironmentTable table) {
+    return refusal_after([&](MicroscopeCampaign& c) { use_environment(c, table); });
+  };
+  const EnvironmentRow start{0.0, {}, {}}, end{5950.0, {}, {}};
+  EXPECT_EQ(refusal({start}), "environment.file = 1 rows (must have 2 to 200000)");
+  EXPECT_EQ(refusal(EnvironmentTable(environment_rows_max + 1)),
+            "environment.file = 200001 rows (must have 2 to 200000)");
+  EXPECT_EQ(refusal({EnvironmentRow{1.0, {}, {}}, end}),
+            "environment.file row 1 = 1 (the first time_s must be <= 0)");
+  EXPECT_EQ(refusal({start, start, end}),
+            "environment.file row 2 = 0 (time_s must be > 0, that of the row before)");
+  EXPECT_EQ(refusal({start, EnvironmentRow{5949.0, {}, {}}}),
+            "environment.file row 2 = 5949 (the last time_s must be >= one orbit, 5950 s)");
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(refusal({start, EnvironmentRow{nan, {}, {}}}),
+            "environment.file row 2 = nan (must be finite)");
+  EXPECT_EQ(refusal({start, EnvironmentRow{5950.0, {0, 0, nan}, {}}}),
+            "environment.file row 2 = nan (must be finite)");
+  EXPECT_EQ(refusal({EnvironmentRow{0.0, {}, {nan, 0, 0}}, end}),
+            "environment.file row 1 = nan (must be finite)");
+}
+
+TEST(MicroscopeCampaign, WantsAValueOfEachTableForEachRun) {
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { use_table(c, {1.0, 2.0, 3.0, 4.0}); }), "");
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) {
+              use_table(c, {1.0, 2.0});
+            }),
+            "dispersion.offcentring_m.y.column = \"dy\" (has 2 rows, 3 runs need one each)");
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(refusal_after([=](MicroscopeCampaign& c) {
+              use_table(c, {1.0, infinity, 3.0});
+            }),
+            "dispersion.offcentring_m.y.column = \"dy\" (row 2 must be finite)");
+  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) {
+              use_table(c, {1.0, 2.0, 3.0});
+              c.table_columns.clear();
+            }),
+            "dispersion = 0 columns (laws of kind table are 1)");
+}
+
+TEST(MicroscopeCampaign, YieldsTheTableValuesOfARun) {
+  MicroscopeCampaign campaign;
+  EXPECT_THAT(campaign.table_values(RunIndex{7}), IsEmpty());
+  use_table(campaign, {1.0, 2.0, 3.0});
+  EXPECT_THAT(campaign.table_values(RunIndex{2}), ElementsAre(3.0));
+}
+
+TEST(CampaignDeathTest, HasNoTableValuesBeyondItsTable) {
+  MicroscopeCampaign campaign;
+  use_table(campaign, {1.0, 2.0, 3.0});
+  EXPECT_DEATH((void)campaign.table_values(RunIndex{3}), "internal invariant broken");
+}
+
+}  // namespace
+}  // namespace proofmass

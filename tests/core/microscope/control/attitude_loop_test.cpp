@@ -1,0 +1,155 @@
+#include "core/microscope/control/attitude_loop.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <vector>
+
+namespace proofmass {
+namespace {
+
+constexpr double period_s = 0.25;
+constexpr Vector3<double> zero{};
+
+/// Angle about X and acceleration that leads from each sample to the next under constant
+/// acceleration.
+struct Trajectory {
+  std::vector<double> angle;
+  std::vector<double> acceleration;
+};
+
+Trajectory swinging_trajectory(int num_samples) {
+  Trajectory trajectory;
+  double angle = 0.0;
+  double rate = 0.0;
+  for (int k = 0; k < num_samples; ++k) {
+    const double acceleration = 1e-6 * std::sin(0.05 * k) + 3e-7 * std::cos(0.7 * k);
+    trajectory.angle.push_back(angle);
+    trajectory.acceleration.push_back(acceleration);
+    angle += period_s * rate + 0.5 * period_s * period_s * acceleration;
+    rate += period_s * acceleration;
+  }
+  return trajectory;
+}
+
+/// Estimates of the angle from star tracker and accelerometer, either switched off by a zero
+/// factor.
+std::vector<double> blended(const Trajectory& trajectory, double star_factor,
+                            double acceleration_factor) {
+  const AttitudeGains gains = attitude_gains({}, period_s);
+  AttitudeEstimator<double> estimator;
+  std::vector<double> estimates;
+  for (std::size_t k = 0; k < trajectory.angle.size(); ++k) {
+    estimator.correct(gains, {star_factor * trajectory.angle[k], 0.0, 0.0});
+    estimates.push_back(estimator.angle.x);
+    estimator.predict(gains, {acceleration_factor * trajectory.acceleration[k], 0.0, 0.0}, zero);
+  }
+  return estimates;
+}
+
+// LP + HP = 1: fed with a true angle and the acceleration that goes with it, the two branches sum
+// to that angle, to rounding.
+TEST(AttitudeEstimator, ItsTwoFiltersSumToOne) {
+  const Trajectory trajectory = swinging_trajectory(20000);
+  const std::vector<double> low = blended(trajectory, 1.0, 0.0);
+  const std::vector<double> high = blended(trajectory, 0.0, 1.0);
+  double largest = 0.0;
+  double branch = 0.0;
+  for (std::size_t k = 0; k < low.size(); ++k) {
+    largest = std::max(largest, std::abs(trajectory.angle[k]));
+    branch = std::max(branch, std::abs(low[k]));
+    ASSERT_NEAR(low[k] + high[k], trajectory.angle[k], 1e-11 * std::max(largest, 1e-6)) << k;
+  }
+  EXPECT_GT(branch, 0.1 * largest);  // Neither branch is trivial.
+}
+
+// Both filters share the triple pole r, so without input every output obeys
+// y₃ − 3r y₂ + 3r² y₁ − r³ y₀ = 0.
+TEST(AttitudeEstimator, ForgetsWithATriplePole) {
+  const AttitudeConfig config;
+  const AttitudeGains gains = attitude_gains(config, period_s);
+  const double r = std::exp(-2.0 * std::numbers::pi * config.blending_hz * period_s);
+  AttitudeEstimator<double> estimator{
+      .angle = {1.0, 0.0, 0.0}, .rate = {0.1, 0.0, 0.0}, .bias = {-0.02, 0.0, 0.0}};
+  std::vector<double> y;
+  for (int k = 0; k < 200; ++k) {
+    estimator.correct(gains, zero);
+    y.push_back(estimator.angle.x);
+    estimator.predict(gains, zero, zero);
+  }
+  for (std::size_t k = 0; k + 3 < y.size(); ++k) {
+    ASSERT_NEAR(y[k + 3] - 3 * r * y[k + 2] + 3 * r * r * y[k + 1] - r * r * r * y[k], 0.0, 1e-13);
+  }
+}
+
+// The high-pass removes the accelerometer's bias, which the third state takes up.
+TEST(AttitudeEstimator, RemovesAConstantBiasOfTheAccelerometer) {
+  const AttitudeGains gains = attitude_gains({}, period_s);
+  const double bias = 1e-9;
+  AttitudeEstimator<double> estimator;
+  for (int k = 0; k < 40000; ++k) {  // 10,000 s are 188 time constants.
+    estimator.correct(gains, zero);
+    estimator.predict(gains, {bias, -bias, 0.0}, zero);
+  }
+  EXPECT_NEAR(estimator.angle.x, 0.0, 1e-9 * bias / (gains.blend_bias_per_s2));
+  EXPECT_NEAR(estimator.bias.x, bias, 1e-9 * bias);
+  EXPECT_NEAR(estimator.bias.y, -bias, 1e-9 * bias);
+}
+
+// In continuous time LP = (3ω s² + 3ω² s + ω³)/(s + ω)³; sampling changes it by a part fT or so.
+TEST(AttitudeEstimator, PassesTheStarTrackerBelowTheCrossover) {
+  const AttitudeConfig config;
+  const AttitudeGains gains = attitude_gains(config, period_s);
+  const double omega = 2.0 * std::numbers::pi * config.blending_hz;
+  for (const double frequency_hz : {3e-4, 1e-3, 3e-3, 1e-2}) {
+    AttitudeEstimator<double> estimator;
+    const std::complex<double> s(0.0, 2.0 * std::numbers::pi * frequency_hz);
+    const std::complex<double> expected =
+        (3.0 * omega * s * s + 3.0 * omega * omega * s + omega * omega * omega) /
+        std::pow(s + omega, 3);
+    const int samples_per_period = static_cast<int>(std::lround(1.0 / (frequency_hz * period_s)));
+    const double step = 2.0 * std::numbers::pi / samples_per_period;
+    std::complex<double> sum = 0.0;
+    const int num_settling = 8000;
+    for (int k = 0; k < num_settling + samples_per_period; ++k) {
+      estimator.correct(gains, {std::cos(step * k), 0.0, 0.0});
+      if (k >= num_settling) sum += estimator.angle.x * std::polar(1.0, -step * k);
+      estimator.predict(gains, zero, zero);
+    }
+    const std::complex<double> measured = sum * (2.0 / samples_per_period);
+    EXPECT_NEAR(std::abs(measured - expected), 0.0, 4.0 * omega * period_s) << frequency_hz;
+  }
+}
+
+// In a rotating reference a constant inertial pointing error turns in the frame; the estimator's
+// prediction follows it: an angle along X with Ω about Y turns into Z at −Ω∧θ.
+TEST(AttitudeEstimator, PredictsInARotatingReference) {
+  const AttitudeGains gains = attitude_gains({}, period_s);
+  AttitudeEstimator<double> estimator{.angle = {1e-4, 0.0, 0.0}, .rate = zero, .bias = zero};
+  const double spin = 0.01;
+  estimator.predict(gains, zero, {0.0, spin, 0.0});
+  EXPECT_DOUBLE_EQ(estimator.angle.x, 1e-4);
+  EXPECT_DOUBLE_EQ(estimator.angle.z, 1e-4 * spin * period_s);  // −(Ω ŷ ∧ θ x̂) = +Ωθ ẑ
+}
+
+// At rest in angle and rate only the proportional part acts at first; the integral adds ω²ω_I∫θ dt.
+TEST(AttitudeController, IsProportionalDerivativeWithASlowIntegral) {
+  const AttitudeConfig config;
+  const AttitudeGains gains = attitude_gains(config, period_s);
+  const double omega = 2.0 * std::numbers::pi * config.bandwidth_hz;
+  AttitudeController<double> controller;
+  const AttitudeEstimator<double> estimate{
+      .angle = {1e-5, 0.0, 0.0}, .rate = {0.0, 2e-7, 0.0}, .bias = zero};
+  Vector3<double> command{};
+  const int num_samples = 40;
+  for (int k = 0; k < num_samples; ++k) command = controller.advance(gains, estimate);
+  const double integral =
+      2.0 * std::numbers::pi * config.integral_hz * num_samples * period_s * 1e-5;
+  EXPECT_NEAR(command.x, -omega * omega * (1e-5 + integral), 1e-14 * 1e-5);
+  EXPECT_NEAR(command.y, -2.0 * config.damping * omega * 2e-7, 1e-14 * 2e-7);
+}
+
+}  // namespace
+}  // namespace proofmass

@@ -1,0 +1,272 @@
+#include "core/microscope/simulation/run.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <functional>
+
+#include "core/microscope/session/signals.hpp"
+#include "tests/support/microscope_results.hpp"
+
+namespace proofmass {
+namespace {
+
+/// The paper's sessions cut to `num_orbits` each: the same code path in a fraction of the time.
+MicroscopeCampaign short_campaign(int num_orbits) {
+  MicroscopeCampaign campaign;
+  campaign.seed = 7;
+  for (Session& session : campaign.scenario.sessions) session.num_orbits = num_orbits;
+  campaign.validate();
+  return campaign;
+}
+
+void expect_same_bits(const RunResult& a, const RunResult& b) {
+  EXPECT_EQ(a.run, b.run);
+  EXPECT_EQ(a.status, b.status);
+  EXPECT_EQ(a.num_draws, b.num_draws);
+  EXPECT_EQ(a.num_rounds, b.num_rounds);
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(a.truth[i]), std::bit_cast<std::uint64_t>(b.truth[i]));
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(a.estimate[i]),
+              std::bit_cast<std::uint64_t>(b.estimate[i]));
+  }
+}
+
+TEST(RunPlan, RepeatsARunBitForBitAfterOthersAndInAnotherPlan) {
+  const MicroscopeCampaign campaign = short_campaign(2);
+  const RunPlan plan(campaign);
+  const RunResult alone = plan.simulate(RunIndex{5}, {});
+  (void)plan.simulate(RunIndex{0}, {});
+  expect_same_bits(plan.simulate(RunIndex{5}, {}), alone);
+  expect_same_bits(RunPlan(campaign).simulate(RunIndex{5}, {}), alone);
+}
+
+TEST(RunPlan, GivesEveryRunAndSeedItsOwnNumbers) {
+  MicroscopeCampaign campaign = short_campaign(1);
+  const RunResult first = RunPlan(campaign).simulate(RunIndex{0}, {});
+  const RunResult second = RunPlan(campaign).simulate(RunIndex{1}, {});
+  campaign.seed = 8;
+  const RunResult other_seed = RunPlan(campaign).simulate(RunIndex{0}, {});
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    EXPECT_NE(first.truth[i], second.truth[i]);
+    EXPECT_NE(first.truth[i], other_seed.truth[i]);
+    EXPECT_NE(first.estimate[i], second.estimate[i]);
+  }
+}
+
+// Sessions draw from streams of their own names, so the estimate that one session alone determines
+// in the first round does not move when the sessions are put in another order.
+TEST(RunPlan, DoesNotDependOnTheOrderOfSessions) {
+  MicroscopeCampaign campaign = short_campaign(1);
+  const RunResult before = RunPlan(campaign).simulate(RunIndex{3}, {});
+  std::swap(campaign.scenario.sessions.front(), campaign.scenario.sessions.back());
+  expect_same_bits(RunPlan(campaign).simulate(RunIndex{3}, {}), before);
+}
+
+RecordNeeds needs_of_test(const Session& /*session*/) { return {}; }
+void refuse_nothing(const std::vector<Session>& /*sessions*/) {}
+
+/// What a method was given, as its estimates; its rounds and convergence are its own.
+Estimation first_phasors(const RunPhasors& records, const Scenario& scenario) {
+  Estimation estimation{.num_rounds = 3, .converged = scenario.estimation.convergence < 0.5};
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    estimation.values[i] = records[i].amplitude[index(Signal::differential_x)][0].real();
+  }
+  estimation.standard_errors = estimation.values;
+  estimation.diagnostics = {{"sessions", static_cast<double>(records.size())}};
+  return estimation;
+}
+
+// A run is what the method makes of its records, one for each session in the scenario's order.
+TEST(RunPlan, EstimatesByTheMethodThatItIsGiven) {
+  constexpr EstimationMethodInfo method{"first_phasors", needs_of_test, refuse_nothing,
+                                        first_phasors};
+  MicroscopeCampaign campaign = short_campaign(1);
+  std::swap(campaign.scenario.sessions[0], campaign.scenario.sessions[7]);
+  const RunPlan plan(campaign, method);
+  const RunRecord record = plan.record(RunIndex{0}, {});
+  ASSERT_EQ(record.phasors.size(), 11U);
+  const RunResult result = plan.estimate(record);
+  EXPECT_EQ(result.status, RunStatus::completed);
+  EXPECT_EQ(result.num_rounds, 3U);
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    EXPECT_EQ(result.estimate[i],
+              record.phasors[i].amplitude[index(Signal::differential_x)][0].real());
+  }
+  // Each session's stream bears its name: a swap of two moves their records and nothing else.
+  std::swap(campaign.scenario.sessions[0], campaign.scenario.sessions[7]);
+  const RunRecord other = RunPlan(campaign, method).record(RunIndex{0}, {});
+  EXPECT_EQ(other.phasors[7].amplitude, record.phasors[0].amplitude);
+  EXPECT_EQ(other.phasors[3].amplitude, record.phasors[3].amplitude);
+  const Estimation estimation = plan.estimation(record);
+  EXPECT_EQ(estimation.standard_errors, estimation.values);
+  EXPECT_EQ(estimation.diagnostics.at(0).value, 11.0);
+  campaign.scenario.estimation.convergence = 0.7;
+  EXPECT_EQ(RunPlan(campaign, method).simulate(RunIndex{0}, {}).status, RunStatus::not_converged);
+}
+
+// Two sessions of a target, each with noise of its own, give an estimate between those of each.
+TEST(RunPlan, EstimatesATargetFromSeveralSessions) {
+  constexpr std::size_t at_a_d12 = index(SessionTarget::a_d12), i = index(Parameter::a_d12);
+  MicroscopeCampaign campaign = short_campaign(2);
+  const double of_first = RunPlan(campaign).simulate(RunIndex{0}, {}).estimate[i];
+  const Session first = campaign.scenario.sessions[at_a_d12];
+  campaign.scenario.sessions[at_a_d12].name = "again";
+  const double of_second = RunPlan(campaign).simulate(RunIndex{0}, {}).estimate[i];
+  campaign.scenario.sessions.insert(campaign.scenario.sessions.begin(), first);
+  campaign.validate();
+  const RunResult of_both = RunPlan(campaign).simulate(RunIndex{0}, {});
+  EXPECT_EQ(of_both.status, RunStatus::completed);
+  EXPECT_GT(of_both.estimate[i], std::min(of_first, of_second));
+  EXPECT_LT(of_both.estimate[i], std::max(of_first, of_second));
+}
+
+// A session without target is recorded and its loops are watched, but no estimate hangs on it.
+TEST(RunPlan, RecordsASessionWithoutTargetBesideTheOthers) {
+  MicroscopeCampaign campaign = short_campaign(1);
+  const RunResult before = RunPlan(campaign).simulate(RunIndex{0}, {});
+  Session spun = campaign.scenario.sessions[0];
+  spun.name = "spun";
+  spun.target = SessionTarget::no_target;
+  spun.spin_rate_rad_s = 4.75e-3;
+  campaign.scenario.sessions.push_back(spun);
+  campaign.validate();
+  const RunPlan plan(campaign);
+  const RunRecord record = plan.record(RunIndex{0}, {});
+  ASSERT_EQ(record.phasors.size(), 12U);
+  EXPECT_NE(record.phasors[11].amplitude[index(Signal::gradient_xx)][0], 0.0);
+  EXPECT_EQ(plan.estimate(record).estimate, before.estimate);
+  campaign.scenario.health.residual_max_m_s2 = 5e-12;
+  EXPECT_EQ(RunPlan(campaign).estimate(record).loss,
+            test::loss_of(LossCause::residual, SessionTarget::no_target));
+}
+
+TEST(RunPlan, ReportsItsOrbitsInOrder) {
+  const MicroscopeCampaign campaign = short_campaign(1);
+  const RunPlan plan(campaign);
+  EXPECT_EQ(plan.num_orbits(), 11);
+  int last = 0;
+  (void)plan.simulate(RunIndex{0}, {}, [&last](int orbits) {
+    EXPECT_GE(orbits, last);
+    last = orbits;
+  });
+  EXPECT_EQ(last, 11);
+}
+
+TEST(RunPlan, SaysWhenNoDrawIsAccepted) {
+  MicroscopeCampaign campaign = short_campaign(1);
+  campaign.scenario.acceptance.a_d11_max = 1e-300;
+  const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::no_draw);
+  EXPECT_EQ(result.num_draws, 1000U);
+}
+
+/// Every session of one orbit, with fifty times the loop gain along X.
+MicroscopeCampaign unstable_campaign() {
+  MicroscopeCampaign campaign = short_campaign(1);
+  for (std::size_t i = 0; i < num_drawn; ++i) {
+    if (drawn_names()[i] != "thruster_scale_error.x") continue;
+    campaign.dispersions[i].law = Law::fixed;
+    campaign.dispersions[i].value = 50.0;  // Loop gain fifty times too high.
+  }
+  return campaign;
+}
+
+// A drag-free loop beyond its stability limit grows without bound, unless a sensor's range ends it.
+TEST(RunPlan, SaysWhenTheSimulationDiverges) {
+  MicroscopeCampaign campaign = unstable_campaign();
+  campaign.scenario.sensor.range_m_s2 = 1e80;
+  const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::lost);
+  EXPECT_EQ(result.loss.cause, static_cast<std::uint32_t>(LossCause::saturation));
+  EXPECT_EQ(test::health_of(result).acceleration_m_s2, magnitude_max);
+  EXPECT_FALSE(result.has_estimate());
+  EXPECT_TRUE(result.has_truth());
+}
+
+TEST(RunPlan, SaysWhenASensorReachesTheEndOfItsRange) {
+  const RunResult result = RunPlan(unstable_campaign()).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::lost);
+  EXPECT_EQ(result.loss, test::loss_of(LossCause::saturation, SessionTarget::a_c11_delta_x));
+  EXPECT_GT(test::health_of(result).acceleration_m_s2, 1e-5);
+  EXPECT_FALSE(result.has_estimate());
+  EXPECT_TRUE(result.has_truth());
+}
+
+// What the loops reach in the nominal campaign, by magnitude: millimetres from the centre of mass
+// and mass motion make 1e-7 m/s², biases of 10 arcsec some 5e-5 rad, the environment 1e-12 m/s².
+TEST(RunPlan, ReportsTheHealthOfItsLoops) {
+  const RunResult result = RunPlan(short_campaign(2)).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::completed);
+  EXPECT_EQ(result.loss.cause, static_cast<std::uint32_t>(LossCause::none));
+  EXPECT_GT(test::health_of(result).acceleration_m_s2, 2e-8);
+  EXPECT_LT(test::health_of(result).acceleration_m_s2, 2e-7);
+  EXPECT_GT(test::health_of(result).attitude_rad, 1e-6);
+  EXPECT_LT(test::health_of(result).attitude_rad, 2e-4);
+  EXPECT_GT(test::health_of(result).residual_m_s2, 3e-13);
+  EXPECT_LT(test::health_of(result).residual_m_s2, 3e-12);
+  EXPECT_GT(test::health_of(result).quadratic_noise, 0.0);
+  EXPECT_LT(test::health_of(result).quadratic_noise, 0.01);
+  EXPECT_GT(test::health_of(result).square_noise, 0.0);
+  EXPECT_LT(test::health_of(result).square_noise, 1e-4);
+}
+
+/// The cause that the first run gives with one limit lowered until it is beyond it.
+Loss loss_with(const std::function<void(Scenario&)>& lower) {
+  MicroscopeCampaign campaign = short_campaign(1);
+  lower(campaign.scenario);
+  const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::lost);
+  return result.loss;
+}
+
+TEST(RunPlan, SaysWhichLimitARunLeftAndInWhichSession) {
+  using enum SessionTarget;
+  EXPECT_EQ(loss_with([](Scenario& s) { s.health.attitude_max_rad = 1e-9; }),
+            test::loss_of(LossCause::attitude, a_c11_delta_x));
+  EXPECT_EQ(loss_with([](Scenario& s) { s.health.residual_max_m_s2 = 1e-14; }),
+            test::loss_of(LossCause::residual, a_c11_delta_x));
+  EXPECT_EQ(loss_with([](Scenario& s) { s.health.quadratic_noise_max = 1e-9; }),
+            test::loss_of(LossCause::quadratic_noise, a_c11_delta_x));
+  EXPECT_EQ(loss_with([](Scenario& s) { s.health.square_noise_max = 1e-12; }),
+            test::loss_of(LossCause::square_noise, k2d));
+}
+
+// In a frame that spins the environment meets the loops at f_spin and f_EP, where they leave more
+// of it than at f_orb.
+TEST(RunPlan, LooksAtTheResidualOfEachSpin) {
+  EXPECT_EQ(loss_with([](Scenario& s) {
+              s.health.residual_max_m_s2 = 5e-12;
+              for (Session& session : s.sessions) {
+                if (session.target == SessionTarget::a_c11_delta_z)
+                  session.spin_rate_rad_s = 4.75e-3;
+              }
+            }),
+            test::loss_of(LossCause::residual, SessionTarget::a_c11_delta_z));
+}
+
+// Estimates are linear in the measured difference.
+TEST(RunPlan, SaysWhenAnEstimateIsOutOfRange) {
+  const MicroscopeCampaign campaign = short_campaign(1);
+  const RunPlan plan(campaign);
+  RunRecord record = plan.record(RunIndex{0}, {});
+  EXPECT_TRUE(plan.estimate(record).has_estimate());
+  for (SessionPhasors& session : record.phasors) {
+    for (auto& amplitude : session.amplitude[index(Signal::differential_x)]) amplitude *= 1e110;
+  }
+  EXPECT_EQ(plan.estimate(record).status, RunStatus::not_finite);
+}
+
+TEST(RunPlan, SaysWhenEstimatesStillMoveInTheLastRound) {
+  MicroscopeCampaign campaign = short_campaign(1);
+  campaign.scenario.estimation.num_rounds_max = 1;
+  const RunResult result = RunPlan(campaign).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::not_converged);
+  EXPECT_EQ(result.num_rounds, 1U);
+  EXPECT_TRUE(result.has_estimate());
+}
+
+}  // namespace
+}  // namespace proofmass

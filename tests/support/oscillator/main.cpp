@@ -1,0 +1,6 @@
+#include "coordinator/cli/command_line.hpp"
+
+int main(int argc, char** argv) {
+  using namespace proofmass::coordinator;
+  return run_proofmass(argc, argv, [](CLI::App&, Command&) {});
+}

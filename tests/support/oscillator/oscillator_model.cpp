@@ -1,0 +1,284 @@
+// A second model beside MICROSCOPE's, as small as a model can be: what runs campaigns must know
+// neither of them. A driven, damped oscillator is read by a noisy accelerometer.
+//
+//     x'' + 2ζω₀x' + ω₀²x = F cos ωt,    y = S x'' + noise
+//
+// In the steady state S x'' = P cos ωt + Q sin ωt, and each run estimates P and Q by least squares.
+// Over whole periods of the drive the cosine and the sine are orthogonal, so that of N samples
+//
+//     P = (2/N) Σ y cos ωt,    Q = (2/N) Σ y sin ωt,    each with the variance 2σ²/N.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/campaign/dispersion.hpp"
+#include "core/campaign/model.hpp"
+#include "core/definition/definition_text.hpp"
+#include "core/definition/document.hpp"
+#include "core/math/elementary.hpp"
+#include "core/random/normal.hpp"
+#include "core/random/stream.hpp"
+
+namespace proofmass {
+namespace {
+
+constexpr int samples_per_period = 16;
+constexpr std::array<DrawnQuantity, 2> drawn_quantities{
+    {{"natural_frequency_hz", "Hz"}, {"scale_factor", "1"}}};
+
+/// Everything of a definition that is a number, and nothing else; SI.
+struct Oscillator {
+  double damping_ratio = 0.05;
+  double drive_m_s2 = 1e-6;
+  double drive_hz = 0.01;
+  double natural_hz = 0.02;
+  double natural_half_width_hz = 0.001;  ///< Drawn uniformly; 0: not drawn.
+  double scale_half_width = 0.01;        ///< Likewise, about 1.
+  double noise_m_s2 = 1e-9;              ///< Standard deviation of a sample.
+  double range_m_s2 = 1e-6;              ///< A larger reading loses the run.
+  double num_periods = 1000;
+  double in_phase_objective_m_s2 = 1e-10;
+};
+
+struct Field {
+  FieldInfo info;
+  double Oscillator::*value;
+};
+
+const std::array<Field, 10> fields{{
+    {{"oscillator.damping_ratio", "ζ", range::positive}, &Oscillator::damping_ratio},
+    {{"oscillator.drive_m_s2", "F", range::between(0.0, 1e6)}, &Oscillator::drive_m_s2},
+    {{"oscillator.drive_hz", "ω/2π", range::between(1e-6, 1e6)}, &Oscillator::drive_hz},
+    {{"oscillator.natural_hz", "ω₀/2π", range::between(1e-6, 1e6)}, &Oscillator::natural_hz},
+    {{"oscillator.natural_half_width_hz", "", range::not_negative},
+     &Oscillator::natural_half_width_hz},
+    {{"sensor.scale_half_width", "of S", range::between(0.0, 1.0)}, &Oscillator::scale_half_width},
+    {{"sensor.noise_m_s2", "σ", range::between(0.0, 1e6)}, &Oscillator::noise_m_s2},
+    {{"sensor.range_m_s2", "", range::positive}, &Oscillator::range_m_s2},
+    {{"sensor.periods", "N/16", range::between(1.0, 1e6)}, &Oscillator::num_periods},
+    {{"objective.in_phase_m_s2", "", range::positive}, &Oscillator::in_phase_objective_m_s2},
+}};
+
+Dispersion around(double centre, double half_width) {
+  Dispersion dispersion;
+  dispersion.law = half_width == 0.0 ? Law::fixed : Law::uniform;
+  dispersion.value = centre;
+  dispersion.minimum = centre - half_width;
+  dispersion.maximum = centre + half_width;
+  return dispersion;
+}
+
+class OscillatorCampaign final : public Campaign {
+ public:
+  OscillatorCampaign() { name = "oscillator"; }
+
+  Oscillator oscillator;
+
+  void validate() const override {
+    check_identity(*this);
+    check_table_columns(*this, {});
+    for (const Field& field : fields) check_field(field.info, oscillator.*field.value);
+  }
+  [[nodiscard]] std::unique_ptr<Campaign> clone() const override {
+    return std::make_unique<OscillatorCampaign>(*this);
+  }
+  [[nodiscard]] std::unique_ptr<const Plan> prepare() const override;
+  [[nodiscard]] Definition definition(TableColumns) const override { return {.text = text()}; }
+  [[nodiscard]] std::vector<DefinitionItem> items() const override {
+    std::vector<DefinitionItem> items{{"campaign.name", name},
+                                      {"campaign.seed", static_cast<std::int64_t>(seed)},
+                                      {"campaign.runs", static_cast<std::int64_t>(num_runs)}};
+    for (const Field& field : fields) {
+      items.push_back({std::string(field.info.path), oscillator.*field.value});
+    }
+    return items;
+  }
+  [[nodiscard]] std::vector<DefinitionDifference> differences_from(
+      const Campaign& other) const override {
+    const std::vector<DefinitionItem> mine = items(), others = other.items();
+    std::vector<DefinitionDifference> differences;
+    for (std::size_t i = 0; i < mine.size(); ++i) {
+      if (mine[i].value == others[i].value || mine[i].key == "campaign.runs") continue;
+      const bool is_identity = mine[i].key.starts_with("campaign.");
+      differences.push_back({mine[i].key.substr(is_identity ? 9 : 0), value_text(mine[i].value),
+                             value_text(others[i].value)});
+    }
+    return differences;
+  }
+  [[nodiscard]] std::vector<double> objectives() const override {
+    return {oscillator.in_phase_objective_m_s2, std::numeric_limits<double>::infinity()};
+  }
+  [[nodiscard]] std::int64_t num_rounds_max() const override { return 1; }
+  [[nodiscard]] std::vector<std::size_t> table_quantities() const override { return {}; }
+
+  [[nodiscard]] RunDraw draw(RunIndex run) const override {
+    const auto draw_of = [&](std::size_t i, double centre, double half_width) {
+      return draw_value(around(centre, half_width), drawn_quantities[i].name, seed, run, 0, 0.0);
+    };
+    const double natural_hz = draw_of(0, oscillator.natural_hz, oscillator.natural_half_width_hz);
+    const double scale = draw_of(1, 1.0, oscillator.scale_half_width);
+    // x = a cos ωt + b sin ωt, both over F/ω²; r is ω₀/ω.
+    const double r = natural_hz / oscillator.drive_hz;
+    const double stiff = r * r - 1.0, loss = 2.0 * oscillator.damping_ratio * r;
+    const double amplitude = -scale * oscillator.drive_m_s2 / (stiff * stiff + loss * loss);
+    return {.num_draws = 1,
+            .values = {natural_hz, scale},
+            .truth = {amplitude * stiff, amplitude * loss}};
+  }
+
+  /// All of the campaign as TOML, in the one form that campaign_of() takes.
+  [[nodiscard]] std::string text() const {
+    std::string text, table;
+    for (const DefinitionItem& item : items()) {
+      const std::size_t dot = item.key.find('.');
+      if (std::exchange(table, item.key.substr(0, dot)) != item.key.substr(0, dot)) {
+        text += fmt::format("[{}]\n", table);
+      }
+      text += fmt::format("{} = {}\n", item.key.substr(dot + 1), value_text(item.value));
+    }
+    return text;
+  }
+
+ private:
+  [[nodiscard]] static std::string value_text(const DefinitionValue& value) {
+    if (const auto* const whole = std::get_if<std::int64_t>(&value)) return fmt::to_string(*whole);
+    if (const auto* const number = std::get_if<double>(&value)) return detail::number_text(*number);
+    return detail::quoted_text(std::get<std::string>(value));
+  }
+};
+
+class OscillatorPlan final : public Plan {
+ public:
+  explicit OscillatorPlan(const OscillatorCampaign& campaign) : campaign_(campaign) {}
+
+  [[nodiscard]] std::vector<RunResult> simulate_batch(
+      std::span<const RunRequest> requests, InstructionSet,
+      const std::function<void(int)>& progress) const override {
+    std::vector<RunResult> results;
+    for (const RunRequest& request : requests) results.push_back(simulate(request.run));
+    if (progress) progress(num_orbits());
+    return results;
+  }
+  [[nodiscard]] int num_orbits() const override {
+    return static_cast<int>(campaign_.oscillator.num_periods);
+  }
+
+ private:
+  [[nodiscard]] RunResult simulate(RunIndex run) const {
+    const double sigma = campaign_.oscillator.noise_m_s2;
+    const RunDraw draw = campaign_.draw(run);
+    const RandomStream noise(campaign_.seed, run, stream_id("accelerometer"));
+    const std::uint32_t num_samples = static_cast<std::uint32_t>(num_orbits()) * samples_per_period;
+    double in_phase = 0.0, quadrature = 0.0, peak = 0.0;
+    std::array<float, 4> deviates{};
+    for (std::uint32_t k = 0; k < num_samples; ++k) {
+      if (k % 4 == 0) deviates = normal_deviates(noise.block(k / 4));
+      const SineCosine drive = sincos_turns((k % samples_per_period) / double{samples_per_period});
+      const double reading = draw.truth[0] * drive.cosine + draw.truth[1] * drive.sine +
+                             sigma * static_cast<double>(deviates[k % 4]);
+      in_phase += reading * drive.cosine;
+      quadrature += reading * drive.sine;
+      peak = std::max(peak, std::abs(reading));
+    }
+    const double weight = 2.0 / num_samples;
+    RunResult result{.run = run, .num_draws = 1, .truth = draw.truth, .health = {peak}};
+    if (peak > campaign_.oscillator.range_m_s2) {
+      result.status = RunStatus::lost;
+      result.loss = {.cause = 1, .session = 1};
+      return result;
+    }
+    result.num_rounds = 1;
+    result.estimate = {weight * in_phase, weight * quadrature};
+    result.standard_error = {sigma * std::sqrt(weight)};
+    return result;
+  }
+
+  OscillatorCampaign campaign_;
+};
+
+std::unique_ptr<const Plan> OscillatorCampaign::prepare() const {
+  return std::make_unique<const OscillatorPlan>(*this);
+}
+
+std::unique_ptr<OscillatorCampaign> read(Document& document) {
+  auto campaign = std::make_unique<OscillatorCampaign>();
+  auto seed = static_cast<std::int64_t>(campaign->seed);
+  auto num_runs = static_cast<std::int64_t>(campaign->num_runs);
+  document.read("campaign.name", campaign->name);
+  document.read("campaign.seed", seed, range::not_negative);
+  document.read("campaign.runs", num_runs, range::between(1, double{num_runs_max}));
+  campaign->seed = static_cast<std::uint64_t>(seed);
+  campaign->num_runs = static_cast<std::uint64_t>(num_runs);
+  for (const Field& field : fields) {
+    document.read(std::string(field.info.path), campaign->oscillator.*field.value,
+                  field.info.range);
+  }
+  document.check();
+  try {
+    campaign->validate();
+  } catch (const ConfigError& error) {
+    throw document.located(error);
+  }
+  return campaign;
+}
+
+class OscillatorModel final : public Model {
+ public:
+  [[nodiscard]] std::string_view version() const override { return "oscillator-1"; }
+
+  [[nodiscard]] const ResultSchema& results() const override {
+    static const ResultSchema schema{
+        .quantities = {{"in_phase", "_m_s2", "P", "m/s²", 1e-9, "nm/s²",
+                        std::numeric_limits<double>::infinity(),
+                        PublishedAccuracy{3e-11, 1e-11, 1e-11}},
+                       {.name = "quadrature",
+                        .unit_suffix = "_m_s2",
+                        .symbol = "Q",
+                        .unit = "m/s²",
+                        .display_scale = 1e-9,
+                        .display_unit = "nm/s²",
+                        .has_standard_error = true}},
+        .health = {{"peak_reading", "_m_s2", "m/s²"}},
+        .loss_causes = {"out_of_range"},
+        .loss_sessions = {"steady_state"},
+        .num_draws_max = 1,
+        .tables = {}};
+    return schema;
+  }
+  [[nodiscard]] std::span<const DrawnQuantity> drawn() const override { return drawn_quantities; }
+  [[nodiscard]] std::size_t batch_size() const override { return 4; }
+
+  [[nodiscard]] std::uint64_t reference_digest(InstructionSet set) const override {
+    const RunRequest request{RunIndex{0}, {}};
+    const RunResult result = OscillatorCampaign().prepare()->simulate_batch({&request, 1}, set)[0];
+    return std::bit_cast<std::uint64_t>(result.estimate[0]) ^
+           std::rotl(std::bit_cast<std::uint64_t>(result.estimate[1]), 1);
+  }
+  [[nodiscard]] std::unique_ptr<Campaign> campaign_of(Definition definition, TableColumns,
+                                                      std::string_view source) const override {
+    Document document(std::string(source), definition.text, {});
+    auto campaign = read(document);
+    if (campaign->definition(TableColumns::included) == definition) return campaign;
+    throw DefinitionError(fmt::format("{}: is no definition of an oscillator", source));
+  }
+  [[nodiscard]] std::unique_ptr<Campaign> read_campaign(Document& document,
+                                                        DataFiles&) const override {
+    return read(document);
+  }
+  [[nodiscard]] std::string example() const override { return OscillatorCampaign().text(); }
+};
+
+}  // namespace
+
+const Model& model() {
+  static const OscillatorModel oscillator;
+  return oscillator;
+}
+
+}  // namespace proofmass

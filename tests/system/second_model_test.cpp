@@ -1,0 +1,214 @@
+// A campaign of a model that is not MICROSCOPE's, through all that runs campaigns and reads them:
+// the oscillator of tests/support/oscillator, whose estimates have closed forms.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include "tests/coordinator/cli/temporary_directory.hpp"
+#include "tests/system/process.hpp"
+#include "tests/system/stored_runs.hpp"
+
+namespace proofmass::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using Arguments = std::vector<std::string>;
+
+const std::string programs = PROOFMASS_OSCILLATOR_PROGRAMS;
+constexpr std::size_t num_runs = 200;
+
+/// Lines of a CSV end with a carriage return and a line feed.
+std::string with_plain_ends(std::string text) {
+  std::erase(text, '\r');
+  return text;
+}
+
+/// A directory with the example of the model, and its programs.
+class SecondModel : public testing::Test {
+ protected:
+  void SetUp() override { ASSERT_EQ(proofmass("init", {"init", "example.toml"}), 0); }
+
+  [[nodiscard]] std::filesystem::path path(const std::string& name) const {
+    return directory / name;
+  }
+  [[nodiscard]] int proofmass(const std::string& name, const Arguments& arguments) const {
+    return Process(directory / "", name, programs + "/proofmass", arguments).wait();
+  }
+  [[nodiscard]] std::string output_of(const std::string& name) const {
+    return read_file(path(name + ".out"));
+  }
+  [[nodiscard]] std::string errors_of(const std::string& name) const {
+    return read_file(path(name + ".err"));
+  }
+  /// The example as NAME.db, by two workers.
+  void run(const std::string& name, const Arguments& further = {}) const {
+    Arguments arguments{"run",    "example.toml",           "--db",      name + ".db",
+                        "--runs", std::to_string(num_runs), "--workers", "2"};
+    arguments.insert(arguments.end(), further.begin(), further.end());
+    ASSERT_EQ(proofmass(name, arguments), 0) << errors_of(name);
+  }
+  [[nodiscard]] double number(const std::string& name, const std::string& query) const {
+    return std::stod(stored_text(path(name + ".db"), "SELECT printf('%!.17g', (" + query + "))"));
+  }
+  [[nodiscard]] std::string answer(const std::string& sql) const {
+    EXPECT_EQ(proofmass("query", {"query", "a.db", sql, "--format", "csv"}), 0)
+        << errors_of("query");
+    return with_plain_ends(output_of("query"));
+  }
+
+  TemporaryDirectory directory;
+};
+
+/// The line `Digest ...` of a report.
+std::string digest_in(const std::string& report) {
+  std::smatch match;
+  EXPECT_TRUE(std::regex_search(report, match, std::regex("Digest +(\\S+)"))) << report;
+  return match[1];
+}
+
+// Without noise a sum of N products is exact but for rounding: N roundings of partial sums, each at
+// most N/2 of the amplitude, so that an error is below N 2⁻⁵³ amplitudes, and as much again for the
+// products and the sine. N is 16,000, an amplitude below 3.9e-7 m/s².
+TEST_F(SecondModel, FindsTheTruthIfThereIsNoNoise) {
+  run("a", {"--set", "sensor.noise_m_s2=0"});
+  const double bound = 2.0 * 16000.0 * std::ldexp(3.9e-7, -53);
+  for (const std::string quantity : {"in_phase", "quadrature"}) {
+    const std::string error = "abs(estimate_" + quantity + "_m_s2 - truth_" + quantity + "_m_s2)";
+    EXPECT_LT(number("a", "SELECT max(" + error + ") FROM run_result"), bound) << quantity;
+    EXPECT_GT(number("a", "SELECT min(abs(truth_" + quantity + "_m_s2)) FROM run_result"), 1e-9);
+  }
+}
+
+// The deviation of either error is σ √(2/N), here 1e-9 √(2/16000) = 1.118e-11 m/s². That of 200
+// errors has a relative standard error of 1/√400 = 5 %, and their mean one of 1/√200 = 7.1 % of the
+// deviation; four of each are allowed.
+TEST_F(SecondModel, ErrsAsTheClosedFormSays) {
+  run("a");
+  const double deviation = 1e-9 * std::sqrt(2.0 / 16000.0);
+  for (const std::string quantity : {"in_phase", "quadrature"}) {
+    const std::string row = " FROM parameter_accuracy WHERE parameter = '" + quantity + "'";
+    EXPECT_NEAR(number("a", "SELECT error_standard_deviation * 1e20" + row) / (deviation * 1e20),
+                1.0, 4.0 * 0.05);
+    EXPECT_LT(std::abs(number("a", "SELECT bias * 1e20" + row)), 4.0 * 0.071 * deviation * 1e20);
+  }
+  for (const std::string which : {"min", "max"}) {
+    EXPECT_NEAR(
+        number("a", "SELECT " + which + "(standard_error_quadrature_m_s2) * 1e11 FROM run_result"),
+        deviation * 1e11, 1e-13);
+  }
+}
+
+TEST_F(SecondModel, LosesRunsThatLeaveTheRangeOfTheSensor) {
+  run("a", {"--set", "sensor.range_m_s2=3.35e-7"});
+  const double num_lost = number("a", "SELECT count(*) FROM run_result WHERE status = 5");
+  EXPECT_GT(num_lost, 0.0);
+  EXPECT_LT(num_lost, 200.0);
+  EXPECT_EQ(number("a",
+                   "SELECT count(*) FROM loop_health WHERE peak_reading_m_s2 > 3.35e-7 AND "
+                   "loss_cause = 'out_of_range' AND loss_session = 'steady_state'"),
+            num_lost);
+  EXPECT_EQ(proofmass("verify", {"verify", "a.db", "--fraction", "1"}), 0) << output_of("verify");
+}
+
+TEST_F(SecondModel, HasOneDigestWhateverIsKilled) {
+  const Arguments slow{"--set", "sensor.periods=20000"};
+  run("alone", slow);
+  std::string text = read_file(path("example.toml"));
+  text = std::regex_replace(text, std::regex("periods = [0-9]+"), "periods = 20000");
+  text = std::regex_replace(text, std::regex("runs = [0-9]+"), "runs = 200");
+  std::ofstream(path("slow.toml")) << text;
+  const std::string endpoint = "ipc://" + path("socket").string();
+  const auto start = [&](const std::string& name, const Arguments& arguments) {
+    return Process(
+        directory / "", name,
+        programs + (name == "coordinator" ? "/proofmass-coordinator" : "/proofmass-worker"),
+        arguments);
+  };
+  const Arguments serve{"slow.toml", "--directory", "served",
+                        "--bind",    endpoint,      "--exit-when-done"};
+  Process first = start("first", {"--connect", endpoint, "--name", "first", "--threads", "1"});
+  Process second = start("second", {"--connect", endpoint, "--name", "second", "--threads", "1"});
+  {
+    Process coordinator = start("coordinator", serve);
+    wait_until("stored runs", [&] { return num_stored(path("served/oscillator.db")) >= 8; });
+    first.signal(SIGKILL);
+    EXPECT_EQ(first.wait(), -SIGKILL);
+    coordinator.signal(SIGKILL);
+    EXPECT_EQ(coordinator.wait(), -SIGKILL);
+  }
+  ASSERT_LT(num_stored(path("served/oscillator.db")), num_runs);
+  Process coordinator = start("coordinator", serve);
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+  EXPECT_EQ(second.wait(), 0) << errors_of("second");
+  EXPECT_EQ(proofmass("report", {"report", "served/oscillator.db"}), 0) << errors_of("report");
+  EXPECT_EQ(digest_in(output_of("report")), digest_in(output_of("alone")));
+  EXPECT_EQ(stored_runs(path("served/oscillator.db")), stored_runs(path("alone.db")));
+}
+
+TEST_F(SecondModel, IsReportedAndAnswersQueries) {
+  run("a");
+  ASSERT_EQ(proofmass("report", {"report", "a.db"}), 0) << errors_of("report");
+  const std::string report = output_of("report");
+  EXPECT_THAT(report, HasSubstr("nm/s²"));
+  EXPECT_TRUE(std::regex_search(report, std::regex("\nP +nm/s²"))) << report;
+  EXPECT_TRUE(std::regex_search(report, std::regex("\nQ +nm/s²"))) << report;
+  EXPECT_THAT(report, Not(HasSubstr("udget")));
+  const std::string met = "in_phase < 1e-10 for 90% with 95%",
+                    broken = "in_phase < 1e-12 for 90% with 95%";
+  EXPECT_EQ(proofmass("met", {"report", "a.db", "--requirement", met}), 0) << errors_of("met");
+  EXPECT_EQ(proofmass("broken", {"report", "a.db", "--requirement", broken}), 3);
+  EXPECT_EQ(answer("SELECT parameter, objective IS NULL, paper_worst IS NULL FROM "
+                   "parameter_accuracy"),
+            "parameter,objective IS NULL,paper_worst IS NULL\nin_phase,0,0\nquadrature,1,1\n");
+  EXPECT_EQ(answer("SELECT count(*) AS n FROM error_long"), "n\n400\n");
+  EXPECT_EQ(answer("SELECT count(*) AS n FROM loop_health WHERE peak_reading_m_s2 > 2.8e-7"),
+            "n\n200\n");
+  EXPECT_EQ(
+      answer("SELECT quantity, count(*) AS n FROM draw WHERE value BETWEEN CASE quantity WHEN "
+             "'scale_factor' THEN 0.99 ELSE 0.019 END AND CASE quantity WHEN 'scale_factor' "
+             "THEN 1.01 ELSE 0.021 END GROUP BY quantity"),
+      "quantity,n\nnatural_frequency_hz,200\nscale_factor,200\n");
+  EXPECT_EQ(answer("SELECT value FROM definition_entry WHERE key = 'sensor.periods'"),
+            "value\n1000\n");
+  EXPECT_EQ(proofmass("verify", {"verify", "a.db", "--fraction", "1"}), 0) << output_of("verify");
+  EXPECT_THAT(output_of("verify"), HasSubstr("200 of 200 runs simulated again"));
+  ASSERT_EQ(proofmass("sensitivity", {"sensitivity", "a.db"}), 0) << errors_of("sensitivity");
+  EXPECT_THAT(output_of("sensitivity"), HasSubstr("scale_factor"));
+  EXPECT_THAT(output_of("sensitivity"), HasSubstr("natural_frequency_hz"));
+}
+
+TEST_F(SecondModel, IsComparedAndExported) {
+  run("a");
+  run("b", {"--seed", "2"});
+  ASSERT_EQ(proofmass("compare", {"compare", "a.db", "b.db"}), 0) << errors_of("compare");
+  EXPECT_THAT(output_of("compare"), HasSubstr("seed"));
+  ASSERT_EQ(proofmass("csv", {"export", "a.db", "--draws"}), 0) << errors_of("csv");
+  const std::string csv = with_plain_ends(output_of("csv"));
+  EXPECT_EQ(csv.substr(0, csv.find('\n')),
+            "run_index,status,num_draws,num_rounds,truth_in_phase_m_s2,truth_quadrature_m_s2,"
+            "estimate_in_phase_m_s2,estimate_quadrature_m_s2,error_in_phase_m_s2,"
+            "error_quadrature_m_s2,standard_error_quadrature_m_s2,health_peak_reading_m_s2,"
+            "loss_cause,loss_session,draw_natural_frequency_hz,draw_scale_factor");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 201);
+  ASSERT_EQ(proofmass("json", {"export", "a.db", "--draws", "--format", "json"}), 0);
+  EXPECT_THAT(output_of("json"), HasSubstr("standard_error_quadrature_m_s2"));
+  EXPECT_TRUE(nlohmann::json::accept(output_of("json")));
+  ASSERT_EQ(
+      proofmass("hdf5", {"export", "a.db", "--draws", "--format", "hdf5", "--output", "a.h5"}), 0)
+      << errors_of("hdf5");
+  EXPECT_THAT(read_file(path("a.h5")), HasSubstr("standard_error"));
+}
+
+}  // namespace
+}  // namespace proofmass::test
