@@ -13,7 +13,7 @@ enum class RunComparison : std::uint8_t { equal, above, at_least, below, at_most
 struct DrawScan {
   std::uint64_t first_run = 0;
   std::uint64_t end_run = 0;            ///< One behind the last.
-  std::optional<std::size_t> quantity;  ///< Index into drawn_names(); empty for all.
+  std::optional<std::size_t> quantity;  ///< Index into Model::drawn(); empty for all.
 
   /// Leaves out runs that cannot hold `run_index <comparison> bound`.
   void narrow(RunComparison comparison, std::int64_t bound);

@@ -1,11 +1,12 @@
 #include "coordinator/report/drawn_runs.hpp"
 
+#include <fmt/format.h>
+
 #include "coordinator/report/digest_check.hpp"
 #include "core/campaign/model.hpp"
 #include "core/campaign/run_ranges.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
 std::vector<std::string> column_names() {
@@ -47,7 +48,12 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
     if (!is_first && result.run != also) return;
     if (is_first) ++drawn.num_first;
     require_in_range(result, model().results());
-    append(result, campaign.draw(result.run), drawn);
+    const RunDraw draw = campaign.draw(result.run);
+    if (draw.values.empty()) {
+      store.refuse_as_damaged(fmt::format(
+          "run {} has an estimate, and its definition yields no draw", result.run.value));
+    }
+    append(result, draw, drawn);
   });
   return drawn;
 }

@@ -108,14 +108,15 @@ class Campaign {
 /// @throws ConfigError naming the field, its value and the rule.
 void check_identity(const Campaign& campaign);
 
+/// Where a quantity's values come from.
+struct TableSource {
+  std::string path;    ///< Of its law in a campaign file: `dispersion.offcentring_m.x`.
+  std::string column;  ///< Heading of its column.
+};
+
 /// Checks that `table_columns` has a column for each of these quantities, with a finite value for
 /// each run.
-/// @param sources  A quantity's path and the heading of its column: `dispersion.offcentring_m.x`.
 /// @throws ConfigError likewise.
-struct TableSource {
-  std::string path;
-  std::string column;
-};
 void check_table_columns(const Campaign& campaign, std::span<const TableSource> sources);
 
 }  // namespace proofmass

@@ -55,7 +55,7 @@ struct DataTableSchema {
 /// a RunResult, of columns, exports and digests. Numbers that are stored count from 1, so that
 /// lists may grow at their end and never otherwise.
 struct ResultSchema {
-  std::vector<Quantity> quantities;  ///< At most 64.
+  std::vector<Quantity> quantities;  ///< 1 to 63: a database keeps a bit for each.
   std::vector<HealthQuantity> health;
   std::vector<std::string_view> loss_causes;    ///< Why a run may be lost: `saturation`.
   std::vector<std::string_view> loss_sessions;  ///< In which part of it: `a_c12`.

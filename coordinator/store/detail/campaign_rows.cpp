@@ -44,7 +44,8 @@ void insert_data_tables(Database& database, const std::vector<DataTable>& tables
 /// The text at a key of a definition; empty if there is none.
 std::string text_at(const Campaign& campaign, std::string_view key) {
   for (const DefinitionItem& item : campaign.items()) {
-    if (item.key == key) return std::get<std::string>(item.value);
+    const auto* const text = std::get_if<std::string>(&item.value);
+    if (item.key == key && text != nullptr) return *text;
   }
   return "";
 }

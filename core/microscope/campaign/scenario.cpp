@@ -56,8 +56,7 @@ NoiseConfig noise_preset(NoisePreset preset) {
 }
 
 Scenario::Scenario() : sessions(hardy2013_sessions()) {
-  std::ranges::transform(microscope_results().quantities, objectives.begin(),
-                         &Quantity::objective);
+  std::ranges::transform(microscope_results().quantities, objectives.begin(), &Quantity::objective);
 }
 
 std::string_view objective_path(std::size_t parameter) {

@@ -242,6 +242,19 @@ TEST_F(DrawnRunsTest, AreThoseOfTheSimulation) {
   }
 }
 
+// No definition that was stored with these results rejects every draw.
+TEST_F(DrawnRunsTest, AreRefusedIfTheDefinitionYieldsNone) {
+  MicroscopeCampaign campaign = hardy2013_campaign();
+  Store::create(file(), campaign, canonical_definition(campaign)).commit(test::deliveries_of(0, 3));
+  const Store store = Store::open_read_only(file());
+  campaign.scenario.acceptance.a_d11_max = 1e-300;
+  EXPECT_EQ(
+      test::store_error_of([&] { (void)read_drawn_runs(store, campaign, 3); }),
+      "campaign file = " + file().string() +
+          " (is damaged: run 0 has an estimate, and its definition yields no draw; restore it "
+          "from a copy)");
+}
+
 // Run 7 lies beyond the first four; run 4 has no estimate.
 TEST_F(DrawnRunsTest, HoldARunBeyondTheFirst) {
   MicroscopeCampaign campaign = hardy2013_campaign();
