@@ -174,6 +174,16 @@ TEST_F(Stability, UnderNoiseOfTheThrustersIsKeptOrReported) {
                          });
 }
 
+// A campaign file may not hold a gain so high that the sample of delay counts: the highest is the
+// harmless end. A low gain does not follow the motions that sessions command.
+TEST_F(Stability, OfTheAttitudeGainIsKeptOrReported) {
+  expect_explained_sweep("attitude bandwidth", {0.1, 0.02, 0.01, 0.007, 0.005, 0.004, 0.003},
+                         [](MicroscopeCampaign& campaign, double bandwidth_hz) {
+                           campaign.scenario.attitude.bandwidth_hz = bandwidth_hz;
+                           campaign.scenario.attitude.damping = 2.0;
+                         });
+}
+
 TEST_F(Stability, UnderNoiseIsKeptOrReported) {
   expect_explained_sweep(
       "noise", {1.0, 3.0, 5.0, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 30.0, 60.0, 100.0, 300.0, 1000.0},
