@@ -165,8 +165,9 @@ TEST_F(Stability, OfTheAttitudeIntegralIsKeptOrReported) {
                          });
 }
 
-// The loop takes the thrusters' noise out of the lines. Between them it stays, and K2 of its square
-// does not: from some twenty times the nominal noise on, that alone spoils the estimates.
+// The loop takes the thrusters' noise out of the lines, but K2 turns its square into noise there.
+// At 28 times the nominal noise the limit of quadratic noise alone keeps a run from being completed
+// whose error its noise does not explain: a_c13 of run 1.
 TEST_F(Stability, UnderNoiseOfTheThrustersIsKeptOrReported) {
   expect_explained_sweep("thrust noise", {1.0, 10.0, 20.0, 25.0, 28.0, 100.0},
                          [](MicroscopeCampaign& campaign, double factor) {
@@ -174,8 +175,9 @@ TEST_F(Stability, UnderNoiseOfTheThrustersIsKeptOrReported) {
                          });
 }
 
-// A campaign file may not hold a gain so high that the sample of delay counts: the highest is the
-// harmless end. A low gain does not follow the motions that sessions command.
+// The highest gain that a campaign file may hold is the harmless end. The lowest one here does not
+// follow the motion that the session of Δy commands: its angle is beyond the limit, though the loop
+// is stable and the estimates would still be right.
 TEST_F(Stability, OfTheAttitudeGainIsKeptOrReported) {
   expect_explained_sweep("attitude bandwidth", {0.1, 0.02, 0.01, 0.007, 0.005, 0.004, 0.003},
                          [](MicroscopeCampaign& campaign, double bandwidth_hz) {
