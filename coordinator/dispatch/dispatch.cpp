@@ -146,8 +146,8 @@ struct Handler {
   void operator()(const wire::Heartbeat& heartbeat) const {
     on_heartbeat(state, worker, heartbeat, header.sequence, now, outbox);
   }
-  void operator()(const wire::ResultBatch& batch) const {
-    on_results(state, worker, batch, now, outbox);
+  void operator()(wire::ResultBatch&& batch) const {
+    on_results(state, worker, std::move(batch), now, outbox);
   }
   void operator()(const wire::GiveBack& give_back) const {
     on_give_back(state, worker, give_back, now, outbox);
@@ -206,10 +206,10 @@ void reject_unregistered(WorkerId id, Outbox& outbox) {
                                .text = "this worker is not registered"});
 }
 
-void on_packet(State& state, WorkerId id, const std::string& key, const wire::Packet& packet,
+void on_packet(State& state, WorkerId id, const std::string& key, wire::Packet packet,
                TimePoint now, Outbox& outbox) {
   const Handler handle{state, id, key, packet.header, now, outbox};
-  const bool is_of_worker = wire::visit_if<wire::WorkerMessage>(packet.message, handle);
+  const bool is_of_worker = wire::visit_if<wire::WorkerMessage>(std::move(packet.message), handle);
   PROOFMASS_EXPECT(is_of_worker);
 }
 

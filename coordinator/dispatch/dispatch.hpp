@@ -58,7 +58,7 @@ void reject_unregistered(WorkerId id, Outbox& outbox);
 /// Calls the function below that is for the message.
 /// @param key  Public key of the connection; empty without keys.
 /// @pre The message is one of a worker.
-void on_packet(State& state, WorkerId id, const std::string& key, const wire::Packet& packet,
+void on_packet(State& state, WorkerId id, const std::string& key, wire::Packet packet,
                TimePoint now, Outbox& outbox);
 /// Registers a worker, or answers again if it is registered already.
 /// @param key  Public key of the connection; empty without keys. What is said about a host counts
@@ -77,8 +77,7 @@ void on_heartbeat(State& state, WorkerId id, const wire::Heartbeat& heartbeat,
                   std::uint64_t sequence, TimePoint now, Outbox& outbox);
 /// Hands results of open runs to the store, and those of others to be compared; acknowledges at
 /// once those that are durable already.
-void on_results(State& state, WorkerId id, const wire::ResultBatch& batch, TimePoint now,
-                Outbox& outbox);
+void on_results(State& state, WorkerId id, wire::ResultBatch batch, TimePoint now, Outbox& outbox);
 void on_give_back(State& state, WorkerId id, const wire::GiveBack& give_back, TimePoint now,
                   Outbox& outbox);
 void on_bye(State& state, WorkerId id, const wire::Bye& bye, TimePoint now, Outbox& outbox);

@@ -49,39 +49,40 @@ struct Intake {
   detail::RunsByWorker holders;   ///< Who else was lent the runs.
   std::vector<RunIndex> durable;  ///< To be acknowledged at once.
 
-  void take(const wire::ComputedRun& computed) {
+  void take(wire::ComputedRun computed) {
     const RunIndex run = computed.result.run;
     if (detail::close_run(state, campaign_id, run, id, holders)) {
       campaign.delivered[run] = {.attempt = attempt, .waiting = {id}};
       if (!computed.result.has_estimate()) ++campaign.num_without_estimate;
-      outbox.store(arrival(computed));
+      outbox.store(arrival(std::move(computed)));
       return;
     }
     const auto delivered = campaign.delivered.find(run);
     if (delivered == campaign.delivered.end()) {
       durable.push_back(run);
       if (!end_audit(run)) ++campaign.num_duplicates;
-      return compare(computed);
+      return compare(std::move(computed));
     }
     std::vector<WorkerId>& waiting = delivered->second.waiting;
     // One that waits repeats itself.
     if (std::find(waiting.begin(), waiting.end(), id) != waiting.end()) return;
     waiting.push_back(id);
     ++campaign.num_duplicates;
-    compare(computed);
+    compare(std::move(computed));
   }
 
  private:
-  [[nodiscard]] Arrival arrival(const wire::ComputedRun& computed) const {
-    return {.campaign = campaign_id, .worker = id, .attempt = attempt, .computed = computed};
+  [[nodiscard]] Arrival arrival(wire::ComputedRun computed) const {
+    return {
+        .campaign = campaign_id, .worker = id, .attempt = attempt, .computed = std::move(computed)};
   }
 
   // What a worker sends again and again must not fill the memory: one that is not compared, is
   // lost.
-  void compare(const wire::ComputedRun& computed) {
+  void compare(wire::ComputedRun computed) {
     if (campaign.num_comparing >= state.config.uncommitted_max) return;
     ++campaign.num_comparing;
-    outbox.compare(arrival(computed));
+    outbox.compare(arrival(std::move(computed)));
   }
 
   /// True if the run was on an audit lease of this worker.
@@ -157,8 +158,7 @@ void count_results(State& state, Worker& worker, CampaignId id, const wire::Resu
 
 }  // namespace
 
-void on_results(State& state, WorkerId id, const wire::ResultBatch& batch, TimePoint now,
-                Outbox& outbox) {
+void on_results(State& state, WorkerId id, wire::ResultBatch batch, TimePoint now, Outbox& outbox) {
   Worker* const worker = detail::heard(state, id, now, outbox);
   if (worker == nullptr) return;
   const auto found = state.campaigns.find(batch.campaign);
@@ -176,8 +176,8 @@ void on_results(State& state, WorkerId id, const wire::ResultBatch& batch, TimeP
   }
   count_results(state, *worker, batch.campaign, batch);
   Intake intake{state, id, batch.campaign, campaign, batch.attempt, outbox, {}, {}};
-  for (const wire::ComputedRun& computed : batch.results) {
-    if (!is_foreign(campaign, computed)) intake.take(computed);
+  for (wire::ComputedRun& computed : batch.results) {
+    if (!is_foreign(campaign, computed)) intake.take(std::move(computed));
   }
   if (!intake.durable.empty()) {
     send_acks(state, batch.campaign, {{id, std::move(intake.durable)}}, outbox);

@@ -238,7 +238,7 @@ class Service::Parts final : public Outbox {
     history_.note_lent(arrival.campaign, arrival.worker);
     const auto session = worker_desk_.peers().session_of(arrival.worker);
     PROOFMASS_EXPECT(session.has_value());
-    return {.result = arrival.computed.result,
+    return {.result = std::move(arrival.computed.result),
             .worker = *session,
             .attempt = arrival.attempt,
             .compute_s = arrival.computed.compute_s};

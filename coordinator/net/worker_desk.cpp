@@ -55,7 +55,7 @@ void WorkerDesk::receive(const Incoming& message, TimePoint now, Outbox& outbox)
     surroundings_.on_leaving(*worker, bye->reason);
   }
   if (is_a<wire::ResultBatch>(packet->message)) wire::kill_point(KillPoint::after_receive);
-  on_packet(state_, *worker, message.from.key, *packet, now, outbox);
+  on_packet(state_, *worker, message.from.key, *std::move(packet), now, outbox);
 }
 
 std::optional<wire::Packet> WorkerDesk::decode(const Incoming& message, TimePoint now,

@@ -4,7 +4,6 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "core/campaign/model.hpp"
@@ -12,9 +11,11 @@
 namespace proofmass::coordinator {
 namespace {
 
-/// The bytes of numbers, one after the other.
+/// Appends the bytes of numbers.
 class Layout {
  public:
+  explicit Layout(std::vector<unsigned char>& bytes) : bytes_(bytes) { bytes_.clear(); }
+
   template <std::unsigned_integral Integer>
   void put(Integer value) {
     for (std::size_t i = 0; i < sizeof(value); ++i) {
@@ -30,17 +31,15 @@ class Layout {
     for (std::size_t i = 0; i < count; ++i) put(have_meaning ? values[i] : 0.0);
   }
 
-  [[nodiscard]] std::span<const unsigned char> bytes() const { return bytes_; }
-
  private:
-  std::vector<unsigned char> bytes_;
+  std::vector<unsigned char>& bytes_;
 };
 
 }  // namespace
 
 void Digest::add(const RunResult& result) {
   const std::size_t num_quantities = model().results().quantities.size();
-  Layout layout;
+  Layout layout(bytes_);
   layout.put(result.run.value);
   layout.put(static_cast<std::uint32_t>(result.status));
   layout.put(result.num_draws);
@@ -49,17 +48,17 @@ void Digest::add(const RunResult& result) {
   layout.put(result.truth, result.has_truth(), num_quantities);
   layout.put(result.estimate, result.has_estimate(), num_quantities);
   layout.put(result.standard_error, true, result.standard_error.size());
-  hash_.add(layout.bytes());
+  hash_.add(bytes_);
 
   if (result.health.empty()) return;
   has_health_ = true;
-  Layout of_health;
+  Layout of_health(bytes_);
   of_health.put(result.run.value);
   of_health.put(result.health, true, result.health.size());
   const Loss loss = result.status == RunStatus::lost ? result.loss : Loss{};
   of_health.put(loss.cause);
   of_health.put(loss.session);
-  health_hash_.add(of_health.bytes());
+  health_hash_.add(bytes_);
 }
 
 ResultDigests Digest::finish() {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
@@ -29,6 +30,7 @@ class Digest {
  private:
   Sha256 hash_;
   Sha256 health_hash_;
+  std::vector<unsigned char> bytes_;  // Of one result: kept from one to the next.
   bool has_health_ = false;
 };
 

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <utility>
-#include <vector>
 
 namespace proofmass::coordinator {
 
@@ -11,9 +10,9 @@ RunTotalPasses::RunTotalPasses(ErrorBudget budget)
 
 void RunTotalPasses::add(const RunResult& result) {
   if (!result.has_estimate()) return;
-  std::vector<double> errors(result.estimate.size());
-  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = std::abs(result.error(i));
-  const double total = budget_.after(errors).total;
+  errors_.resize(result.estimate.size());
+  for (std::size_t i = 0; i < errors_.size(); ++i) errors_[i] = std::abs(result.error(i));
+  const double total = budget_.after(errors_).total;
   passes_.add(total);
   if (!is_first_ && total <= totals_.worst) return;
   is_first_ = false;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "core/campaign/error_budget.hpp"
 #include "core/campaign/run_result.hpp"
@@ -33,6 +34,7 @@ class RunTotalPasses {
  private:
   ErrorBudget budget_;
   ValuePasses passes_;
+  std::vector<double> errors_;  // Of the last result.
   RunTotals totals_;
   bool is_first_ = true;  ///< No total was added in any pass.
 };

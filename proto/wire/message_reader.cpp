@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <utility>
 
 #include "core/campaign/model.hpp"
 #include "core/error.hpp"
@@ -236,7 +237,7 @@ ComputedRun read_run(const proto::ComputedRun& message) {
   result.num_draws = message.num_draws();
   result.num_rounds = message.num_rounds();
   read_values(message, result);
-  return {.result = result,
+  return {.result = std::move(result),
           .compute_s = checked_time(message.compute_s(), "compute_s"),
           .elapsed_s = checked_time(message.elapsed_s(), "elapsed_s")};
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -271,15 +272,15 @@ using Message = detail::Joined<WorkerMessage, CoordinatorMessage>::type;
 /// Calls the handler with what the message holds if that is one of `Messages`, which is
 /// WorkerMessage or CoordinatorMessage. The handler must take all of these.
 /// @return False if it is none of them.
-template <typename Messages, typename Handler>
-bool visit_if(const Message& message, const Handler& handle) {
+template <typename Messages, typename AnyMessage, typename Handler>
+bool visit_if(AnyMessage&& message, const Handler& handle) {
   return std::visit(
-      [&]<typename Content>(const Content& content) {
-        constexpr bool is_wanted = detail::is_among<Content, Messages>;
-        if constexpr (is_wanted) handle(content);
+      [&]<typename Content>(Content&& content) {
+        constexpr bool is_wanted = detail::is_among<std::remove_cvref_t<Content>, Messages>;
+        if constexpr (is_wanted) handle(std::forward<Content>(content));
         return is_wanted;
       },
-      message);
+      std::forward<AnyMessage>(message));
 }
 
 /// A message as it travels.

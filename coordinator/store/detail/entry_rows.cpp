@@ -39,6 +39,7 @@ EntryRows::EntryRows(const Database& database)
       standouts_(database),
       workers_(database),
       insert_delivery_(database.prepare("INSERT INTO delivery VALUES (?, ?, ?, ?, ?)")),
+      select_failures_(database.prepare("SELECT EXISTS (SELECT 1 FROM run_failure)")),
       delete_failure_(database.prepare("DELETE FROM run_failure WHERE run_index = ?")),
       insert_audit_(database.prepare(insert_audit_sql)),
       insert_attempt_(database.prepare(
@@ -52,6 +53,8 @@ EntryRows::EntryRows(const Database& database)
 
 CommitSummary EntryRows::write(std::span<const Entry> entries) {
   now_unix_s_ = static_cast<std::int64_t>(std::time(nullptr));
+  has_failures_ = select_failures_.step() && select_failures_.integer(0) != 0;
+  select_failures_.finish();
   for (const Entry& entry : entries) {
     std::visit([this](const auto& kind) { write_entry(kind); }, entry);
   }
@@ -74,7 +77,7 @@ void EntryRows::write_entry(const Delivery& delivery) {
   const std::int64_t worker = workers_.key_of(delivery.worker);
   insert_delivery_.run(delivery.result.run.value, worker, delivery.attempt.value,
                        delivery.compute_s, now_unix_s_);
-  delete_failure_.run(delivery.result.run.value);
+  if (has_failures_) delete_failure_.run(delivery.result.run.value);
   standouts_.add(delivery.result);
   workers_.count_result(worker, delivery.compute_s);
   ++summary_.num_new;
@@ -147,6 +150,7 @@ void EntryRows::write_entry(const LostRuns& lost) {
 
 void EntryRows::write_entry(const GivenUpRun& given_up) {
   database_.prepare(insert_failure_sql).run(given_up.run.value);
+  has_failures_ = true;
 }
 
 void EntryRows::write_entry(const EventEntry& event) {

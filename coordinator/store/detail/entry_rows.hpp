@@ -51,6 +51,7 @@ class EntryRows {
   StandoutRows standouts_;
   WorkerRows workers_;
   Statement insert_delivery_;
+  Statement select_failures_;
   Statement delete_failure_;
   Statement insert_audit_;
   Statement insert_attempt_;
@@ -58,6 +59,7 @@ class EntryRows {
   Statement insert_event_;
   Statement trim_events_;
   std::int64_t now_unix_s_ = 0;
+  bool has_failures_ = false;                ///< Of runs that are given up, which is rare.
   std::optional<std::uint64_t> num_audits_;  ///< Rows; counted when the first is written.
   bool is_audit_full_ = false;               ///< As was said.
   CommitSummary summary_;

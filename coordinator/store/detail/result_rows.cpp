@@ -123,6 +123,7 @@ bool has_value(const Statement& row, int column, int count) {
 std::vector<double> read_health(const Statement& row) {
   if (!has_value(row, columns().health, columns().num_health)) return {};
   std::vector<double> health;
+  health.reserve(static_cast<std::size_t>(columns().num_health));
   for (int i = 0; i < columns().num_health; ++i) {
     const int column = columns().health + i;
     const double value = row.optional_real(column).value_or(-1.0);
