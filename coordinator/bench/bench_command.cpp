@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <iterator>
-#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -15,8 +13,10 @@
 #include "coordinator/bench/bench_bits.hpp"
 #include "coordinator/bench/bench_parts.hpp"
 #include "coordinator/bench/bench_report.hpp"
+#include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "core/microscope/session/session_signals.hpp"
+#include "core/microscope/simulation/run.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 
@@ -24,6 +24,11 @@ namespace proofmass::coordinator {
 namespace {
 
 constexpr std::uint64_t bench_runs_max = 1'000'000;
+
+struct BenchOptions {
+  OutputFormat format = OutputFormat::text;
+  std::uint64_t num_runs = batch_lanes;  ///< Of each instruction set but `scalar`, which takes one.
+};
 
 Machine this_machine() {
   std::ifstream file("/proc/cpuinfo");
@@ -91,26 +96,27 @@ BenchFigures measure(const MicroscopeCampaign& campaign, std::uint64_t num_runs)
   return figures;
 }
 
-}  // namespace
-
+/// Measures the speed of a run of the paper's campaign on one core of this machine, with every
+/// instruction set that it has, compares their results and prints both.
+/// @return An ExitCode: exit_cannot_be_done if results differ.
 int run_bench(const BenchOptions& options) {
   const BenchFigures figures = measure(MicroscopeCampaign{}, options.num_runs);
-  const bool is_table = options.format == BenchFormat::table;
-  fmt::print("{}", is_table ? bench_table(figures) : bench_json(figures));
+  const bool is_json = options.format == OutputFormat::json;
+  fmt::print("{}", is_json ? bench_json(figures) : bench_table(figures));
   if (all_bits_agree(figures)) return exit_done;
   wire::say("proofmass: error: instruction sets give different results\n");
   return exit_cannot_be_done;
 }
 
+}  // namespace
+
 void add_bench_command(CLI::App& app, Command& chosen) {
-  const auto options = std::make_shared<BenchOptions>();
-  CLI::App& bench = *app.add_subcommand("bench", "Measure the speed of this machine");
-  bench.add_option("--runs", options->num_runs, "Runs of each instruction set")
+  auto [command, options] = add_command<BenchOptions>(
+      app, chosen, "bench", "Measure the speed of this machine", run_bench);
+  command.add_option("--runs", options.num_runs, "Runs of each instruction set")
       ->check(wire::in_range(std::uint64_t{1}, bench_runs_max))
       ->capture_default_str();
-  bench.add_flag_callback(
-      "--json", [options] { options->format = BenchFormat::json; }, "Print JSON");
-  bench.callback([options, &chosen] { chosen = [options] { return run_bench(*options); }; });
+  add_json_flag(command, options.format);
 }
 
 }  // namespace proofmass::coordinator

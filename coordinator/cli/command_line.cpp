@@ -1,5 +1,6 @@
 #include "coordinator/cli/command_line.hpp"
 
+#include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
 
 namespace proofmass::coordinator {
@@ -15,11 +16,13 @@ int run_proofmass(int argc, char** argv,
       ->envname("PROOFMASS_CONFIG");
   app.allow_config_extras(CLI::config_extras_mode::error);
   Command chosen;
-  add_local_commands(app, chosen);
+  for (const auto add : {add_run, add_init, add_keygen}) add(app, chosen);
   add_further_commands(app, chosen);
-  add_analysis_commands(app, chosen);
-  add_archive_commands(app, chosen);
-  add_client_commands(app, chosen);
+  for (const auto add : {add_report, add_sensitivity, add_query, add_verify, add_export, add_backup,
+                         add_compare, add_list, add_tag, add_note, add_submit, add_status,
+                         add_watch, add_control, add_workers, add_release}) {
+    add(app, chosen);
+  }
   return run_program(app, argc, argv, [&] { return chosen(); });
 }
 

@@ -2,6 +2,9 @@
 
 #include <csignal>
 
+#include "coordinator/cli/exit_code.hpp"
+#include "proto/command_line/standard_error.hpp"
+
 namespace proofmass::coordinator {
 namespace {
 
@@ -23,6 +26,16 @@ const std::atomic<StopRequest>& catch_stop_signals(OnTerminate on_terminate) {
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   return request;
+}
+
+int run_until_stopped(const std::function<int(const IsStopped&)>& work) {
+  const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
+  try {
+    return work([&stop] { return stop != StopRequest::none; });
+  } catch (const Interrupted&) {
+    wire::say("proofmass: interrupted\n");
+    return exit_interrupted;
+  }
 }
 
 }  // namespace proofmass::coordinator

@@ -7,11 +7,10 @@
 #include <functional>
 #include <string>
 
-#include "coordinator/cli/client_options.hpp"
+#include "coordinator/cli/client.hpp"
 #include "coordinator/cli/exit_code.hpp"
-#include "coordinator/cli/keygen_command.hpp"
-#include "coordinator/cli/submit_command.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -26,9 +25,7 @@ class ClientCommands : public test::ServiceTest {
   ClientCommands() { config.clients_endpoint = "tcp://127.0.0.1:*"; }
 
   void use_keys() {
-    testing::internal::CaptureStdout();
-    (void)make_keys({.directory = directory / "keys", .worker = {}, .client = {}});
-    (void)testing::internal::GetCapturedStdout();
+    ASSERT_EQ(test::answer_of({"keygen", directory / "keys"}).exit_code, exit_done);
     config.keys = directory / "keys";
   }
 
@@ -88,13 +85,10 @@ TEST_F(ClientCommands, ControlACampaignWithKeys) {
 TEST_F(ClientCommands, PrintWhatTheCoordinatorSays) {
   start({});
   std::ofstream(directory / "mine.toml") << "[campaign]\nname = \"mine\"\nruns = 7\n";
-  SubmitOptions submit;
-  submit.client = options();
-  submit.campaign_file = directory / "mine.toml";
-  testing::internal::CaptureStdout();
-  EXPECT_EQ(submit_campaign(submit), exit_done);
-  EXPECT_EQ(testing::internal::GetCapturedStdout(),
-            "campaign mine: active, 7 runs, 0 of them done\n");
+  const auto answer = test::answer_of(
+      {"submit", directory / "mine.toml", "--connect", service->clients_endpoint()});
+  EXPECT_EQ(answer.exit_code, exit_done) << answer.error;
+  EXPECT_EQ(answer.output, "campaign mine: active, 7 runs, 0 of them done\n");
 }
 
 TEST_F(ClientCommands, FailInTheCoordinatorsWords) {

@@ -1,10 +1,9 @@
-#include "coordinator/cli/init_command.hpp"
-
 #include <gtest/gtest.h>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 
 namespace proofmass::coordinator {
@@ -13,32 +12,26 @@ namespace {
 TEST(Init, WritesACampaignThatCanBeRead) {
   const test::TemporaryDirectory directory;
   const auto file = directory / "a.toml";
-  EXPECT_EQ(write_campaign(file, IfFileExists::refuse), exit_done);
+  EXPECT_EQ(test::answer_of({"init", file}).output, "wrote " + file.string() + "\n");
   EXPECT_TRUE(definition_differences(hardy2013_campaign(), *read_campaign(file)).empty());
 }
 
 TEST(Init, ReplacesAFileOnlyIfItMust) {
   const test::TemporaryDirectory directory;
   const auto file = directory / "a.toml";
-  (void)write_campaign(file, IfFileExists::refuse);
-  try {
-    (void)write_campaign(file, IfFileExists::refuse);
-    FAIL();
-  } catch (const UsageError& error) {
-    EXPECT_EQ(std::string(error.what()), file.string() + " exists (replace it with --force)");
-  }
-  EXPECT_EQ(write_campaign(file, IfFileExists::replace), exit_done);
+  (void)test::answer_of({"init", file});
+  const test::Answer answer = test::answer_of({"init", file});
+  EXPECT_EQ(answer.exit_code, exit_wrong_usage);
+  EXPECT_EQ(answer.error, file.string() + " exists (replace it with --force)");
+  EXPECT_EQ(test::answer_of({"init", file, "--force"}).exit_code, exit_done);
 }
 
 TEST(Init, SaysWhyAFileCannotBeWritten) {
   const test::TemporaryDirectory directory;
   const auto file = directory / "none" / "a.toml";
-  try {
-    (void)write_campaign(file, IfFileExists::refuse);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(std::string(error.what()), file.string() + ": No such file or directory");
-  }
+  const test::Answer answer = test::answer_of({"init", file});
+  EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
+  EXPECT_EQ(answer.error, file.string() + ": No such file or directory");
 }
 
 }  // namespace

@@ -1,41 +1,38 @@
-#include "coordinator/cli/keygen_command.hpp"
-
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include <set>
 #include <string>
+#include <vector>
 
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/net/allow_list.hpp"
 #include "proto/link/security.hpp"
+#include "tests/coordinator/cli/program.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 using test::mode_of;
-using test::refusal_of;
 using test::ScratchDirectory;
 using test::text_of;
 using wire::KeyRole;
 
-// The output of a command, and its exit code at the end.
-std::string output_of(const KeygenOptions& options) {
-  ::testing::internal::CaptureStdout();
-  const int exit_code = make_keys(options);
-  return ::testing::internal::GetCapturedStdout() + std::to_string(exit_code);
-}
-
 class Keygen : public ::testing::Test {
  protected:
-  void make_whole_set() { (void)output_of({.directory = directory_, .worker = {}, .client = {}}); }
-  void add_worker(const std::string& name) {
-    (void)output_of({.directory = directory_, .worker = name, .client = {}});
-  }
+  void make_whole_set() { (void)keygen({}); }
 
-  [[nodiscard]] std::string refusal(const KeygenOptions& options) const {
-    return refusal_of([&] { (void)make_keys(options); });
+  /// With these arguments behind the directory.
+  [[nodiscard]] test::Answer keygen(const std::vector<std::string>& arguments) const {
+    std::vector<std::string> all{"keygen", directory_};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    return test::answer_of(all);
+  }
+  [[nodiscard]] std::string refusal(const std::vector<std::string>& arguments) const {
+    const test::Answer answer = keygen(arguments);
+    EXPECT_EQ(answer.exit_code, exit_wrong_usage);
+    return answer.error;
   }
 
   ScratchDirectory scratch_;
@@ -79,9 +76,10 @@ TEST_F(Keygen, KeepsSecretsToTheirOwner) {
 }
 
 TEST_F(Keygen, SaysWhatToCopyWhereAndNoSecret) {
-  const std::string output = output_of({.directory = directory_, .worker = {}, .client = {}});
+  const test::Answer answer = keygen({});
+  EXPECT_EQ(answer.exit_code, exit_done);
   const std::string path = directory_.string();
-  EXPECT_EQ(output,
+  EXPECT_EQ(answer.output,
             "wrote " + path + "\nThe coordinator keeps it: proofmass-coordinator --keys " + path +
                 "\nIt admits the keys in authorized_workers and authorized_clients.\n"
                 "A host of workers (proofmass-worker --keys) needs a directory with two files, "
@@ -90,27 +88,24 @@ TEST_F(Keygen, SaysWhatToCopyWhereAndNoSecret) {
                 "/coordinator.pub\n"
                 "A person who submits and watches (proofmass --keys) needs a directory with two "
                 "files, readable by its user alone:\n  " +
-                path + "/client.key\n  " + path + "/coordinator.pub\n0");
+                path + "/client.key\n  " + path + "/coordinator.pub\n");
 }
 
 TEST_F(Keygen, ReplacesNothing) {
   make_whole_set();
   const std::string before = text_of(directory_ / "coordinator.key");
   const std::string tail = " (exists; keys are never replaced)";
-  EXPECT_EQ(refusal({.directory = directory_, .worker = {}, .client = {}}),
-            "key file = " + (directory_ / "coordinator.key").string() + tail);
+  EXPECT_EQ(refusal({}), "key file = " + (directory_ / "coordinator.key").string() + tail);
   EXPECT_EQ(text_of(directory_ / "coordinator.key"), before);
 
   std::filesystem::remove(directory_ / "coordinator.key");
-  EXPECT_EQ(refusal({.directory = directory_, .worker = {}, .client = {}}),
-            "key file = " + (directory_ / "coordinator.pub").string() + tail);
+  EXPECT_EQ(refusal({}), "key file = " + (directory_ / "coordinator.pub").string() + tail);
   EXPECT_FALSE(std::filesystem::exists(directory_ / "coordinator.key"));
 }
 
 TEST_F(Keygen, AddsAPairAndItsLine) {
   make_whole_set();
-  const std::string output =
-      output_of({.directory = directory_, .worker = "cluster-2", .client = {}});
+  const std::string output = keygen({"--worker", "cluster-2"}).output;
   EXPECT_NE(output.find((directory_ / "cluster-2.key").string() + "  as worker.key\n"),
             std::string::npos)
       << output;
@@ -125,31 +120,30 @@ TEST_F(Keygen, AddsAPairAndItsLine) {
 TEST_F(Keygen, AddsToAListThatAPersonHasEdited) {
   make_whole_set();
   test::write_text(directory_ / "authorized_clients", "# mine alone", 0644);
-  (void)output_of({.directory = directory_, .worker = {}, .client = "anna"});
+  (void)keygen({"--client", "anna"});
   const std::string key = wire::read_public_key(directory_ / "anna.pub", KeyRole::client).text();
   EXPECT_EQ(text_of(directory_ / "authorized_clients"), "# mine alone\n" + key + " anna\n");
 }
 
 TEST_F(Keygen, RefusesAPairThatMakesNoSense) {
-  const KeygenOptions worker{.directory = directory_, .worker = "w2", .client = {}};
+  const std::vector<std::string> worker{"--worker", "w2"};
   EXPECT_EQ(refusal(worker), "allow-list = " + (directory_ / "authorized_workers").string() +
                                  " (No such file or directory; `proofmass keygen DIR` makes one)");
   make_whole_set();
-  add_worker("w2");
+  (void)keygen(worker);
   EXPECT_EQ(refusal(worker),
             "--worker = w2 (is in " + (directory_ / "authorized_workers").string() + " already)");
-  EXPECT_EQ(
-      refusal({.directory = directory_, .worker = {}, .client = "w2"}),
-      "key file = " + (directory_ / "w2.key").string() + " (exists; keys are never replaced)");
-  EXPECT_EQ(refusal({.directory = directory_, .worker = "../x", .client = {}}),
-            "--worker = ../x (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal({"--client", "w2"}), "key file = " + (directory_ / "w2.key").string() +
+                                             " (exists; keys are never replaced)");
+  EXPECT_EQ(refusal({"--worker", "../x"}), "--worker = ../x (must be 1 to 128 of [A-Za-z0-9._-])");
 }
 
 TEST_F(Keygen, RefusesADirectoryThatCannotBeMade) {
   const std::filesystem::path file = scratch_ / "file";
   test::write_text(file, "", 0644);
-  EXPECT_EQ(refusal({.directory = file / "keys", .worker = {}, .client = {}}),
-            "key directory = " + (file / "keys").string() + " (Not a directory)");
+  const test::Answer answer = test::answer_of({"keygen", file / "keys"});
+  EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
+  EXPECT_EQ(answer.error, "key directory = " + (file / "keys").string() + " (Not a directory)");
 }
 
 }  // namespace

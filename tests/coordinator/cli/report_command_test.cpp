@@ -1,5 +1,3 @@
-#include "coordinator/cli/report_command.hpp"
-
 #include <gtest/gtest.h>
 
 #include <string>
@@ -8,14 +6,12 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
-#include "tests/message_of.hpp"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using test::message_of;
 
 /// 60 runs whose errors of every parameter are 1, 2, ... 60 times 1e-6.
 class ReportCommand : public testing::Test {
@@ -38,7 +34,7 @@ class ReportCommand : public testing::Test {
   }
 
   [[nodiscard]] int answer(const std::string& requirement) const {
-    return print_report({.database = database_, .requirements = {requirement}});
+    return test::answer_of({"report", database_, "--requirement", requirement}).exit_code;
   }
 
   test::TemporaryDirectory directory_;
@@ -46,8 +42,7 @@ class ReportCommand : public testing::Test {
 };
 
 TEST_F(ReportCommand, NeedsADatabase) {
-  EXPECT_THROW((void)print_report({.database = directory_ / "none.db", .requirements = {}}),
-               StoreError);
+  EXPECT_EQ(test::answer_of({"report", directory_ / "none.db"}).exit_code, exit_cannot_be_done);
 }
 
 // 59 runs below the limit show 95 % with 95 % [Wilks1941], and none is above 61e-6.
@@ -58,26 +53,29 @@ TEST_F(ReportCommand, TellsInItsExitCodeWhetherARequirementIsMet) {
 }
 
 TEST_F(ReportCommand, NeedsAllRequirementsMet) {
-  EXPECT_EQ(print_report({.database = database_,
-                          .requirements = {"a_c12 < 61e-6 for 95% with 95%",
-                                           "k2c < 61e-6 for 95% with 95%"}}),
+  EXPECT_EQ(test::answer_of({"report", database_, "--requirement", "a_c12 < 61e-6 for 95% with 95%",
+                             "--requirement", "k2c < 61e-6 for 95% with 95%"})
+                .exit_code,
             exit_done);
-  EXPECT_EQ(print_report({.database = database_,
-                          .requirements = {"a_c12 < 61e-6 for 95% with 95%",
-                                           "k2c < 30e-6 for 95% with 95%"}}),
+  EXPECT_EQ(test::answer_of({"report", database_, "--requirement", "a_c12 < 61e-6 for 95% with 95%",
+                             "--requirement", "k2c < 30e-6 for 95% with 95%"})
+                .exit_code,
             exit_not_met);
 }
 
 TEST_F(ReportCommand, RefusesARequirementThatCannotBeRead) {
-  EXPECT_EQ(message_of<UsageError>([&] { (void)answer("a_c12 is small"); }),
+  const test::Answer refused =
+      test::answer_of({"report", database_, "--requirement", "a_c12 is small"});
+  EXPECT_EQ(refused.exit_code, exit_wrong_usage);
+  EXPECT_EQ(refused.error,
             "requirement = a_c12 is small (must read \"PARAMETER < LIMIT for COVERAGE% with "
             "CONFIDENCE%\" or \"all objectives for COVERAGE% with CONFIDENCE%\")");
 }
 
 TEST_F(ReportCommand, RefusesAnUnknownParameter) {
-  EXPECT_EQ(message_of<UsageError>([&] {
-              (void)print_sensitivity({.database = database_, .parameter = "k2e", .run = {}});
-            }),
+  const test::Answer refused = test::answer_of({"sensitivity", database_, "--parameter", "k2e"});
+  EXPECT_EQ(refused.exit_code, exit_wrong_usage);
+  EXPECT_EQ(refused.error,
             "parameter = k2e (must be one of a_c11_delta_x a_c11_delta_z a_c11_delta_y a_c12 "
             "a_c13 a_d11_prime a_d12 a_d13 k2d k2c)");
 }
@@ -87,17 +85,16 @@ TEST_F(ReportCommand, SaysWhenRunsAreTooFewForSensitivities) {
   const auto few = directory_ / "few.db", enough = directory_ / "enough.db";
   make(few, 15);
   make(enough, 16);
-  EXPECT_EQ(message_of<Error>(
-                [&] { (void)print_sensitivity({.database = few, .parameter = {}, .run = {}}); }),
-            "runs with an estimate = 15 (sensitivities need 16 at least)");
-  EXPECT_EQ(print_sensitivity({.database = enough, .parameter = "k2c", .run = {}}), exit_done);
+  const test::Answer refused = test::answer_of({"sensitivity", few});
+  EXPECT_EQ(refused.exit_code, exit_cannot_be_done);
+  EXPECT_EQ(refused.error, "runs with an estimate = 15 (sensitivities need 16 at least)");
+  EXPECT_EQ(test::answer_of({"sensitivity", enough, "--parameter", "k2c"}).exit_code, exit_done);
 }
 
 TEST_F(ReportCommand, RefusesARunWithoutAnEstimate) {
-  EXPECT_EQ(message_of<InvalidArgument>([&] {
-              (void)print_sensitivity({.database = database_, .parameter = {}, .run = 60});
-            }),
-            "run = 60 (must have an estimate, as 60 runs up to 59 have)");
+  const test::Answer refused = test::answer_of({"sensitivity", database_, "--run", "60"});
+  EXPECT_EQ(refused.exit_code, exit_wrong_usage);
+  EXPECT_EQ(refused.error, "run = 60 (must have an estimate, as 60 runs up to 59 have)");
 }
 
 }  // namespace

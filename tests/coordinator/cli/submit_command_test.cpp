@@ -1,9 +1,8 @@
-#include "coordinator/cli/submit_command.hpp"
-
 #include <gtest/gtest.h>
 
 #include <fstream>
 
+#include "coordinator/cli/commands/submit.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"

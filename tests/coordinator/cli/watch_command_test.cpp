@@ -1,5 +1,3 @@
-#include "coordinator/cli/watch_command.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -9,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "coordinator/cli/commands/watch.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/watch_display.hpp"
 

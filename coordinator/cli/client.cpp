@@ -1,0 +1,96 @@
+#include "coordinator/cli/client.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <iterator>
+#include <utility>
+#include <vector>
+
+#include "coordinator/cli/exit_code.hpp"
+#include "proto/command_line/option_checks.hpp"
+#include "proto/command_line/standard_error.hpp"
+#include "proto/wire/endpoint.hpp"
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr double timeout_s_min = 0.01;
+constexpr double timeout_s_max = 86400.0;
+
+template <typename Row>
+void append(std::vector<Row>& rows, std::vector<Row>& further) {
+  rows.insert(rows.end(), std::make_move_iterator(further.begin()),
+              std::make_move_iterator(further.end()));
+}
+
+}  // namespace
+
+void add_client_options(CLI::App& command, ClientOptions& options) {
+  ClientConnectionConfig& connection = options.connection;
+  command
+      .add_option("--connect", connection.endpoint,
+                  "The coordinator's address for clients,\ne.g. tcp://127.0.0.1:5556")
+      ->envname("PROOFMASS_CONNECT_CLIENTS")
+      ->required();
+  command.add_option("--keys", connection.keys, "Directory with client.key and coordinator.pub")
+      ->envname("PROOFMASS_KEYS");
+  command.add_flag("--insecure-plain", connection.is_plain_waived,
+                   "Allow an address beyond this machine without keys");
+  command
+      .add_option_function<double>(
+          "--timeout",
+          [&connection](double timeout_s) {
+            connection.reply_wait = std::chrono::duration<double>(timeout_s);
+          },
+          "Seconds to wait for an answer; 10 by default")
+      ->check(wire::in_range(timeout_s_min, timeout_s_max));
+  add_json_flag(command, options.format);
+}
+
+void warn_if_plain(const ClientOptions& options) {
+  const ClientConnectionConfig& connection = options.connection;
+  if (connection.keys || wire::is_local(connection.endpoint)) return;
+  wire::say(fmt::format(
+      "proofmass: warning: connect = {} (--insecure-plain: anybody on the way can read and "
+      "change what is said)\n",
+      connection.endpoint));
+}
+
+int with_connection(const ClientOptions& options, const std::function<int(const Ask&)>& work) {
+  ClientConnection connection(options.connection);
+  warn_if_plain(options);
+  return work([&](const wire::ClientRequest& request) { return connection.ask(request); });
+}
+
+// Campaigns are only ever added to the end of a coordinator's list.
+wire::StatusReply whole_status(const Ask& ask) {
+  auto status = reply_of<wire::StatusReply>(ask, wire::StatusRequest{});
+  while (status.campaigns.size() < status.num_campaigns) {
+    auto page = reply_of<wire::StatusReply>(
+        ask, wire::StatusRequest{.first_campaign = status.campaigns.size()});
+    if (page.campaigns.empty()) break;  // It has fewer now: it was started again.
+    append(status.campaigns, page.campaigns);
+  }
+  return status;
+}
+
+wire::WorkersReply all_workers(const Ask& ask) {
+  auto workers = reply_of<wire::WorkersReply>(ask, wire::WorkersRequest{});
+  bool is_more = workers.workers.size() < workers.num_workers && !workers.workers.empty();
+  while (is_more) {
+    auto page = reply_of<wire::WorkersReply>(
+        ask, wire::WorkersRequest{.after_worker_id = workers.workers.back().id.value});
+    is_more = !page.workers.empty();
+    append(workers.workers, page.workers);
+  }
+  return workers;
+}
+
+std::string checked_campaign_name(const std::string& name) {
+  if (wire::is_name(name)) return name;
+  throw UsageError(fmt::format("campaign = \"{}\" (must be 1 to 128 of [A-Za-z0-9._-])", name));
+}
+
+}  // namespace proofmass::coordinator

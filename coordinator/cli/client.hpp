@@ -1,0 +1,58 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/net/client_connection.hpp"
+#include "core/error.hpp"
+#include "proto/wire/client_messages.hpp"
+
+namespace proofmass::coordinator {
+
+/// Arguments of every command that asks a coordinator.
+struct ClientOptions {
+  ClientConnectionConfig connection;
+  OutputFormat format = OutputFormat::text;
+};
+
+/// Declares --connect, --keys, --insecure-plain, --timeout and --json.
+/// @param options  Lives as long as the command.
+void add_client_options(CLI::App& command, ClientOptions& options);
+
+/// Warns on standard error if what is said goes unprotected beyond this machine.
+void warn_if_plain(const ClientOptions& options);
+
+/// How a command asks; a ClientConnection, or a test.
+using Ask = std::function<wire::ClientReply(const wire::ClientRequest&)>;
+
+/// The reply of the kind that the request has.
+/// @throws Error with the coordinator's words if it refuses the request.
+template <typename Reply>
+[[nodiscard]] Reply reply_of(const Ask& ask, const wire::ClientRequest& request) {
+  wire::ClientReply reply = ask(request);
+  if (const auto* const refusal = std::get_if<wire::ErrorReply>(&reply)) throw Error(refusal->text);
+  if (auto* const wanted = std::get_if<Reply>(&reply)) return std::move(*wanted);
+  throw Error("reply = of another kind (must be that of the request)");
+}
+
+/// Connects, and lets `work` ask.
+/// @return What `work` returns.
+/// @throws What ClientConnection and `work` throw.
+[[nodiscard]] int with_connection(const ClientOptions& options,
+                                  const std::function<int(const Ask&)>& work);
+
+/// All campaigns, which a coordinator tells in several replies if they are too many for one.
+/// @throws Error if the coordinator refuses.
+[[nodiscard]] wire::StatusReply whole_status(const Ask& ask);
+
+/// All workers, likewise.
+/// @throws Error if the coordinator refuses.
+[[nodiscard]] wire::WorkersReply all_workers(const Ask& ask);
+
+/// The name. @throws UsageError unless a campaign may have it.
+[[nodiscard]] std::string checked_campaign_name(const std::string& name);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,39 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <system_error>
+
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/store/store.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+struct BackupOptions {
+  std::filesystem::path database;
+  std::filesystem::path destination;
+};
+
+int back_up_database(const BackupOptions& options) {
+  const std::string destination = options.destination.string();
+  std::error_code ignored;
+  if (std::filesystem::exists(options.destination, ignored)) {
+    throw UsageError(fmt::format("destination = {} (exists already)", destination));
+  }
+  Store::open_read_only(options.database).back_up(options.destination);
+  print_lines(fmt::format("wrote {}\n", destination));
+  return exit_done;
+}
+
+}  // namespace
+
+void add_backup(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<BackupOptions>(
+      app, chosen, "backup", "Copy a database, also while it is written", back_up_database);
+  command.add_option("DB", options.database, database_text)->required();
+  command.add_option("DESTINATION", options.destination, "File to make")->required();
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "coordinator/cli/command_line.hpp"
+
+namespace proofmass::coordinator {
+
+/// How a command prints what it found.
+enum class OutputFormat : std::uint8_t { text, json };
+
+/// A command that is being declared, and what its arguments are written to.
+template <typename Options>
+struct Declared {
+  CLI::App& command;
+  Options& options;  ///< Lives as long as `command`.
+};
+
+/// Declares a command that calls `run` with its options.
+/// @param chosen  Set while the arguments are parsed; outlives `app`.
+template <typename Options>
+Declared<Options> add_command(CLI::App& app, Command& chosen, const std::string& name,
+                              const std::string& description, int (*run)(const Options&)) {
+  const auto options = std::make_shared<Options>();
+  CLI::App& command = *app.add_subcommand(name, description);
+  command.callback([options, run, &chosen] { chosen = [options, run] { return run(*options); }; });
+  return {command, *options};
+}
+
+/// Declares --json.
+/// @param format  Lives as long as the command.
+inline void add_json_flag(CLI::App& command, OutputFormat& format) {
+  command.add_flag_callback(
+      "--json", [&format] { format = OutputFormat::json; }, "Print JSON");
+}
+
+inline constexpr const char* database_text = "Database of a campaign";
+
+// A function for each command, in the file of its name; arguments as of add_command(). What fails
+// is thrown: see run_program() for what becomes of it.
+
+void add_run(CLI::App& app, Command& chosen);
+void add_init(CLI::App& app, Command& chosen);
+void add_keygen(CLI::App& app, Command& chosen);
+
+// Of databases.
+void add_report(CLI::App& app, Command& chosen);
+void add_sensitivity(CLI::App& app, Command& chosen);
+void add_query(CLI::App& app, Command& chosen);
+void add_verify(CLI::App& app, Command& chosen);
+void add_export(CLI::App& app, Command& chosen);
+void add_backup(CLI::App& app, Command& chosen);
+void add_compare(CLI::App& app, Command& chosen);
+void add_list(CLI::App& app, Command& chosen);
+void add_tag(CLI::App& app, Command& chosen);
+void add_note(CLI::App& app, Command& chosen);
+
+// Of clients of a coordinator.
+void add_submit(CLI::App& app, Command& chosen);
+void add_status(CLI::App& app, Command& chosen);
+void add_watch(CLI::App& app, Command& chosen);
+void add_control(CLI::App& app, Command& chosen);  ///< `pause`, `resume` and `cancel`.
+void add_workers(CLI::App& app, Command& chosen);
+void add_release(CLI::App& app, Command& chosen);
+
+}  // namespace proofmass::coordinator

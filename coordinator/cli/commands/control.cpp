@@ -1,0 +1,50 @@
+#include <string>
+
+#include "coordinator/cli/client.hpp"
+#include "coordinator/cli/client_json.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "proto/wire/client_codec.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using wire::ControlAction;
+
+struct ControlOptions {
+  ClientOptions client;
+  ControlAction action = ControlAction::pause;
+  std::string campaign;
+};
+
+int control_campaign(const ControlOptions& options) {
+  const wire::ControlRequest request{.action = options.action,
+                                     .campaign = checked_campaign_name(options.campaign)};
+  return with_connection(options.client, [&](const Ask& ask) {
+    const auto done = reply_of<wire::DoneReply>(ask, request);
+    const bool is_json = options.client.format == OutputFormat::json;
+    print_lines(is_json ? done_json(wire::name_of(request.action), request.campaign, done)
+                        : done.text + "\n");
+    return exit_done;
+  });
+}
+
+void add_action(CLI::App& app, Command& chosen, ControlAction action,
+                const std::string& description) {
+  auto [command, options] = add_command<ControlOptions>(
+      app, chosen, std::string(wire::name_of(action)), description, control_campaign);
+  options.action = action;
+  command.add_option("NAME", options.campaign, "Campaign")->required();
+  add_client_options(command, options.client);
+}
+
+}  // namespace
+
+void add_control(CLI::App& app, Command& chosen) {
+  add_action(app, chosen, ControlAction::pause, "Lend no more runs of a campaign for now");
+  add_action(app, chosen, ControlAction::resume, "Go on with a paused or cancelled campaign");
+  add_action(app, chosen, ControlAction::cancel, "Drop a campaign's open runs; results stay");
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,169 @@
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/net/allow_list.hpp"
+#include "core/error.hpp"
+#include "proto/link/key_files.hpp"
+#include "proto/link/whole_file.hpp"
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using wire::KeyRole;
+
+constexpr mode_t list_mode = 0644;
+
+struct KeygenOptions {
+  std::filesystem::path directory;
+  std::optional<std::string> worker;  ///< Adds a pair of this name for another worker.
+  std::optional<std::string> client;  ///< Likewise for a client.
+};
+
+std::string_view list_name(KeyRole role) {
+  return role == KeyRole::worker ? wire::authorized_workers_name : wire::authorized_clients_name;
+}
+
+wire::Domain domain_of(KeyRole role) {
+  return role == KeyRole::worker ? wire::Domain::workers : wire::Domain::clients;
+}
+
+std::string list_head(KeyRole role) {
+  const bool is_client = role == KeyRole::client;
+  return fmt::format(
+      "# Public keys of the {0}s that may connect, one line `KEY NAME{1}` each.\n{2}"
+      "# Remove a line to revoke a key; a running coordinator notices within a second.\n",
+      to_text(role), is_client ? " [RIGHTS]" : "",
+      is_client ? "# RIGHTS: a comma list of observe, submit (and control what the same NAME\n"
+                  "# submitted), control (everybody's campaigns); observe,submit if left out.\n"
+                : "");
+}
+
+std::string list_line(const wire::KeyPair& pair, std::string_view name,
+                      std::string_view rights = "") {
+  return fmt::format("{} {}{}{}\n", pair.public_key.text(), name, rights.empty() ? "" : " ",
+                     rights);
+}
+
+/// Whoever sets a coordinator up may control all of its campaigns.
+std::string_view first_rights(KeyRole role) {
+  return role == KeyRole::client ? "observe,submit,control" : "";
+}
+
+void refuse_to_replace(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(std::filesystem::symlink_status(file))) return;
+  throw UsageError(fmt::format("key file = {} (exists; keys are never replaced)", file.string()));
+}
+
+void make_directory(const std::filesystem::path& directory) {
+  if (::mkdir(directory.c_str(), 0700) == 0 || errno == EEXIST) return;
+  throw Error(fmt::format("key directory = {} ({})", directory.string(), std::strerror(errno)));
+}
+
+void make_whole_set(const std::filesystem::path& directory) {
+  for (const std::string_view name :
+       {"coordinator.key", "coordinator.pub", "worker.key", "worker.pub", "client.key",
+        "client.pub", "authorized_workers", "authorized_clients"}) {
+    refuse_to_replace(directory / name);
+  }
+  make_directory(directory);
+  wire::write_key_pair(directory, to_text(KeyRole::coordinator), KeyRole::coordinator,
+                       wire::make_key_pair());
+  for (const KeyRole role : {KeyRole::worker, KeyRole::client}) {
+    const wire::KeyPair pair = wire::make_key_pair();
+    wire::write_key_pair(directory, to_text(role), role, pair);
+    wire::write_whole_file("allow-list", directory / list_name(role),
+                           list_head(role) + list_line(pair, to_text(role), first_rights(role)),
+                           list_mode, wire::IfExists::refuse);
+  }
+}
+
+std::string read_list(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) {
+    throw UsageError(fmt::format("allow-list = {} ({}; `proofmass keygen DIR` makes one)",
+                                 file.string(), std::strerror(errno)));
+  }
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+void add_pair(const std::filesystem::path& directory, KeyRole role, const std::string& name) {
+  if (!wire::is_name(name)) {
+    throw UsageError(
+        fmt::format("--{} = {} (must be 1 to 128 of [A-Za-z0-9._-])", to_text(role), name));
+  }
+  const std::filesystem::path list = directory / list_name(role);
+  std::string text = read_list(list);
+  for (const auto& [key, owner] : parse_allow_list(text, domain_of(role), list)) {
+    if (owner.name != name) continue;
+    throw UsageError(
+        fmt::format("--{} = {} (is in {} already)", to_text(role), name, list.string()));
+  }
+  for (const std::string_view ending : {"key", "pub"}) {
+    refuse_to_replace(directory / fmt::format("{}.{}", name, ending));
+  }
+  const wire::KeyPair pair = wire::make_key_pair();
+  wire::write_key_pair(directory, name, role, pair);
+  if (!text.empty() && text.back() != '\n') text += '\n';
+  wire::write_whole_file("allow-list", list, text + list_line(pair, name), list_mode,
+                         wire::IfExists::replace);
+}
+
+void say_where_to_copy(const std::filesystem::path& directory, KeyRole role,
+                       std::string_view name) {
+  const bool is_renamed = name != to_text(role);
+  fmt::print("{0} needs a directory with two files, readable by its user alone:\n  {1}{2}\n  {3}\n",
+             role == KeyRole::worker ? "A host of workers (proofmass-worker --keys)"
+                                     : "A person who submits and watches (proofmass --keys)",
+             (directory / fmt::format("{}.key", name)).string(),
+             is_renamed ? fmt::format("  as {}.key", to_text(role)) : "",
+             (directory / "coordinator.pub").string());
+}
+
+/// Makes a directory with the keys of a coordinator, of workers and of clients, and the lists of
+/// who may connect; or adds pairs to one. Says what to copy where.
+int make_keys(const KeygenOptions& options) {
+  const std::filesystem::path& directory = options.directory;
+  if (options.worker) {
+    add_pair(directory, KeyRole::worker, *options.worker);
+    say_where_to_copy(directory, KeyRole::worker, *options.worker);
+  }
+  if (options.client) {
+    add_pair(directory, KeyRole::client, *options.client);
+    say_where_to_copy(directory, KeyRole::client, *options.client);
+  }
+  if (options.worker || options.client) return exit_done;
+  make_whole_set(directory);
+  fmt::print(
+      "wrote {0}\nThe coordinator keeps it: proofmass-coordinator --keys {0}\n"
+      "It admits the keys in authorized_workers and authorized_clients.\n",
+      directory.string());
+  say_where_to_copy(directory, KeyRole::worker, to_text(KeyRole::worker));
+  say_where_to_copy(directory, KeyRole::client, to_text(KeyRole::client));
+  return exit_done;
+}
+
+}  // namespace
+
+void add_keygen(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<KeygenOptions>(
+      app, chosen, "keygen", "Make keys of a coordinator, workers, clients", make_keys);
+  command.add_option("DIRECTORY", options.directory, "Directory to make, or to add a key to")
+      ->required();
+  command.add_option("--worker", options.worker, "Add a key of this name for a worker");
+  command.add_option("--client", options.client, "Add a key of this name for a client");
+}
+
+}  // namespace proofmass::coordinator

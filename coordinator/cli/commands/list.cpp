@@ -1,0 +1,34 @@
+#include <filesystem>
+#include <vector>
+
+#include "coordinator/archive/listing.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+struct ListOptions {
+  std::vector<std::filesystem::path> places;  ///< Files and directories; empty for this one.
+  OutputFormat format = OutputFormat::text;
+};
+
+int list_databases(const ListOptions& options) {
+  const std::vector<std::filesystem::path> here{"."};
+  const auto campaigns = list_campaigns(options.places.empty() ? here : options.places);
+  const auto print = options.format == OutputFormat::json ? listing_json : listing_text;
+  print_lines(print(campaigns));
+  return exit_done;
+}
+
+}  // namespace
+
+void add_list(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<ListOptions>(
+      app, chosen, "list", "List the campaigns of directories and files", list_databases);
+  command.add_option("PLACE", options.places, "Directories, databases; this directory by default");
+  add_json_flag(command, options.format);
+}
+
+}  // namespace proofmass::coordinator

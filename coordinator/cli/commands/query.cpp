@@ -1,0 +1,140 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <chrono>
+#include <cstddef>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/cli/watch_display.hpp"
+#include "coordinator/query/query_process.hpp"
+#include "coordinator/query/row_writer.hpp"
+#include "proto/command_line/option_checks.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr double timeout_s_max = 86'400.0;
+constexpr std::size_t table_rows_max = 1'000'000;
+
+struct QueryOptions {
+  std::filesystem::path database;
+  std::vector<std::string> attached;  ///< `NAME=FILE`.
+  std::string sql;                    ///< `-`: to be read from standard input.
+  RowFormat format = RowFormat::table;
+  double timeout_s = 60.0;
+  std::size_t num_rows_max = 1000;  ///< Of a table.
+};
+
+std::string read_standard_input() {
+  std::string text;
+  std::array<char, 4096> buffer{};
+  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), stdin)) {
+    text.append(buffer.data(), size);
+    if (text.size() > sql_size_max) {
+      throw UsageError(
+          fmt::format("sql = - (standard input has more than {} bytes)", sql_size_max));
+    }
+  }
+  if (std::ferror(stdin) != 0) {
+    throw Error(fmt::format("standard input: {}", std::strerror(errno)));
+  }
+  return text;
+}
+
+std::optional<std::size_t> terminal_columns() {
+  if (isatty(fileno(stdout)) == 0) return std::nullopt;
+  return screen_size_of(stdout).columns;
+}
+
+// `NAME=FILE`; the names differ, and letters in them have no case.
+std::vector<AttachedFile> attached_files_of(const std::vector<std::string>& texts) {
+  std::vector<AttachedFile> files;
+  std::set<std::string> names;
+  for (const std::string& text : texts) {
+    const auto refuse = [&](std::string_view why) {
+      throw UsageError(fmt::format("--attach {} ({})", text, why));
+    };
+    const std::size_t sign = text.find('=');
+    if (sign == std::string::npos || sign + 1 == text.size()) refuse("must be NAME=FILE");
+    AttachedFile file{.name = text.substr(0, sign), .file = text.substr(sign + 1)};
+    try {
+      check_attached_name(file.name);
+    } catch (const InvalidArgument& error) {
+      refuse(error.what());
+    }
+    std::string small = file.name;
+    std::ranges::transform(small, small.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (!names.insert(small).second) refuse("its name is attached already");
+    files.push_back(std::move(file));
+  }
+  if (files.size() > attached_files_max) {
+    throw UsageError(
+        fmt::format("--attach = {} files (must be at most {})", files.size(), attached_files_max));
+  }
+  return files;
+}
+
+// SIGINT and SIGTERM end it in order.
+int query_database(const QueryOptions& options) {
+  const QueryFiles files(options.database, attached_files_of(options.attached));
+  // While it waits for input, a signal ends the process at once.
+  const std::string sql = options.sql == "-" ? read_standard_input() : options.sql;
+  const auto& stop = catch_stop_signals(OnTerminate::stop_now);
+  const QueryLimits limits{.time_limit = std::chrono::duration<double>(options.timeout_s),
+                           .is_interrupted = [&] { return stop != StopRequest::none; }};
+  const TableLimits table{.num_rows_max = options.num_rows_max, .num_columns = terminal_columns()};
+  const QueryOutput output{.format = options.format,
+                           .table = table,
+                           .sink = write_standard_output,
+                           .flush = flush_standard_output};
+  const QueryEnd end = run_query_in_process(files, sql, limits, output);
+  flush_standard_output();
+  return end == QueryEnd::complete ? exit_done : exit_interrupted;
+}
+
+}  // namespace
+
+void add_query(CLI::App& app, Command& chosen) {
+  static const std::map<std::string, RowFormat> formats{{"table", RowFormat::table},
+                                                        {"csv", RowFormat::csv},
+                                                        {"json", RowFormat::json},
+                                                        {"markdown", RowFormat::markdown}};
+  auto [command, options] = add_command<QueryOptions>(
+      app, chosen, "query", "Ask a database a question in SQL", query_database);
+  command.add_option("DB", options.database, database_text)->required();
+  command.add_option("SQL", options.sql, "One statement that reads; - for standard input")
+      ->required();
+  command
+      .add_option("--attach", options.attached,
+                  "NAME=FILE: another campaign, whose tables are\n"
+                  "NAME.run_result and so on; may be repeated")
+      ->allow_extra_args(false);
+  wire::add_choice(command, "--format", options.format, formats,
+                   "table, csv, json or markdown; table by default");
+  command.add_option("--timeout", options.timeout_s, "Seconds that it may take")
+      ->check(wire::in_range(0.001, timeout_s_max))
+      ->capture_default_str();
+  command.add_option("--rows-max", options.num_rows_max, "Rows that a table shows")
+      ->check(wire::in_range(std::size_t{1}, table_rows_max))
+      ->capture_default_str();
+}
+
+}  // namespace proofmass::coordinator

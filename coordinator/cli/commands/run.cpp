@@ -1,0 +1,288 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/campaign_start.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/local_workers.hpp"
+#include "coordinator/cli/override_options.hpp"
+#include "coordinator/cli/progress_display.hpp"
+#include "coordinator/cli/signal_thread.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/net/private_endpoint.hpp"
+#include "coordinator/net/service.hpp"
+#include "coordinator/report/report.hpp"
+#include "coordinator/report/summarise.hpp"
+#include "coordinator/store/store_error.hpp"
+#include "core/campaign/model.hpp"
+#include "core/campaign/run_ranges.hpp"
+#include "proto/command_line/option_checks.hpp"
+#include "proto/command_line/standard_error.hpp"
+#include "proto/text/visible_text.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr unsigned workers_max = 1024;
+
+struct RunOptions {
+  std::filesystem::path campaign_file;
+  std::optional<std::filesystem::path> database;  ///< By default STEM.db in the current directory.
+  Overrides overrides;
+  std::optional<unsigned> num_workers;  ///< By default one for each processor.
+  double audit_fraction = 0.0;          ///< Of the runs that are missing, computed twice; 0 to 1.
+  StopOptions stop;
+  bool is_quiet = false;
+};
+
+std::filesystem::path database_of(const RunOptions& options) {
+  return options.database.value_or(options.campaign_file.stem().string() + ".db");
+}
+
+std::uint64_t num_missing(const Store& store) {
+  return store.num_runs() - num_runs_in(store.finished_runs());
+}
+
+/// No more than there are batches: runs of one batch take no longer than one of them.
+std::uint64_t num_workers(const RunOptions& options, std::uint64_t num_runs_missing) {
+  const unsigned num_processors = std::max(1U, std::thread::hardware_concurrency());
+  const std::uint64_t num_batches =
+      (num_runs_missing + model().batch_size() - 1) / model().batch_size();
+  return std::min<std::uint64_t>(options.num_workers.value_or(num_processors), num_batches);
+}
+
+StopPlan plan_of(const RunOptions& options, std::uint64_t num_runs) {
+  StopPlan plan{.stop_rule = options.stop.rule,
+                .num_runs_max = {},
+                .failures_max = options.stop.failures_max};
+  if (!plan.stop_rule.empty()) plan.num_runs_max = num_runs;
+  return plan;
+}
+
+/// The file of a campaign that asks for more runs until its stop rule is reached.
+class GrowingFile final : public CampaignFiles {
+ public:
+  [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan&,
+                                    const Asker&) override {
+    throw UsageError(fmt::format("submit = {} (nobody is there to submit)", wanted.name));
+  }
+  [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,
+                                                       const Campaign& wanted) override {
+    store.extend(wanted, wanted.definition(TableColumns::left_out).text);
+    return wanted.clone();
+  }
+  std::optional<std::uint64_t> summarise(
+      const std::filesystem::path& file, const Campaign& campaign,
+      const std::function<void(const std::function<void(Store&)>&)>& write) override {
+    return summarise_file(file, campaign, write);
+  }
+};
+
+/// The service of one campaign for the workers of this process.
+ServiceConfig service_config(const PrivateEndpoint& endpoint, std::uint64_t num_workers,
+                             CampaignFiles& files) {
+  ServiceConfig config;
+  config.files = &files;
+  config.workers_endpoint = endpoint.address();
+  config.end = ServiceEnd::when_done;
+  config.given_up = GivenUpRuns::retry;
+  config.version = PROOFMASS_VERSION;
+  config.dispatch.reference_digest = model().reference_digest(best_instruction_set());
+  config.dispatch.reattach_wait = Duration::zero();  // Workers of the last time ended with it.
+  // All workers may die at once, and runs must be found guilty before the machine is.
+  config.dispatch.crashes_per_host_max =
+      config.dispatch.crashes_per_run_max * static_cast<std::uint32_t>(num_workers + 1);
+  return config;
+}
+
+/// What nobody needs to see while all goes well goes into the database only.
+Log log_to(ProgressDisplay& display) {
+  return [&display](const Event& event) {
+    // StorageNotes tells of the storage.
+    if (event.severity != Severity::error || event.kind == "storage_failed") return;
+    display.note("proofmass: error: " + to_text(event));
+  };
+}
+
+/// Tells when nothing can be stored, why, and when that is over.
+class StorageNotes {
+ public:
+  StorageNotes(ProgressDisplay& display, Duration retry_after)
+      : display_(display), retry_after_s_(std::chrono::duration<double>(retry_after).count()) {}
+
+  void update(const wire::CampaignStatus& status) {
+    if (status.storage_failure == shown_) return;
+    shown_ = status.storage_failure;
+    if (shown_.empty()) return display_.note("proofmass: all results are stored again");
+    display_.note(fmt::format(
+        "proofmass: error: {}\nproofmass: results are kept, and stored when that is possible; "
+        "tried again every {} s",
+        wire::visible_text(shown_), retry_after_s_));
+  }
+
+ private:
+  ProgressDisplay& display_;
+  double retry_after_s_;
+  std::string shown_;
+};
+
+void make_active(Store& store, const RunOptions& options) {
+  const Entry control = CampaignControl{.phase = wire::CampaignPhase::active,
+                                        .priority = store.control().priority,
+                                        .audit_fraction = options.audit_fraction};
+  (void)store.write({&control, 1});
+}
+
+/// What came of a campaign.
+struct Outcome {
+  Store store;
+  bool is_done = false;  ///< Every run is stored or given up, and the stop rule is decided.
+};
+
+/// Computes the missing runs, up to `num_runs` in all.
+Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOptions& options) {
+  const bool is_decided =
+      options.stop.rule.empty() || campaign.store.control().phase == wire::CampaignPhase::finished;
+  if (num_missing(campaign.store) == 0 && is_decided) {
+    return {.store = std::move(campaign.store), .is_done = true};
+  }
+  make_active(campaign.store, options);
+  const SignalThread signals;
+  const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
+  ProgressDisplay display(options.is_quiet ? DisplayMode::quiet : display_mode_for(stderr), stderr);
+  const PrivateEndpoint endpoint;
+  GrowingFile file;
+  const std::uint64_t num_local =
+      num_workers(options, num_runs - num_runs_in(campaign.store.finished_runs()));
+  std::vector<ServedCampaign> campaigns;
+  campaigns.push_back(std::move(campaign));
+  const ServiceConfig config = service_config(endpoint, num_local, file);
+  Service service(std::move(campaigns), config, log_to(display));
+  LocalWorkers workers(service, display);
+  StorageNotes storage(display, config.writer.retry_after);
+  const auto show = [&] {
+    const wire::CampaignStatus status = service.campaigns().front();
+    storage.update(status);
+    display.update(status);
+  };
+  workers.start(num_local);
+  service.run(stop, [&] {
+    if (stop == StopRequest::none && !service.is_done()) workers.replace_dead();
+    show();
+  });
+  show();
+  const bool is_done = service.is_done();
+  return {.store = std::move(service.close().front().store), .is_done = is_done};
+}
+
+/// What is written to a file that has lost its name is lost with it.
+void require_in_place(const Store& store, const std::filesystem::path& database) {
+  if (store.is_in_place()) return;
+  throw StoreError(fmt::format(
+      "campaign file = {} (was removed or replaced while the campaign ran; results that "
+      "are not in what is there now are lost, and the same command computes them again)",
+      database.string()));
+}
+
+int say_interrupted(const Store& store, const std::filesystem::path& database) {
+  const std::uint64_t num_runs = store.num_runs();
+  wire::say(
+      fmt::format("proofmass: interrupted; {} of {} runs are in {}\n"
+                  "proofmass: the same command computes the others\n",
+                  num_runs - num_missing(store), num_runs, database.string()));
+  return exit_interrupted;
+}
+
+/// The file alone holds everything, or it is said that its log does too.
+void bring_to_rest(Store& store, const std::filesystem::path& database) {
+  const std::optional<std::string> reason = store.rest();
+  if (!reason) return;
+  wire::say(
+      fmt::format("proofmass: warning: campaign file = {0} ({1}; copy {2}-wal with it, or make "
+                  "copies with `proofmass backup`)\n",
+                  database.string(), *reason, database.filename().string()));
+}
+
+/// Statistics of a file that cannot be written stay as they are; what is stored is said.
+int end_interrupted(Store& store, const Campaign& campaign, const std::filesystem::path& database) {
+  try {
+    update_statistics(store, campaign);
+    bring_to_rest(store, database);
+  } catch (const StoreError& error) {
+    wire::say(fmt::format("proofmass: error: {}\n", wire::visible_text(error.what())));
+  }
+  require_in_place(store, database);
+  return say_interrupted(store, database);
+}
+
+int say_given_up(std::span<const RunRange> given_up, std::uint64_t num_runs) {
+  const RunSet runs(given_up);
+  wire::say(
+      fmt::format("proofmass: error: {} of {} runs given up, having crashed their workers: {}\n"
+                  "proofmass: the same command tries them again\n",
+                  runs.size(), num_runs, to_text(runs)));
+  return exit_cannot_be_done;
+}
+
+int say_cancelled(const Store& store, std::uint64_t failures_max) {
+  wire::say(fmt::format(
+      "proofmass: error: {} of {} runs given up or without an estimate (at most {} with "
+      "--failures); cancelled\n",
+      store.num_without_estimate() + num_runs_in(store.given_up_runs()), store.num_runs(),
+      failures_max));
+  return exit_cannot_be_done;
+}
+
+/// Runs what is missing of a campaign with local workers and prints its tables. A run that crashes
+/// its workers is given up, and tried again the next time.
+/// @return An ExitCode; exit_not_met if all runs together do not reach the stop rule.
+int run_campaign(const RunOptions& options) {
+  const std::unique_ptr<Campaign> campaign =
+      read_campaign(options.campaign_file, options.overrides);
+  const std::filesystem::path database = database_of(options);
+  Outcome outcome =
+      compute(open_or_create(*campaign, plan_of(options, campaign->num_runs), database),
+              campaign->num_runs, options);
+  if (!outcome.is_done) return end_interrupted(outcome.store, *campaign, database);
+  update_statistics(outcome.store, *campaign);
+  require_in_place(outcome.store, database);
+  bring_to_rest(outcome.store, database);
+  print_lines(report_text(outcome.store, *campaign));
+  if (outcome.store.control().phase == wire::CampaignPhase::cancelled) {
+    return say_cancelled(outcome.store, options.stop.failures_max.value_or(0));
+  }
+  const std::vector<RunRange> given_up = outcome.store.given_up_runs();
+  if (!given_up.empty()) return say_given_up(given_up, outcome.store.num_runs());
+  return is_rule_missed(outcome.store) ? exit_not_met : exit_done;
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<RunOptions>(
+      app, chosen, "run", "Run a campaign, or what is missing of it", run_campaign);
+  command.add_option("FILE", options.campaign_file, "Campaign file (TOML)")->required();
+  command.add_option("--db", options.database, "Database; FILE's stem with .db, here, by default");
+  add_override_options(command, options.overrides);
+  add_audit_option(command, options.audit_fraction);
+  add_stop_options(command, options.stop);
+  command
+      .add_option("--workers", options.num_workers, "Worker processes; one a processor by default")
+      ->check(wire::in_range(1U, workers_max));
+  command.add_flag("--quiet", options.is_quiet, "Show no progress");
+}
+
+}  // namespace proofmass::coordinator

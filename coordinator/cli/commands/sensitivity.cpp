@@ -1,0 +1,85 @@
+#include "core/statistics/sensitivity.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/report/sensitivity_text.hpp"
+#include "coordinator/store/store.hpp"
+#include "core/campaign/dispersion.hpp"
+#include "core/campaign/identifiers.hpp"
+#include "core/campaign/model.hpp"
+#include "proto/command_line/option_checks.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+struct SensitivityOptions {
+  std::filesystem::path database;
+  std::optional<std::string> parameter;  ///< Name; all by default.
+  std::optional<std::uint64_t> run;      ///< To be explained.
+  std::size_t num_rows = 5;              ///< Drawn quantities that are named for each error.
+};
+
+std::size_t quantity_named(std::string_view name) {
+  const ResultSchema& schema = model().results();
+  if (const std::optional<std::size_t> found = find_quantity(schema, name)) return *found;
+  throw UsageError(fmt::format("parameter = {} (must be one of {})", name,
+                               fmt::join(quantity_names(schema), " ")));
+}
+
+int print_sensitivity(const SensitivityOptions& options) {
+  std::vector<std::size_t> quantities;
+  if (options.parameter) quantities.push_back(quantity_named(*options.parameter));
+  const Store store = Store::open_read_only(options.database);
+  std::optional<RunIndex> explained;
+  if (options.run) explained = RunIndex{*options.run};
+  const DrawnRuns drawn =
+      read_drawn_runs(store, *stored_campaign(store), sensitivity_runs_max, explained);
+  if (drawn.runs.size() < sensitivity_values_min) {
+    throw Error(fmt::format("runs with an estimate = {} (sensitivities need {} at least)",
+                            drawn.runs.size(), sensitivity_values_min));
+  }
+  if (explained) {
+    const std::size_t quantity =
+        quantities.empty() ? worst_quantity_of(drawn, *explained) : quantities.front();
+    print_lines(explanation_text(drawn, quantity, *explained, options.num_rows));
+    return exit_done;
+  }
+  if (quantities.empty()) {
+    for (std::size_t i = 0; i < drawn.errors.size(); ++i) quantities.push_back(i);
+  }
+  std::string_view separator = "";
+  for (const std::size_t quantity : quantities) {
+    print_lines(
+        fmt::format("{}{}", separator, sensitivity_text(drawn, quantity, options.num_rows)));
+    separator = "\n";
+  }
+  return exit_done;
+}
+
+}  // namespace
+
+void add_sensitivity(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<SensitivityOptions>(
+      app, chosen, "sensitivity", "Print which drawn quantities drive the errors",
+      print_sensitivity);
+  command.add_option("DB", options.database, database_text)->required();
+  command.add_option("--parameter", options.parameter, "Of this parameter; all by default");
+  command.add_option("--run", options.run, "Why this run is as far off as it is")
+      ->check(wire::in_range(std::uint64_t{0}, num_runs_max - 1));
+  command.add_option("--rows", options.num_rows, "Quantities to name for each error")
+      ->check(wire::in_range(std::size_t{1},
+                             model().drawn().size() + model().results().quantities.size()))
+      ->capture_default_str();
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,63 @@
+#include "coordinator/cli/commands/submit.hpp"
+
+#include "coordinator/cli/client_json.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "core/error.hpp"
+#include "proto/command_line/option_checks.hpp"
+#include "proto/wire/client_codec.hpp"
+
+namespace proofmass::coordinator {
+
+std::unique_ptr<Campaign> campaign_to_submit(const SubmitOptions& options) {
+  std::unique_ptr<Campaign> campaign = read_campaign(options.campaign_file, options.overrides);
+  if (options.name) {
+    campaign->name = *options.name;
+    try {
+      campaign->validate();
+    } catch (const ConfigError& error) {
+      throw UsageError(error.what());
+    }
+  }
+  return campaign;
+}
+
+wire::SubmitRequest submit_request(const SubmitOptions& options, const Campaign& campaign) {
+  return {.definition = campaign.definition(TableColumns::included),
+          .priority = options.priority,
+          .audit_fraction = options.audit_fraction,
+          .stop_rule = options.stop.rule,
+          .failures_max = options.stop.failures_max};
+}
+
+namespace {
+
+// A new campaign, or one that is there and has more runs now.
+int submit_campaign(const SubmitOptions& options) {
+  const std::unique_ptr<Campaign> campaign = campaign_to_submit(options);
+  const wire::SubmitRequest request = submit_request(options, *campaign);
+  return with_connection(options.client, [&](const Ask& ask) {
+    const auto done = reply_of<wire::DoneReply>(ask, request);
+    const bool is_json = options.client.format == OutputFormat::json;
+    print_lines(is_json ? done_json("submit", campaign->name, done) : done.text + "\n");
+    return exit_done;
+  });
+}
+
+}  // namespace
+
+void add_submit(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<SubmitOptions>(
+      app, chosen, "submit", "Hand a campaign or more runs to a coordinator", submit_campaign);
+  command.add_option("FILE", options.campaign_file, "Campaign file (TOML)")->required();
+  command.add_option("--name", options.name, "Name of the campaign; the one in FILE by default");
+  command.add_option("--priority", options.priority, "Runs of a higher one are computed first")
+      ->check(wire::in_range(-wire::priority_max, wire::priority_max));
+  add_audit_option(command, options.audit_fraction);
+  add_stop_options(command, options.stop);
+  add_override_options(command, options.overrides);
+  add_client_options(command, options.client);
+}
+
+}  // namespace proofmass::coordinator

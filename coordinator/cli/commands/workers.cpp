@@ -1,0 +1,28 @@
+#include "coordinator/cli/client.hpp"
+#include "coordinator/cli/client_json.hpp"
+#include "coordinator/cli/client_tables.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+int show_workers(const ClientOptions& options) {
+  return with_connection(options, [&](const Ask& ask) {
+    const wire::WorkersReply workers = all_workers(ask);
+    print_lines(options.format == OutputFormat::json ? workers_json(workers)
+                                                     : workers_table(workers));
+    return exit_done;
+  });
+}
+
+}  // namespace
+
+void add_workers(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<ClientOptions>(
+      app, chosen, "workers", "Show the workers of a coordinator", show_workers);
+  add_client_options(command, options);
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,266 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/campaign_folder.hpp"
+#include "coordinator/cli/command_line.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
+#include "coordinator/cli/signal_thread.hpp"
+#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/net/service.hpp"
+#include "coordinator/net/submission_limits.hpp"
+#include "coordinator/report/report.hpp"
+#include "core/campaign/model.hpp"
+#include "proto/command_line/option_checks.hpp"
+#include "proto/link/init_system.hpp"
+#include "proto/link/log.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr double drain_time_s_max = 366.0 * 86400.0;
+constexpr std::uint64_t memory_mib_min = 64;
+constexpr std::uint64_t memory_mib_max = std::uint64_t{1} << 24;
+constexpr std::size_t campaigns_per_key_max = 1'000'000;
+constexpr std::uint64_t bytes_per_key_max = std::uint64_t{1} << 50;
+
+/// Arguments of `proofmass-coordinator`.
+struct ServeOptions {
+  std::filesystem::path directory;              ///< Of the campaign files.
+  std::string endpoint;                         ///< For workers.
+  std::optional<std::string> clients_endpoint;  ///< By default a socket in the directory.
+  std::optional<std::filesystem::path> keys;    ///< Directory of `proofmass keygen`.
+  bool is_plain_waived = false;
+  ServiceEnd end = ServiceEnd::never;
+  double drain_time_s = 120.0;          ///< ≥ 0.
+  std::uint64_t memory_mib_max = 2048;  ///< ≥ 64; of the process.
+  SubmissionLimits limits;              ///< Of each client's key.
+  wire::LogFormat log_format = wire::LogFormat::text;
+  std::string faults;       ///< As FaultPlan::parse() reads them.
+  double time_scale = 1.0;  ///< > 0; of all that is waited for. Below 1 in tests of this program.
+  std::vector<std::filesystem::path> campaign_files;  ///< To be served beside those that are there.
+};
+
+/// Tells the init system how the coordinator is.
+class Notices {
+ public:
+  void on_tick(const Service& service, StopRequest stop) {
+    using std::chrono::steady_clock;
+    if (stop != StopRequest::none && !std::exchange(is_stopping_, true)) notify("STOPPING=1");
+    const steady_clock::time_point now = steady_clock::now();
+    const auto watchdog = init_system_.watchdog_interval();
+    if (watchdog && take_turn(watchdog_at_, now, *watchdog)) notify("WATCHDOG=1");
+    if (!take_turn(status_at_, now, status_interval)) return;
+    std::size_t num_active = 0;
+    for (const wire::CampaignStatus& campaign : service.campaigns()) {
+      num_active += campaign.phase == wire::CampaignPhase::active ? 1U : 0U;
+    }
+    notify(fmt::format("STATUS={} campaigns to compute", num_active));
+  }
+  void ready() const { notify("READY=1"); }
+
+ private:
+  static constexpr std::chrono::seconds status_interval{5};
+
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  static bool take_turn(TimePoint& at, TimePoint now, std::chrono::microseconds interval) {
+    if (now < at) return false;
+    at = now + interval;
+    return true;
+  }
+  void notify(std::string_view lines) const { init_system_.notify(lines); }
+
+  wire::InitSystem init_system_ = wire::InitSystem::from_environment();
+  bool is_stopping_ = false;
+  TimePoint watchdog_at_ = TimePoint::min();
+  TimePoint status_at_ = TimePoint::min();
+};
+
+/// Those of campaign files, new ones or such that have more runs than before.
+std::vector<ServedCampaign> campaigns_of(const ServeOptions& options, CampaignFolder& folder) {
+  std::vector<ServedCampaign> campaigns;
+  for (const std::filesystem::path& file : options.campaign_files) {
+    campaigns.push_back(folder.open(*read_campaign(file), {}, {}));
+  }
+  return campaigns;
+}
+
+/// Multiplies what a coordinator waits for workers and disks.
+void scale_times(ServiceConfig& config, double factor) {
+  DispatchConfig& dispatch = config.dispatch;
+  for (Duration* const time :
+       {&dispatch.heartbeat_interval, &dispatch.suspect_after, &dispatch.lost_after,
+        &dispatch.arrival_max, &dispatch.hung_after_min, &dispatch.reattach_wait,
+        &config.writer.retry_after}) {
+    *time = std::chrono::duration_cast<Duration>(factor * *time);
+  }
+}
+
+ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
+  ServiceConfig config;
+  config.workers_endpoint = options.endpoint;
+  config.clients_endpoint = options.clients_endpoint.value_or(
+      "ipc://" + (std::filesystem::absolute(options.directory) / "clients").string());
+  config.keys = options.keys;
+  config.is_plain_waived = options.is_plain_waived;
+  config.end = options.end;
+  config.drain_max =
+      std::chrono::duration_cast<Duration>(std::chrono::duration<double>(options.drain_time_s));
+  config.memory_size_max = options.memory_mib_max << 20;
+  config.files = &folder;
+  config.directory = &folder;
+  config.limits = options.limits;
+  config.version = PROOFMASS_VERSION;
+  config.dispatch.reference_digest = model().reference_digest(best_instruction_set());
+  if (!options.faults.empty()) config.faults = wire::FaultPlan::parse(options.faults);
+  scale_times(config, options.time_scale);
+  return config;
+}
+
+void log_start(const Service& service, const Log& log) {
+  log({.kind = "coordinator_started",
+       .fields = {{"bind", service.workers_endpoint()},
+                  {"bind_clients", service.clients_endpoint()},
+                  {"campaigns", service.campaigns().size()}}});
+}
+
+/// Brings the statistics of the campaigns that are still open up to date.
+/// @return False if they could not all be written.
+bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
+  bool is_written = true;
+  for (auto& [file, store, definition] : campaigns) {
+    try {
+      update_statistics(store, *definition);
+      if (const std::optional<std::string> reason = store.rest()) {
+        log({.severity = Severity::warning,
+             .kind = "write_ahead_log_kept",
+             .fields = {{"file", file.string()}, Field::reason(*reason)}});
+      }
+    } catch (const std::exception& error) {
+      is_written = false;
+      log({.severity = Severity::error,
+           .kind = "statistics_failed",
+           .fields = {{"file", file.string()}, Field::reason(error.what())}});
+    }
+  }
+  return is_written;
+}
+
+bool has_given_up_runs(const Service& service) {
+  const std::vector<wire::CampaignStatus> campaigns = service.campaigns();
+  return std::any_of(campaigns.begin(), campaigns.end(),
+                     [](const wire::CampaignStatus& one) { return one.num_given_up > 0; });
+}
+
+/// Serves all campaigns of a directory to the workers that connect.
+/// @return An ExitCode.
+int serve_campaigns(const ServeOptions& options) {
+  const Log log = wire::make_log("proofmass-coordinator", options.log_format, wire::LogLevel::info);
+  const SignalThread signals;
+  const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::drain);
+  CampaignFolder folder(options.directory);
+  const ServiceConfig config = config_of(options, folder);
+  if (config.faults && config.faults->kill) {
+    wire::arm_kill_point(config.faults->kill->point, config.faults->kill->passage);
+  }
+  Service service(campaigns_of(options, folder), config, log);
+  log_start(service, log);
+  Notices notices;
+  notices.ready();
+  service.run(stop, [&] { notices.on_tick(service, stop); });
+  const bool is_done = service.is_done();
+  const bool has_given_up = has_given_up_runs(service);
+  const std::size_t num_campaigns = service.campaigns().size();
+  const bool is_written = finish(service.close(), log);
+  log({.kind = "coordinator_ended", .fields = {{"campaigns", num_campaigns}}});
+  if (!is_written || service.has_storage_failed()) return exit_cannot_be_done;
+  const bool is_in_order =
+      options.end == ServiceEnd::when_done ? is_done : stop != StopRequest::now;
+  if (!is_in_order) return exit_interrupted;
+  return has_given_up && options.end == ServiceEnd::when_done ? exit_cannot_be_done : exit_done;
+}
+
+void add_addresses(CLI::App& app, ServeOptions& options) {
+  app.add_option("--bind", options.endpoint,
+                 "Where workers connect, ipc://PATH or\ntcp://HOST:PORT")
+      ->envname("PROOFMASS_BIND")
+      ->required();
+  app.add_option("--bind-clients", options.clients_endpoint,
+                 "Where clients connect; a socket in the\ndirectory by default")
+      ->envname("PROOFMASS_BIND_CLIENTS");
+  app.add_option("--keys", options.keys, "Directory of keys, made by `proofmass keygen`")
+      ->envname("PROOFMASS_KEYS");
+  app.add_flag("--insecure-plain", options.is_plain_waived,
+               "Serve other machines without keys: on a\nnetwork that you trust");
+}
+
+void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
+  app.add_option("FILE", options.campaign_files, "Campaign files (TOML) to serve as well");
+  app.add_option("--directory", options.directory, "Directory of the campaigns, one NAME.db each")
+      ->envname("PROOFMASS_DIRECTORY")
+      ->required();
+  app.add_flag("--exit-when-done", ends_when_done, "End when every campaign is finished");
+  app.add_option("--drain-time", options.drain_time_s,
+                 "Seconds that workers have after SIGTERM to\ndeliver what they hold")
+      ->check(wire::in_range(0.0, drain_time_s_max))
+      ->capture_default_str();
+  app.add_option(
+         "--memory-max", options.memory_mib_max,
+         "MiB of memory; before it has more it closes\nall connections, and peers connect anew")
+      ->check(wire::in_range(memory_mib_min, memory_mib_max))
+      ->envname("PROOFMASS_MEMORY_MAX")
+      ->capture_default_str();
+  app.add_option("--campaigns-per-key", options.limits.campaigns_max,
+                 "Unfinished campaigns that a client's key may\nhave, at most")
+      ->check(wire::in_range(std::size_t{1}, campaigns_per_key_max))
+      ->capture_default_str();
+  app.add_option("--bytes-per-key", options.limits.size_max,
+                 "Bytes of the definitions of these campaigns,\nat most")
+      ->check(wire::in_range(std::uint64_t{1}, bytes_per_key_max))
+      ->capture_default_str();
+  static const std::map<std::string, wire::LogFormat> formats{{"json", wire::LogFormat::json},
+                                                              {"text", wire::LogFormat::text}};
+  wire::add_choice(app, "--log-format", options.log_format, formats,
+                   "Of the log on standard error; text by default")
+      ->envname("PROOFMASS_LOG_FORMAT");
+  // For tests of the program by itself.
+  app.add_option("--faults", options.faults)->group("");
+  app.add_option("--time-scale", options.time_scale)->group("")->check(CLI::PositiveNumber);
+}
+
+}  // namespace
+
+int run_proofmass_coordinator(int argc, char** argv) {
+  CLI::App app(
+      "Lends the runs of campaigns to workers and stores their results.\n"
+      "SIGTERM lets workers deliver what they hold; SIGINT, or a second one, does not.",
+      "proofmass-coordinator");
+  app.footer(exit_codes_text);
+  app.set_version_flag("--version", "proofmass-coordinator " PROOFMASS_VERSION);
+  app.set_config("--config", "", "File with these options, as in\n`bind = \"tcp://*:5555\"`")
+      ->envname("PROOFMASS_CONFIG");
+  app.allow_config_extras(CLI::config_extras_mode::error);
+  ServeOptions options;
+  bool ends_when_done = false;
+  add_service(app, options, ends_when_done);
+  add_addresses(app, options);
+  return run_program(app, argc, argv, [&] {
+    if (ends_when_done) options.end = ServiceEnd::when_done;
+    return serve_campaigns(options);
+  });
+}
+
+}  // namespace proofmass::coordinator
