@@ -36,7 +36,9 @@ std::uint64_t num_out_of_memory() {
 sigset_t supervised_signals() {
   sigset_t set;
   sigemptyset(&set);
-  for (const int signal : {SIGTERM, SIGINT, SIGCHLD, handed_on_signal()}) sigaddset(&set, signal);
+  for (const int signal : {SIGTERM, SIGINT, SIGCHLD, SIGCONT, handed_on_signal()}) {
+    sigaddset(&set, signal);
+  }
   return set;
 }
 
@@ -95,14 +97,19 @@ class Supervisor {
     _exit(exit_code);  // The supervisor ends the program; this is a part of it.
   }
 
-  /// Hands requests on until the child has ended, and returns how it did.
+  /// Hands requests on until the child has ended, and returns how it did. Whoever is continued
+  /// continues the child: one that is forked while its group is stopped and continued may stay
+  /// stopped, and could not even end.
   int wait_for(pid_t child) {
     int status = 0;
     while (waitpid(child, &status, WNOHANG) != child) {
       const int signal = sigwaitinfo(&signals_, nullptr);
-      if (signal != SIGTERM && signal != SIGINT) continue;
-      ++num_requests_;
-      sigqueue(child, handed_on_signal(), {.sival_int = num_requests_});
+      if (signal == SIGTERM || signal == SIGINT) {
+        ++num_requests_;
+        sigqueue(child, handed_on_signal(), {.sival_int = num_requests_});
+        kill(child, SIGCONT);
+      }
+      if (signal == SIGCONT) kill(child, SIGCONT);
     }
     return status;
   }

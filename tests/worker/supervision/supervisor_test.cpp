@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <csignal>
+#include <fstream>
 #include <functional>
 #include <new>
 #include <string>
@@ -143,6 +144,16 @@ int count_requests(Board& board, int num_expected) {
   return 40 + info.si_value.sival_int;
 }
 
+void wait_until_stopped(const Board& board) {
+  const auto state = [&] {
+    std::ifstream file("/proc/" + std::to_string(board.child) + "/stat");
+    std::string id, name, letter;
+    file >> id >> name >> letter;
+    return letter;
+  };
+  while (board.child == 0 || state() != "T") std::this_thread::yield();
+}
+
 // The child has SIGTERM and SIGINT blocked: to its process group they were sent, too.
 TEST_F(SupervisorTest, HandsOnThatItIsAskedToEndAndHowOften) {
   const pid_t supervisor = start_supervisor([&](const ChildStart&) {
@@ -154,6 +165,29 @@ TEST_F(SupervisorTest, HandsOnThatItIsAskedToEndAndHowOften) {
   while (board.num_requests == 0) std::this_thread::yield();
   kill(supervisor, SIGINT);
   EXPECT_EQ(exit_code_of(supervisor), 42);
+}
+
+// As the kernel may leave one that is forked while its group is stopped and continued.
+TEST_F(SupervisorTest, ContinuesAStoppedWorkerWhenItIsContinued) {
+  const pid_t supervisor = start_supervisor([&](const ChildStart&) {
+    board.child = getpid();
+    raise(SIGSTOP);
+    return 7;
+  });
+  wait_until_stopped(board);
+  kill(supervisor, SIGCONT);
+  EXPECT_EQ(exit_code_of(supervisor), 7);
+}
+
+TEST_F(SupervisorTest, ContinuesAStoppedWorkerThatIsToEnd) {
+  const pid_t supervisor = start_supervisor([&](const ChildStart&) {
+    board.child = getpid();
+    raise(SIGSTOP);
+    return count_requests(board, 1);
+  });
+  wait_until_stopped(board);
+  kill(supervisor, SIGTERM);
+  EXPECT_EQ(exit_code_of(supervisor), 41);
 }
 
 TEST_F(SupervisorTest, DoesNotStartAWorkerAgainThatCrashesWhenAskedToEnd) {
