@@ -1,5 +1,5 @@
-// The campaign of [Hardy2013]: mean errors over random draws, against an independent prototype of
-// the same model and against the paper's table of 100 simulations.
+// The campaign of [Hardy2013]: mean errors over random draws, against the paper's table of 100
+// simulations.
 
 #include <gtest/gtest.h>
 
@@ -13,13 +13,6 @@ namespace proofmass {
 namespace {
 
 constexpr std::uint64_t num_runs = 96;
-
-/// Mean |error| of 100 draws of an independent scalar prototype of this model, SI, in the order of
-/// Parameter.
-constexpr ParameterArray prototype_first_order{15e-9,   15e-9,   53e-9,   2.7e-4, 2.8e-4,
-                                               0.36e-6, 0.17e-6, 0.21e-6, 26.0,   45.0};
-constexpr ParameterArray prototype_second_order{7.5e-9,  6.5e-9,  53e-9,   2.7e-4, 2.8e-4,
-                                                0.36e-6, 0.17e-6, 0.21e-6, 18.0,   7.8};
 
 /// Batches give the bits of the scalar reference in a tenth of its time.
 CampaignStatistics statistics_of(Correction correction) {
@@ -38,30 +31,12 @@ CampaignStatistics statistics_of(Correction correction) {
   return statistics.statistics();
 }
 
-/// The mean of n absolute errors scatters by std/√n, about 0.8/√96 = 8 % here (13 % where the error
-/// is a product of two drawn quantities), so a factor 2 is eight (five) standard errors wide.
-void expect_within_factor(const CampaignStatistics& statistics, const ParameterArray& expected,
-                          double factor) {
-  EXPECT_EQ(statistics.num_estimated, num_runs);
-  for (const test::ParameterInfo& info : test::parameter_infos()) {
-    const double ratio =
-        statistics.accuracy[index(info.parameter)].mean / expected[index(info.parameter)];
-    EXPECT_GT(ratio, 1.0 / factor) << info.name;
-    EXPECT_LT(ratio, factor) << info.name;
-  }
-}
-
-TEST(Accuracy, FirstOrderMeansAreThoseOfThePrototype) {
-  expect_within_factor(statistics_of(Correction::first_order), prototype_first_order, 2.0);
-}
-
-TEST(Accuracy, SecondOrderMeansAreThoseOfThePrototype) {
-  expect_within_factor(statistics_of(Correction::second_order), prototype_second_order, 2.0);
-}
-
 TEST(Accuracy, FirstOrderMeansAreThePapersWhereItSaysWhatItDid) {
   using enum Parameter;
   const CampaignStatistics statistics = statistics_of(Correction::first_order);
+  EXPECT_EQ(statistics.num_estimated, num_runs);
+  // The mean of n absolute errors scatters by std/√n, about 0.8/√96 = 8 % here and 0.8/√100 in the
+  // paper, and by 13 % where the error is a product of two drawn quantities.
   for (const Parameter parameter : {k2d, k2c, a_c12, a_c13, a_c11_delta_x, a_c11_delta_y}) {
     const test::ParameterInfo& info = test::parameter_infos()[index(parameter)];
     const double ratio = statistics.accuracy[index(parameter)].mean / info.published->mean;
