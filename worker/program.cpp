@@ -6,7 +6,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -34,12 +33,6 @@ constexpr std::chrono::seconds give_up_with_parent(60);
 /// A thread that computes looks several times an orbit whether it is still wanted.
 constexpr std::chrono::seconds thread_end_max(5);
 
-std::string host_name() {
-  std::array<char, 256> name{};
-  gethostname(name.data(), name.size() - 1);
-  return wire::name_from(name.data());
-}
-
 /// A worker that a campaign started must not outlive it, however that ends.
 void die_with(pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -47,7 +40,7 @@ void die_with(pid_t parent) {
 }
 
 wire::Hello hello_for(const Options& options, const ChildStart& start) {
-  const std::string host = host_name();
+  const std::string host = wire::host_name();
   const auto process_id = static_cast<std::uint64_t>(getpid());
   wire::Hello hello{
       .worker_name = options.name.empty() ? wire::name_from(fmt::format("{}-{}", host, process_id))

@@ -27,7 +27,7 @@ std::string wrapped(const std::string& text, std::size_t indent) {
   std::size_t column = indent;
   while (stream >> word) {
     const bool is_first = column == indent;
-    if (!is_first && column + 1 + text_width(word) > line_width) {
+    if (!is_first && column + 1 + display_width(word) > line_width) {
       lines += "\n" + std::string(indent, ' ');
       column = indent;
     } else if (!is_first) {
@@ -35,7 +35,7 @@ std::string wrapped(const std::string& text, std::size_t indent) {
       ++column;
     }
     lines += word;
-    column += text_width(word);
+    column += display_width(word);
   }
   return lines;
 }

@@ -14,7 +14,7 @@
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/digest_check.hpp"
 #include "core/campaign/model.hpp"
-#include "core/campaign/run_ranges.hpp"
+#include "core/runs.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/error_change.hpp"
 #include "core/statistics/moments.hpp"

@@ -31,7 +31,7 @@ std::string definitions(const CampaignComparison& comparison) {
   std::string text = "The definitions differ:\n";
   for (const auto& [field, first, second] : comparison.differences) {
     const std::string line = fmt::format("  {}: {} in A, {} in B", field, first, second);
-    text += text_width(line) <= line_width
+    text += display_width(line) <= line_width
                 ? line + "\n"
                 : fmt::format("  {}\n    A  {}\n    B  {}\n", field, first, second);
   }
@@ -63,7 +63,7 @@ std::string left_out(const CampaignComparison& comparison) {
 std::string heading(std::initializer_list<std::pair<std::string_view, std::size_t>> titles) {
   std::string line = left_aligned("parameter", label_width) + left_aligned("unit", unit_width);
   for (const auto& [title, width] : titles) line += right_aligned(title, width);
-  return line + "\n" + horizontal_rule(text_width(line)) + "\n";
+  return line + "\n" + horizontal_rule(display_width(line)) + "\n";
 }
 
 std::string row_label(const Quantity& quantity) {

@@ -14,7 +14,7 @@
 
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/summarise.hpp"
-#include "core/campaign/run_ranges.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -8,7 +8,7 @@
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/archive/campaign_mark.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/campaign/run_ranges.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -14,42 +14,13 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A heading and its column; text stands left, numbers right.
-struct Column {
-  std::string_view title;
-  std::size_t width;
-  bool is_text = false;
-};
-
-constexpr std::array<Column, 7> columns{{{"file", 18, true},
-                                         {"campaign", 14, true},
-                                         {"phase", 10, true},
-                                         {"done", 9},
-                                         {"runs", 9},
-                                         {"seed", 9},
-                                         {"created", 11}}};
-
-std::string row(const std::array<std::string, columns.size()>& cells) {
-  std::string text;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    // A space at least stays between a column and the next.
-    const auto& [title, width, is_text] = columns[i];
-    const std::string cell = shortened(wire::visible_text(cells[i]), width - 1);
-    text += is_text ? left_aligned(cell, width) : right_aligned(cell, width);
-  }
-  text.erase(text.find_last_not_of(' ') + 1);
-  return text + "\n";
-}
-
-std::string heading() {
-  std::array<std::string, columns.size()> titles;
-  std::size_t width = 0;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    titles[i] = columns[i].title;
-    width += columns[i].width;
-  }
-  return row(titles) + horizontal_rule(width) + "\n";
-}
+constexpr std::array<TextColumn, 7> columns{{{"file", 18, true},
+                                             {"campaign", 14, true},
+                                             {"phase", 10, true},
+                                             {"done", 9},
+                                             {"runs", 9},
+                                             {"seed", 9},
+                                             {"created", 11}}};
 
 std::string tag_lines(std::span<const std::string> tags) {
   if (tags.empty()) return "";
@@ -70,10 +41,12 @@ std::string entry(const ListedCampaign& campaign) {
   const std::string file = wire::visible_text(campaign.file.filename().string());
   if (!campaign.problem.empty()) return file + "\n  " + campaign.problem + "\n";
   constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10Z.
-  std::string text =
-      row({file, campaign.name, std::string(wire::name_of(campaign.phase)),
-           std::to_string(campaign.num_finished), std::to_string(campaign.num_runs),
-           std::to_string(campaign.seed), campaign.created_utc.substr(0, date_size)});
+  std::string text = table_row(
+      columns,
+      std::array{file, wire::visible_text(campaign.name),
+                 std::string(wire::name_of(campaign.phase)), std::to_string(campaign.num_finished),
+                 std::to_string(campaign.num_runs), std::to_string(campaign.seed),
+                 wire::visible_text(campaign.created_utc.substr(0, date_size))});
   return text + tag_lines(campaign.tags);
 }
 
@@ -95,7 +68,7 @@ Json json_of(const ListedCampaign& campaign) {
 
 std::string listing_text(std::span<const ListedCampaign> campaigns) {
   if (campaigns.empty()) return "no campaigns\n";
-  std::string text = heading();
+  std::string text = table_heading(columns);
   for (const ListedCampaign& campaign : campaigns) text += entry(campaign);
   return text;
 }

@@ -13,7 +13,7 @@
 
 #include "coordinator/archive/result_columns.hpp"
 #include "core/campaign/model.hpp"
-#include "core/campaign/run_ranges.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 namespace {

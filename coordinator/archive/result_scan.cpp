@@ -42,15 +42,6 @@ class Rules {
   ResultScan& scan_;
 };
 
-/// Appends to ranges that end before the run.
-void append(std::vector<RunRange>& ranges, RunIndex run) {
-  if (!ranges.empty() && ranges.back().end() == run.value) {
-    ++ranges.back().count;
-  } else {
-    ranges.push_back({.first = run, .count = 1});
-  }
-}
-
 /// Reports each of these runs that is not one of those; both ascending.
 void violate_missing(std::span<const RunRange> those, std::span<const RunRange> these,
                      const std::string& what, Rules& rules) {

@@ -7,7 +7,7 @@
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/identifiers.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 

@@ -13,7 +13,7 @@
 #include "coordinator/archive/result_scan.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/campaign/run_ranges.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 namespace {

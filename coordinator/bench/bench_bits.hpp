@@ -8,7 +8,7 @@
 namespace proofmass::coordinator {
 
 /// True if both are the same to the last bit: −0 is not 0, and a NaN is itself.
-[[nodiscard]] bool have_same_bits(const RunResult& a, const RunResult& b);
+[[nodiscard]] bool agree_to_the_bit(const RunResult& a, const RunResult& b);
 
 /// Compares results with those of the same runs that are known, in the same order, and makes those
 /// of further runs known.

@@ -23,50 +23,23 @@ using wire::WorkerStatus;
 
 constexpr std::size_t table_width = 79;
 
-/// A heading and its column; text stands left, numbers right.
-struct Column {
-  std::string_view title;
-  std::size_t width;
-  bool is_text = false;
-};
+constexpr std::array<TextColumn, 8> status_columns{{{"campaign", 17, true},
+                                                    {"phase", 10, true},
+                                                    {"prio", 5},
+                                                    {"done", 11},
+                                                    {"runs", 11},
+                                                    {"%", 5},
+                                                    {"runs/s", 8},
+                                                    {"time left", 12}}};
 
-constexpr std::array<Column, 8> status_columns{{{"campaign", 17, true},
-                                                {"phase", 10, true},
-                                                {"prio", 5},
-                                                {"done", 11},
-                                                {"runs", 11},
-                                                {"%", 5},
-                                                {"runs/s", 8},
-                                                {"time left", 12}}};
-
-constexpr std::array<Column, 8> worker_columns{{{"id", 8},
-                                                {"  worker", 17, true},
-                                                {"host", 14, true},
-                                                {"pid", 8},
-                                                {"slots", 6},
-                                                {"lent", 8},
-                                                {"results", 9},
-                                                {"heard", 9}}};
-
-template <std::size_t N>
-std::string row(const std::array<Column, N>& columns, const std::array<std::string, N>& cells) {
-  std::string text;
-  for (std::size_t i = 0; i < N; ++i) {
-    // A space at least stays between a column and the next.
-    const auto& [title, width, is_text] = columns[i];
-    const std::string cell = shortened(cells[i], width - 1);
-    text += is_text ? left_aligned(cell, width) : right_aligned(cell, width);
-  }
-  text.erase(text.find_last_not_of(' ') + 1);
-  return text + "\n";
-}
-
-template <std::size_t N>
-std::string heading(const std::array<Column, N>& columns) {
-  std::array<std::string, N> titles;
-  for (std::size_t i = 0; i < N; ++i) titles[i] = columns[i].title;
-  return row(columns, titles) + horizontal_rule(table_width) + "\n";
-}
+constexpr std::array<TextColumn, 8> worker_columns{{{"id", 8},
+                                                    {"  worker", 17, true},
+                                                    {"host", 14, true},
+                                                    {"pid", 8},
+                                                    {"slots", 6},
+                                                    {"lent", 8},
+                                                    {"results", 9},
+                                                    {"heard", 9}}};
 
 std::string counted(std::uint64_t count, std::string_view thing) {
   return fmt::format("{} {}{}", count, thing, count == 1 ? "" : "s");
@@ -115,11 +88,12 @@ std::vector<std::string> notes_about(const CampaignStatus& campaign) {
 }
 
 std::string campaign_row(const CampaignStatus& campaign) {
-  return row<8>(
+  return table_row(
       status_columns,
-      {campaign.name, std::string(wire::name_of(campaign.phase)), std::to_string(campaign.priority),
-       std::to_string(campaign.num_done), std::to_string(campaign.num_runs),
-       std::to_string(percent_done(campaign)), rate(campaign), time_left(campaign)});
+      std::array{campaign.name, std::string(wire::name_of(campaign.phase)),
+                 std::to_string(campaign.priority), std::to_string(campaign.num_done),
+                 std::to_string(campaign.num_runs), std::to_string(percent_done(campaign)),
+                 rate(campaign), time_left(campaign)});
 }
 
 std::string service_line(const wire::StatusReply& status) {
@@ -152,10 +126,11 @@ std::string ago(double seconds) {
 }
 
 std::string worker_row(const WorkerStatus& worker) {
-  return row<8>(worker_columns, {count_cell(worker.id.value), "  " + worker.name, worker.host,
-                                 count_cell(worker.process_id), count_cell(worker.num_slots),
-                                 count_cell(worker.num_lent), count_cell(worker.num_results),
-                                 ago(worker.silent_s)});
+  return table_row(worker_columns,
+                   std::array{count_cell(worker.id.value), "  " + worker.name, worker.host,
+                              count_cell(worker.process_id), count_cell(worker.num_slots),
+                              count_cell(worker.num_lent), count_cell(worker.num_results),
+                              ago(worker.silent_s)});
 }
 
 std::string further(std::uint64_t count, std::size_t num_shown, std::string_view thing) {
@@ -185,7 +160,7 @@ std::string service_notes(const wire::StatusReply& status) {
 std::string status_table(const wire::StatusReply& status) {
   std::string text = service_line(status);
   if (status.campaigns.empty()) return text + "no campaigns\n" + service_notes(status);
-  text += heading(status_columns);
+  text += table_heading(status_columns);
   for (const CampaignStatus& campaign : status.campaigns) text += campaign_row(campaign);
   for (const CampaignStatus& campaign : status.campaigns) {
     for (const std::string& note : notes_about(campaign)) {
@@ -198,7 +173,7 @@ std::string status_table(const wire::StatusReply& status) {
 
 std::string workers_table(const wire::WorkersReply& workers) {
   if (workers.workers.empty()) return "no workers\n";
-  std::string text = heading(worker_columns);
+  std::string text = table_heading(worker_columns);
   for (const WorkerStatus& worker : workers.workers) text += worker_row(worker);
   for (const WorkerStatus& worker : workers.workers) {
     if (!worker.is_quarantined) continue;

@@ -53,41 +53,12 @@ struct ServeOptions {
   std::vector<std::filesystem::path> campaign_files;  ///< To be served beside those that are there.
 };
 
-/// Tells the init system how the coordinator is.
-class Notices {
- public:
-  void on_tick(const Service& service, StopRequest stop) {
-    using std::chrono::steady_clock;
-    if (stop != StopRequest::none && !std::exchange(is_stopping_, true)) notify("STOPPING=1");
-    const steady_clock::time_point now = steady_clock::now();
-    const auto watchdog = init_system_.watchdog_interval();
-    if (watchdog && take_turn(watchdog_at_, now, *watchdog)) notify("WATCHDOG=1");
-    if (!take_turn(status_at_, now, status_interval)) return;
-    std::size_t num_active = 0;
-    for (const wire::CampaignStatus& campaign : service.campaigns()) {
-      num_active += campaign.phase == wire::CampaignPhase::active ? 1U : 0U;
-    }
-    notify(fmt::format("STATUS={} campaigns to compute", num_active));
-  }
-  void ready() const { notify("READY=1"); }
-
- private:
-  static constexpr std::chrono::seconds status_interval{5};
-
-  using TimePoint = std::chrono::steady_clock::time_point;
-
-  static bool take_turn(TimePoint& at, TimePoint now, std::chrono::microseconds interval) {
-    if (now < at) return false;
-    at = now + interval;
-    return true;
-  }
-  void notify(std::string_view lines) const { init_system_.notify(lines); }
-
-  wire::InitSystem init_system_ = wire::InitSystem::from_environment();
-  bool is_stopping_ = false;
-  TimePoint watchdog_at_ = TimePoint::min();
-  TimePoint status_at_ = TimePoint::min();
-};
+std::string status_of(const Service& service) {
+  const std::vector<wire::CampaignStatus> campaigns = service.campaigns();
+  const auto num_active =
+      std::ranges::count(campaigns, wire::CampaignPhase::active, &wire::CampaignStatus::phase);
+  return fmt::format("{} campaigns to compute", num_active);
+}
 
 /// Those of campaign files, new ones or such that have more runs than before.
 std::vector<ServedCampaign> campaigns_of(const ServeOptions& options, CampaignFolder& folder) {
@@ -178,9 +149,12 @@ int serve_campaigns(const ServeOptions& options) {
   }
   Service service(campaigns_of(options, folder), config, log);
   log_start(service, log);
-  Notices notices;
+  wire::ServiceNotices notices;
   notices.ready();
-  service.run(stop, [&] { notices.on_tick(service, stop); });
+  service.run(stop, [&] {
+    if (stop != StopRequest::none) notices.stopping();
+    notices.on_tick(std::chrono::steady_clock::now(), [&] { return status_of(service); });
+  });
   const bool is_done = service.is_done();
   const bool has_given_up = has_given_up_runs(service);
   const std::size_t num_campaigns = service.campaigns().size();

@@ -1,9 +1,6 @@
 #include "coordinator/cli/local_workers.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
-
-#include <array>
 
 #include "core/error.hpp"
 #include "proto/wire/names.hpp"
@@ -12,12 +9,6 @@ namespace proofmass::coordinator {
 namespace {
 
 constexpr int failures_in_a_row_max = 3;
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  gethostname(name.data(), name.size() - 1);
-  return wire::name_from(name.data());
-}
 
 std::uint64_t num_done(const Service& service) {
   std::uint64_t count = 0;
@@ -31,7 +22,7 @@ LocalWorkers::LocalWorkers(Service& service, ProgressDisplay& display)
     : service_(service),
       display_(display),
       processes_(worker_executable(), service.workers_endpoint()),
-      host_(host_name()) {}
+      host_(wire::host_name()) {}
 
 void LocalWorkers::start(std::uint64_t num_workers) {
   for (std::uint64_t i = 1; i <= num_workers; ++i) processes_.start(fmt::format("local-{}", i));

@@ -3,9 +3,9 @@
 #include <CLI/CLI.hpp>
 
 #include "coordinator/cli/exit_code.hpp"
-#include "core/campaign/identifiers.hpp"
 #include "core/campaign/model_rules.hpp"
 #include "core/error.hpp"
+#include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {

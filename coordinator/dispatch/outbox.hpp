@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/identifiers.hpp"
+#include "core/runs.hpp"
 #include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"
 
@@ -15,14 +15,6 @@ using wire::Event;
 using wire::Field;
 using wire::Log;
 using wire::Severity;
-
-/// A result that a worker delivered, on its way to the store.
-struct Arrival {
-  wire::CampaignId campaign;
-  wire::WorkerId worker;
-  wire::Attempt attempt;  ///< Under which it was computed.
-  wire::ComputedRun computed;
-};
 
 /// Runs that came back without a result.
 struct Loss {
@@ -47,10 +39,10 @@ class Outbox {
                                const std::shared_ptr<const Campaign>& definition) = 0;
   /// Must lead to on_committed() with this run once the result is durable, or to the end of the
   /// service. Called at most once for a run.
-  virtual void store(Arrival arrival) = 0;
+  virtual void store(wire::WorkerId worker, wire::LeasedResult result) = 0;
   /// Must lead to on_compared() with the run once the result has been compared with the stored one.
   /// Called for runs that were handed to store() before, or committed.
-  virtual void compare(Arrival arrival) = 0;
+  virtual void compare(wire::WorkerId worker, wire::LeasedResult result) = 0;
   /// To be kept for the history of attempts; need not be durable at once.
   virtual void record(const Loss& loss) = 0;
   /// The run crashed too many workers: to be kept as given up, so that the campaign can end.

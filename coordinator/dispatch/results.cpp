@@ -54,7 +54,7 @@ struct Intake {
     if (detail::close_run(state, campaign_id, run, id, holders)) {
       campaign.delivered[run] = {.attempt = attempt, .waiting = {id}};
       if (!computed.result.has_estimate()) ++campaign.num_without_estimate;
-      outbox.store(arrival(std::move(computed)));
+      outbox.store(id, leased(std::move(computed)));
       return;
     }
     const auto delivered = campaign.delivered.find(run);
@@ -72,9 +72,8 @@ struct Intake {
   }
 
  private:
-  [[nodiscard]] Arrival arrival(wire::ComputedRun computed) const {
-    return {
-        .campaign = campaign_id, .worker = id, .attempt = attempt, .computed = std::move(computed)};
+  [[nodiscard]] wire::LeasedResult leased(wire::ComputedRun computed) const {
+    return {.campaign = campaign_id, .attempt = attempt, .computed = std::move(computed)};
   }
 
   // What a worker sends again and again must not fill the memory: one that is not compared, is
@@ -82,7 +81,7 @@ struct Intake {
   void compare(wire::ComputedRun computed) {
     if (campaign.num_comparing >= state.config.uncommitted_max) return;
     ++campaign.num_comparing;
-    outbox.compare(arrival(std::move(computed)));
+    outbox.compare(id, leased(std::move(computed)));
   }
 
   /// True if the run was on an audit lease of this worker.

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/campaign/identifiers.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 

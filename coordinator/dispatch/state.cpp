@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/error.hpp"
+#include "core/math/hash.hpp"
 
 namespace proofmass::coordinator {
 
@@ -89,15 +90,7 @@ std::string_view name_of(LossReason reason) {
 }
 
 bool is_audited(std::uint64_t campaign_seed, RunIndex run, double fraction) {
-  // SplitMix64 [Steele2014] of both numbers, one after the other.
-  std::uint64_t number = 0;
-  for (const std::uint64_t part : {campaign_seed, run.value}) {
-    number += part + 0x9e3779b97f4a7c15U;
-    number = (number ^ (number >> 30)) * 0xbf58476d1ce4e5b9U;
-    number = (number ^ (number >> 27)) * 0x94d049bb133111ebU;
-    number ^= number >> 31;
-  }
-  return static_cast<double>(number >> 11) * 0x1.0p-53 < fraction;
+  return fraction_of(mixed(mixed(campaign_seed) + run.value)) < fraction;
 }
 
 }  // namespace proofmass::coordinator

@@ -28,7 +28,7 @@ namespace proofmass::coordinator {
 /// what may wait for a disk is done in the background.
 class CampaignDesk {
  public:
-  /// What the desk works with; all of it outlives the desk.
+  /// What it works with; all of that outlives it.
   struct Surroundings {
     State& state;
     StoreWriter& writer;
@@ -130,7 +130,7 @@ class CampaignDesk {
     std::optional<std::uint64_t> num_runs;  ///< That the stop rule asks for next.
   };
 
-  /// What the desk knows of a campaign beside the dispatch's state.
+  /// What is known of a campaign beside the dispatch's state.
   struct Served {
     std::filesystem::path file;
     std::string name;

@@ -24,10 +24,10 @@ using Respond = std::function<void(wire::ClientReply)>;
 
 /// Between the clients' socket and what carries requests out: puts large requests together from
 /// their parts, reads them in the background, and sends each reply to whoever waits for it. Knows
-/// no socket. Nothing that a client sends makes a function of the desk throw.
+/// no socket. Nothing that a client sends makes one of its functions throw.
 class ClientDesk {
  public:
-  /// What the desk needs from the service.
+  /// What it needs from the service.
   struct Surroundings {
     /// Hands bytes to a connection, which may be gone.
     std::function<void(const std::string& routing_id, const std::string& bytes)> transmit;
@@ -42,7 +42,7 @@ class ClientDesk {
   /// again.
   static constexpr std::size_t waiters_max = 16;
 
-  /// @param background  Outlives the desk.
+  /// @param background  Outlives the gateway.
   ClientDesk(Background& background, Surroundings surroundings);
 
   /// Handles one message, anything at all.

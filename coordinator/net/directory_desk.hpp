@@ -21,7 +21,7 @@ namespace proofmass::coordinator {
 /// place is served, and a file that was removed takes its campaign from the list.
 class DirectoryDesk {
  public:
-  /// What the desk works with; all of it outlives the desk.
+  /// What it works with; all of that outlives it.
   struct Surroundings {
     CampaignDesk& campaigns;
     Background& background;

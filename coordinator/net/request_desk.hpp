@@ -17,7 +17,7 @@ namespace proofmass::coordinator {
 /// Carries out what clients ask for, if they may ask for it.
 class RequestDesk {
  public:
-  /// What the desk works with; all of it outlives the desk.
+  /// What it works with; all of that outlives it.
   struct Surroundings {
     State& state;
     CampaignDesk& campaigns;

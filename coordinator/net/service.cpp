@@ -64,7 +64,7 @@ class Service::Parts final : public Outbox {
         writer_([this] { sockets_.wake(); }, config.writer),
         history_(state_, writer_, beginning.attached),
         worker_desk_(state_, start_.epoch, surroundings_of_workers()),
-        desk_(surroundings_of_campaigns()),
+        campaign_desk_(surroundings_of_campaigns()),
         directory_desk_(surroundings_of_directory()),
         submission_desk_(surroundings_of_submissions()),
         request_desk_(surroundings_of_requests()),
@@ -77,10 +77,10 @@ class Service::Parts final : public Outbox {
   /// For all that is measured here and in the dispatch.
   [[nodiscard]] TimePoint now() { return time_.at(std::chrono::steady_clock::now()); }
   [[nodiscard]] const State& state() const { return state_; }
-  [[nodiscard]] const CampaignDesk& desk() const { return desk_; }
+  [[nodiscard]] const CampaignDesk& campaign_desk() const { return campaign_desk_; }
   [[nodiscard]] const ServiceSockets& sockets() const { return sockets_; }
   [[nodiscard]] bool is_done() const {
-    return desk_.is_all_done() && directory_desk_.is_all_served();
+    return campaign_desk_.is_all_done() && directory_desk_.is_all_served();
   }
   [[nodiscard]] bool has_storage_failed() const { return has_storage_failed_; }
 
@@ -100,7 +100,7 @@ class Service::Parts final : public Outbox {
     on_gone(state_, worker, reason, now(), *this);
   }
 
-  std::vector<ServedCampaign> close() { return desk_.close(); }
+  std::vector<ServedCampaign> close() { return campaign_desk_.close(); }
 
   // Outbox.
 
@@ -116,14 +116,12 @@ class Service::Parts final : public Outbox {
     worker_desk_.send_definition(worker, request, definition);
   }
 
-  void store(Arrival arrival) override {
-    const CampaignId campaign = arrival.campaign;
-    writer_.deliver(campaign, delivery_of(std::move(arrival)));
+  void store(WorkerId worker, wire::LeasedResult result) override {
+    writer_.deliver(result.campaign, delivery_of(worker, std::move(result)));
   }
 
-  void compare(Arrival arrival) override {
-    const CampaignId campaign = arrival.campaign;
-    writer_.compare(campaign, delivery_of(std::move(arrival)));
+  void compare(WorkerId worker, wire::LeasedResult result) override {
+    writer_.compare(result.campaign, delivery_of(worker, std::move(result)));
   }
 
   void record(const Loss& loss) override {
@@ -142,7 +140,7 @@ class Service::Parts final : public Outbox {
   using Outbox::log;
   void log(Event event, CampaignId campaign) override {
     log_(event);
-    if (campaign != CampaignId{} && !desk_.is_served(campaign)) return;
+    if (campaign != CampaignId{} && !campaign_desk_.is_served(campaign)) return;
     writer_.record_event(campaign, entry_of(event));
   }
 
@@ -152,7 +150,7 @@ class Service::Parts final : public Outbox {
     const auto* const prepared = std::get_if<PreparedCampaign>(&outcome);
     const bool is_of_directory = config_.directory != nullptr || prepared == nullptr;
     if (is_of_directory) return directory_desk_.take(std::move(outcome));
-    desk_.serve(std::get<PreparedCampaign>(std::move(outcome)));
+    campaign_desk_.serve(std::get<PreparedCampaign>(std::move(outcome)));
   }
 
   WorkerDesk::Surroundings surroundings_of_workers() {
@@ -184,7 +182,7 @@ class Service::Parts final : public Outbox {
   }
 
   DirectoryDesk::Surroundings surroundings_of_directory() {
-    return {.campaigns = desk_,
+    return {.campaigns = campaign_desk_,
             .background = background_,
             .outbox = *this,
             .directory = config_.directory,
@@ -193,7 +191,7 @@ class Service::Parts final : public Outbox {
   }
 
   SubmissionDesk::Surroundings surroundings_of_submissions() {
-    return {.campaigns = desk_,
+    return {.campaigns = campaign_desk_,
             .writer = writer_,
             .background = background_,
             .files = config_.files,
@@ -204,7 +202,7 @@ class Service::Parts final : public Outbox {
 
   RequestDesk::Surroundings surroundings_of_requests() {
     return {.state = state_,
-            .campaigns = desk_,
+            .campaigns = campaign_desk_,
             .submissions = submission_desk_,
             .directory = directory_desk_,
             .outbox = *this,
@@ -216,7 +214,7 @@ class Service::Parts final : public Outbox {
     return {.transmit =
                 [this](const std::string& routing_id, const std::string& bytes) {
                   (void)sockets_.send_to_client(routing_id, bytes, now());
-                  if (!desk_.is_all_done()) told_progress_at_ = now();
+                  if (!campaign_desk_.is_all_done()) told_progress_at_ = now();
                 },
             .asker_of = [this](const std::string& key) -> std::optional<Asker> {
               Authenticator* const authenticator = sockets_.authenticator();
@@ -234,14 +232,14 @@ class Service::Parts final : public Outbox {
     return authenticator == nullptr || authenticator->is_allowed(domain, key, time);
   }
 
-  Delivery delivery_of(Arrival arrival) {
-    history_.note_lent(arrival.campaign, arrival.worker);
-    const auto session = worker_desk_.peers().session_of(arrival.worker);
+  Delivery delivery_of(WorkerId worker, wire::LeasedResult&& result) {
+    history_.note_lent(result.campaign, worker);
+    const auto session = worker_desk_.peers().session_of(worker);
     PROOFMASS_EXPECT(session.has_value());
-    return {.result = std::move(arrival.computed.result),
+    return {.result = std::move(result.computed.result),
             .worker = *session,
-            .attempt = arrival.attempt,
-            .compute_s = arrival.computed.compute_s};
+            .attempt = result.attempt,
+            .compute_s = result.computed.compute_s};
   }
 
   /// Carries out what is asked for; true if nothing remains to be done.
@@ -273,7 +271,7 @@ class Service::Parts final : public Outbox {
     if (now() - ticked_at_ < tick_interval) return;
     ticked_at_ = now();
     on_tick(state_, ticked_at_, *this);
-    desk_.review();
+    campaign_desk_.review();
     directory_desk_.review(ticked_at_);
     submission_desk_.review();
     client_desk_.review();
@@ -343,11 +341,11 @@ class Service::Parts final : public Outbox {
                 *this);
   }
   void complete(const StoreFailed& failed) {
-    if (!desk_.is_served(failed.campaign)) return;
+    if (!campaign_desk_.is_served(failed.campaign)) return;
     on_store_failed(state_, failed.campaign, failed.text, *this);
   }
   void complete(const StoreRecovered& recovered) {
-    if (!desk_.is_served(recovered.campaign)) return;
+    if (!campaign_desk_.is_served(recovered.campaign)) return;
     on_store_recovered(state_, recovered.campaign, now(), *this);
   }
 
@@ -359,7 +357,7 @@ class Service::Parts final : public Outbox {
         grown.campaign);
   }
   void complete(const FileReturned& returned) {
-    if (!desk_.is_served(returned.campaign)) return;
+    if (!campaign_desk_.is_served(returned.campaign)) return;
     log({.severity = Severity::warning,
          .kind = kind_of(returned.kind),
          .fields = {{"runs", state_.campaigns.at(returned.campaign).committed.size()}}},
@@ -387,7 +385,7 @@ class Service::Parts final : public Outbox {
     }
     for (const auto& [id, campaign] : state_.campaigns) note_unstored(id, campaign);
     dismiss_workers();
-    desk_.review();
+    campaign_desk_.review();
     settle_background();
     history_.end_all(LossReason::drained);
   }
@@ -425,7 +423,7 @@ class Service::Parts final : public Outbox {
   StoreWriter writer_;
   WorkerHistory history_;
   WorkerDesk worker_desk_;
-  CampaignDesk desk_;
+  CampaignDesk campaign_desk_;
   DirectoryDesk directory_desk_;
   SubmissionDesk submission_desk_;
   RequestDesk request_desk_;
@@ -454,7 +452,7 @@ void Service::run(const std::atomic<StopRequest>& stop, const std::function<void
 }
 
 std::vector<wire::CampaignStatus> Service::campaigns() const {
-  return parts_->desk().statuses(0, parts_->desk().num_campaigns());
+  return parts_->campaign_desk().statuses(0, parts_->campaign_desk().num_campaigns());
 }
 
 bool Service::is_done() const { return parts_->is_done(); }

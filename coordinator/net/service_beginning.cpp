@@ -4,7 +4,6 @@
 #include <sys/random.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <string>
@@ -28,10 +27,8 @@ wire::Epoch random_epoch() {
 }
 
 CoordinatorStart coordinator_start(wire::Epoch epoch, const std::string& version) {
-  std::array<char, 256> host{};
-  gethostname(host.data(), host.size() - 1);
   return {.epoch = epoch,
-          .host = wire::name_from(host.data()),
+          .host = wire::host_name(),
           .process_id = static_cast<std::uint64_t>(getpid()),
           .version = version};
 }

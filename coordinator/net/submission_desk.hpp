@@ -23,7 +23,7 @@ namespace proofmass::coordinator {
 /// that the service goes on meanwhile.
 class SubmissionDesk {
  public:
-  /// What the desk works with; all of it outlives the desk.
+  /// What it works with; all of that outlives it.
   struct Surroundings {
     CampaignDesk& campaigns;
     StoreWriter& writer;

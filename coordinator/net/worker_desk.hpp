@@ -28,7 +28,7 @@ struct Incoming {
 /// Whoever breaks the rules is told once and is not listened to any more on that connection.
 class WorkerDesk {
  public:
-  /// What the desk needs from the service.
+  /// What it needs from the service.
   struct Surroundings {
     /// Hands bytes to a connection; false if it is gone or its queue is full.
     std::function<bool(const std::string& routing_id, const std::string& bytes)> transmit;
@@ -38,7 +38,7 @@ class WorkerDesk {
     std::function<void(WorkerId worker, LossReason reason)> on_leaving;
   };
 
-  /// @param state  Outlives the desk.
+  /// @param state  Outlives the gateway.
   WorkerDesk(State& state, wire::Epoch epoch, Surroundings surroundings);
 
   void receive(const Incoming& message, TimePoint now, Outbox& outbox);

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "coordinator/query/per_cent.hpp"
+#include "coordinator/query/interval_functions.hpp"
 #include "core/error.hpp"
 #include "core/statistics/correlation.hpp"
 #include "core/statistics/moments.hpp"

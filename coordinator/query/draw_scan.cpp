@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/campaign/identifiers.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 

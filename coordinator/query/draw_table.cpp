@@ -1,11 +1,8 @@
-#include "coordinator/query/draw_table.hpp"
-
 #include <sqlite3ext.h>
 
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <new>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,7 +10,8 @@
 
 #include "coordinator/query/draw_scan.hpp"
 #include "coordinator/query/drawn_campaign.hpp"
-#include "coordinator/query/virtual_table.hpp"
+#include "coordinator/query/functions.hpp"
+#include "coordinator/query/virtual_table-inl.hpp"
 #include "core/campaign/model.hpp"
 
 SQLITE_EXTENSION_INIT3
@@ -23,51 +21,32 @@ namespace {
 
 enum Column : int { run_index_column, quantity_column, unit_column, value_column, campaign_column };
 
-constexpr const char* table_name = "draw";
-constexpr const char* declaration =
-    "CREATE TABLE draw(run_index INTEGER, quantity TEXT, unit TEXT, value REAL, "
-    "campaign TEXT HIDDEN)";
+struct Draw {
+  static constexpr const char* name = "draw";
+  static constexpr const char* declaration =
+      "CREATE TABLE draw(run_index INTEGER, quantity TEXT, unit TEXT, value REAL, "
+      "campaign TEXT HIDDEN)";
 
-/// One for a connection.
-struct DrawTable : sqlite3_vtab {
-  sqlite3* connection = nullptr;
-  MadeOfDatabases<DrawnCampaign> databases;
+  using Made = DrawnCampaign;
+  struct Cursor : sqlite3_vtab_cursor {
+    std::shared_ptr<DrawnCampaign> runs;
+    DrawScan scan;
+    std::uint64_t run = 0;
+    std::size_t quantity = 0;
+    std::vector<double> values;  // Of the run; empty if all draws were rejected.
+  };
+
+  static int choose_plan(sqlite3_vtab* table, sqlite3_index_info* plan);
+  static int filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value** values);
+  static int next(sqlite3_vtab_cursor* base);
+  static int is_at_end(sqlite3_vtab_cursor* base);
+  static int column(sqlite3_vtab_cursor* base, sqlite3_context* context, int number);
+  static int row_identifier(sqlite3_vtab_cursor* base, sqlite3_int64* identifier);
 };
 
-/// One for a place in a statement that names the table.
-struct DrawCursor : sqlite3_vtab_cursor {
-  std::shared_ptr<DrawnCampaign> runs;
-  DrawScan scan;
-  std::uint64_t run = 0;
-  std::size_t quantity = 0;
-  std::vector<double> values;  // Of the run; empty if all draws were rejected.
-};
+using DrawTable = VirtualTable<Draw>;
 
-DrawTable& table_of(sqlite3_vtab* table) { return *static_cast<DrawTable*>(table); }
-DrawCursor& cursor_of(sqlite3_vtab_cursor* cursor) { return *static_cast<DrawCursor*>(cursor); }
-
-int connect(sqlite3* connection, void*, int, const char* const*, sqlite3_vtab** table, char**) {
-  const int code = sqlite3_declare_vtab(connection, declaration);
-  if (code != SQLITE_OK) return code;
-  auto* made = new (std::nothrow) DrawTable();
-  if (made == nullptr) return SQLITE_NOMEM;
-  made->connection = connection;
-  *table = made;
-  return SQLITE_OK;
-}
-
-// Another function than connect(), as SQLite takes a table whose functions are the same for one
-// that is there without having been created: it would then be found by the name of any database,
-// also `other.draw`, and hold the runs of another campaign than the name says.
-int create(sqlite3* connection, void* nothing, int num_arguments, const char* const* arguments,
-           sqlite3_vtab** table, char** error) {
-  return connect(connection, nothing, num_arguments, arguments, table, error);
-}
-
-int disconnect(sqlite3_vtab* table) {
-  delete &table_of(table);
-  return SQLITE_OK;
-}
+Draw::Cursor& cursor_of(sqlite3_vtab_cursor* cursor) { return *static_cast<Draw::Cursor*>(cursor); }
 
 /// What a plan may hand to the scan, in the order of its arguments; bit i of the plan's number says
 /// that it does.
@@ -118,7 +97,7 @@ void estimate_cost(sqlite3_index_info& plan) {
   if ((plan.idxNum & one_row) == one_row) plan.idxFlags = SQLITE_INDEX_SCAN_UNIQUE;
 }
 
-int choose_plan(sqlite3_vtab*, sqlite3_index_info* plan) {
+int Draw::choose_plan(sqlite3_vtab*, sqlite3_index_info* plan) {
   if (ignores_the_argument(*plan, campaign_column)) return SQLITE_CONSTRAINT;
   int num_arguments = 0;
   for (std::size_t i = 0; i < offers.size(); ++i) {
@@ -131,15 +110,6 @@ int choose_plan(sqlite3_vtab*, sqlite3_index_info* plan) {
   estimate_cost(*plan);
   plan->orderByConsumed = plan->nOrderBy == 1 && plan->aOrderBy[0].desc == 0 &&
                           plan->aOrderBy[0].iColumn == run_index_column;
-  return SQLITE_OK;
-}
-
-int open(sqlite3_vtab* table, sqlite3_vtab_cursor** cursor) {
-  return guarded(*table, table_name, [&] { *cursor = std::make_unique<DrawCursor>().release(); });
-}
-
-int close(sqlite3_vtab_cursor* cursor) {
-  delete &cursor_of(cursor);
   return SQLITE_OK;
 }
 
@@ -165,16 +135,16 @@ void narrow(DrawScan& scan, const Offer& offer, sqlite3_value* value) {
 }
 
 // Behind the end there are no values.
-void go_to_run(DrawCursor& cursor, std::uint64_t run) {
+void go_to_run(Draw::Cursor& cursor, std::uint64_t run) {
   cursor.run = run;
   cursor.quantity = cursor.scan.quantity.value_or(0);
   if (run < cursor.scan.end_run) cursor.values = cursor.runs->values_of(RunIndex{run});
 }
 
-int filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value** values) {
-  DrawCursor& cursor = cursor_of(base);
-  return guarded(*base->pVtab, table_name, [&] {
-    DrawTable& table = table_of(base->pVtab);
+int Draw::filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value** values) {
+  Cursor& cursor = cursor_of(base);
+  return guarded(*base->pVtab, name, [&] {
+    DrawTable& table = DrawTable::of(*base);
     cursor.runs =
         table.databases.current(table.connection, database_in(table, plan, values),
                                 [](std::shared_ptr<const Campaign> campaign) {
@@ -190,16 +160,16 @@ int filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value*
   });
 }
 
-int next(sqlite3_vtab_cursor* base) {
-  DrawCursor& cursor = cursor_of(base);
-  return guarded(*base->pVtab, table_name, [&] {
+int Draw::next(sqlite3_vtab_cursor* base) {
+  Cursor& cursor = cursor_of(base);
+  return guarded(*base->pVtab, name, [&] {
     ++cursor.quantity;
     if (cursor.scan.quantity || cursor.quantity == model().drawn().size())
       go_to_run(cursor, cursor.run + 1);
   });
 }
 
-int is_at_end(sqlite3_vtab_cursor* cursor) {
+int Draw::is_at_end(sqlite3_vtab_cursor* cursor) {
   return cursor_of(cursor).run >= cursor_of(cursor).scan.end_run ? 1 : 0;
 }
 
@@ -207,8 +177,8 @@ void set_text(sqlite3_context* context, std::string_view text) {
   sqlite3_result_text(context, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
 }
 
-int column(sqlite3_vtab_cursor* base, sqlite3_context* context, int number) {
-  const DrawCursor& cursor = cursor_of(base);
+int Draw::column(sqlite3_vtab_cursor* base, sqlite3_context* context, int number) {
+  const Cursor& cursor = cursor_of(base);
   switch (number) {
     case run_index_column:
       sqlite3_result_int64(context, static_cast<sqlite3_int64>(cursor.run));
@@ -230,38 +200,14 @@ int column(sqlite3_vtab_cursor* base, sqlite3_context* context, int number) {
   return SQLITE_OK;
 }
 
-int row_identifier(sqlite3_vtab_cursor* base, sqlite3_int64* identifier) {
-  const DrawCursor& cursor = cursor_of(base);
+int Draw::row_identifier(sqlite3_vtab_cursor* base, sqlite3_int64* identifier) {
+  const Cursor& cursor = cursor_of(base);
   *identifier = static_cast<sqlite3_int64>(cursor.run * model().drawn().size() + cursor.quantity);
   return SQLITE_OK;
 }
 
-constexpr sqlite3_module draw_module = [] {
-  sqlite3_module module{};
-  module.xCreate = create;
-  module.xConnect = connect;
-  module.xBestIndex = choose_plan;
-  module.xDisconnect = disconnect;
-  module.xDestroy = disconnect;
-  module.xOpen = open;
-  module.xClose = close;
-  module.xFilter = filter;
-  module.xNext = next;
-  module.xEof = is_at_end;
-  module.xColumn = column;
-  module.xRowid = row_identifier;
-  return module;
-}();
-
 }  // namespace
 
-int register_draw_table(sqlite3* connection) {
-  const int code =
-      sqlite3_create_module_v2(connection, "proofmass_draw", &draw_module, nullptr, nullptr);
-  if (code != SQLITE_OK) return code;
-  return sqlite3_exec(connection,
-                      "CREATE VIRTUAL TABLE IF NOT EXISTS temp.draw USING proofmass_draw", nullptr,
-                      nullptr, nullptr);
-}
+int register_draw_table(sqlite3* connection) { return DrawTable::add_to(connection); }
 
 }  // namespace proofmass::coordinator

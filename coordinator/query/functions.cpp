@@ -13,8 +13,6 @@
 #include <string_view>
 
 #include "coordinator/query/aggregates.hpp"
-#include "coordinator/query/definition_table.hpp"
-#include "coordinator/query/draw_table.hpp"
 #include "coordinator/query/interval_functions.hpp"
 #include "core/error.hpp"
 

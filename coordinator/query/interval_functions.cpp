@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 
-#include "coordinator/query/per_cent.hpp"
 #include "core/error.hpp"
 #include "core/statistics/interval.hpp"
 

@@ -24,4 +24,10 @@ struct IntervalFunction {
 /// binomial_interval_lower and binomial_interval_upper; see README.md.
 [[nodiscard]] std::span<const IntervalFunction> interval_functions();
 
+/// A coverage or a confidence that SQL states in per cent, as a fraction. One below 1 % is of no
+/// use and would be a fraction where per cent is meant.
+/// @param name  Of the argument, for the message.
+/// @throws InvalidArgument unless it is in [1, 100).
+[[nodiscard]] double fraction_of(std::string_view name, double per_cent);
+
 }  // namespace proofmass::coordinator

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/query/display_text.hpp"
 #include "coordinator/query/functions.hpp"
 #include "coordinator/query/open_files.hpp"
 #include "coordinator/query/read_rule.hpp"
+#include "coordinator/report/text_cells.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -38,7 +38,7 @@ std::string shown_sql(std::string_view sql, std::size_t position) {
   const std::string_view before = sql.substr(0, position);
   const std::size_t begin = before.rfind('\n') + 1;  // 0 without one.
   const std::size_t end = std::min(sql.find('\n', position), sql.size());
-  return shortened_text(wire::visible_text(sql.substr(begin, end - begin)), shown_sql_width);
+  return shortened(wire::visible_text(sql.substr(begin, end - begin)), shown_sql_width);
 }
 
 std::string place_text(std::string_view sql, std::size_t position) {

@@ -20,6 +20,17 @@ struct Blob {
 /// A value of SQL; monostate is NULL. Text and bytes live until the next row.
 using Cell = std::variant<std::monostate, std::int64_t, double, std::string_view, Blob>;
 
+/// The shortest text that reads back as the same double: `0.1`, `1e+20`, `-0`, `inf`.
+[[nodiscard]] std::string shortest_text(double value);
+
+/// Bytes as SQL writes them: `x'00ff'`.
+[[nodiscard]] std::string blob_text(const Blob& blob);
+
+/// Numbers in shortest form, text as it is, bytes as blob_text(), NULL as nothing.
+[[nodiscard]] std::string cell_text(const Cell& cell);
+
+[[nodiscard]] bool is_number(const Cell& cell);
+
 /// What becomes of the rows of a query: begin() once, row() for each until it wants no more, end()
 /// once.
 class RowWriter {

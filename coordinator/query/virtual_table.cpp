@@ -1,5 +1,3 @@
-#include "coordinator/query/virtual_table.hpp"
-
 #include <sqlite3ext.h>
 
 #include <algorithm>
@@ -7,6 +5,8 @@
 #include <exception>
 #include <new>
 #include <span>
+
+#include "coordinator/query/virtual_table-inl.hpp"
 
 SQLITE_EXTENSION_INIT3
 

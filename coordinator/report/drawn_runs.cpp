@@ -4,7 +4,7 @@
 
 #include "coordinator/report/digest_check.hpp"
 #include "core/campaign/model.hpp"
-#include "core/campaign/run_ranges.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 namespace {

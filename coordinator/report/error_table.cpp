@@ -23,10 +23,6 @@ constexpr std::size_t from_width = 7;
 constexpr std::size_t to_width = 8;
 constexpr std::size_t rates_width = from_width + to_width;
 
-std::string signed_figure(double value) {
-  return fmt::format("{}{}", value < 0.0 ? "-" : "", measured_figure(std::abs(value)));
-}
-
 std::string heading() {
   std::string levels;
   for (const double level : percentile_levels) {

@@ -32,10 +32,6 @@ std::string triple(double value, const std::optional<Interval>& interval, double
   return triple(figure(value), figure(interval->lower), figure(interval->upper));
 }
 
-std::string signed_figure(double value) {
-  return fmt::format("{}{}", value < 0.0 ? "-" : "", measured_figure(std::abs(value)));
-}
-
 std::string heading() {
   const std::string rule =
       fmt::format("{}┼{}┼{}\n", horizontal_rule(label_width + triple_width),

@@ -7,8 +7,8 @@
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "core/campaign/model.hpp"
-#include "core/campaign/run_ranges.hpp"
 #include "core/campaign/statistics_passes.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 

@@ -9,8 +9,8 @@
 #include "coordinator/report/probability_text.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "core/campaign/model_rules.hpp"
-#include "core/campaign/run_ranges.hpp"
 #include "core/error.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -89,7 +89,7 @@ std::string name_of(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
 
 std::string term_row(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
   const std::string name = name_of(drawn, term);
-  const bool fits = text_width(name) < terms_width;
+  const bool fits = display_width(name) < terms_width;
   return (fits ? left_aligned(name, terms_width) : name + "\n" + left_aligned("", terms_width)) +
          right_aligned(fmt::format("{:.3g}", term.slope), slope_width) +
          right_aligned(fmt::format("{:.1f} %", 100.0 * term.share), term_share_width) +

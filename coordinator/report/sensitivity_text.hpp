@@ -4,7 +4,7 @@
 #include <string>
 
 #include "coordinator/report/drawn_runs.hpp"
-#include "core/campaign/identifiers.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 

@@ -4,22 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace proofmass::coordinator {
 namespace {
 
 std::string spaces(std::size_t width, std::string_view text) {
-  const std::size_t taken = text_width(text);
+  const std::size_t taken = display_width(text);
   return std::string(width > taken ? width - taken : 0, ' ');
 }
 
 }  // namespace
-
-// Every byte of UTF-8 starts a character but those of the form 10xxxxxx.
-std::size_t text_width(std::string_view text) {
-  const auto starts = [](char byte) { return (static_cast<unsigned char>(byte) & 0xc0) != 0x80; };
-  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), starts));
-}
 
 std::string left_aligned(std::string_view text, std::size_t width) {
   return std::string(text) + spaces(width, text);
@@ -34,22 +29,32 @@ std::string centred(std::string_view text, std::size_t width) {
   return std::string(margin, ' ') + std::string(text);
 }
 
-std::string shortened(std::string_view text, std::size_t width) {
-  if (text_width(text) <= width) return std::string(text);
-  std::size_t size = 0;
-  // Every byte that continues a UTF-8 character goes with the one before it.
-  for (std::size_t num_characters = 0; size < text.size(); ++size) {
-    const bool continues = (static_cast<unsigned char>(text[size]) & 0xc0) == 0x80;
-    if (!continues && ++num_characters >= width) break;
-  }
-  return std::string(text.substr(0, size)) + "…";
-}
-
 std::string line_of(std::string_view first, std::string_view second, std::size_t margin) {
   constexpr std::size_t columns_max = 80;
-  const bool fits = text_width(first) + 1 + text_width(second) <= columns_max;
+  const bool fits = display_width(first) + 1 + display_width(second) <= columns_max;
   return fits ? fmt::format("{} {}\n", first, second)
               : fmt::format("{}\n{:{}}{}\n", first, "", margin, second);
+}
+
+std::string table_row(std::span<const TextColumn> columns, std::span<const std::string> cells) {
+  std::string text;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const auto& [title, width, is_text] = columns[i];
+    const std::string cell = shortened(cells[i], width - 1);
+    text += is_text ? left_aligned(cell, width) : right_aligned(cell, width);
+  }
+  text.erase(text.find_last_not_of(' ') + 1);
+  return text + "\n";
+}
+
+std::string table_heading(std::span<const TextColumn> columns) {
+  std::vector<std::string> titles;
+  std::size_t width = 0;
+  for (const TextColumn& column : columns) {
+    titles.emplace_back(column.title);
+    width += column.width;
+  }
+  return table_row(columns, titles) + horizontal_rule(width) + "\n";
 }
 
 std::string horizontal_rule(std::size_t count) {
@@ -65,6 +70,10 @@ std::string measured_figure(double value) {
   const double rounded = std::stod(fmt::format("{:.2e}", value));
   const int exponent = static_cast<int>(std::floor(std::log10(rounded)));
   return fmt::format("{:.{}f}", value, std::max(0, 2 - exponent));
+}
+
+std::string signed_figure(double value) {
+  return fmt::format("{}{}", value < 0.0 ? "-" : "", measured_figure(std::abs(value)));
 }
 
 std::string given_figure(double value) {

@@ -1,27 +1,41 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 
+#include "proto/text/display_width.hpp"
+
 namespace proofmass::coordinator {
 
-/// Characters of UTF-8 text: Δ and ² are one each, as on a terminal.
-[[nodiscard]] std::size_t text_width(std::string_view text);
+using wire::display_width;
+using wire::shortened;
 
-/// Text filled up with spaces on the right or left to `width` characters.
+/// Text filled up with spaces on the right or left to `width` columns of a terminal.
 [[nodiscard]] std::string left_aligned(std::string_view text, std::size_t width);
 [[nodiscard]] std::string right_aligned(std::string_view text, std::size_t width);
-/// Text in the middle of `width` characters, without spaces behind it.
+/// Text in the middle of `width` columns, without spaces behind it.
 [[nodiscard]] std::string centred(std::string_view text, std::size_t width);
-
-/// Text cut to `width` characters, the last of them `…` if something is missing.
-[[nodiscard]] std::string shortened(std::string_view text, std::size_t width);
 
 /// Two parts of a line with a space between; below each other, the second behind `margin` spaces,
 /// if they take more than the 80 columns of a terminal.
 [[nodiscard]] std::string line_of(std::string_view first, std::string_view second,
                                   std::size_t margin);
+
+/// A column of a table: text stands left, numbers right.
+struct TextColumn {
+  std::string_view title;
+  std::size_t width;  ///< A space at least stays between it and the next.
+  bool is_text = false;
+};
+
+/// A line of a table, of as many cells as there are columns; what does not fit is shortened.
+[[nodiscard]] std::string table_row(std::span<const TextColumn> columns,
+                                    std::span<const std::string> cells);
+
+/// The titles, and a line below them.
+[[nodiscard]] std::string table_heading(std::span<const TextColumn> columns);
 
 /// `count` times the line ─.
 [[nodiscard]] std::string horizontal_rule(std::size_t count);
@@ -29,6 +43,9 @@ namespace proofmass::coordinator {
 /// A number ≥ 0 with three significant digits: `0.361`, `7.53`, `49.2`, `1240`; from a million on
 /// and below a thousandth `1.2e+06`, which is at most seven characters below 1e99.
 [[nodiscard]] std::string measured_figure(double value);
+
+/// The same of any number, with a minus sign if it is below 0.
+[[nodiscard]] std::string signed_figure(double value);
 
 /// A number ≥ 0 given by somebody: the same without zeros that say nothing, `7.3`, `2000`.
 [[nodiscard]] std::string given_figure(double value);

@@ -6,8 +6,8 @@
 #include <variant>
 #include <vector>
 
-#include "core/campaign/identifiers.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/runs.hpp"
 #include "core/statistics/stop_rule.hpp"
 #include "proto/text/event.hpp"
 #include "proto/wire/client_messages.hpp"

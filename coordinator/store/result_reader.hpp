@@ -4,8 +4,8 @@
 #include <memory>
 #include <optional>
 
-#include "core/campaign/identifiers.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 

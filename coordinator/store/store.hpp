@@ -15,9 +15,9 @@
 #include "coordinator/store/result_reader.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/identifiers.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"
+#include "core/runs.hpp"
 #include "core/statistics/stop_rule.hpp"
 #include "proto/wire/messages.hpp"
 

@@ -11,9 +11,9 @@
 
 #include "core/campaign/definition.hpp"
 #include "core/campaign/error_budget.hpp"
-#include "core/campaign/identifiers.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/math/instruction_set.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass {
 

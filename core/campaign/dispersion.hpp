@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/campaign/identifiers.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass {
 

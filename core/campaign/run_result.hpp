@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "core/campaign/identifiers.hpp"
 #include "core/campaign/result_schema.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass {
 

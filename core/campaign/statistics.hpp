@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/campaign/identifiers.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/runs.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/sum.hpp"

@@ -8,7 +8,6 @@
 #include "core/microscope/campaign/draw.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "core/microscope/definition/definition_items.hpp"
 #include "core/microscope/instrument/instrument.hpp"
 #include "core/microscope/simulation/reference_digest.hpp"
 #include "core/microscope/simulation/run.hpp"

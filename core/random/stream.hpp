@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "core/campaign/identifiers.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/campaign/identifiers.hpp"
 #include "core/error.hpp"
+#include "core/runs.hpp"
 #include "core/statistics/detail/phrase.hpp"
 #include "core/statistics/detail/requirement_phrase.hpp"
 #include "core/statistics/distribution.hpp"

@@ -4,8 +4,8 @@
 #include <functional>
 #include <vector>
 
-#include "core/campaign/identifiers.hpp"
 #include "core/error.hpp"
+#include "core/runs.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/distribution.hpp"
 

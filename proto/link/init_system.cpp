@@ -13,6 +13,8 @@
 namespace proofmass::wire {
 namespace {
 
+constexpr std::chrono::seconds status_interval(5);
+
 std::string environment(const char* name) {
   const char* const value = std::getenv(name);
   return value == nullptr ? "" : value;
@@ -56,6 +58,27 @@ void InitSystem::notify(std::string_view lines) const {
 std::optional<std::chrono::microseconds> InitSystem::watchdog_interval() const {
   if (!watchdog_) return std::nullopt;
   return *watchdog_ / 2;
+}
+
+ServiceNotices::ServiceNotices(InitSystem init_system) : init_system_(std::move(init_system)) {}
+
+void ServiceNotices::ready() {
+  if (!std::exchange(is_ready_, true)) init_system_.notify("READY=1");
+}
+
+void ServiceNotices::stopping() {
+  if (!std::exchange(is_stopping_, true)) init_system_.notify("STOPPING=1");
+}
+
+void ServiceNotices::on_tick(TimePoint now, const std::function<std::string()>& status) {
+  const auto watchdog = init_system_.watchdog_interval();
+  if (watchdog && now >= watchdog_at_) {
+    watchdog_at_ = now + *watchdog;
+    init_system_.notify("WATCHDOG=1");
+  }
+  if (now < status_at_) return;
+  status_at_ = now + status_interval;
+  init_system_.notify("STATUS=" + status());
 }
 
 }  // namespace proofmass::wire

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -27,6 +28,26 @@ class InitSystem {
  private:
   std::string socket_;
   std::optional<std::chrono::microseconds> watchdog_;
+};
+
+/// Tells the init system how a service is.
+class ServiceNotices {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  explicit ServiceNotices(InitSystem init_system = InitSystem::from_environment());
+
+  void ready();     ///< The first time only.
+  void stopping();  ///< The first time only.
+  /// Says in time that the service lives, and every 5 s what it does. To be called often.
+  void on_tick(TimePoint now, const std::function<std::string()>& status);
+
+ private:
+  InitSystem init_system_;
+  bool is_ready_ = false;
+  bool is_stopping_ = false;
+  TimePoint watchdog_at_ = TimePoint::min();
+  TimePoint status_at_ = TimePoint::min();
 };
 
 }  // namespace proofmass::wire

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "core/error.hpp"
+#include "core/math/hash.hpp"
 #include "proto/proofmass.pb.h"
 #include "proto/wire/checks.hpp"
-#include "proto/wire/checksum.hpp"
 #include "proto/wire/definition_message.hpp"
 #include "proto/wire/field_count.hpp"
 
@@ -55,7 +55,7 @@ std::variant<Definition, DecodeError> decode_definition(std::string_view bytes) 
 }
 
 EncodedDefinition::EncodedDefinition(std::string bytes)
-    : bytes_(std::move(bytes)), checksum_(checksum(bytes_)) {}
+    : bytes_(std::move(bytes)), checksum_(fnv1a(bytes_)) {}
 
 DefinitionPart EncodedDefinition::part(const CampaignRequest& request) const {
   const std::uint64_t offset = request.offset < bytes_.size() ? request.offset : 0;
@@ -83,7 +83,7 @@ std::variant<Definition, DecodeError> IncomingDefinition::take() {
   const std::string bytes = std::exchange(bytes_, {});
   total_size_ = 0;
   const std::uint64_t expected = std::exchange(checksum_, 0);
-  const std::uint64_t found = checksum(bytes);
+  const std::uint64_t found = fnv1a(bytes);
   if (found != expected) {
     return DecodeError{
         DecodeFault::invalid,

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "core/campaign/definition.hpp"
-#include "core/campaign/identifiers.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::wire {
 
@@ -146,7 +146,7 @@ struct DefinitionPart {
   CampaignId campaign;
   std::uint64_t offset = 0;
   std::uint64_t total_size = 0;  ///< Bytes of the whole; 1 to definition_size_max.
-  std::uint64_t checksum = 0;    ///< wire::checksum() of the whole.
+  std::uint64_t checksum = 0;    ///< fnv1a() of the whole.
   std::string content;           ///< 1 to definition_part_size_max bytes, within the whole.
 };
 
@@ -192,6 +192,13 @@ struct ComputedRun {
   RunResult result;
   double compute_s = 0.0;  ///< Time of a thread: its share of the batch it was in; 0 to 1e9.
   double elapsed_s = 0.0;  ///< From its beginning to its end: the time of that batch; 0 to 1e9.
+};
+
+/// A result, and the lease under which it was computed.
+struct LeasedResult {
+  CampaignId campaign;
+  Attempt attempt;
+  ComputedRun computed;
 };
 
 /// Worker → coordinator: results, repeated until acknowledged.

@@ -3,8 +3,8 @@
 #include <array>
 #include <utility>
 
+#include "core/runs.hpp"
 #include "tests/benchmarks/null_result.hpp"
-#include "worker/execution/run_ranges.hpp"
 
 namespace proofmass::test {
 
@@ -16,7 +16,7 @@ void NullExecution::define(wire::CampaignId campaign, std::shared_ptr<const Camp
 }
 
 void NullExecution::submit(wire::RunLease lease) {
-  for (const RunIndex run : worker::indices_of(std::array{lease.runs})) {
+  for (const RunIndex run : indices_of(std::array{lease.runs})) {
     if (is_defined(lease.campaign)) {
       finish(lease.campaign, run);
     } else {
@@ -30,7 +30,7 @@ std::vector<RunIndex> NullExecution::drop_waiting(wire::CampaignId campaign,
   std::vector<RunIndex> dropped;
   const auto waiting = waiting_.find(campaign);
   if (waiting == waiting_.end()) return dropped;
-  for (const RunIndex run : worker::indices_of(ranges)) {
+  for (const RunIndex run : indices_of(ranges)) {
     if (waiting->second.erase(run) > 0) dropped.push_back(run);
   }
   return dropped;

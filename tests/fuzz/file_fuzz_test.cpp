@@ -18,7 +18,6 @@
 #include "core/definition/csv.hpp"
 #include "core/error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "core/microscope/definition/environment_reader.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "proto/link/key_files.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
@@ -144,7 +143,7 @@ TEST_F(MutatedTexts, AreEnvironmentTablesOrRefused) {
       "angular_z_rad_s2\n";
   for (int i = 0; i < 8; ++i) text += std::to_string(1000 * i) + ",1e-8,2e-8,0,1e-9,0,-1.5e-9\n";
   mutate(text, [](const std::string& changed) {
-    (void)detail::parse_environment(changed, "environment.csv", 5950.0);
+    (void)parse_environment(changed, "environment.csv", 5950.0);
   });
 }
 

@@ -67,7 +67,7 @@ struct FuzzSummary {
   FuzzSummary& operator+=(const FuzzSummary& other);
 };
 
-/// Lets the steps of an input happen to decoders, workers' desk and dispatch, which must survive
+/// Lets the steps of an input happen to decoders, workers' gateway and dispatch, which must survive
 /// anything that peers send. Aborts if an invariant is broken, if a message that was sent cannot be
 /// read, or if a run is handed to the store twice.
 FuzzSummary run_fuzz_input(std::string_view input);

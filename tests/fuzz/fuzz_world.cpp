@@ -17,7 +17,6 @@
 namespace proofmass::test {
 namespace {
 
-using coordinator::Arrival;
 using coordinator::TimePoint;
 using wire::CampaignId;
 
@@ -55,7 +54,8 @@ coordinator::DispatchConfig config() {
 /// The coordinator without sockets and files, in a time of its own.
 class World final : public coordinator::Outbox {
  public:
-  World() : state_(initial_state(config(), {}, now_)), desk_(state_, fuzz_epoch, surroundings()) {
+  World()
+      : state_(initial_state(config(), {}, now_)), gateway_(state_, fuzz_epoch, surroundings()) {
     on_campaign(state_, fuzz_campaign, stored(false), now_, *this);
     on_campaign(state_, fuzz_table_campaign, stored(true), now_, *this);
     check_invariants(state_);
@@ -70,19 +70,21 @@ class World final : public coordinator::Outbox {
 
   // Outbox.
   void send(wire::WorkerId worker, wire::Message message) override {
-    desk_.send(worker, std::move(message));
+    gateway_.send(worker, std::move(message));
   }
   void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
                        const std::shared_ptr<const Campaign>& definition) override {
-    desk_.send_definition(worker, request, definition);
+    gateway_.send_definition(worker, request, definition);
   }
-  void store(Arrival arrival) override {
-    const auto& run = arrival.computed.result.run;
+  void store(wire::WorkerId, wire::LeasedResult result) override {
+    const auto& run = result.computed.result.run;
     PROOFMASS_EXPECT(run.value < fuzz_num_runs);
-    PROOFMASS_EXPECT(handed_over_.emplace(arrival.campaign, run).second);
-    to_commit_.push_back(std::move(arrival));
+    PROOFMASS_EXPECT(handed_over_.emplace(result.campaign, run).second);
+    to_commit_.push_back(std::move(result));
   }
-  void compare(Arrival arrival) override { to_compare_.push_back(std::move(arrival)); }
+  void compare(wire::WorkerId worker, wire::LeasedResult result) override {
+    to_compare_.emplace_back(worker, std::move(result));
+  }
   void record(const coordinator::Loss& loss) override {
     PROOFMASS_EXPECT(loss.runs.count > 0 && loss.runs.end() <= fuzz_num_runs);
     summary_.num_lost += loss.runs.count;
@@ -122,9 +124,9 @@ class World final : public coordinator::Outbox {
   void act(const Step& step) {
     switch (step.kind) {
       case StepKind::worker_message:
-        return desk_.receive({.from = {.routing_id = routing_id(step), .key = "", .host = ""},
-                              .frames = {step.content}},
-                             now_, *this);
+        return gateway_.receive({.from = {.routing_id = routing_id(step), .key = "", .host = ""},
+                                 .frames = {step.content}},
+                                now_, *this);
       case StepKind::client_request:
         return carry_out_request(step.content);
       case StepKind::client_reply:
@@ -200,8 +202,8 @@ class World final : public coordinator::Outbox {
   void commit(std::size_t count_max) {
     std::map<CampaignId, std::vector<RunIndex>> committed;
     for (std::size_t i = 0; i < count_max && !to_commit_.empty(); ++i) {
-      const Arrival& arrival = to_commit_.front();
-      committed[arrival.campaign].push_back(arrival.computed.result.run);
+      const wire::LeasedResult& result = to_commit_.front();
+      committed[result.campaign].push_back(result.computed.result.run);
       to_commit_.pop_front();
       ++summary_.num_committed;
     }
@@ -210,17 +212,16 @@ class World final : public coordinator::Outbox {
 
   void compare_next(bool is_equal) {
     if (to_compare_.empty()) return;
-    const Arrival arrival = std::move(to_compare_.front());
+    const auto [worker, result] = std::move(to_compare_.front());
     to_compare_.pop_front();
     ++summary_.num_compared;
-    on_compared(state_, arrival.campaign, arrival.computed.result.run, arrival.worker, is_equal,
-                now_, *this);
+    on_compared(state_, result.campaign, result.computed.result.run, worker, is_equal, now_, *this);
   }
 
   void elapse(TimePoint::duration duration) {
     now_ += duration;
     on_tick(state_, now_, *this);
-    desk_.review(now_, *this);
+    gateway_.review(now_, *this);
   }
 
   void fail_or_recover(bool fails) {
@@ -231,7 +232,7 @@ class World final : public coordinator::Outbox {
   }
 
   void end_process(const Step& step) {
-    const auto worker = desk_.peers().worker_at(routing_id(step));
+    const auto worker = gateway_.peers().worker_at(routing_id(step));
     if (!worker) return;
     const bool ran_out = step.number >= num_connections;
     on_gone(state_, *worker, ran_out ? wire::LossReason::out_of_memory : wire::LossReason::crashed,
@@ -240,10 +241,10 @@ class World final : public coordinator::Outbox {
 
   TimePoint now_{};
   coordinator::State state_;
-  coordinator::WorkerDesk desk_;
+  coordinator::WorkerDesk gateway_;
   std::set<std::pair<CampaignId, RunIndex>> handed_over_;
-  std::deque<Arrival> to_commit_;
-  std::deque<Arrival> to_compare_;
+  std::deque<wire::LeasedResult> to_commit_;
+  std::deque<std::pair<wire::WorkerId, wire::LeasedResult>> to_compare_;
   bool is_failing_ = false;
   FuzzSummary summary_;
 };

@@ -327,23 +327,22 @@ void PlayedCoordinator::flush(wire::CampaignId id) {
   after_event();
 }
 
-void PlayedCoordinator::store(coordinator::Arrival arrival) {
-  const RunIndex run = arrival.computed.result.run;
-  write_later(arrival.campaign, [this, id = arrival.campaign, run](PlayedFile& file) {
+void PlayedCoordinator::store(wire::WorkerId, wire::LeasedResult result) {
+  const RunIndex run = result.computed.result.run;
+  write_later(result.campaign, [this, id = result.campaign, run](PlayedFile& file) {
     ++file.num_commits[run];
     file.given_up.erase(run);
     on_committed(life_->state, id, std::vector{run}, agenda_.now(), *this);
   });
 }
 
-void PlayedCoordinator::compare(coordinator::Arrival arrival) {
-  const RunIndex run = arrival.computed.result.run;
-  write_later(arrival.campaign,
-              [this, id = arrival.campaign, worker = arrival.worker, run](PlayedFile& file) {
-                EXPECT_TRUE(file.num_commits.contains(run)) << "compared with nothing";
-                file.compared.insert(run);
-                on_compared(life_->state, id, run, worker, true, agenda_.now(), *this);
-              });
+void PlayedCoordinator::compare(wire::WorkerId worker, wire::LeasedResult result) {
+  const RunIndex run = result.computed.result.run;
+  write_later(result.campaign, [this, id = result.campaign, worker, run](PlayedFile& file) {
+    EXPECT_TRUE(file.num_commits.contains(run)) << "compared with nothing";
+    file.compared.insert(run);
+    on_compared(life_->state, id, run, worker, true, agenda_.now(), *this);
+  });
 }
 
 void PlayedCoordinator::record(const coordinator::Loss& loss) {

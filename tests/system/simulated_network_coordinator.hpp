@@ -104,8 +104,8 @@ class PlayedCoordinator final : public coordinator::Outbox {
   void send(wire::WorkerId worker, wire::Message message) override;
   void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
                        const std::shared_ptr<const Campaign>& definition) override;
-  void store(coordinator::Arrival arrival) override;
-  void compare(coordinator::Arrival arrival) override;
+  void store(wire::WorkerId, wire::LeasedResult result) override;
+  void compare(wire::WorkerId worker, wire::LeasedResult result) override;
   void record(const coordinator::Loss& loss) override;
   void give_up(wire::CampaignId campaign, RunIndex run) override;
   void log(coordinator::Event event, wire::CampaignId campaign) override;

@@ -143,10 +143,10 @@ void World::spool(Process& process) {
   if (agenda_.now() - process.spooled_at < 5s) return;
   process.spooled_at = agenda_.now();
   auto& spool = machines_.at(process.machine).spool;
-  const std::vector<worker::KeptResult> results = process.conversation->unacknowledged();
+  const std::vector<wire::LeasedResult> results = process.conversation->unacknowledged();
   if (results.empty()) spool.clear();
   std::set<RunKey> seen;
-  for (const worker::KeptResult& result : results) {
+  for (const wire::LeasedResult& result : results) {
     const RunKey run{result.campaign, result.computed.result.run};
     seen.insert(run);
     if (process.unspooled.contains(run)) spool[run] = result;

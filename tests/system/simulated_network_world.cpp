@@ -215,7 +215,7 @@ void World::receive(Process& process, const wire::Packet& packet) {
   const auto num_kept = [&] {
     if (forget == nullptr) return conversation.num_unacknowledged();
     std::size_t count = 0;
-    for (const worker::KeptResult& result : conversation.unacknowledged()) {
+    for (const wire::LeasedResult& result : conversation.unacknowledged()) {
       const bool is_forgotten = result.campaign == forget->campaign &&
                                 result.computed.result.run.value < forget->num_runs;
       if (!is_forgotten) ++count;
@@ -280,7 +280,7 @@ void World::start_process(std::size_t machine, std::optional<wire::FormerSession
   };
   process.conversation = std::make_unique<worker::Conversation>(session, hello, *process.execution,
                                                                 send, agenda_.now(), config);
-  std::vector<worker::KeptResult> spooled;
+  std::vector<wire::LeasedResult> spooled;
   for (const auto& [run, result] : on.spool) spooled.push_back(result);
   incidents_.num_spooled += spooled.size();
   process.conversation->restore(std::move(spooled));
@@ -360,7 +360,7 @@ void World::end_if_over(wire::SessionId session) {
   if (!ending) return;
   EXPECT_EQ(ending->kind, worker::Ending::Kind::done) << ending->reason;
   if (weather_.has_spools) {
-    for (const worker::KeptResult& result : process.conversation->unacknowledged()) {
+    for (const wire::LeasedResult& result : process.conversation->unacknowledged()) {
       machines_.at(process.machine).spool[{result.campaign, result.computed.result.run}] = result;
     }
   }

@@ -82,7 +82,7 @@ class World {
     std::size_t num_threads = 1;
     std::size_t num_lanes = 1;
     bool is_bad = false;
-    std::map<RunKey, worker::KeptResult> spool;
+    std::map<RunKey, wire::LeasedResult> spool;
   };
   struct Process {
     std::size_t machine = 0;

@@ -32,7 +32,7 @@ TEST(CheckLayers, CatchesEachForbiddenInclude) {
   EXPECT_THAT(layers("core/campaign/a.cpp", "<toml++/toml.h>"), SizeIs(1));
   EXPECT_THAT(layers("proto/wire/a.cpp", "<toml++/toml.h>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/store/store.hpp", "<sqlite3.h>"), SizeIs(1));
-  EXPECT_THAT(layers("coordinator/cli/query_command.cpp", "<sqlite3ext.h>"), SizeIs(1));
+  EXPECT_THAT(layers("coordinator/cli/commands/query.cpp", "<sqlite3ext.h>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/dispatch/a.cpp", "<zmq.hpp>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/net/a.hpp", "<zmq.hpp>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/net/a.cpp", "\"proofmass.pb.h\""), SizeIs(1));
@@ -72,7 +72,7 @@ TEST(CheckLayers, KeepMathematicsFromKnowingCampaigns) {
   for (const std::string topic : {"math", "random", "signal", "statistics", "statistics/detail"}) {
     const std::string path = "core/" + topic + "/a.cpp";
     EXPECT_THAT(layers(path, "\"core/campaign/campaign.hpp\""), SizeIs(1)) << path;
-    EXPECT_THAT(layers(path, "\"core/campaign/identifiers.hpp\""), IsEmpty()) << path;
+    EXPECT_THAT(layers(path, "\"core/runs.hpp\""), IsEmpty()) << path;
   }
   EXPECT_THAT(layers("core/definition/a.hpp", "\"core/campaign/definition.hpp\""), IsEmpty());
 }

@@ -24,13 +24,6 @@ struct FinishedRun {
   wire::ComputedRun computed;
 };
 
-/// A result that is kept until the coordinator has acknowledged it.
-struct KeptResult {
-  wire::CampaignId campaign;
-  wire::Attempt attempt;
-  wire::ComputedRun computed;
-};
-
 /// Runs that are being computed together.
 struct RunningBatch {
   std::uint64_t number = 0;  ///< No other batch of the execution has it.

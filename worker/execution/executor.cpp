@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/error.hpp"
-#include "worker/execution/run_ranges.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::worker {
 namespace {

@@ -8,20 +8,12 @@
 #include <variant>
 
 #include "core/error.hpp"
-#include "worker/execution/run_ranges.hpp"
+#include "core/math/hash.hpp"
+#include "core/runs.hpp"
 #include "worker/net/held_runs.hpp"
 
 namespace proofmass::worker {
 namespace {
-
-/// The mixing of SplitMix64: a number without visible relation to its argument, in [0, 1).
-double fraction_from(std::uint64_t number) {
-  number += 0x9e3779b97f4a7c15U;
-  number = (number ^ (number >> 30)) * 0xbf58476d1ce4e5b9U;
-  number = (number ^ (number >> 27)) * 0x94d049bb133111ebU;
-  number ^= number >> 31;
-  return static_cast<double>(number >> 11) * 0x1.0p-53;
-}
 
 Duration times(double factor, Duration duration) {
   return std::chrono::duration_cast<Duration>(factor * duration);
@@ -282,7 +274,7 @@ void Conversation::come_again(const wire::Reject& reject, TimePoint now) {
   refused_at_ = now;
   is_registered_ = false;
   is_closed_out_ = reject.reason == wire::RejectReason::malformed;
-  const double jitter = 0.25 * fraction_from(session_.value + num_sent_);
+  const double jitter = 0.25 * fraction_of(mixed(session_.value + num_sent_));
   hello_due_at_ = now + times(1.0 + jitter, refusal_delay_);
   hello_delay_ = config_.hello_delay;
   refusal_delay_ = std::min(2 * refusal_delay_, config_.refusal_delay_max);
@@ -298,7 +290,7 @@ void Conversation::come_again(const wire::Reject& reject, TimePoint now) {
 void Conversation::say_hello(TimePoint now) {
   is_refused_ = false;
   send(hello_);
-  const double jitter = 0.25 * fraction_from(session_.value + num_sent_);
+  const double jitter = 0.25 * fraction_of(mixed(session_.value + num_sent_));
   hello_due_at_ = now + times(1.0 + jitter, hello_delay_);
   hello_delay_ = std::min(2 * hello_delay_, config_.hello_delay_max);
 }

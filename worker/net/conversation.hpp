@@ -73,7 +73,7 @@ class Conversation {
                TimePoint now, const ConversationConfig& config = {});
 
   /// Takes over results of a process before this one, to be delivered first.
-  void restore(std::vector<KeptResult> results);
+  void restore(std::vector<wire::LeasedResult> results);
 
   void on_packet(const wire::Packet& packet, TimePoint now);
   /// Messages sent before had nowhere to go.
@@ -103,7 +103,7 @@ class Conversation {
   /// Those among them that the coordinator could not take: it does not serve their campaigns.
   [[nodiscard]] std::size_t num_set_aside() const { return num_set_aside_; }
   /// Results without an acknowledgement, in order of campaign and run.
-  [[nodiscard]] std::vector<KeptResult> unacknowledged() const;
+  [[nodiscard]] std::vector<wire::LeasedResult> unacknowledged() const;
   /// Runs that wait or are being computed.
   [[nodiscard]] std::size_t num_unfinished() const { return unfinished_.size(); }
 

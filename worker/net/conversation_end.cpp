@@ -3,7 +3,7 @@
 #include <array>
 #include <utility>
 
-#include "worker/execution/run_ranges.hpp"
+#include "core/runs.hpp"
 #include "worker/net/conversation.hpp"
 
 // How a conversation ends. While it does, it takes no more runs.

@@ -11,8 +11,8 @@
 
 namespace proofmass::worker {
 
-void Conversation::restore(std::vector<KeptResult> results) {
-  for (KeptResult& result : results) {
+void Conversation::restore(std::vector<wire::LeasedResult> results) {
+  for (wire::LeasedResult& result : results) {
     const RunKey key{result.campaign, result.computed.result.run};
     unacknowledged_[key] = {.attempt = result.attempt,
                             .computed = result.computed,
@@ -21,8 +21,8 @@ void Conversation::restore(std::vector<KeptResult> results) {
   }
 }
 
-std::vector<KeptResult> Conversation::unacknowledged() const {
-  std::vector<KeptResult> results;
+std::vector<wire::LeasedResult> Conversation::unacknowledged() const {
+  std::vector<wire::LeasedResult> results;
   for (const auto& [key, sent] : unacknowledged_) {
     results.push_back({key.first, sent.attempt, sent.computed});
   }

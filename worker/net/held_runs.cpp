@@ -11,13 +11,10 @@ std::vector<wire::HeldRuns> grouped(std::vector<HeldRun> runs, std::size_t num_r
   for (const HeldRun& held : runs) {
     const bool is_of_last = !groups.empty() && groups.back().campaign == held.campaign &&
                             groups.back().attempt == held.attempt;
-    if (is_of_last && groups.back().ranges.back().end() == held.run.value) {
-      ++groups.back().ranges.back().count;
-      continue;
-    }
-    if (num_ranges++ == num_ranges_max) break;
+    const bool is_in_last = is_of_last && groups.back().ranges.back().end() == held.run.value;
+    if (!is_in_last && num_ranges++ == num_ranges_max) break;
     if (!is_of_last) groups.push_back({held.campaign, held.attempt, {}});
-    groups.back().ranges.push_back({held.run, 1});
+    append(groups.back().ranges, held.run);
   }
   return groups;
 }

@@ -23,7 +23,6 @@ constexpr std::chrono::milliseconds tick_interval(100);
 constexpr std::chrono::seconds awake_turn_max(1);       ///< Longer ones were spent asleep.
 constexpr std::chrono::milliseconds fault_interval(5);  ///< How exactly faults are timed.
 constexpr std::chrono::seconds spool_interval(30);
-constexpr std::chrono::seconds status_interval(10);
 
 TimePoint time_now() { return std::chrono::steady_clock::now(); }
 
@@ -87,39 +86,12 @@ class Keeping {
   TimePoint due_at_ = TimePoint::min();
 };
 
-/// Tells the init system how the worker is.
-class Notices {
- public:
-  explicit Notices(const Conversation& conversation) : conversation_(conversation) {}
-
-  void on_tick(TimePoint now) {
-    if (conversation_.is_registered() && !std::exchange(is_ready_, true)) notify("READY=1");
-    if (conversation_.is_leaving()) stopping();
-    const auto watchdog = init_system_.watchdog_interval();
-    if (watchdog && take_turn(watchdog_at_, now, *watchdog)) notify("WATCHDOG=1");
-    if (take_turn(status_at_, now, status_interval)) {
-      notify(fmt::format(
-          "STATUS={}, {} runs at hand, {} results not acknowledged, {} of them not served now",
-          conversation_.is_registered() ? "registered" : "not registered",
-          conversation_.num_unfinished(), conversation_.num_unacknowledged(),
-          conversation_.num_set_aside()));
-    }
-  }
-
-  void stopping() {
-    if (!std::exchange(is_stopping_, true)) notify("STOPPING=1");
-  }
-
- private:
-  void notify(std::string_view lines) const { init_system_.notify(lines); }
-
-  const Conversation& conversation_;
-  wire::InitSystem init_system_ = wire::InitSystem::from_environment();
-  bool is_ready_ = false;
-  bool is_stopping_ = false;
-  TimePoint watchdog_at_ = TimePoint::min();
-  TimePoint status_at_ = TimePoint::min();
-};
+std::string status_of(const Conversation& conversation) {
+  return fmt::format("{}, {} runs at hand, {} results not acknowledged, {} of them not served now",
+                     conversation.is_registered() ? "registered" : "not registered",
+                     conversation.num_unfinished(), conversation.num_unacknowledged(),
+                     conversation.num_set_aside());
+}
 
 class Service {
  public:
@@ -133,8 +105,7 @@ class Service {
         conversation_(
             config.session, config.hello, execution,
             [this](const wire::Packet& packet) { send(packet); }, time_now(), config.conversation),
-        keeping_(config.spool, config.hello.model_version, conversation_, log_),
-        notices_(conversation_) {}
+        keeping_(config.spool, config.hello.model_version, conversation_, log_) {}
 
   Ending run() {
     TimePoint tick_at = time_now();
@@ -216,7 +187,9 @@ class Service {
     conversation_.on_tick(now);
     if (conversation_.take_reconnection()) link_.reconnect();
     keeping_.on_tick(now);
-    notices_.on_tick(now);
+    if (conversation_.is_registered()) notices_.ready();
+    if (conversation_.is_leaving()) notices_.stopping();
+    notices_.on_tick(now, [this] { return status_of(conversation_); });
   }
 
   const wire::Log& log_;
@@ -227,7 +200,7 @@ class Service {
   CoordinatorLink link_;
   Conversation conversation_;
   Keeping keeping_;
-  Notices notices_;
+  wire::ServiceNotices notices_;
 };
 
 }  // namespace

@@ -13,7 +13,7 @@
 #include <variant>
 
 #include "core/error.hpp"
-#include "proto/wire/checksum.hpp"
+#include "core/math/hash.hpp"
 #include "proto/wire/codec.hpp"
 
 namespace proofmass::worker {
@@ -40,8 +40,8 @@ std::uint64_t from_little_endian(std::string_view bytes) {
 
 std::string record_of(const wire::ResultBatch& batch) {
   const std::string payload = wire::encode({.header = record_header, .message = batch});
-  return little_endian(payload.size(), size_bytes) +
-         little_endian(wire::checksum(payload), checksum_bytes) + payload;
+  return little_endian(payload.size(), size_bytes) + little_endian(fnv1a(payload), checksum_bytes) +
+         payload;
 }
 
 /// The payload at the start of the bytes; nothing if they do not start with a whole record.
@@ -52,7 +52,7 @@ std::optional<std::string_view> payload_at(std::string_view bytes) {
   if (bytes.size() - head_bytes < size) return std::nullopt;
   const std::string_view payload = bytes.substr(head_bytes, size);
   const std::uint64_t expected = from_little_endian(bytes.substr(size_bytes, checksum_bytes));
-  if (wire::checksum(payload) != expected) return std::nullopt;
+  if (fnv1a(payload) != expected) return std::nullopt;
   return payload;
 }
 
@@ -64,10 +64,10 @@ std::optional<wire::ResultBatch> batch_from(std::string_view payload) {
   return batch == nullptr ? std::nullopt : std::optional(*batch);
 }
 
-std::vector<wire::ResultBatch> batches_of(std::span<const KeptResult> results) {
+std::vector<wire::ResultBatch> batches_of(std::span<const wire::LeasedResult> results) {
   std::vector<wire::ResultBatch> batches;
   std::map<std::pair<wire::CampaignId, wire::Attempt>, std::size_t> open;
-  for (const KeptResult& result : results) {
+  for (const wire::LeasedResult& result : results) {
     const std::pair key(result.campaign, result.attempt);
     const auto [entry, is_new] = open.try_emplace(key, batches.size());
     if (is_new) batches.push_back({result.campaign, result.attempt, {}});
@@ -145,7 +145,7 @@ void Spool::read_records(std::string_view content) {
   if (ftruncate(file_, static_cast<off_t>(size_)) != 0) throw Error(message(std::strerror(errno)));
 }
 
-std::optional<std::string> Spool::append(std::span<const KeptResult> results) {
+std::optional<std::string> Spool::append(std::span<const wire::LeasedResult> results) {
   std::string records;
   for (const wire::ResultBatch& batch : batches_of(results)) records += record_of(batch);
   return write(records);

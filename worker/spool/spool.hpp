@@ -38,13 +38,15 @@ class Spool {
   Spool& operator=(const Spool&) = delete;
 
   /// The results that it held when it was opened.
-  [[nodiscard]] const std::vector<KeptResult>& former_results() const { return former_results_; }
+  [[nodiscard]] const std::vector<wire::LeasedResult>& former_results() const {
+    return former_results_;
+  }
   /// Bytes at its end that were no records and have been dropped.
   [[nodiscard]] std::uint64_t num_bytes_dropped() const { return num_bytes_dropped_; }
 
   /// Adds results; they survive the process and the machine. If that is not possible, none is added
   /// and the reason is returned, as `spool = PATH (reason)`.
-  [[nodiscard]] std::optional<std::string> append(std::span<const KeptResult> results);
+  [[nodiscard]] std::optional<std::string> append(std::span<const wire::LeasedResult> results);
   /// Everything has been acknowledged.
   void clear();
 
@@ -65,7 +67,7 @@ class Spool {
   int file_ = -1;
   std::uint64_t size_ = 0;
   std::uint64_t num_bytes_dropped_ = 0;
-  std::vector<KeptResult> former_results_;
+  std::vector<wire::LeasedResult> former_results_;
 };
 
 }  // namespace proofmass::worker

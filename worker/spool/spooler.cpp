@@ -3,23 +3,23 @@
 namespace proofmass::worker {
 
 Spooler::Spooler(Spool& spool) : spool_(spool) {
-  for (const KeptResult& result : spool.former_results()) spooled_.insert(key_of(result));
+  for (const wire::LeasedResult& result : spool.former_results()) spooled_.insert(key_of(result));
 }
 
-Spooler::RunKey Spooler::key_of(const KeptResult& result) {
+Spooler::RunKey Spooler::key_of(const wire::LeasedResult& result) {
   return {result.campaign, result.computed.result.run};
 }
 
-std::optional<std::string> Spooler::look(const std::vector<KeptResult>& unacknowledged) {
+std::optional<std::string> Spooler::look(const std::vector<wire::LeasedResult>& unacknowledged) {
   if (unacknowledged.empty()) {
     spool_.clear();
     spooled_.clear();
     seen_.clear();
     return std::nullopt;
   }
-  std::vector<KeptResult> old;
+  std::vector<wire::LeasedResult> old;
   std::set<RunKey> seen;
-  for (const KeptResult& result : unacknowledged) {
+  for (const wire::LeasedResult& result : unacknowledged) {
     const RunKey key = key_of(result);
     seen.insert(key);
     if (seen_.contains(key) && !spooled_.contains(key)) old.push_back(result);
@@ -28,15 +28,15 @@ std::optional<std::string> Spooler::look(const std::vector<KeptResult>& unacknow
   return append(old);
 }
 
-std::optional<std::string> Spooler::finish(const std::vector<KeptResult>& unacknowledged) {
+std::optional<std::string> Spooler::finish(const std::vector<wire::LeasedResult>& unacknowledged) {
   (void)look(unacknowledged);
   return look(unacknowledged);
 }
 
-std::optional<std::string> Spooler::append(const std::vector<KeptResult>& results) {
+std::optional<std::string> Spooler::append(const std::vector<wire::LeasedResult>& results) {
   if (results.empty()) return std::nullopt;
   if (auto reason = spool_.append(results)) return reason;
-  for (const KeptResult& result : results) spooled_.insert(key_of(result));
+  for (const wire::LeasedResult& result : results) spooled_.insert(key_of(result));
   return std::nullopt;
 }
 

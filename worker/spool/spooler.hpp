@@ -20,15 +20,17 @@ class Spooler {
 
   /// To be called now and then with the results that are not acknowledged. Returns why they could
   /// not be written, if so; they stay in memory, and the next call tries again.
-  [[nodiscard]] std::optional<std::string> look(const std::vector<KeptResult>& unacknowledged);
+  [[nodiscard]] std::optional<std::string> look(
+      const std::vector<wire::LeasedResult>& unacknowledged);
   /// Likewise at the end, when they will not stay in memory.
-  [[nodiscard]] std::optional<std::string> finish(const std::vector<KeptResult>& unacknowledged);
+  [[nodiscard]] std::optional<std::string> finish(
+      const std::vector<wire::LeasedResult>& unacknowledged);
 
  private:
   using RunKey = std::pair<wire::CampaignId, RunIndex>;
 
-  [[nodiscard]] static RunKey key_of(const KeptResult& result);
-  [[nodiscard]] std::optional<std::string> append(const std::vector<KeptResult>& results);
+  [[nodiscard]] static RunKey key_of(const wire::LeasedResult& result);
+  [[nodiscard]] std::optional<std::string> append(const std::vector<wire::LeasedResult>& results);
 
   Spool& spool_;
   std::set<RunKey> spooled_;

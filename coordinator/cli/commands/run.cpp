@@ -28,7 +28,7 @@
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/campaign/model.hpp"
-#include "core/campaign/run_ranges.hpp"
+#include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/text/visible_text.hpp"

@@ -15,8 +15,8 @@
 #include "coordinator/report/sensitivity_text.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/dispersion.hpp"
-#include "core/campaign/identifiers.hpp"
 #include "core/campaign/model.hpp"
+#include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {

@@ -61,15 +61,6 @@ void check_next_run(const Statement& row, std::span<const RunRange> ranges,
   row.refuse_as_damaged(fmt::format("row of run {}, of {} there are", run, num_runs));
 }
 
-/// Appends to ranges that end before the run.
-void append_run(std::vector<RunRange>& ranges, RunIndex run) {
-  if (!ranges.empty() && ranges.back().end() == run.value) {
-    ++ranges.back().count;
-  } else {
-    ranges.push_back({.first = run, .count = 1});
-  }
-}
-
 }  // namespace
 
 CampaignControl read_control(const Database& database) {
@@ -169,7 +160,7 @@ std::vector<RunRange> read_runs(const Database& database, std::string_view sql) 
   const std::uint64_t num_runs = database.count("SELECT num_runs FROM campaign");
   do {
     check_next_run(select, ranges, num_runs);
-    append_run(ranges, RunIndex{select.count(0)});
+    append(ranges, RunIndex{select.count(0)});
   } while (select.step());
   return ranges;
 }

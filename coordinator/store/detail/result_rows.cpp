@@ -13,6 +13,7 @@
 #include "coordinator/store/store_error.hpp"
 #include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/math/hash.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -66,12 +67,9 @@ std::string select_sql(std::string_view clause) {
   return fmt::format("SELECT {} FROM run_result {}", column_list(), clause);
 }
 
-/// Adds the bytes of a number to a digest, lowest first [RFC 9923].
+/// Adds the bytes of a number to a digest, lowest first.
 std::uint64_t digest_with(std::uint64_t digest, std::uint64_t number) {
-  constexpr std::uint64_t prime = 0x100000001b3;
-  for (int shift = 0; shift < 64; shift += 8) {
-    digest = (digest ^ ((number >> shift) & 0xff)) * prime;
-  }
+  for (int shift = 0; shift < 64; shift += 8) digest = fnv1a(digest, (number >> shift) & 0xff);
   return digest;
 }
 
@@ -239,8 +237,7 @@ bool are_equal(const RunResult& left, const RunResult& right) {
 }
 
 std::uint64_t digest(const RunResult& result) {
-  constexpr std::uint64_t offset_basis = 0xcbf29ce484222325;
-  std::uint64_t digest = offset_basis;
+  std::uint64_t digest = fnv1a_basis;
   for (const std::uint64_t number :
        {result.run.value, static_cast<std::uint64_t>(result.status),
         std::uint64_t{result.num_draws}, std::uint64_t{result.num_rounds}}) {

@@ -6,7 +6,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -14,14 +13,13 @@
 #include <system_error>
 
 #include "coordinator/store/store_error.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
 
 std::string this_process() {
-  std::array<char, 256> host{};
-  ::gethostname(host.data(), host.size() - 1);
-  return fmt::format("process {} on {}", ::getpid(), host.data());
+  return fmt::format("process {} on {}", ::getpid(), wire::host_name());
 }
 
 std::string holder(const std::filesystem::path& path) {

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <string>
 
+#include "core/microscope/campaign/scenario.hpp"
+
 namespace proofmass {
 namespace {
 

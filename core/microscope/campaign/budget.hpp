@@ -5,9 +5,20 @@
 
 #include "core/campaign/error_budget.hpp"
 #include "core/microscope/campaign/parameter.hpp"
-#include "core/microscope/campaign/scenario.hpp"
 
 namespace proofmass {
+
+struct Scenario;
+
+/// Levels and bounds behind the budget tables ([Hardy2013] tab:Budget, tab:Budget_cali).
+struct BudgetConfig {
+  double t_xy_s2 = 3.0e-11;            ///< T_xy at f_EP, from 1.4 mrad of tilt.
+  double residual_m_s2 = 1e-12;        ///< Drag-free residue at f_EP.
+  double differential_m_s2 = 1.43e-8;  ///< Γ_app,d at DC.
+  double offcentring_max_m = 20e-6;
+  double scale_factor_error_max = 1e-2;
+  double quadratic_factor_max_s2_m = 14000.0;
+};
 
 inline constexpr std::size_t num_budget_entries = 10;
 

@@ -42,6 +42,15 @@ inline constexpr std::size_t num_health_values = 5;
 /// All of them, in the order of LoopHealth.
 [[nodiscard]] const std::array<HealthValue, num_health_values>& health_values();
 
+/// Limits beyond which a run is `lost`: its estimates are not what the method claims of them. A
+/// sensor at the end of its range is lost, too.
+struct HealthConfig {
+  double attitude_max_rad = 1.4e-3;  ///< The tilt behind the budget's T_xy.
+  double residual_max_m_s2 = 1e-10;  ///< K2 of its square: 1e-3 of Δx's objective at the bound.
+  double quadratic_noise_max = 1.0;  ///< Then noise is √2 of what the sensors have.
+  double square_noise_max = 5e-4;    ///< K2 is then known to 1.6 %, and its estimate still linear.
+};
+
 /// Why a run is lost: the first of these that is beyond its limit. The values are stored and sent:
 /// never renumber.
 enum class LossCause : std::uint8_t {

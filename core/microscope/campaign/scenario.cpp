@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numbers>
 #include <type_traits>
 
 #include "core/error.hpp"
@@ -11,49 +10,6 @@
 #include "core/microscope/session/session_names.hpp"
 
 namespace proofmass {
-
-std::span<const std::string_view> names_of(EnvironmentKind) {
-  static constexpr std::array<std::string_view, 2> names{"harmonic", "file"};
-  return names;
-}
-
-std::span<const std::string_view> names_of(NoisePreset) {
-  static constexpr std::array<std::string_view, 2> names{"design_2013", "flight_suref"};
-  return names;
-}
-
-std::span<const std::string_view> names_of(Correction) {
-  static constexpr std::array<std::string_view, 3> names{"first_order", "second_order",
-                                                         "hardy2013"};
-  return names;
-}
-
-// Drag and radiation pressure in inertial pointing, at the level that leaves the mission's
-// drag-free residue of 1e-12 m/s². The sines are cosines a quarter of a turn late.
-EnvironmentConfig::EnvironmentConfig() {
-  constexpr double sine = -std::numbers::pi / 2;
-  linear_x = {5e-9, 1e-8, 0.0, 3e-9, 0.3};
-  linear_y = {0.0, 3e-9, sine, 0.0, 0.0};
-  linear_z = {0.0, 1e-8, sine, 3e-9, sine};
-  angular_x = angular_y = angular_z = {0.0, 1e-8, 0.0, 0.0, 0.0};
-}
-
-NoiseConfig::NoiseConfig()
-    : linear_x{1.4e-12, 2.7e-4, 1.4e-12, 0.03, 0.0},
-      linear_yz{7e-12, 2.7e-4, 1.4e-12, 0.03, 0.0},
-      angular{2e-10, 1e-3, 0.0, 0.03, 0.0} {}
-
-NoiseConfig noise_preset(NoisePreset preset) {
-  NoiseConfig noise;
-  noise.preset = preset;
-  if (preset == NoisePreset::flight_suref) {
-    // Fit to the in-flight spectrum of SUREF, session 380, from 0.1 mHz to 0.1 Hz. Y and Z are not
-    // published: they keep the ratio of the design to X.
-    noise.linear_x = {4.49e-12, 7.33e-3, 4.49e-12, 0.01846, 0.0596};
-    noise.linear_yz = {2.245e-11, 7.33e-3, 4.49e-12, 0.01846, 0.0596};
-  }
-  return noise;
-}
 
 Scenario::Scenario() : sessions(hardy2013_sessions()) {
   std::ranges::transform(microscope_results().quantities, objectives.begin(), &Quantity::objective);

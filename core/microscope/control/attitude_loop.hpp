@@ -2,9 +2,16 @@
 
 #include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
-#include "core/microscope/campaign/scenario.hpp"
 
 namespace proofmass {
+
+/// Proportional-derivative loop of natural frequency f and damping ζ, with a slow integral.
+struct AttitudeConfig {
+  double bandwidth_hz = 0.02;
+  double damping = 0.8;
+  double integral_hz = 1e-3;  ///< Corner below which the integral acts.
+  double blending_hz = 3e-3;  ///< Crossover from star tracker to angular accelerometer.
+};
 
 /// Gains of the attitude estimator and controller at the sample rate.
 struct AttitudeGains {

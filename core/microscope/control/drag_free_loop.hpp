@@ -2,9 +2,18 @@
 
 #include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
-#include "core/microscope/campaign/scenario.hpp"
 
 namespace proofmass {
+
+/// Linear loop L(s) = (ω_c/s)(1 + ω_i/s), one sample of delay.
+struct DragFreeConfig {
+  double bandwidth_hz = 0.05;  ///< f_c.
+  double integral_hz = 0.005;  ///< f_i.
+  /// Error of the read-out bias that the loop subtracts, on each axis of S, m/s².
+  double bias_compensation_error_x_m_s2 = 0.0;
+  double bias_compensation_error_y_m_s2 = 0.0;
+  double bias_compensation_error_z_m_s2 = 0.0;
+};
 
 /// Gains of the linear loop at the sample rate.
 struct DragFreeGains {

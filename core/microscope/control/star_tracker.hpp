@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/instrument/noise_config.hpp"
 
 namespace proofmass {
 

@@ -7,7 +7,6 @@
 
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
-#include "core/microscope/definition/readers.hpp"
 
 namespace proofmass {
 namespace {
@@ -51,22 +50,6 @@ void require_same_text(std::string_view source, std::string_view text, std::stri
 }
 
 }  // namespace
-
-MicroscopeCampaign read_definition(Document& document) {
-  MicroscopeCampaign campaign;
-  document.read("campaign.name", campaign.name);
-  auto seed = static_cast<std::int64_t>(campaign.seed);
-  auto num_runs = static_cast<std::int64_t>(campaign.num_runs);
-  document.read("campaign.seed", seed, range::not_negative);
-  document.read("campaign.runs", num_runs, range::between(1, static_cast<double>(num_runs_max)));
-  campaign.seed = static_cast<std::uint64_t>(seed);
-  campaign.num_runs = static_cast<std::uint64_t>(num_runs);
-  document.read("environment.file", campaign.environment_file);
-  detail::read_scenario(document, campaign.scenario);
-  campaign.scenario.sessions = detail::read_sessions(document);
-  campaign.dispersions = detail::read_dispersions(document);
-  return campaign;
-}
 
 MicroscopeCampaign parse_campaign(const std::string& name, std::string_view text,
                                   EnvironmentTable environment_table,

@@ -18,6 +18,13 @@ class Document;
 /// its nominal value; what is wrong is remembered by the document.
 [[nodiscard]] MicroscopeCampaign read_definition(Document& document);
 
+/// Rows of an environment file, checked for an orbit of that period.
+///
+/// @param name  For messages: path of the file that has the text.
+/// @throws DefinitionError naming file, line and reason.
+[[nodiscard]] EnvironmentTable parse_environment(std::string_view text, const std::string& name,
+                                                 double orbit_period_s);
+
 /// The campaign that a document and its data files define, checked.
 /// @throws DefinitionError naming file, line, field, value and rule.
 [[nodiscard]] MicroscopeCampaign read_campaign(Document& document, DataFiles& files);
@@ -52,6 +59,10 @@ class Document;
 
 /// The same for people: each field with its meaning and rule, dispersions by group.
 [[nodiscard]] std::string commented_campaign(const MicroscopeCampaign& campaign);
+
+/// Every key of a campaign with its value, in the order of canonical_definition(), which says the
+/// same as one text. The rows of data files are not in it.
+[[nodiscard]] std::vector<DefinitionItem> definition_items(const MicroscopeCampaign& campaign);
 
 /// Everything but the number of runs that two campaigns do not share, in the order of a campaign
 /// file. The name of a data file whose values are the same is no difference.

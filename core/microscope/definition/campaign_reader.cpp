@@ -1,20 +1,38 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <charconv>
+
 #include "core/campaign/model.hpp"
 #include "core/definition/csv.hpp"
 #include "core/definition/document.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "core/microscope/definition/environment_reader.hpp"
 
 namespace proofmass {
 namespace {
+
+constexpr std::array<std::string_view, 7> environment_headings{
+    "time_s",           "linear_x_m_s2",    "linear_y_m_s2",   "linear_z_m_s2",
+    "angular_x_rad_s2", "angular_y_rad_s2", "angular_z_rad_s2"};
+
+// Row i of an environment table stands in line i + 1, below the headings.
+DefinitionError located_in_table(const ConfigError& error, const std::string& name) {
+  constexpr std::string_view row_prefix = "environment.file row ";
+  std::size_t row = 0;
+  if (error.field().starts_with(row_prefix)) {
+    const char* const digits = error.field().data() + row_prefix.size();
+    std::from_chars(digits, error.field().data() + error.field().size(), row);
+  }
+  return DefinitionError(fmt::format("{}:{}: {}", name, row + 1, error.what()));
+}
 
 void read_environment(MicroscopeCampaign& campaign, DataFiles& files) {
   if (campaign.scenario.environment.kind != EnvironmentKind::file) return;
   if (campaign.environment_file.empty()) return;  // validate() says what is missing.
   const std::string& text = files.text_of(campaign.environment_file, "environment.file");
-  campaign.environment_table = detail::parse_environment(
-      text, files.name_of(campaign.environment_file), campaign.scenario.orbit.period_s);
+  campaign.environment_table = parse_environment(text, files.name_of(campaign.environment_file),
+                                                 campaign.scenario.orbit.period_s);
 }
 
 void read_columns(MicroscopeCampaign& campaign, DataFiles& files) {
@@ -27,6 +45,31 @@ void read_columns(MicroscopeCampaign& campaign, DataFiles& files) {
 }
 
 }  // namespace
+
+EnvironmentTable parse_environment(std::string_view text, const std::string& name,
+                                   double orbit_period_s) {
+  CsvReader reader(text, name);
+  if (!reader.next_row() || !std::ranges::equal(reader.cells(), environment_headings)) {
+    reader.refuse(fmt::format("the first line must be {}", fmt::join(environment_headings, ",")));
+  }
+  EnvironmentTable table;
+  while (reader.next_row()) {
+    if (table.size() == environment_rows_max) {
+      reader.refuse(fmt::format("more than {} rows", environment_rows_max));
+    }
+    reader.expect_cells(environment_headings.size());
+    const auto number = [&](std::size_t i) { return reader.number(i, environment_headings[i]); };
+    table.push_back({.time_s = number(0),
+                     .linear_m_s2 = {number(1), number(2), number(3)},
+                     .angular_rad_s2 = {number(4), number(5), number(6)}});
+  }
+  try {
+    validate_environment_table(table, orbit_period_s);
+  } catch (const ConfigError& error) {
+    throw located_in_table(error, name);
+  }
+  return table;
+}
 
 MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
   MicroscopeCampaign campaign = read_definition(document);

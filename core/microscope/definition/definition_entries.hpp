@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "core/microscope/campaign/microscope_campaign.hpp"
-#include "core/microscope/definition/definition_items.hpp"
 
 namespace proofmass::detail {
 

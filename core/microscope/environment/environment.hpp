@@ -2,13 +2,39 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
 
 #include "core/math/vector3.hpp"
-#include "core/microscope/campaign/scenario.hpp"
 #include "core/microscope/environment/environment_table.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
 
 namespace proofmass {
+
+enum class EnvironmentKind : std::uint8_t { harmonic = 1, file = 2 };
+
+/// Spelling of an enumerator in campaign files; the list of all of them, in value order from 1.
+[[nodiscard]] std::span<const std::string_view> names_of(EnvironmentKind);
+
+/// mean + a₁ cos(n t + φ₁) + a₂ cos(2 n t + φ₂), t from perigee, n the mean motion.
+struct HarmonicAxis {
+  double mean = 0.0;
+  double orbital = 0.0;
+  double orbital_phase_rad = 0.0;
+  double twice_orbital = 0.0;
+  double twice_orbital_phase_rad = 0.0;
+};
+
+/// External acceleration of the satellite, in S: linear m/s², angular rad/s².
+struct EnvironmentConfig {
+  EnvironmentKind kind = EnvironmentKind::harmonic;
+  double scale = 1.0;  ///< Multiplies every external acceleration; 0 switches them off.
+  HarmonicAxis linear_x, linear_y, linear_z;
+  HarmonicAxis angular_x, angular_y, angular_z;
+
+  EnvironmentConfig();  ///< The nominal harmonic environment.
+};
 
 /// Non-gravitational accelerations of the satellite from outside, in S.
 struct ExternalAcceleration {

@@ -28,6 +28,12 @@ const EstimationMethodInfo& estimation_method(EstimationMethod method) {
   return methods[position];
 }
 
+std::span<const std::string_view> names_of(Correction) {
+  static constexpr std::array<std::string_view, 3> names{"first_order", "second_order",
+                                                         "hardy2013"};
+  return names;
+}
+
 std::span<const std::string_view> names_of(EstimationMethod) { return method_names; }
 
 }  // namespace proofmass

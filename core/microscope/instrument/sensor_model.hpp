@@ -9,6 +9,12 @@
 
 namespace proofmass {
 
+/// Of each sensor.
+struct SensorConfig {
+  /// Largest acceleration that a sensor reports on an axis, m/s²; a larger one reads as this.
+  double range_m_s2 = 1e-5;
+};
+
 /// Satellite motion that both test masses feel, in S.
 template <typename T>
 struct SatelliteMotion {

@@ -6,9 +6,14 @@
 
 #include "core/math/elementary.hpp"
 #include "core/math/inline.hpp"
-#include "core/microscope/campaign/scenario.hpp"
 
 namespace proofmass {
+
+/// Of the satellite about the Earth.
+struct OrbitConfig {
+  double period_s = 5950.0;
+  double eccentricity = 5e-3;
+};
 
 /// Where the satellite is on its orbit, in the orbital plane of I (X towards perigee, Z a quarter
 /// of a turn on).

@@ -9,6 +9,12 @@
 
 namespace proofmass {
 
+/// Of all sessions.
+struct SimulationConfig {
+  double sample_period_s = 0.25;
+  double settling_s = 4000.0;  ///< Time that the loops run before a session's record begins.
+};
+
 /// The frequency orbital·f_orb + excitation·f + spin·f_spin, with f that of the session's first
 /// excitation and f_spin = spin_rate_rad_s/2π, plus multiples of its further excitations. Multiples
 /// need not be whole: 5.5 f_orb is a line of a session that spins at 4.5 f_orb.

@@ -3,6 +3,7 @@
 #include <bit>
 #include <vector>
 
+#include "core/math/hash.hpp"
 #include "core/microscope/simulation/run.hpp"
 
 namespace proofmass {
@@ -26,28 +27,17 @@ std::vector<RunResult> results(const RunPlan& plan, InstructionSet set) {
   return results;
 }
 
-/// FNV-1a over 64-bit words: it guards against faults, not against forgery.
-class Hash {
- public:
-  void add(double value) {
-    value_ = (value_ ^ std::bit_cast<std::uint64_t>(value)) * 1099511628211ULL;
-  }
-  [[nodiscard]] std::uint64_t value() const { return value_; }
-
- private:
-  std::uint64_t value_ = 14695981039346656037ULL;
-};
-
 }  // namespace
 
 std::uint64_t reference_digest(InstructionSet set) {
   const RunPlan plan(reference_campaign());
-  Hash hash;
+  std::uint64_t hash = fnv1a_basis;
+  const auto add = [&](double value) { hash = fnv1a(hash, std::bit_cast<std::uint64_t>(value)); };
   for (const RunResult& result : results(plan, set)) {
-    for (const double value : result.truth) hash.add(value);
-    for (const double value : result.estimate) hash.add(value);
+    for (const double value : result.truth) add(value);
+    for (const double value : result.estimate) add(value);
   }
-  return hash.value();
+  return hash;
 }
 
 }  // namespace proofmass

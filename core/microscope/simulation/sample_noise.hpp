@@ -4,11 +4,11 @@
 #include <cstdint>
 #include <string_view>
 
-#include "core/campaign/identifiers.hpp"
 #include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
-#include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/instrument/noise_config.hpp"
 #include "core/random/stream.hpp"
+#include "core/runs.hpp"
 #include "core/signal/noise_shape.hpp"
 
 namespace proofmass {

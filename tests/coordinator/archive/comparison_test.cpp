@@ -319,7 +319,7 @@ TEST(ComparisonText, FitsATerminalAndMarksWhatIsSignificant) {
   std::istringstream lines(text);
   std::size_t num_marks = 0;
   for (std::string line; std::getline(lines, line);) {
-    EXPECT_LE(text_width(line), 80U) << line;
+    EXPECT_LE(display_width(line), 80U) << line;
     if (line.find(" *") != std::string::npos && line.find("*:") == std::string::npos) {
       EXPECT_TRUE(line.starts_with("a_c12 ")) << line;
       ++num_marks;

@@ -148,7 +148,7 @@ const ListedCampaign extreme{.file = "/some/where/a-file-with-a-rather-long-name
 TEST(ListingText, FitsATerminal) {
   const std::string text = listing_text({&extreme, 1});
   std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) EXPECT_LE(text_width(line), 80U) << line;
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(display_width(line), 80U) << line;
   EXPECT_THAT(text, HasSubstr("a-file-with-a-ra… "));
   EXPECT_THAT(text, HasSubstr("cancelled"));
   EXPECT_THAT(text, HasSubstr("2024-02-29\n  tags: a thesis\n"));

@@ -285,7 +285,7 @@ TEST(CheckText, BreaksLinesBetweenWords) {
       {.name = "digest", .verdict = Verdict::not_checked, .finding = finding, .details = {}}));
   std::size_t num_lines = 0, num_words = 0;
   for (std::string line; std::getline(lines, line); ++num_lines) {
-    EXPECT_LE(text_width(line), 80U);
+    EXPECT_LE(display_width(line), 80U);
     for (std::size_t at = 0; (at = line.find("seven77", at)) != std::string::npos; ++at) {
       ++num_words;
     }

@@ -21,29 +21,29 @@ RunResult result(std::uint64_t run) {
 
 TEST(SameBits, AreSeenInEveryField) {
   const RunResult reference = result(7);
-  EXPECT_TRUE(have_same_bits(reference, result(7)));
-  EXPECT_FALSE(have_same_bits(reference, result(8)));
+  EXPECT_TRUE(agree_to_the_bit(reference, result(7)));
+  EXPECT_FALSE(agree_to_the_bit(reference, result(8)));
   RunResult other = reference;
   other.status = RunStatus::not_converged;
-  EXPECT_FALSE(have_same_bits(reference, other));
+  EXPECT_FALSE(agree_to_the_bit(reference, other));
   other = reference;
   other.num_draws = 2;
-  EXPECT_FALSE(have_same_bits(reference, other));
+  EXPECT_FALSE(agree_to_the_bit(reference, other));
   other = reference;
   other.num_rounds = 5;
-  EXPECT_FALSE(have_same_bits(reference, other));
+  EXPECT_FALSE(agree_to_the_bit(reference, other));
   other = reference;
   other.truth[3] = -0.0;
-  EXPECT_FALSE(have_same_bits(reference, other));
+  EXPECT_FALSE(agree_to_the_bit(reference, other));
   other = reference;
   other.estimate[9] = std::nextafter(1.5, 2.0);
-  EXPECT_FALSE(have_same_bits(reference, other));
+  EXPECT_FALSE(agree_to_the_bit(reference, other));
 }
 
 TEST(SameBits, AreThoseOfANanWithItself) {
   RunResult a = result(0);
   a.estimate[0] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(have_same_bits(a, a));
+  EXPECT_TRUE(agree_to_the_bit(a, a));
 }
 
 TEST(KnownResults, GrowByRunsThatNobodyComputedBefore) {

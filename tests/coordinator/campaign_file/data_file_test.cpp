@@ -7,13 +7,11 @@
 #include <string>
 
 #include "core/definition/csv.hpp"
-#include "core/microscope/definition/environment_reader.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/campaign_file/scratch_folder.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
-
-using proofmass::detail::parse_environment;
 
 using ::testing::ElementsAre;
 

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "coordinator/report/text_cells.hpp"
-#include "core/campaign/identifiers.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -44,7 +44,7 @@ wire::WorkerStatus worker(std::uint64_t id, const std::string& name) {
 
 void expect_width_at_most(const std::string& text, std::size_t width) {
   std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) EXPECT_LE(text_width(line), width) << line;
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(display_width(line), width) << line;
 }
 
 TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {

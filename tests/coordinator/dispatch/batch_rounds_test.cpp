@@ -90,8 +90,12 @@ class Rounds final : public Outbox {
   }
   void send_definition(WorkerId, const wire::CampaignRequest&,
                        const std::shared_ptr<const Campaign>&) override {}
-  void store(Arrival arrival) override { stored_.push_back(arrival.computed.result.run); }
-  void compare(Arrival) override { ADD_FAILURE() << "a run was computed twice"; }
+  void store(WorkerId, wire::LeasedResult result) override {
+    stored_.push_back(result.computed.result.run);
+  }
+  void compare(WorkerId, wire::LeasedResult) override {
+    ADD_FAILURE() << "a run was computed twice";
+  }
   void record(const Loss&) override { ADD_FAILURE() << "runs were lost"; }
   void give_up(CampaignId, RunIndex) override { ADD_FAILURE() << "a run was given up"; }
   void log(Event, CampaignId) override {}

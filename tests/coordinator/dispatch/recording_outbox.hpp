@@ -15,6 +15,11 @@
 
 namespace proofmass::test {
 
+/// A result that was handed over, and whose it is.
+struct RecordedResult : wire::LeasedResult {
+  wire::WorkerId worker;
+};
+
 /// Writes down what the dispatch does. Everything must be taken before the next event: what nobody
 /// expected is found by expect_nothing_more().
 class RecordingOutbox final : public coordinator::Outbox {
@@ -26,8 +31,12 @@ class RecordingOutbox final : public coordinator::Outbox {
                        const std::shared_ptr<const Campaign>& definition) override {
     definitions_.push_back({worker, request, definition});
   }
-  void store(coordinator::Arrival arrival) override { stored_.push_back(std::move(arrival)); }
-  void compare(coordinator::Arrival arrival) override { compared_.push_back(std::move(arrival)); }
+  void store(wire::WorkerId worker, wire::LeasedResult result) override {
+    stored_.push_back({std::move(result), worker});
+  }
+  void compare(wire::WorkerId worker, wire::LeasedResult result) override {
+    compared_.push_back({std::move(result), worker});
+  }
   void record(const coordinator::Loss& loss) override { losses_.push_back(loss); }
   void give_up(wire::CampaignId, RunIndex run) override { given_up_.push_back(run); }
   void log(coordinator::Event event, wire::CampaignId) override {
@@ -75,7 +84,7 @@ class RecordingOutbox final : public coordinator::Outbox {
   std::vector<RunIndex> take_given_up() { return std::exchange(given_up_, {}); }
   std::vector<std::string> take_events() { return std::exchange(events_, {}); }
 
-  [[nodiscard]] const std::vector<coordinator::Arrival>& stored() const { return stored_; }
+  [[nodiscard]] const std::vector<RecordedResult>& stored() const { return stored_; }
   [[nodiscard]] std::size_t num_sent() const { return sent_.size(); }
 
   /// Drops all that has been written down: what another test checks.
@@ -104,16 +113,16 @@ class RecordingOutbox final : public coordinator::Outbox {
   }
 
  private:
-  static std::vector<RunIndex> runs_of(const std::vector<coordinator::Arrival>& arrivals) {
+  static std::vector<RunIndex> runs_of(const std::vector<RecordedResult>& results) {
     std::vector<RunIndex> runs;
-    for (const auto& arrival : arrivals) runs.push_back(arrival.computed.result.run);
+    for (const auto& result : results) runs.push_back(result.computed.result.run);
     return runs;
   }
 
   std::vector<std::pair<wire::WorkerId, wire::Message>> sent_;
   std::vector<SentDefinition> definitions_;
-  std::vector<coordinator::Arrival> stored_;
-  std::vector<coordinator::Arrival> compared_;
+  std::vector<RecordedResult> stored_;
+  std::vector<RecordedResult> compared_;
   std::vector<coordinator::Loss> losses_;
   std::vector<RunIndex> given_up_;
   std::vector<std::string> events_;

@@ -13,13 +13,14 @@
 namespace proofmass::coordinator {
 namespace {
 
-/// A desk whose requests are carried out when the test says so.
+/// A gateway whose requests are carried out when the test says so.
 class ClientDeskTest : public testing::Test {
  protected:
   void ask(const std::string& routing_id, std::uint64_t id) {
     const std::string bytes =
         wire::encode(wire::RequestPacket{.id = id, .request = wire::ReleaseHostRequest{"n7"}});
-    desk_.receive({.from = {.routing_id = routing_id, .key = {}, .host = {}}, .frames = {bytes}});
+    campaign_desk_.receive(
+        {.from = {.routing_id = routing_id, .key = {}, .host = {}}, .frames = {bytes}});
   }
 
   /// The replies to a connection, in order: texts, and the numbers of their requests.
@@ -58,7 +59,7 @@ class ClientDeskTest : public testing::Test {
 
   std::map<std::string, std::vector<std::pair<std::uint64_t, std::string>>> replies_;
   Background background_{[] {}};
-  ClientDesk desk_{background_, surroundings()};
+  ClientDesk campaign_desk_{background_, surroundings()};
 };
 
 TEST_F(ClientDeskTest, CarriesARepeatedRequestOutOnceAndTellsAllWhoWait) {

@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/query/cell_text.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {

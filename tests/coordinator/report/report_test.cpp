@@ -31,7 +31,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-MATCHER(FitsATerminal, "has at most 80 characters") { return text_width(arg) <= 80; }
+MATCHER(FitsATerminal, "has at most 80 characters") { return display_width(arg) <= 80; }
 
 /// Statistics with the paper's own errors and `num_runs` runs, all of them estimated.
 CampaignStatistics paper_statistics(std::uint64_t num_runs) {
@@ -298,7 +298,7 @@ TEST(Report, AlignsEveryRow) {
     const auto is_row = [](const std::string& line) { return line.find("│") != line.npos; };
     for (std::size_t i = 3; i < lines.size(); ++i) {
       if (!is_row(lines[i]) && !lines[i].starts_with("─")) continue;
-      EXPECT_EQ(text_width(lines[i]), text_width(lines[4])) << lines[i];
+      EXPECT_EQ(display_width(lines[i]), display_width(lines[4])) << lines[i];
     }
   }
 }

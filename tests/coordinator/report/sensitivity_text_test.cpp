@@ -24,7 +24,7 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-MATCHER(FitsATerminal, "has at most 80 characters") { return text_width(arg) <= 80; }
+MATCHER(FitsATerminal, "has at most 80 characters") { return display_width(arg) <= 80; }
 
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;
@@ -94,7 +94,7 @@ TEST(SensitivityText, NamesTheProductThatMakesAnError) {
   const auto lines = lines_of(sensitivity_text(drawn, index(Parameter::k2c), 1));
   EXPECT_THAT(lines[12], StartsWith("error as a sum of "));
   EXPECT_EQ(lines[14], drawn_names()[7] + " × " + drawn_names()[40]);
-  EXPECT_EQ(lines[15], std::string(51, ' ') + "-3.03      100.0 %     <1e-09");
+  EXPECT_EQ(lines[15], std::string(51, ' ').append("-3.03      100.0 %     <1e-09"));
 }
 
 TEST(SensitivityText, NamesASquareAndSaysWhenNothingExplainsTheError) {

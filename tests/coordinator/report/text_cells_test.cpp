@@ -2,18 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <string>
 
 namespace proofmass::coordinator {
 namespace {
-
-TEST(TextWidth, CountsCharactersNotBytes) {
-  EXPECT_EQ(text_width(""), 0u);
-  EXPECT_EQ(text_width("a_c11·Δx"), 8u);
-  EXPECT_EQ(text_width("s²/m"), 4u);
-  EXPECT_EQ(text_width("│─−µ"), 4u);
-}
 
 TEST(Alignment, FillsUpWithSpaces) {
   EXPECT_EQ(left_aligned("Δx", 4), "Δx  ");
@@ -28,17 +22,19 @@ TEST(Alignment, CutsNothing) {
   EXPECT_EQ(centred("Δxyz", 2), "Δxyz");
 }
 
-TEST(ShortenedText, EndsWithAMarkIfSomethingIsMissing) {
-  EXPECT_EQ(shortened("abcde", 5), "abcde");
-  EXPECT_EQ(shortened("abcdef", 5), "abcd…");
-  EXPECT_EQ(shortened("─────", 3), "──…");
-  EXPECT_EQ(shortened("ab", 1), "…");
+TEST(Table, KeepsASpaceBetweenColumns) {
+  const std::array<TextColumn, 2> columns{{{"name", 6, true}, {"runs", 6}}};
+  EXPECT_EQ(table_heading(columns), "name    runs\n────────────\n");
+  EXPECT_EQ(table_row(columns, std::array<std::string, 2>{"Δx", "12"}), "Δx        12\n");
+  EXPECT_EQ(table_row(columns, std::array<std::string, 2>{"calibration", "1234567"}),
+            "cali…  1234…\n");
+  EXPECT_EQ(table_row(columns, std::array<std::string, 2>{"a", ""}), "a\n");
 }
 
 TEST(LineOf, BreaksWhatATerminalHasNoRoomFor) {
   const std::string first(40, 'a');
-  EXPECT_EQ(line_of(first, std::string(37, 'b') + "² ", 4),
-            first + " " + std::string(37, 'b') + "² \n");
+  const std::string second = std::string(37, 'b').append("² ");
+  EXPECT_EQ(line_of(first, second, 4), first + " " + second + "\n");
   EXPECT_EQ(line_of(first, std::string(40, 'b'), 4),
             first + "\n    " + std::string(40, 'b') + "\n");
 }
@@ -66,6 +62,12 @@ TEST(MeasuredFigure, HasAtMostSevenCharactersBelow1e99) {
       EXPECT_LE(figure.size(), 7u) << figure;
     }
   }
+}
+
+TEST(SignedFigure, HasASignIfItIsBelowZero) {
+  EXPECT_EQ(signed_figure(-7.526), "-7.53");
+  EXPECT_EQ(signed_figure(7.526), "7.53");
+  EXPECT_EQ(signed_figure(-0.0), "0");
 }
 
 TEST(GivenFigure, HasNoZerosThatSayNothing) {

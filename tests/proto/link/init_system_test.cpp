@@ -55,5 +55,36 @@ TEST(InitSystem, IsKnownFromTheEnvironment) {
   EXPECT_EQ(InitSystem::from_environment().watchdog_interval(), std::nullopt);
 }
 
+TEST(ServiceNotices, SayEachStateOnce) {
+  const test::ScratchDirectory directory;
+  const std::string path = (directory / "notify").string();
+  const test::NoticeReceiver receiver(path);
+  ServiceNotices notices(InitSystem(path, std::nullopt));
+  notices.ready();
+  notices.ready();
+  notices.stopping();
+  notices.stopping();
+  InitSystem(path, std::nullopt).notify("END");
+  EXPECT_EQ(receiver.receive(), "READY=1");
+  EXPECT_EQ(receiver.receive(), "STOPPING=1");
+  EXPECT_EQ(receiver.receive(), "END");
+}
+
+// Of a watchdog that waits 4 s: every 2 s that the service lives, every 5 s what it does.
+TEST(ServiceNotices, ComeInTime) {
+  const test::ScratchDirectory directory;
+  const std::string path = (directory / "notify").string();
+  const test::NoticeReceiver receiver(path);
+  ServiceNotices notices(InitSystem(path, 4s));
+  const ServiceNotices::TimePoint start{};
+  for (int second = 0; second <= 6; ++second) {
+    notices.on_tick(start + std::chrono::seconds(second), [&] { return std::to_string(second); });
+  }
+  for (const char* const expected :
+       {"WATCHDOG=1", "STATUS=0", "WATCHDOG=1", "WATCHDOG=1", "STATUS=5", "WATCHDOG=1"}) {
+    EXPECT_EQ(receiver.receive(), expected);
+  }
+}
+
 }  // namespace
 }  // namespace proofmass::wire

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "core/runs.hpp"
 #include "tests/support/microscope_results.hpp"
-#include "worker/execution/run_ranges.hpp"
 #include "worker/net/conversation.hpp"
 
 namespace proofmass::worker {

@@ -29,9 +29,9 @@ class NotServedTest : public ConversationTest {
   }
   /// So many results, of runs from `first` on, of a process before this one.
   void restore(wire::CampaignId campaign, std::uint64_t first, std::uint64_t count) {
-    std::vector<KeptResult> results;
+    std::vector<wire::LeasedResult> results;
     for (std::uint64_t run = first; run < first + count; ++run) {
-      KeptResult result{.campaign = campaign, .attempt = {1}, .computed = {}};
+      wire::LeasedResult result{.campaign = campaign, .attempt = {1}, .computed = {}};
       result.computed.result = test::zero_result({.run = {run}});
       results.push_back(result);
     }

@@ -313,7 +313,7 @@ TEST_F(ConversationTest, IgnoresAnAcknowledgementOfAnotherCampaign) {
 
 TEST_F(ConversationTest, DeliversTheResultsOfAFormerProcess) {
   start();
-  KeptResult result{campaign_2, {3}, {}};
+  wire::LeasedResult result{campaign_2, {3}, {}};
   result.computed.result = test::zero_result({.run = {9}});
   conversation->restore({result});
   (void)take_sent<wire::Hello>();
@@ -327,7 +327,7 @@ TEST_F(ConversationTest, DeliversTheResultsOfAFormerProcess) {
 // A message has room for 4096 results.
 TEST_F(ConversationTest, SendsManyResultsOneMessageATick) {
   start();
-  std::vector<KeptResult> results(2 * wire::runs_per_lease_max + 1);
+  std::vector<wire::LeasedResult> results(2 * wire::runs_per_lease_max + 1);
   for (std::size_t i = 0; i < results.size(); ++i) {
     results[i].campaign = campaign_1;
     results[i].computed.result = test::zero_result({.run = {i}});

@@ -16,8 +16,9 @@
 namespace proofmass::worker {
 namespace {
 
-KeptResult result(std::uint64_t run, std::uint64_t campaign = 1, std::uint32_t attempt = 1) {
-  KeptResult kept{{campaign}, {attempt}, {}};
+wire::LeasedResult result(std::uint64_t run, std::uint64_t campaign = 1,
+                          std::uint32_t attempt = 1) {
+  wire::LeasedResult kept{{campaign}, {attempt}, {}};
   kept.computed.result = test::zero_result({.run = {run}});
   kept.computed.result.truth[3] = 0.1 * static_cast<double>(run);
   kept.computed.compute_s = 1.5;
@@ -25,9 +26,9 @@ KeptResult result(std::uint64_t run, std::uint64_t campaign = 1, std::uint32_t a
   return kept;
 }
 
-std::vector<std::uint64_t> runs_of(const std::vector<KeptResult>& results) {
+std::vector<std::uint64_t> runs_of(const std::vector<wire::LeasedResult>& results) {
   std::vector<std::uint64_t> runs;
-  for (const KeptResult& kept : results) runs.push_back(kept.computed.result.run.value);
+  for (const wire::LeasedResult& kept : results) runs.push_back(kept.computed.result.run.value);
   return runs;
 }
 
@@ -37,7 +38,7 @@ class SpoolTest : public testing::Test {
   std::vector<std::uint64_t> stored_runs() const {
     return runs_of(Spool(path, "model").former_results());
   }
-  void store(const std::vector<KeptResult>& results) const {
+  void store(const std::vector<wire::LeasedResult>& results) const {
     ASSERT_EQ(Spool(path, "model").append(results), std::nullopt);
   }
   std::string content() const {
@@ -66,7 +67,7 @@ TEST_F(SpoolTest, HandsResultsToTheNextWorker) {
   store({result(7, 1, 2), result(8, 1, 2), result(7, 2)});
   const Spool spool(path, "model");
   ASSERT_EQ(runs_of(spool.former_results()), (std::vector<std::uint64_t>{7, 8, 7}));
-  const KeptResult& kept = spool.former_results()[1];
+  const wire::LeasedResult& kept = spool.former_results()[1];
   EXPECT_EQ(kept.campaign, wire::CampaignId{1});
   EXPECT_EQ(kept.attempt, wire::Attempt{2});
   EXPECT_EQ(std::bit_cast<std::uint64_t>(kept.computed.result.truth[3]),
@@ -84,7 +85,7 @@ TEST_F(SpoolTest, AddsToWhatIsThere) {
 
 // More than one message has room for.
 TEST_F(SpoolTest, TakesManyResults) {
-  std::vector<KeptResult> results;
+  std::vector<wire::LeasedResult> results;
   for (std::uint64_t run = 0; run < 5000; ++run) results.push_back(result(run));
   store(results);
   const std::vector<std::uint64_t> runs = stored_runs();

@@ -8,8 +8,8 @@
 namespace proofmass::worker {
 namespace {
 
-std::vector<KeptResult> results(const std::vector<std::uint64_t>& runs) {
-  std::vector<KeptResult> kept;
+std::vector<wire::LeasedResult> results(const std::vector<std::uint64_t>& runs) {
+  std::vector<wire::LeasedResult> kept;
   for (const std::uint64_t run : runs) {
     kept.push_back({{1}, {1}, {}});
     kept.back().computed.result = test::zero_result({.run = {run}});
@@ -25,7 +25,7 @@ class SpoolerTest : public testing::Test {
     spool.reset();
     std::vector<std::uint64_t> runs;
     const Spool next(path, "m");
-    for (const KeptResult& kept : next.former_results()) {
+    for (const wire::LeasedResult& kept : next.former_results()) {
       runs.push_back(kept.computed.result.run.value);
     }
     return runs;

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace proofmass::coordinator {
+namespace proofmass::wire {
 
 /// Columns of a terminal that visible text takes: none for a combining mark, two for an East Asian
 /// character or a pictograph.
@@ -12,6 +12,6 @@ namespace proofmass::coordinator {
 
 /// Visible text of at most `width` columns, the last a `…` if something is left out.
 /// @pre width ≥ 1.
-[[nodiscard]] std::string shortened_text(std::string_view text, std::size_t width);
+[[nodiscard]] std::string shortened(std::string_view text, std::size_t width);
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::wire

@@ -1,8 +1,8 @@
-#include "worker/execution/run_ranges.hpp"
+#include "core/runs.hpp"
 
 #include <gtest/gtest.h>
 
-namespace proofmass::worker {
+namespace proofmass {
 namespace {
 
 TEST(RunRanges, AreTheFewestThatHoldTheRuns) {
@@ -14,4 +14,4 @@ TEST(RunRanges, AreTheFewestThatHoldTheRuns) {
 }
 
 }  // namespace
-}  // namespace proofmass::worker
+}  // namespace proofmass

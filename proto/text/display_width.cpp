@@ -1,4 +1,4 @@
-#include "coordinator/query/display_text.hpp"
+#include "proto/text/display_width.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,11 +6,7 @@
 
 #include "proto/text/characters.hpp"
 
-namespace proofmass::coordinator {
-
-using wire::Character;
-using wire::first_character;
-
+namespace proofmass::wire {
 namespace {
 
 /// Characters of one kind, both ends among them.
@@ -61,7 +57,7 @@ std::size_t display_width(std::string_view text) {
   return width;
 }
 
-std::string shortened_text(std::string_view text, std::size_t width) {
+std::string shortened(std::string_view text, std::size_t width) {
   std::size_t end = 0;         // Of what fits.
   std::size_t end_if_cut = 0;  // Of what leaves room for the mark.
   std::size_t taken = 0;
@@ -75,4 +71,4 @@ std::string shortened_text(std::string_view text, std::size_t width) {
   return std::string(text);
 }
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::wire

@@ -1,12 +1,50 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cstdint>
 #include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
-#include "core/microscope/definition/readers.hpp"
+#include "core/definition/document.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/definition/dispersion_keys.hpp"
 #include "core/microscope/session/session_names.hpp"
 
-namespace proofmass::detail {
+namespace proofmass {
 namespace {
+
+using namespace detail;
+
+// Each part asks the document for its keys and completes what is absent with the nominal values.
+// What is wrong is remembered by the document, and found by Document::check().
+
+struct FieldReader {
+  Document& document;
+
+  void operator()(const FieldInfo& field, double& value) const {
+    document.read(std::string(field.path), value, field.range);
+  }
+  void operator()(const FieldInfo& field, std::int64_t& value) const {
+    document.read(std::string(field.path), value, field.range);
+  }
+  template <typename Choice>
+  void operator()(const FieldInfo& field, Choice& value) const {
+    document.read(std::string(field.path), value);
+  }
+};
+
+/// Numbers and choices of the scenario, all but its sessions.
+void read_scenario(Document& document, Scenario& scenario) {
+  // The preset sets the values that the other keys of noise then replace.
+  NoisePreset preset = scenario.noise.preset;
+  document.read("noise.preset", preset);
+  scenario.noise = noise_preset(preset);
+  for_each_field(scenario, FieldReader{document});
+}
 
 // Far more than the sessions of a valid campaign have: they bound what hostile texts cost.
 constexpr std::size_t sessions_max = 64;
@@ -122,8 +160,7 @@ Session read_session(Document& document, const std::string& path) {
   return session;
 }
 
-}  // namespace
-
+/// The list `session`, or the paper's sessions if the file has none.
 std::vector<Session> read_sessions(Document& document) {
   const std::optional<std::size_t> num_sessions = document.num_tables("session", sessions_max);
   if (!num_sessions) return hardy2013_sessions();
@@ -134,4 +171,82 @@ std::vector<Session> read_sessions(Document& document) {
   return sessions;
 }
 
-}  // namespace proofmass::detail
+constexpr std::array<std::string_view, 7> all_keys{
+    "minimum", "maximum", "mean", "standard_deviation", "value", "file", "column"};
+
+bool read_key(Document& document, const std::string& path, std::string_view key,
+              Dispersion& dispersion) {
+  if (double* const number = number_at(dispersion, key)) return document.read(path, *number);
+  return document.read(path, *text_at(dispersion, key));
+}
+
+// Keys that belong to other laws: a mean beside a uniform law would be silently without effect.
+void refuse_other_keys(Document& document, const std::string& path, Law law) {
+  const std::span<const std::string_view> keys = keys_of(law);
+  for (const std::string_view key : all_keys) {
+    const std::string key_path = fmt::format("{}.{}", path, key);
+    if (std::ranges::find(keys, key) != keys.end()) continue;
+    if (document.find(key_path) == nullptr) continue;
+    document.refuse(key_path, fmt::format("not a key of law {}, which has {}", name_of(law),
+                                          fmt::join(keys, ", ")));
+  }
+}
+
+// The law at `path` where it differs from an outer one, `base`.
+Dispersion read_dispersion(Document& document, const std::string& path, const Dispersion& base) {
+  Law law = base.law;
+  const bool has_law = document.read(path + ".law", law);
+  const bool is_law_refused = !has_law && document.find(path + ".law") != nullptr;
+  if (is_law_refused) {
+    for (const std::string_view key : all_keys)
+      (void)document.find(fmt::format("{}.{}", path, key));
+    return base;
+  }
+  Dispersion dispersion = law == base.law ? base : Dispersion{};
+  dispersion.law = law;
+  for (const std::string_view key : keys_of(law)) {
+    const std::string key_path = fmt::format("{}.{}", path, key);
+    const bool is_absent = document.find(key_path) == nullptr;
+    if (is_absent && law != base.law) {
+      document.refuse_absence(key_path, fmt::format("law {} needs it", name_of(law)));
+    } else {
+      read_key(document, key_path, key, dispersion);
+    }
+  }
+  refuse_other_keys(document, path, law);
+  return dispersion;
+}
+
+/// Laws of `[dispersion.<group>]` and, over them, of `[dispersion.<group>.<element>]`.
+DispersionSet read_dispersions(Document& document) {
+  DispersionSet dispersions = nominal_dispersions();
+  for (const DrawGroup& group : draw_groups()) {
+    const Dispersion of_group = read_dispersion(document, fmt::format("dispersion.{}", group.name),
+                                                dispersions[group.first]);
+    for (std::size_t i = group.first; i < group.first + group.count; ++i) {
+      dispersions[i] =
+          read_dispersion(document, fmt::format("dispersion.{}", drawn_names()[i]), of_group);
+    }
+  }
+  return dispersions;
+}
+
+}  // namespace
+
+MicroscopeCampaign read_definition(Document& document) {
+  MicroscopeCampaign campaign;
+  document.read("campaign.name", campaign.name);
+  auto seed = static_cast<std::int64_t>(campaign.seed);
+  auto num_runs = static_cast<std::int64_t>(campaign.num_runs);
+  document.read("campaign.seed", seed, range::not_negative);
+  document.read("campaign.runs", num_runs, range::between(1, static_cast<double>(num_runs_max)));
+  campaign.seed = static_cast<std::uint64_t>(seed);
+  campaign.num_runs = static_cast<std::uint64_t>(num_runs);
+  document.read("environment.file", campaign.environment_file);
+  read_scenario(document, campaign.scenario);
+  campaign.scenario.sessions = read_sessions(document);
+  campaign.dispersions = read_dispersions(document);
+  return campaign;
+}
+
+}  // namespace proofmass
