@@ -334,7 +334,7 @@ void on_tick(State& state, TimePoint now, Outbox& outbox) {
   for (const WorkerId id : silent) detail::part_with(state, id, LossReason::silent, outbox);
   for (const auto& [id, batch] : hung) detail::part_with_hung(state, id, batch, outbox);
   detail::settle(state, now, outbox);
-  detail::share_tail(state, now, outbox);
+  detail::speculate(state, now, outbox);
 }
 
 void on_drain(State& state, Outbox& outbox) {

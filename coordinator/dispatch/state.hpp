@@ -134,7 +134,7 @@ struct Suspicion {
 
 /// A result on its way to the store, with the workers that wait for the acknowledgement; the first
 /// one's result is stored.
-struct Delivered {
+struct Uncommitted {
   Attempt attempt;
   std::vector<WorkerId> waiting;
 };
@@ -163,7 +163,7 @@ struct CampaignState {
   std::map<Attempt, RunSet> pending;  ///< By the attempt under which they will be lent.
   std::map<RunIndex, Attempt> pending_suspects;  ///< Pending ones that are to be lent alone.
   LeaseIndex lent;                               ///< Runs on first leases.
-  std::map<RunIndex, Delivered> delivered;       ///< Handed to the store, not committed yet.
+  std::map<RunIndex, Uncommitted> delivered;     ///< Handed to the store, not committed yet.
   RunSet committed;
   RunSet given_up;
   std::map<RunIndex, Suspicion> suspects;           ///< Open runs that were blamed for a crash.

@@ -31,6 +31,6 @@ void note_progress(State& state, Worker& worker, const wire::Heartbeat& heartbea
                                                     TimePoint now);
 
 /// Nothing waits to be lent: gives idle workers a part of what others are too slow with.
-void share_tail(State& state, TimePoint now, Outbox& outbox);
+void speculate(State& state, TimePoint now, Outbox& outbox);
 
 }  // namespace proofmass::coordinator::detail

@@ -81,9 +81,9 @@ std::optional<Request> request_from(const std::vector<std::string>& frames) {
 
 }  // namespace
 
-class Authenticator::Parts {
+class Authenticator::Impl {
  public:
-  Parts(zmq::context_t& context, const std::filesystem::path& directory, Log log)
+  Impl(zmq::context_t& context, const std::filesystem::path& directory, Log log)
       : log_(std::move(log)),
         refusals_(log_),
         workers_(directory / wire::authorized_workers_name, Domain::workers),
@@ -192,26 +192,26 @@ class Authenticator::Parts {
 
 Authenticator::Authenticator(zmq::context_t& context, const std::filesystem::path& directory,
                              Log log)
-    : parts_(std::make_unique<Parts>(context, directory, std::move(log))) {}
+    : impl_(std::make_unique<Impl>(context, directory, std::move(log))) {}
 
 Authenticator::~Authenticator() = default;
 
-void* Authenticator::handle() const { return parts_->handle(); }
+void* Authenticator::handle() const { return impl_->handle(); }
 void Authenticator::watch(Domain domain, HandshakeWatch::EventSource next_event) {
-  parts_->watch(domain, std::move(next_event));
+  impl_->watch(domain, std::move(next_event));
 }
-void Authenticator::serve(TimePoint now) { parts_->serve(now); }
+void Authenticator::serve(TimePoint now) { impl_->serve(now); }
 
 bool Authenticator::is_allowed(Domain domain, std::string_view public_key, TimePoint now) {
-  return parts_->is_allowed(domain, public_key, now);
+  return impl_->is_allowed(domain, public_key, now);
 }
 
 std::string Authenticator::name_of(Domain domain, std::string_view public_key) const {
-  return parts_->name_of(domain, public_key);
+  return impl_->name_of(domain, public_key);
 }
 
 std::optional<Asker> Authenticator::client(std::string_view public_key, TimePoint now) {
-  return parts_->client(public_key, now);
+  return impl_->client(public_key, now);
 }
 
 }  // namespace proofmass::coordinator

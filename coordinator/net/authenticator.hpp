@@ -61,8 +61,8 @@ class Authenticator {
   [[nodiscard]] std::optional<Asker> client(std::string_view public_key, TimePoint now);
 
  private:
-  class Parts;
-  std::unique_ptr<Parts> parts_;
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass::coordinator

@@ -34,9 +34,9 @@ wire::ClientSecurity security_of(const ClientConnectionConfig& config) {
 
 }  // namespace
 
-class ClientConnection::Parts {
+class ClientConnection::Impl {
  public:
-  explicit Parts(const ClientConnectionConfig& config)
+  explicit Impl(const ClientConnectionConfig& config)
       : config_(config),
         security_(security_of(config)),
         dealer_(wire::make_dealer(context_, security_)),
@@ -157,12 +157,12 @@ class ClientConnection::Parts {
 };
 
 ClientConnection::ClientConnection(const ClientConnectionConfig& config)
-    : parts_(std::make_unique<Parts>(config)) {}
+    : impl_(std::make_unique<Impl>(config)) {}
 
 ClientConnection::~ClientConnection() = default;
 
 wire::ClientReply ClientConnection::ask(const wire::ClientRequest& request) {
-  return parts_->ask(request);
+  return impl_->ask(request);
 }
 
 }  // namespace proofmass::coordinator

@@ -41,8 +41,8 @@ class ClientConnection {
   [[nodiscard]] wire::ClientReply ask(const wire::ClientRequest& request);
 
  private:
-  class Parts;
-  std::unique_ptr<Parts> parts_;
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass::coordinator

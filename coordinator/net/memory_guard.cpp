@@ -69,15 +69,15 @@ std::size_t ResidentMemory::size() const {
   return pages[1] * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
-class MemoryGuard::Parts {
+class MemoryGuard::Impl {
  public:
-  Parts(std::size_t size_max, Actions actions)
+  Impl(std::size_t size_max, Actions actions)
       : bound_(size_max),
         size_max_(size_max),
         actions_(std::move(actions)),
         thread_([this] { watch(); }) {}
 
-  ~Parts() {
+  ~Impl() {
     {
       const std::lock_guard lock(mutex_);
       is_stopping_ = true;
@@ -86,8 +86,8 @@ class MemoryGuard::Parts {
     thread_.join();
   }
 
-  Parts(const Parts&) = delete;
-  Parts& operator=(const Parts&) = delete;
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
 
  private:
   void watch() {
@@ -162,7 +162,7 @@ class MemoryGuard::Parts {
 };
 
 MemoryGuard::MemoryGuard(std::size_t size_max, Actions actions)
-    : parts_(std::make_unique<Parts>(size_max, std::move(actions))) {}
+    : impl_(std::make_unique<Impl>(size_max, std::move(actions))) {}
 
 MemoryGuard::~MemoryGuard() = default;
 

@@ -64,8 +64,8 @@ class MemoryGuard {
   MemoryGuard& operator=(const MemoryGuard&) = delete;
 
  private:
-  class Parts;
-  std::unique_ptr<Parts> parts_;
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass::coordinator

@@ -45,10 +45,10 @@ Incoming view_of(const Received& received) {
 
 }  // namespace
 
-class RouterSocket::Parts {
+class RouterSocket::Impl {
  public:
-  Parts(zmq::context_t& context, std::string_view option, const std::string& endpoint,
-        const wire::ServerSecurity& security, const std::optional<wire::FaultPlan>& faults)
+  Impl(zmq::context_t& context, std::string_view option, const std::string& endpoint,
+       const wire::ServerSecurity& security, const std::optional<wire::FaultPlan>& faults)
       : context_(context), option_(option), security_(security) {
     bind(endpoint);
     endpoint_ = socket_.get(zmq::sockopt::last_endpoint);
@@ -192,29 +192,29 @@ class RouterSocket::Parts {
 RouterSocket::RouterSocket(zmq::context_t& context, std::string_view option,
                            const std::string& endpoint, const wire::ServerSecurity& security,
                            const std::optional<wire::FaultPlan>& faults)
-    : parts_(std::make_unique<Parts>(context, option, endpoint, security, faults)) {}
+    : impl_(std::make_unique<Impl>(context, option, endpoint, security, faults)) {}
 
 RouterSocket::~RouterSocket() = default;
 
-std::unique_lock<std::mutex> RouterSocket::hold() const { return parts_->hold(); }
+std::unique_lock<std::mutex> RouterSocket::hold() const { return impl_->hold(); }
 
-void* RouterSocket::handle() const { return parts_->handle(); }
+void* RouterSocket::handle() const { return impl_->handle(); }
 
-const std::string& RouterSocket::endpoint() const { return parts_->endpoint(); }
+const std::string& RouterSocket::endpoint() const { return impl_->endpoint(); }
 
-std::optional<wire::SocketEvent> RouterSocket::take_event() { return parts_->take_event(); }
+std::optional<wire::SocketEvent> RouterSocket::take_event() { return impl_->take_event(); }
 
 void RouterSocket::receive(int count_max, TimePoint now,
                            const std::function<void(const Incoming&)>& handle) {
-  parts_->receive(count_max, now, handle);
+  impl_->receive(count_max, now, handle);
 }
 
 bool RouterSocket::send(const std::string& routing_id, const std::string& bytes, TimePoint now) {
-  return parts_->send(routing_id, bytes, now);
+  return impl_->send(routing_id, bytes, now);
 }
 
-void RouterSocket::close() { parts_->close(); }
+void RouterSocket::close() { impl_->close(); }
 
-bool RouterSocket::open() { return parts_->open(); }
+bool RouterSocket::open() { return impl_->open(); }
 
 }  // namespace proofmass::coordinator

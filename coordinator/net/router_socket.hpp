@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "coordinator/dispatch/state.hpp"
-#include "coordinator/net/worker_desk.hpp"
+#include "coordinator/net/worker_gateway.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/security.hpp"
 #include "proto/link/socket_events.hpp"
@@ -60,8 +60,8 @@ class RouterSocket {
   [[nodiscard]] bool open();
 
  private:
-  class Parts;
-  std::unique_ptr<Parts> parts_;
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass::coordinator

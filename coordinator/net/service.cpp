@@ -9,17 +9,17 @@
 
 #include "coordinator/dispatch/dispatch.hpp"
 #include "coordinator/net/background.hpp"
-#include "coordinator/net/campaign_desk.hpp"
-#include "coordinator/net/client_desk.hpp"
+#include "coordinator/net/campaign_service.hpp"
+#include "coordinator/net/client_gateway.hpp"
 #include "coordinator/net/descriptor_limit.hpp"
-#include "coordinator/net/directory_desk.hpp"
+#include "coordinator/net/directory_service.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
-#include "coordinator/net/request_desk.hpp"
+#include "coordinator/net/request_service.hpp"
 #include "coordinator/net/service_beginning.hpp"
 #include "coordinator/net/service_sockets.hpp"
-#include "coordinator/net/submission_desk.hpp"
+#include "coordinator/net/submission_service.hpp"
 #include "coordinator/net/waking_time.hpp"
-#include "coordinator/net/worker_desk.hpp"
+#include "coordinator/net/worker_gateway.hpp"
 #include "coordinator/net/worker_history.hpp"
 #include "core/error.hpp"
 #include "proto/link/kill_point.hpp"
@@ -53,9 +53,9 @@ std::string_view kind_of(FileReturn file_return) {
 
 }  // namespace
 
-class Service::Parts final : public Outbox {
+class Service::Impl final : public Outbox {
  public:
-  Parts(Beginning beginning, const ServiceConfig& config, Log log)
+  Impl(Beginning beginning, const ServiceConfig& config, Log log)
       : config_(config),
         log_(std::move(log)),
         start_(beginning.start),
@@ -63,12 +63,12 @@ class Service::Parts final : public Outbox {
         state_(initial_state(config.dispatch, beginning.attached, now())),
         writer_([this] { sockets_.wake(); }, config.writer),
         history_(state_, writer_, beginning.attached),
-        worker_desk_(state_, start_.epoch, surroundings_of_workers()),
-        campaign_desk_(surroundings_of_campaigns()),
-        directory_desk_(surroundings_of_directory()),
-        submission_desk_(surroundings_of_submissions()),
-        request_desk_(surroundings_of_requests()),
-        client_desk_(background_, surroundings_of_clients()),
+        worker_gateway_(state_, start_.epoch, surroundings_of_workers()),
+        campaign_service_(surroundings_of_campaigns()),
+        directory_service_(surroundings_of_directory()),
+        submission_service_(surroundings_of_submissions()),
+        request_service_(surroundings_of_requests()),
+        client_gateway_(background_, surroundings_of_clients()),
         background_([this] { sockets_.wake(); }) {
     raise_descriptor_limit();
     for (FileOutcome& outcome : beginning.campaigns) begin_with(std::move(outcome));
@@ -77,10 +77,10 @@ class Service::Parts final : public Outbox {
   /// For all that is measured here and in the dispatch.
   [[nodiscard]] TimePoint now() { return time_.at(std::chrono::steady_clock::now()); }
   [[nodiscard]] const State& state() const { return state_; }
-  [[nodiscard]] const CampaignDesk& campaign_desk() const { return campaign_desk_; }
+  [[nodiscard]] const CampaignService& campaign_service() const { return campaign_service_; }
   [[nodiscard]] const ServiceSockets& sockets() const { return sockets_; }
   [[nodiscard]] bool is_done() const {
-    return campaign_desk_.is_all_done() && directory_desk_.is_all_served();
+    return campaign_service_.is_all_done() && directory_service_.is_all_served();
   }
   [[nodiscard]] bool has_storage_failed() const { return has_storage_failed_; }
 
@@ -100,7 +100,7 @@ class Service::Parts final : public Outbox {
     on_gone(state_, worker, reason, now(), *this);
   }
 
-  std::vector<ServedCampaign> close() { return campaign_desk_.close(); }
+  std::vector<ServedCampaign> close() { return campaign_service_.close(); }
 
   // Outbox.
 
@@ -108,12 +108,12 @@ class Service::Parts final : public Outbox {
     if (std::holds_alternative<wire::Welcome>(message)) history_.note_registered(worker);
     const auto* lease = std::get_if<wire::RunLease>(&message);
     if (lease != nullptr) history_.note_lent(lease->campaign, worker);
-    worker_desk_.send(worker, std::move(message));
+    worker_gateway_.send(worker, std::move(message));
   }
 
   void send_definition(WorkerId worker, const wire::CampaignRequest& request,
                        const std::shared_ptr<const Campaign>& definition) override {
-    worker_desk_.send_definition(worker, request, definition);
+    worker_gateway_.send_definition(worker, request, definition);
   }
 
   void store(WorkerId worker, wire::LeasedResult result) override {
@@ -125,7 +125,7 @@ class Service::Parts final : public Outbox {
   }
 
   void record(const Loss& loss) override {
-    const auto session = worker_desk_.peers().session_of(loss.worker);
+    const auto session = worker_gateway_.peers().session_of(loss.worker);
     history_.note_lent(loss.campaign, loss.worker);
     history_.note_reason(loss.worker, loss.reason);
     writer_.record_loss(loss.campaign, {.runs = loss.runs,
@@ -140,7 +140,7 @@ class Service::Parts final : public Outbox {
   using Outbox::log;
   void log(Event event, CampaignId campaign) override {
     log_(event);
-    if (campaign != CampaignId{} && !campaign_desk_.is_served(campaign)) return;
+    if (campaign != CampaignId{} && !campaign_service_.is_served(campaign)) return;
     writer_.record_event(campaign, entry_of(event));
   }
 
@@ -149,11 +149,11 @@ class Service::Parts final : public Outbox {
   void begin_with(FileOutcome outcome) {
     const auto* const prepared = std::get_if<PreparedCampaign>(&outcome);
     const bool is_of_directory = config_.directory != nullptr || prepared == nullptr;
-    if (is_of_directory) return directory_desk_.take(std::move(outcome));
-    campaign_desk_.serve(std::get<PreparedCampaign>(std::move(outcome)));
+    if (is_of_directory) return directory_service_.take(std::move(outcome));
+    campaign_service_.serve(std::get<PreparedCampaign>(std::move(outcome)));
   }
 
-  WorkerDesk::Surroundings surroundings_of_workers() {
+  WorkerGateway::Surroundings surroundings_of_workers() {
     return {.transmit =
                 [this](const std::string& routing_id, const std::string& bytes) {
                   return sockets_.send_to_worker(routing_id, bytes, now());
@@ -166,7 +166,7 @@ class Service::Parts final : public Outbox {
                                  LossReason reason) { history_.note_reason(worker, reason); }};
   }
 
-  CampaignDesk::Surroundings surroundings_of_campaigns() {
+  CampaignService::Surroundings surroundings_of_campaigns() {
     return {.state = state_,
             .writer = writer_,
             .background = background_,
@@ -181,8 +181,8 @@ class Service::Parts final : public Outbox {
             .start = start_};
   }
 
-  DirectoryDesk::Surroundings surroundings_of_directory() {
-    return {.campaigns = campaign_desk_,
+  DirectoryService::Surroundings surroundings_of_directory() {
+    return {.campaigns = campaign_service_,
             .background = background_,
             .outbox = *this,
             .directory = config_.directory,
@@ -190,8 +190,8 @@ class Service::Parts final : public Outbox {
             .start = start_};
   }
 
-  SubmissionDesk::Surroundings surroundings_of_submissions() {
-    return {.campaigns = campaign_desk_,
+  SubmissionService::Surroundings surroundings_of_submissions() {
+    return {.campaigns = campaign_service_,
             .writer = writer_,
             .background = background_,
             .files = config_.files,
@@ -200,21 +200,21 @@ class Service::Parts final : public Outbox {
             .start = start_};
   }
 
-  RequestDesk::Surroundings surroundings_of_requests() {
+  RequestService::Surroundings surroundings_of_requests() {
     return {.state = state_,
-            .campaigns = campaign_desk_,
-            .submissions = submission_desk_,
-            .directory = directory_desk_,
+            .campaigns = campaign_service_,
+            .submissions = submission_service_,
+            .directory = directory_service_,
             .outbox = *this,
             .now = [this] { return now(); },
             .version = config_.version};
   }
 
-  ClientDesk::Surroundings surroundings_of_clients() {
+  ClientGateway::Surroundings surroundings_of_clients() {
     return {.transmit =
                 [this](const std::string& routing_id, const std::string& bytes) {
                   (void)sockets_.send_to_client(routing_id, bytes, now());
-                  if (!campaign_desk_.is_all_done()) told_progress_at_ = now();
+                  if (!campaign_service_.is_all_done()) told_progress_at_ = now();
                 },
             .asker_of = [this](const std::string& key) -> std::optional<Asker> {
               Authenticator* const authenticator = sockets_.authenticator();
@@ -222,7 +222,7 @@ class Service::Parts final : public Outbox {
             },
             .carry_out =
                 [this](Request request, const Asker& asker, Respond respond) {
-                  request_desk_.carry_out(std::move(request), asker, std::move(respond));
+                  request_service_.carry_out(std::move(request), asker, std::move(respond));
                 },
             .now = [this] { return now(); }};
   }
@@ -234,7 +234,7 @@ class Service::Parts final : public Outbox {
 
   Delivery delivery_of(WorkerId worker, wire::LeasedResult&& result) {
     history_.note_lent(result.campaign, worker);
-    const auto session = worker_desk_.peers().session_of(worker);
+    const auto session = worker_gateway_.peers().session_of(worker);
     PROOFMASS_EXPECT(session.has_value());
     return {.result = std::move(result.computed.result),
             .worker = *session,
@@ -271,10 +271,10 @@ class Service::Parts final : public Outbox {
     if (now() - ticked_at_ < tick_interval) return;
     ticked_at_ = now();
     on_tick(state_, ticked_at_, *this);
-    campaign_desk_.review();
-    directory_desk_.review(ticked_at_);
-    submission_desk_.review();
-    client_desk_.review();
+    campaign_service_.review();
+    directory_service_.review(ticked_at_);
+    submission_service_.review();
+    client_gateway_.review();
     history_.review();
     if (ticked_at_ - reviewed_at_ < review_interval) return;
     reviewed_at_ = ticked_at_;
@@ -282,8 +282,8 @@ class Service::Parts final : public Outbox {
   }
 
   void review() {
-    worker_desk_.review(reviewed_at_, *this);
-    const std::uint64_t num_unsent = worker_desk_.num_unsent();
+    worker_gateway_.review(reviewed_at_, *this);
+    const std::uint64_t num_unsent = worker_gateway_.num_unsent();
     if (num_unsent == num_unsent_logged_) return;
     log({.severity = Severity::warning,
          .kind = "messages_unsent",
@@ -294,14 +294,14 @@ class Service::Parts final : public Outbox {
   void receive_from_workers() {
     sockets_.receive_from_workers(
         worker_messages_per_turn_max, now(), [this](const Incoming& message) {
-          guarded("worker", [&] { worker_desk_.receive(message, now(), *this); });
+          guarded("worker", [&] { worker_gateway_.receive(message, now(), *this); });
         });
   }
 
   void receive_from_clients() {
     sockets_.receive_from_clients(client_messages_per_turn_max, now(),
                                   [this](const Incoming& message) {
-                                    guarded("client", [&] { client_desk_.receive(message); });
+                                    guarded("client", [&] { client_gateway_.receive(message); });
                                   });
   }
 
@@ -336,16 +336,16 @@ class Service::Parts final : public Outbox {
   }
   void complete(const Compared& compared) {
     const auto& [run, session, is_equal] = compared.comparison;
-    const auto worker = worker_desk_.peers().worker_of(session);
+    const auto worker = worker_gateway_.peers().worker_of(session);
     on_compared(state_, compared.campaign, run, worker.value_or(WorkerId{}), is_equal, now(),
                 *this);
   }
   void complete(const StoreFailed& failed) {
-    if (!campaign_desk_.is_served(failed.campaign)) return;
+    if (!campaign_service_.is_served(failed.campaign)) return;
     on_store_failed(state_, failed.campaign, failed.text, *this);
   }
   void complete(const StoreRecovered& recovered) {
-    if (!campaign_desk_.is_served(recovered.campaign)) return;
+    if (!campaign_service_.is_served(recovered.campaign)) return;
     on_store_recovered(state_, recovered.campaign, now(), *this);
   }
 
@@ -357,7 +357,7 @@ class Service::Parts final : public Outbox {
         grown.campaign);
   }
   void complete(const FileReturned& returned) {
-    if (!campaign_desk_.is_served(returned.campaign)) return;
+    if (!campaign_service_.is_served(returned.campaign)) return;
     log({.severity = Severity::warning,
          .kind = kind_of(returned.kind),
          .fields = {{"runs", state_.campaigns.at(returned.campaign).committed.size()}}},
@@ -385,7 +385,7 @@ class Service::Parts final : public Outbox {
     }
     for (const auto& [id, campaign] : state_.campaigns) note_unstored(id, campaign);
     dismiss_workers();
-    campaign_desk_.review();
+    campaign_service_.review();
     settle_background();
     history_.end_all(LossReason::drained);
   }
@@ -396,9 +396,9 @@ class Service::Parts final : public Outbox {
     const auto deadline = now() + dismissal_max;
     std::uint64_t num_unsent = 0;
     do {
-      num_unsent = worker_desk_.num_unsent();
+      num_unsent = worker_gateway_.num_unsent();
       on_stop(state_, *this);
-      num_unsent = worker_desk_.num_unsent() - num_unsent;
+      num_unsent = worker_gateway_.num_unsent() - num_unsent;
       if (num_unsent < state_.workers.size()) std::this_thread::sleep_for(dismissal_interval);
     } while (num_unsent < state_.workers.size() && now() < deadline);
   }
@@ -422,12 +422,12 @@ class Service::Parts final : public Outbox {
   State state_;
   StoreWriter writer_;
   WorkerHistory history_;
-  WorkerDesk worker_desk_;
-  CampaignDesk campaign_desk_;
-  DirectoryDesk directory_desk_;
-  SubmissionDesk submission_desk_;
-  RequestDesk request_desk_;
-  ClientDesk client_desk_;
+  WorkerGateway worker_gateway_;
+  CampaignService campaign_service_;
+  DirectoryService directory_service_;
+  SubmissionService submission_service_;
+  RequestService request_service_;
+  ClientGateway client_gateway_;
   std::optional<TimePoint> drained_until_;
   std::optional<TimePoint> told_progress_at_;  ///< To any client.
   TimePoint ticked_at_;
@@ -438,46 +438,46 @@ class Service::Parts final : public Outbox {
 };
 
 Service::Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log)
-    : parts_(std::make_unique<Parts>(beginning_of(std::move(campaigns), config), config,
-                                     std::move(log))) {}
+    : impl_(std::make_unique<Impl>(beginning_of(std::move(campaigns), config), config,
+                                   std::move(log))) {}
 
 Service::~Service() = default;
 
-std::string Service::workers_endpoint() const { return parts_->sockets().workers_endpoint(); }
+std::string Service::workers_endpoint() const { return impl_->sockets().workers_endpoint(); }
 
-std::string Service::clients_endpoint() const { return parts_->sockets().clients_endpoint(); }
+std::string Service::clients_endpoint() const { return impl_->sockets().clients_endpoint(); }
 
 void Service::run(const std::atomic<StopRequest>& stop, const std::function<void()>& on_turn) {
-  parts_->run(stop, on_turn);
+  impl_->run(stop, on_turn);
 }
 
 std::vector<wire::CampaignStatus> Service::campaigns() const {
-  return parts_->campaign_desk().statuses(0, parts_->campaign_desk().num_campaigns());
+  return impl_->campaign_service().statuses(0, impl_->campaign_service().num_campaigns());
 }
 
-bool Service::is_done() const { return parts_->is_done(); }
+bool Service::is_done() const { return impl_->is_done(); }
 
-bool Service::has_storage_failed() const { return parts_->has_storage_failed(); }
+bool Service::has_storage_failed() const { return impl_->has_storage_failed(); }
 
 std::optional<WorkerId> Service::worker_of(std::uint64_t process_id) const {
-  for (const auto& [id, worker] : parts_->state().workers) {
+  for (const auto& [id, worker] : impl_->state().workers) {
     if (worker.process_id == process_id) return id;
   }
   return std::nullopt;
 }
 
 std::string Service::runs_held_text(WorkerId worker) const {
-  return coordinator::runs_held_text(parts_->state(), worker);
+  return coordinator::runs_held_text(impl_->state(), worker);
 }
 
 bool Service::is_quarantined(const std::string& host) const {
-  return coordinator::is_quarantined(parts_->state(), host);
+  return coordinator::is_quarantined(impl_->state(), host);
 }
 
 void Service::worker_ended(WorkerId worker, LossReason reason) {
-  parts_->worker_ended(worker, reason);
+  impl_->worker_ended(worker, reason);
 }
 
-std::vector<ServedCampaign> Service::close() { return parts_->close(); }
+std::vector<ServedCampaign> Service::close() { return impl_->close(); }
 
 }  // namespace proofmass::coordinator

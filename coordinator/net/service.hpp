@@ -108,8 +108,8 @@ class Service {
   [[nodiscard]] std::vector<ServedCampaign> close();
 
  private:
-  class Parts;
-  std::unique_ptr<Parts> parts_;
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass::coordinator

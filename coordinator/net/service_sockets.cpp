@@ -47,9 +47,9 @@ ServiceConfig checked(const ServiceConfig& config) {
 
 }  // namespace
 
-class ServiceSockets::Parts {
+class ServiceSockets::Impl {
  public:
-  Parts(const ServiceConfig& config, Log log)
+  Impl(const ServiceConfig& config, Log log)
       : config_(checked(config)),
         log_(std::move(log)),
         authenticator_(make_authenticator()),
@@ -167,37 +167,37 @@ class ServiceSockets::Parts {
 };
 
 ServiceSockets::ServiceSockets(const ServiceConfig& config, Log log)
-    : parts_(std::make_unique<Parts>(config, std::move(log))) {}
+    : impl_(std::make_unique<Impl>(config, std::move(log))) {}
 
 ServiceSockets::~ServiceSockets() = default;
 
-std::string ServiceSockets::workers_endpoint() const { return parts_->workers().endpoint(); }
+std::string ServiceSockets::workers_endpoint() const { return impl_->workers().endpoint(); }
 
 std::string ServiceSockets::clients_endpoint() const {
-  return parts_->clients() == nullptr ? "" : parts_->clients()->endpoint();
+  return impl_->clients() == nullptr ? "" : impl_->clients()->endpoint();
 }
 
-Authenticator* ServiceSockets::authenticator() { return parts_->authenticator(); }
-void ServiceSockets::wait(std::chrono::milliseconds duration_max) { parts_->wait(duration_max); }
-void ServiceSockets::wake() const { parts_->wake(); }
-void ServiceSockets::serve(TimePoint now) { parts_->serve(now); }
+Authenticator* ServiceSockets::authenticator() { return impl_->authenticator(); }
+void ServiceSockets::wait(std::chrono::milliseconds duration_max) { impl_->wait(duration_max); }
+void ServiceSockets::wake() const { impl_->wake(); }
+void ServiceSockets::serve(TimePoint now) { impl_->serve(now); }
 
 void ServiceSockets::receive_from_workers(int count_max, TimePoint now, const Handle& handle) {
-  parts_->workers().receive(count_max, now, handle);
+  impl_->workers().receive(count_max, now, handle);
 }
 
 void ServiceSockets::receive_from_clients(int count_max, TimePoint now, const Handle& handle) {
-  if (parts_->clients() != nullptr) parts_->clients()->receive(count_max, now, handle);
+  if (impl_->clients() != nullptr) impl_->clients()->receive(count_max, now, handle);
 }
 
 bool ServiceSockets::send_to_worker(const std::string& routing_id, const std::string& bytes,
                                     TimePoint now) {
-  return parts_->workers().send(routing_id, bytes, now);
+  return impl_->workers().send(routing_id, bytes, now);
 }
 
 bool ServiceSockets::send_to_client(const std::string& routing_id, const std::string& bytes,
                                     TimePoint now) {
-  return parts_->clients() != nullptr && parts_->clients()->send(routing_id, bytes, now);
+  return impl_->clients() != nullptr && impl_->clients()->send(routing_id, bytes, now);
 }
 
 }  // namespace proofmass::coordinator

@@ -7,7 +7,7 @@
 
 #include "coordinator/net/authenticator.hpp"
 #include "coordinator/net/service.hpp"
-#include "coordinator/net/worker_desk.hpp"
+#include "coordinator/net/worker_gateway.hpp"
 
 namespace proofmass::coordinator {
 
@@ -54,8 +54,8 @@ class ServiceSockets {
   bool send_to_client(const std::string& routing_id, const std::string& bytes, TimePoint now);
 
  private:
-  class Parts;
-  std::unique_ptr<Parts> parts_;
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass::coordinator

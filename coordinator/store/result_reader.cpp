@@ -7,7 +7,7 @@
 
 namespace proofmass::coordinator {
 
-struct ResultReader::Parts {
+struct ResultReader::Impl {
   const detail::Database& database;
   detail::Statement row;
   std::optional<std::uint64_t> num_runs;  // Of the campaign; read with the first result.
@@ -15,11 +15,11 @@ struct ResultReader::Parts {
 };
 
 ResultReader::ResultReader(const detail::Database& database)
-    : parts_(std::make_unique<Parts>(database, detail::select_results(database))) {}
+    : impl_(std::make_unique<Impl>(database, detail::select_results(database))) {}
 
 ResultReader::ResultReader(const detail::Database& database, RunRange runs)
-    : parts_(std::make_unique<Parts>(database, detail::select_results_in_range(database))) {
-  parts_->row.bind_all(runs.first.value, runs.end());
+    : impl_(std::make_unique<Impl>(database, detail::select_results_in_range(database))) {
+  impl_->row.bind_all(runs.first.value, runs.end());
 }
 
 ResultReader::~ResultReader() = default;
@@ -27,22 +27,22 @@ ResultReader::ResultReader(ResultReader&&) noexcept = default;
 ResultReader& ResultReader::operator=(ResultReader&&) noexcept = default;
 
 std::optional<RunResult> ResultReader::next() {
-  if (!parts_->row.step()) return std::nullopt;
+  if (!impl_->row.step()) return std::nullopt;
   // A coordinator may raise the number of runs meanwhile. Once the first row is there, this query
   // is of the same state of the file.
-  if (!parts_->num_runs) {
-    parts_->num_runs = parts_->database.count("SELECT num_runs FROM campaign");
+  if (!impl_->num_runs) {
+    impl_->num_runs = impl_->database.count("SELECT num_runs FROM campaign");
   }
-  const RunResult result = detail::read_result(parts_->row);
-  if (parts_->last && !(*parts_->last < result.run)) {
-    parts_->database.refuse_as_damaged(fmt::format("result of run {} comes after that of run {}",
-                                                   result.run.value, parts_->last->value));
+  const RunResult result = detail::read_result(impl_->row);
+  if (impl_->last && !(*impl_->last < result.run)) {
+    impl_->database.refuse_as_damaged(fmt::format("result of run {} comes after that of run {}",
+                                                  result.run.value, impl_->last->value));
   }
-  if (result.run.value >= *parts_->num_runs) {
-    parts_->database.refuse_as_damaged(
-        fmt::format("result of run {}, of {} there are", result.run.value, *parts_->num_runs));
+  if (result.run.value >= *impl_->num_runs) {
+    impl_->database.refuse_as_damaged(
+        fmt::format("result of run {}, of {} there are", result.run.value, *impl_->num_runs));
   }
-  parts_->last = result.run;
+  impl_->last = result.run;
   return result;
 }
 

@@ -32,8 +32,8 @@ class ResultReader {
   [[nodiscard]] std::optional<RunResult> next();
 
  private:
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass::coordinator

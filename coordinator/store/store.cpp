@@ -18,11 +18,11 @@
 #include "coordinator/store/detail/file_log.hpp"
 #include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/detail/integrity.hpp"
-#include "coordinator/store/detail/parts.hpp"
 #include "coordinator/store/detail/rescue.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/detail/store_lock.hpp"
 #include "coordinator/store/detail/table_digest.hpp"
 #include "core/campaign/model.hpp"
@@ -84,10 +84,10 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
 
 }  // namespace
 
-Store::Store(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+Store::Store(std::unique_ptr<Impl> parts) : impl_(std::move(parts)) {}
 
 Store::~Store() {
-  if (parts_ == nullptr) return;
+  if (impl_ == nullptr) return;
   try {
     (void)return_to_place();
   } catch (const std::exception&) {
@@ -107,14 +107,14 @@ Store Store::create(const std::filesystem::path& path, const Campaign& campaign,
   detail::appear_complete(path, detail::IfThere::keep, [&](const std::filesystem::path& draft) {
     write_draft(draft, campaign, definition);
   });
-  return Store(std::make_unique<Parts>(path, std::move(lock)));
+  return Store(std::make_unique<Impl>(path, std::move(lock)));
 }
 
 Store Store::open(const std::filesystem::path& path) {
   check_presence(path);
   check_that_name_is_the_only_one(path);
   detail::check_directory_of(path);
-  Store store(std::make_unique<Parts>(path, std::make_unique<detail::StoreLock>(path)));
+  Store store(std::make_unique<Impl>(path, std::make_unique<detail::StoreLock>(path)));
   if (store.has_lost_its_log()) {
     store.record_event("log_lost", "results that were not in the file itself are missing");
   }
@@ -123,7 +123,7 @@ Store Store::open(const std::filesystem::path& path) {
 
 Store Store::open_read_only(const std::filesystem::path& path) {
   check_presence(path);
-  return Store(std::make_unique<Parts>(path));
+  return Store(std::make_unique<Impl>(path));
 }
 
 void Store::annotate(const std::filesystem::path& path,
@@ -151,155 +151,154 @@ void Store::annotate(const std::filesystem::path& path,
 }
 
 wire::CampaignId Store::id() const {
-  return {
-      static_cast<std::uint64_t>(parts_->database.integer("SELECT campaign_uid FROM campaign"))};
+  return {static_cast<std::uint64_t>(impl_->database.integer("SELECT campaign_uid FROM campaign"))};
 }
 
-std::string Store::name() const { return parts_->database.text("SELECT name FROM campaign"); }
+std::string Store::name() const { return impl_->database.text("SELECT name FROM campaign"); }
 
 std::uint64_t Store::seed() const {
-  const std::string digits = parts_->database.text("SELECT seed FROM campaign");
+  const std::string digits = impl_->database.text("SELECT seed FROM campaign");
   std::uint64_t seed = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), seed);
   if (error != std::errc() || end != digits.data() + digits.size()) {
-    parts_->database.refuse_as_damaged(fmt::format("seed = {}", digits));
+    impl_->database.refuse_as_damaged(fmt::format("seed = {}", digits));
   }
   return seed;
 }
 
 std::uint64_t Store::num_runs() const {
-  return parts_->database.count("SELECT num_runs FROM campaign");
+  return impl_->database.count("SELECT num_runs FROM campaign");
 }
 
 std::string Store::definition() const {
-  return parts_->database.text("SELECT definition FROM campaign");
+  return impl_->database.text("SELECT definition FROM campaign");
 }
 
 std::string Store::model_version() const {
-  const std::string version = parts_->database.text("SELECT model_version FROM campaign");
+  const std::string version = impl_->database.text("SELECT model_version FROM campaign");
   // It is shown, and compared with ours, which has no control characters.
   if (wire::visible_text(version) == version) return version;
-  parts_->database.refuse_as_damaged(fmt::format("model_version = {}", version));
+  impl_->database.refuse_as_damaged(fmt::format("model_version = {}", version));
 }
 
-std::string Store::build() const { return parts_->database.text("SELECT build FROM campaign"); }
+std::string Store::build() const { return impl_->database.text("SELECT build FROM campaign"); }
 
 std::string Store::created_utc() const {
-  return parts_->database.text("SELECT created_utc FROM campaign");
+  return impl_->database.text("SELECT created_utc FROM campaign");
 }
 
-std::string Store::owner() const { return parts_->database.text("SELECT owner FROM campaign"); }
+std::string Store::owner() const { return impl_->database.text("SELECT owner FROM campaign"); }
 
 void Store::set_owner(std::string_view owner) {
-  parts_->change([&](Database& database) {
+  impl_->change([&](Database& database) {
     database.prepare("UPDATE campaign SET owner = ?").run(owner);
     detail::write_table_digest(database);
   });
 }
 
 std::string Store::table_digest() const {
-  return parts_->database.text("SELECT table_digest FROM campaign");
+  return impl_->database.text("SELECT table_digest FROM campaign");
 }
 
 std::string Store::computed_table_digest() const {
-  return detail::compute_table_digest(parts_->database);
+  return detail::compute_table_digest(impl_->database);
 }
 
 std::vector<DataTable> Store::data_tables() const {
-  return detail::read_data_tables(parts_->database);
+  return detail::read_data_tables(impl_->database);
 }
 
 std::vector<std::vector<double>> Store::table_columns() const {
   std::vector<std::vector<double>> columns;
   for (const DrawnQuantity& quantity : model().drawn()) {
-    columns.push_back(detail::read_dispersion_values(parts_->database, quantity.name));
+    columns.push_back(detail::read_dispersion_values(impl_->database, quantity.name));
     if (columns.back().empty()) columns.pop_back();
   }
   return columns;
 }
 
 void Store::extend(const Campaign& campaign, std::string_view definition) {
-  detail::check_extension(parts_->database, campaign);
-  parts_->change(
+  detail::check_extension(impl_->database, campaign);
+  impl_->change(
       [&](Database& database) { detail::extend_campaign(database, campaign, definition); });
 }
 
-CampaignControl Store::control() const { return detail::read_control(parts_->database); }
+CampaignControl Store::control() const { return detail::read_control(impl_->database); }
 
-StopPlan Store::stop_plan() const { return detail::read_stop_plan(parts_->database); }
+StopPlan Store::stop_plan() const { return detail::read_stop_plan(impl_->database); }
 
 void Store::set_stop_plan(const StopPlan& plan) {
-  parts_->change([&](Database& database) { detail::write_stop_plan(database, plan); });
+  impl_->change([&](Database& database) { detail::write_stop_plan(database, plan); });
 }
 
 void Store::record_stop_check(std::uint64_t num_runs, std::string_view statistic,
                               const StopCheck& check) {
-  parts_->change([&](Database& database) {
+  impl_->change([&](Database& database) {
     detail::replace_stop_check(database, num_runs, statistic, check);
   });
 }
 
 std::optional<StoredStopCheck> Store::last_stop_check(std::string_view statistic) const {
-  return detail::read_last_stop_check(parts_->database, statistic);
+  return detail::read_last_stop_check(impl_->database, statistic);
 }
 
 std::vector<StopCheckRow> Store::stop_checks() const {
-  return detail::read_stop_checks(parts_->database);
+  return detail::read_stop_checks(impl_->database);
 }
 
 std::uint64_t Store::num_without_estimate() const {
   // The index has all that are not completed.
-  return parts_->database.count("SELECT count(*) FROM run_result WHERE status <> 1 AND status > 2");
+  return impl_->database.count("SELECT count(*) FROM run_result WHERE status <> 1 AND status > 2");
 }
 
-std::vector<std::string> Store::tags() const { return detail::read_tags(parts_->database); }
+std::vector<std::string> Store::tags() const { return detail::read_tags(impl_->database); }
 
-std::vector<Note> Store::notes() const { return detail::read_notes(parts_->database); }
+std::vector<Note> Store::notes() const { return detail::read_notes(impl_->database); }
 
 std::vector<RunRange> Store::finished_runs() const {
-  return detail::read_runs(parts_->database, "SELECT run_index FROM delivery ORDER BY 1");
+  return detail::read_runs(impl_->database, "SELECT run_index FROM delivery ORDER BY 1");
 }
 
 std::vector<RunRange> Store::compared_runs() const {
-  return detail::read_runs(parts_->database, "SELECT DISTINCT run_index FROM audit ORDER BY 1");
+  return detail::read_runs(impl_->database, "SELECT DISTINCT run_index FROM audit ORDER BY 1");
 }
 
 std::vector<RunRange> Store::given_up_runs() const {
-  if (parts_->database.integer("SELECT EXISTS (SELECT 1 FROM run_failure"
-                               " WHERE run_index IN (SELECT run_index FROM delivery))") != 0) {
-    parts_->database.refuse_as_damaged("a run is given up and has a result");
+  if (impl_->database.integer("SELECT EXISTS (SELECT 1 FROM run_failure"
+                              " WHERE run_index IN (SELECT run_index FROM delivery))") != 0) {
+    impl_->database.refuse_as_damaged("a run is given up and has a result");
   }
-  return detail::read_runs(parts_->database, "SELECT run_index FROM run_failure ORDER BY 1");
+  return detail::read_runs(impl_->database, "SELECT run_index FROM run_failure ORDER BY 1");
 }
 
 std::vector<BlamedRun> Store::blamed_runs() const {
-  return detail::read_blamed_runs(parts_->database);
+  return detail::read_blamed_runs(impl_->database);
 }
 
 std::uint64_t Store::num_before_blame() const {
-  return parts_->database.count(
+  return impl_->database.count(
       "SELECT coalesce((SELECT min(first_run) FROM attempt WHERE is_blamed), num_runs)"
       " FROM campaign");
 }
 
 std::uint64_t Store::num_compared() const {
-  return parts_->database.count("SELECT count(*) FROM audit");
+  return impl_->database.count("SELECT count(*) FROM audit");
 }
 
 std::vector<Contradiction> Store::contradictions() const {
-  return detail::read_contradictions(parts_->database);
+  return detail::read_contradictions(impl_->database);
 }
 
 std::vector<wire::SessionId> Store::attached_sessions() const {
-  return detail::read_attached_sessions(parts_->database);
+  return detail::read_attached_sessions(impl_->database);
 }
 
 void Store::begin_coordinator(const CoordinatorStart& start) {
-  parts_->change([&](Database& database) { detail::insert_start(database, start); });
+  impl_->change([&](Database& database) { detail::insert_start(database, start); });
 }
 
 void Store::end_coordinator(wire::Epoch epoch) {
-  parts_->change([&](Database& database) { detail::end_start(database, epoch); });
+  impl_->change([&](Database& database) { detail::end_start(database, epoch); });
 }
 
 CommitSummary Store::write(std::span<const Entry> entries) {
@@ -310,50 +309,50 @@ CommitSummary Store::write(std::span<const Entry> entries) {
   }
   CommitSummary summary;
   try {
-    parts_->commit([&](Database& database) {
-      if (!parts_->rows) parts_->rows.emplace(database);
-      summary = parts_->rows->write(entries);
+    impl_->commit([&](Database& database) {
+      if (!impl_->rows) impl_->rows.emplace(database);
+      summary = impl_->rows->write(entries);
       wire::kill_point(wire::KillPoint::before_commit);
     });
   } catch (...) {
-    parts_->rows.reset();  // It knows of rows that are rolled back.
+    impl_->rows.reset();  // It knows of rows that are rolled back.
     throw;
   }
   return summary;
 }
 
-bool Store::is_of_older_version() const { return parts_->is_older; }
+bool Store::is_of_older_version() const { return impl_->is_older; }
 
-bool Store::has_lost_its_log() const { return parts_->is_log_lost; }
+bool Store::has_lost_its_log() const { return impl_->is_log_lost; }
 
 std::optional<std::string> Store::rest() {
   (void)return_to_place();
-  return parts_->rest();
+  return impl_->rest();
 }
 
 std::optional<FileReturn> Store::return_to_place() {
-  if (!parts_->place) return std::nullopt;
-  const detail::Placement placement = parts_->place->look();
+  if (!impl_->place) return std::nullopt;
+  const detail::Placement placement = impl_->place->look();
   switch (placement) {
     case detail::Placement::in_place:
       return std::nullopt;
     case detail::Placement::log_removed:
-      parts_->renew_log();
+      impl_->renew_log();
       return FileReturn::log_made_anew;
     case detail::Placement::without_directory:
-      parts_->check_place();
+      impl_->check_place();
       return std::nullopt;
     case detail::Placement::removed:
     case detail::Placement::replaced:
       break;
   }
-  const std::filesystem::path path = parts_->place->path();
-  if (!parts_->lock || !parts_->lock->is_in_place()) {
-    parts_->lock = std::make_unique<detail::StoreLock>(path);
+  const std::filesystem::path path = impl_->place->path();
+  if (!impl_->lock || !impl_->lock->is_in_place()) {
+    impl_->lock = std::make_unique<detail::StoreLock>(path);
   }
-  detail::restore_name(path, parts_->database, *parts_->place, placement);
-  auto fresh = std::make_unique<Parts>(path, std::move(parts_->lock));
-  parts_ = std::move(fresh);
+  detail::restore_name(path, impl_->database, *impl_->place, placement);
+  auto fresh = std::make_unique<Impl>(path, std::move(impl_->lock));
+  impl_ = std::move(fresh);
   return placement == detail::Placement::removed ? FileReturn::restored : FileReturn::replaced;
 }
 
@@ -366,12 +365,12 @@ void Store::for_each_result(const std::function<void(const RunResult&)>& visit) 
   while (const std::optional<RunResult> result = reader.next()) visit(*result);
 }
 
-ResultReader Store::results() const { return ResultReader(parts_->database); }
+ResultReader Store::results() const { return ResultReader(impl_->database); }
 
-ResultReader Store::results(RunRange runs) const { return ResultReader(parts_->database, runs); }
+ResultReader Store::results(RunRange runs) const { return ResultReader(impl_->database, runs); }
 
 void Store::refuse_as_damaged(std::string_view what) const {
-  parts_->database.refuse_as_damaged(what);
+  impl_->database.refuse_as_damaged(what);
 }
 
 void Store::record_event(std::string_view kind, std::string_view text) {
@@ -380,16 +379,16 @@ void Store::record_event(std::string_view kind, std::string_view text) {
 }
 
 void Store::read_one_state(const std::function<void()>& read) const {
-  const detail::ReadTransaction transaction(parts_->database);
+  const detail::ReadTransaction transaction(impl_->database);
   read();
 }
 
-bool Store::is_in_place() const { return parts_->database.is_in_place(); }
+bool Store::is_in_place() const { return impl_->database.is_in_place(); }
 
-std::uint64_t Store::log_size() const { return parts_->database.log_size(); }
+std::uint64_t Store::log_size() const { return impl_->database.log_size(); }
 
 void Store::check_integrity() const {
-  read_one_state([&] { detail::check_integrity(parts_->database); });
+  read_one_state([&] { detail::check_integrity(impl_->database); });
 }
 
 void Store::back_up(const std::filesystem::path& destination) const {
@@ -399,7 +398,7 @@ void Store::back_up(const std::filesystem::path& destination) const {
   detail::appear_complete(
       destination, detail::IfThere::keep, [&](const std::filesystem::path& draft) {
         Database copy(draft, Access::create);
-        parts_->database.copy_to(copy);
+        impl_->database.copy_to(copy);
         copy.execute("PRAGMA cell_size_check = ON");
         (void)detail::check_all_pages(copy);  // Nobody shall rely on the copy of a damaged file.
         // What is copied may say that there is a log.

@@ -230,10 +230,10 @@ class Store {
   void back_up(const std::filesystem::path& destination) const;
 
  private:
-  struct Parts;
-  explicit Store(std::unique_ptr<Parts> parts);
+  struct Impl;
+  explicit Store(std::unique_ptr<Impl> parts);
 
-  std::unique_ptr<Parts> parts_;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass::coordinator

@@ -5,8 +5,8 @@
 #include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/detail/parts.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/detail/table_differences.hpp"
 #include "coordinator/store/store.hpp"
 
@@ -28,20 +28,20 @@ void replace_all(Database& database, const CampaignStatistics& statistics,
 void Store::write_statistics(const CampaignStatistics& statistics,
                              const std::optional<ErrorBudget>& budget,
                              const ResultDigests& digests) {
-  parts_->change([&](Database& database) {
+  impl_->change([&](Database& database) {
     replace_all(database, statistics, budget);
     detail::replace_summary(database, statistics, digests);
   });
 }
 
-std::optional<Summary> Store::summary() const { return detail::read_summary(parts_->database); }
+std::optional<Summary> Store::summary() const { return detail::read_summary(impl_->database); }
 
 std::vector<std::string> Store::parameter_differences(const Campaign& campaign) const {
   constexpr std::array tables{
       ComparedTable{.name = "parameter", .row_name = "parameter"},
       ComparedTable{.name = "budget_coefficient", .row_name = "parameter || ' in ' || term"}};
   return detail::table_differences(
-      parts_->database, [&](Database& expected) { detail::insert_parameters(expected, campaign); },
+      impl_->database, [&](Database& expected) { detail::insert_parameters(expected, campaign); },
       tables);
 }
 
@@ -50,7 +50,7 @@ std::vector<std::string> Store::statistic_differences(
   constexpr std::array tables{ComparedTable{.name = "statistic", .row_name = "parameter"},
                               ComparedTable{.name = "budget_entry", .row_name = "term"}};
   return detail::table_differences(
-      parts_->database, [&](Database& expected) { replace_all(expected, statistics, budget); },
+      impl_->database, [&](Database& expected) { replace_all(expected, statistics, budget); },
       tables);
 }
 
@@ -60,7 +60,7 @@ std::vector<std::string> Store::budget_differences(const std::optional<ErrorBudg
       .row_name = "term",
       .columns = "position, label, before, paper_before, paper_after_worst, paper_after_mean"}};
   return detail::table_differences(
-      parts_->database, [&](Database& expected) { detail::replace_budgets(expected, budget, {}); },
+      impl_->database, [&](Database& expected) { detail::replace_budgets(expected, budget, {}); },
       tables);
 }
 
@@ -71,7 +71,7 @@ std::vector<std::string> Store::stop_check_differences(
                     .row_name = "statistic || ' after ' || num_runs || ' runs'",
                     .columns = "estimate, lower, upper, relative_half_width, is_reached"}};
   return detail::table_differences(
-      parts_->database,
+      impl_->database,
       [&](Database& database) {
         for (const StopCheckRow& row : expected) {
           detail::replace_stop_check(database, row.num_runs, row.statistic, row.check);
@@ -81,7 +81,7 @@ std::vector<std::string> Store::stop_check_differences(
 }
 
 bool Store::has_statistics() const {
-  return parts_->database.integer("SELECT EXISTS (SELECT 1 FROM statistic)") != 0;
+  return impl_->database.integer("SELECT EXISTS (SELECT 1 FROM statistic)") != 0;
 }
 
 }  // namespace proofmass::coordinator

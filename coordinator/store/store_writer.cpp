@@ -54,8 +54,8 @@ CommitTimes times_of(const WriterConfig& config) {
 
 }  // namespace
 
-struct StoreWriter::Parts {
-  Parts(std::function<void()> wake_caller, const WriterConfig& writer_config)
+struct StoreWriter::Impl {
+  Impl(std::function<void()> wake_caller, const WriterConfig& writer_config)
       : config(writer_config),
         times(times_of(config)),
         wake(std::move(wake_caller)),
@@ -99,13 +99,13 @@ struct StoreWriter::Parts {
   std::thread thread;  // Begins when all else is there.
 };
 
-OpenFile& StoreWriter::Parts::file(wire::CampaignId campaign) {
+OpenFile& StoreWriter::Impl::file(wire::CampaignId campaign) {
   const auto found = files.find(campaign);
   PROOFMASS_EXPECT(found != files.end());
   return found->second;
 }
 
-void StoreWriter::Parts::add(wire::CampaignId campaign, Entry entry) {
+void StoreWriter::Impl::add(wire::CampaignId campaign, Entry entry) {
   bool is_sooner = false;
   {
     const std::lock_guard lock(mutex);
@@ -114,8 +114,8 @@ void StoreWriter::Parts::add(wire::CampaignId campaign, Entry entry) {
   if (is_sooner) changed.notify_one();  // Otherwise the thread would wake for every result.
 }
 
-void StoreWriter::Parts::add_where(const Entry& entry,
-                                   const std::function<bool(const OpenFile&)>& is_for) {
+void StoreWriter::Impl::add_where(const Entry& entry,
+                                  const std::function<bool(const OpenFile&)>& is_for) {
   bool is_sooner = false;
   {
     const std::lock_guard lock(mutex);
@@ -127,7 +127,7 @@ void StoreWriter::Parts::add_where(const Entry& entry,
 }
 
 /// True if the file is to be written to sooner than before. @pre The lock is held.
-bool StoreWriter::Parts::add(OpenFile& open_file, Entry entry) {
+bool StoreWriter::Impl::add(OpenFile& open_file, Entry entry) {
   const TimePoint now = std::chrono::steady_clock::now();
   const std::optional<TimePoint> due_before = due_time(open_file, times);
   note_worker(open_file, entry);
@@ -137,7 +137,7 @@ bool StoreWriter::Parts::add(OpenFile& open_file, Entry entry) {
   return due_time(open_file, times) != due_before;
 }
 
-void StoreWriter::Parts::wait_for(wire::CampaignId campaign, std::function<void()> action) {
+void StoreWriter::Impl::wait_for(wire::CampaignId campaign, std::function<void()> action) {
   Request request{.campaign = campaign, .action = std::move(action), .done = {}};
   std::future<void> done = request.done.get_future();
   {
@@ -148,7 +148,7 @@ void StoreWriter::Parts::wait_for(wire::CampaignId campaign, std::function<void(
   done.get();
 }
 
-void StoreWriter::Parts::run() {
+void StoreWriter::Impl::run() {
   Lock lock(mutex);
   while (!is_ending || !requests.empty()) {
     if (!requests.empty()) {
@@ -168,7 +168,7 @@ void StoreWriter::Parts::run() {
   for (const wire::CampaignId campaign : ids()) write_all(campaign, lock);
 }
 
-void StoreWriter::Parts::serve_request(Lock& lock) {
+void StoreWriter::Impl::serve_request(Lock& lock) {
   Request request = std::move(requests.front());
   requests.pop_front();
   const bool is_for_all = request.campaign == wire::CampaignId{};
@@ -185,7 +185,7 @@ void StoreWriter::Parts::serve_request(Lock& lock) {
   lock.lock();
 }
 
-void StoreWriter::Parts::write_due(Lock& lock) {
+void StoreWriter::Impl::write_due(Lock& lock) {
   const TimePoint now = std::chrono::steady_clock::now();
   for (const wire::CampaignId campaign : ids()) {
     const std::optional<TimePoint> due = due_time(file(campaign), times);
@@ -199,7 +199,7 @@ void StoreWriter::Parts::write_due(Lock& lock) {
 }
 
 /// Gives files back the names that they lost while nothing was to be written.
-void StoreWriter::Parts::look_at_all(Lock& lock) {
+void StoreWriter::Impl::look_at_all(Lock& lock) {
   if (std::chrono::steady_clock::now() < look_at) return;
   for (const wire::CampaignId campaign : ids()) {
     if (!file(campaign).retry_at) write_some(campaign, 0, lock);
@@ -208,7 +208,7 @@ void StoreWriter::Parts::look_at_all(Lock& lock) {
 }
 
 /// Writes all that waits now, until something fails; not what is added meanwhile.
-void StoreWriter::Parts::write_all(wire::CampaignId campaign, Lock& lock) {
+void StoreWriter::Impl::write_all(wire::CampaignId campaign, Lock& lock) {
   std::size_t num_left = file(campaign).waiting.size();
   bool is_written = write_some(campaign, 0, lock);
   while (is_written && num_left > 0) {
@@ -220,7 +220,7 @@ void StoreWriter::Parts::write_all(wire::CampaignId campaign, Lock& lock) {
 }
 
 /// Brings a file of which nothing waits to rest.
-void StoreWriter::Parts::fold(wire::CampaignId campaign, Lock& lock) {
+void StoreWriter::Impl::fold(wire::CampaignId campaign, Lock& lock) {
   if (!write_some(campaign, 0, lock)) return;  // Gives the file its name back if need be.
   OpenFile& open_file = file(campaign);
   open_file.rest_at.reset();  // What is added meanwhile sets it again.
@@ -244,7 +244,7 @@ void StoreWriter::Parts::fold(wire::CampaignId campaign, Lock& lock) {
 
 /// Tries to write what failed before or, if nothing did, up to `num_max` more entries. The file
 /// stays: only the thread itself removes one.
-bool StoreWriter::Parts::write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock) {
+bool StoreWriter::Impl::write_some(wire::CampaignId campaign, std::size_t num_max, Lock& lock) {
   OpenFile& open_file = file(campaign);
   if (open_file.writing.empty() && num_max > 0) {
     open_file.waiting.take(num_max, open_file.writing, std::chrono::steady_clock::now());
@@ -263,8 +263,8 @@ bool StoreWriter::Parts::write_some(wire::CampaignId campaign, std::size_t num_m
   return is_written;
 }
 
-void StoreWriter::Parts::finish_write(wire::CampaignId campaign, OpenFile& open_file,
-                                      Attempted attempted) {
+void StoreWriter::Impl::finish_write(wire::CampaignId campaign, OpenFile& open_file,
+                                     Attempted attempted) {
   const bool has_failed_before = open_file.retry_at.has_value();
   if (attempted.failure) {
     open_file.retry_at = std::chrono::steady_clock::now() + config.retry_after;
@@ -287,8 +287,8 @@ void StoreWriter::Parts::finish_write(wire::CampaignId campaign, OpenFile& open_
   if (has_failed_before) completions.emplace_back(StoreRecovered{.campaign = campaign});
 }
 
-void StoreWriter::Parts::watch_log(wire::CampaignId campaign, OpenFile& open_file,
-                                   std::uint64_t log_size) {
+void StoreWriter::Impl::watch_log(wire::CampaignId campaign, OpenFile& open_file,
+                                  std::uint64_t log_size) {
   const bool is_large = log_size > config.log_size_max;
   if (is_large == open_file.has_large_log) return;
   open_file.has_large_log = is_large;
@@ -299,7 +299,7 @@ void StoreWriter::Parts::watch_log(wire::CampaignId campaign, OpenFile& open_fil
   }
 }
 
-std::optional<TimePoint> StoreWriter::Parts::next_due_time() const {
+std::optional<TimePoint> StoreWriter::Impl::next_due_time() const {
   std::optional<TimePoint> next;
   if (!files.empty()) next = look_at;
   for (const auto& [campaign, file] : files) {
@@ -309,115 +309,114 @@ std::optional<TimePoint> StoreWriter::Parts::next_due_time() const {
   return next;
 }
 
-std::vector<wire::CampaignId> StoreWriter::Parts::ids() const {
+std::vector<wire::CampaignId> StoreWriter::Impl::ids() const {
   std::vector<wire::CampaignId> ids;
   for (const auto& [campaign, file] : files) ids.push_back(campaign);
   return ids;
 }
 
 StoreWriter::StoreWriter(std::function<void()> wake, const WriterConfig& config)
-    : parts_(std::make_unique<Parts>(std::move(wake), config)) {}
+    : impl_(std::make_unique<Impl>(std::move(wake), config)) {}
 
 StoreWriter::~StoreWriter() {
   {
-    const std::lock_guard lock(parts_->mutex);
-    parts_->is_ending = true;
+    const std::lock_guard lock(impl_->mutex);
+    impl_->is_ending = true;
   }
-  parts_->changed.notify_one();
-  parts_->thread.join();
+  impl_->changed.notify_one();
+  impl_->thread.join();
 }
 
 void StoreWriter::open(wire::CampaignId campaign, Store store) {
   const std::vector<wire::SessionId> attached = store.attached_sessions();
   {
-    const std::lock_guard lock(parts_->mutex);
+    const std::lock_guard lock(impl_->mutex);
     OpenFile file{.store = std::move(store),
-                  .waiting = detail::WaitingEntries(parts_->config.num_records_max),
+                  .waiting = detail::WaitingEntries(impl_->config.num_records_max),
                   .writing = {},
                   .unconfirmed = {},
                   .retry_at = {},
                   .known = {},
                   .rest_at = {}};
     for (const wire::SessionId session : attached) file.known.insert(session);
-    const bool is_new = parts_->files.emplace(campaign, std::move(file)).second;
+    const bool is_new = impl_->files.emplace(campaign, std::move(file)).second;
     PROOFMASS_EXPECT(is_new);
   }
-  parts_->changed.notify_one();
+  impl_->changed.notify_one();
 }
 
 Store StoreWriter::close(wire::CampaignId campaign) {
   std::optional<Store> store;
-  parts_->wait_for(campaign, [&] {
-    const std::lock_guard lock(parts_->mutex);
-    store = std::move(parts_->file(campaign).store);
-    parts_->files.erase(campaign);
+  impl_->wait_for(campaign, [&] {
+    const std::lock_guard lock(impl_->mutex);
+    store = std::move(impl_->file(campaign).store);
+    impl_->files.erase(campaign);
   });
   return std::move(*store);
 }
 
 void StoreWriter::access(wire::CampaignId campaign, const std::function<void(Store&)>& action) {
-  parts_->wait_for(campaign, [&] {
-    std::unique_lock lock(parts_->mutex);
-    Store& store = parts_->file(campaign).store;
+  impl_->wait_for(campaign, [&] {
+    std::unique_lock lock(impl_->mutex);
+    Store& store = impl_->file(campaign).store;
     lock.unlock();
     action(store);
   });
 }
 
 void StoreWriter::deliver(wire::CampaignId campaign, Delivery delivery) {
-  parts_->add(campaign, std::move(delivery));
+  impl_->add(campaign, std::move(delivery));
 }
 
 void StoreWriter::compare(wire::CampaignId campaign, Delivery delivery) {
-  parts_->add(campaign, SecondDelivery{.delivery = std::move(delivery)});
+  impl_->add(campaign, SecondDelivery{.delivery = std::move(delivery)});
 }
 
 void StoreWriter::record_loss(wire::CampaignId campaign, const LostRuns& lost) {
-  parts_->add(campaign, lost);
+  impl_->add(campaign, lost);
 }
 
 void StoreWriter::give_up(wire::CampaignId campaign, RunIndex run) {
-  parts_->add(campaign, GivenUpRun{.run = run});
+  impl_->add(campaign, GivenUpRun{.run = run});
 }
 
 void StoreWriter::record_event(wire::CampaignId campaign, EventEntry event) {
   if (campaign != wire::CampaignId{}) {
-    parts_->add(campaign, std::move(event));
+    impl_->add(campaign, std::move(event));
     return;
   }
-  parts_->add_where(event, [](const OpenFile& file) { return !file.is_rest_wanted; });
+  impl_->add_where(event, [](const OpenFile& file) { return !file.is_rest_wanted; });
 }
 
 void StoreWriter::record_worker_joined(wire::CampaignId campaign, const WorkerJoined& worker) {
-  parts_->add(campaign, worker);
+  impl_->add(campaign, worker);
 }
 
 void StoreWriter::record_worker_ended(const WorkerEnded& ended) {
-  parts_->add_where(ended,
-                    [&](const OpenFile& file) { return file.known.contains(ended.session); });
+  impl_->add_where(ended, [&](const OpenFile& file) { return file.known.contains(ended.session); });
 }
 
 void StoreWriter::rest(wire::CampaignId campaign) {
   {
-    const std::lock_guard lock(parts_->mutex);
-    OpenFile& open_file = parts_->file(campaign);
+    const std::lock_guard lock(impl_->mutex);
+    OpenFile& open_file = impl_->file(campaign);
     open_file.is_rest_wanted = true;
     open_file.rest_at = std::chrono::steady_clock::now();
   }
-  parts_->changed.notify_one();
+  impl_->changed.notify_one();
 }
 
 void StoreWriter::set_control(wire::CampaignId campaign, const CampaignControl& control) {
-  parts_->add(campaign, control);
+  impl_->add(campaign, control);
 }
 
 std::vector<Completion> StoreWriter::take_completions() {
-  const std::lock_guard lock(parts_->mutex);
-  return std::exchange(parts_->completions, {});
+  const std::lock_guard lock(impl_->mutex);
+  return std::exchange(impl_->completions, {});
 }
 
 void StoreWriter::flush() {
-  parts_->wait_for(wire::CampaignId{}, [] {});
+  impl_->wait_for(wire::CampaignId{}, [] {});
 }
 
 }  // namespace proofmass::coordinator

@@ -52,10 +52,10 @@ std::string broken_off_text(const std::string& endpoint, const ClientSecurity& s
 
 }  // namespace
 
-class ConnectionMonitor::Parts {
+class ConnectionMonitor::Impl {
  public:
-  Parts(zmq::context_t& context, zmq::socket_t& dealer, std::string endpoint,
-        const ClientSecurity& security, TimePoint now)
+  Impl(zmq::context_t& context, zmq::socket_t& dealer, std::string endpoint,
+       const ClientSecurity& security, TimePoint now)
       : dealer_(dealer),
         endpoint_(std::move(endpoint)),
         security_(security),
@@ -161,13 +161,13 @@ class ConnectionMonitor::Parts {
 ConnectionMonitor::ConnectionMonitor(zmq::context_t& context, zmq::socket_t& dealer,
                                      std::string endpoint, const ClientSecurity& security,
                                      TimePoint now)
-    : parts_(std::make_unique<Parts>(context, dealer, std::move(endpoint), security, now)) {}
+    : impl_(std::make_unique<Impl>(context, dealer, std::move(endpoint), security, now)) {}
 
 ConnectionMonitor::~ConnectionMonitor() = default;
 
-void* ConnectionMonitor::handle() const { return parts_->handle(); }
-void ConnectionMonitor::update(TimePoint now) { parts_->update(now); }
-bool ConnectionMonitor::is_connected() const { return parts_->is_connected(); }
-std::optional<std::string> ConnectionMonitor::take_refusal() { return parts_->take_refusal(); }
+void* ConnectionMonitor::handle() const { return impl_->handle(); }
+void ConnectionMonitor::update(TimePoint now) { impl_->update(now); }
+bool ConnectionMonitor::is_connected() const { return impl_->is_connected(); }
+std::optional<std::string> ConnectionMonitor::take_refusal() { return impl_->take_refusal(); }
 
 }  // namespace proofmass::wire

@@ -47,8 +47,8 @@ class ConnectionMonitor {
   [[nodiscard]] std::optional<std::string> take_refusal();
 
  private:
-  class Parts;
-  std::unique_ptr<Parts> parts_;
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass::wire

@@ -21,9 +21,9 @@ std::string new_address() {
 
 }  // namespace
 
-class SocketEvents::Parts {
+class SocketEvents::Impl {
  public:
-  Parts(zmq::context_t& context, void* socket, int kinds)
+  Impl(zmq::context_t& context, void* socket, int kinds)
       : socket_(socket), events_(context, zmq::socket_type::pair) {
     const std::string address = new_address();
     if (zmq_socket_monitor(socket_, address.c_str(), kinds) != 0) {
@@ -34,9 +34,9 @@ class SocketEvents::Parts {
     events_.set(zmq::sockopt::rcvhwm, 0);
     events_.connect(address);
   }
-  ~Parts() { zmq_socket_monitor(socket_, nullptr, 0); }
-  Parts(const Parts&) = delete;
-  Parts& operator=(const Parts&) = delete;
+  ~Impl() { zmq_socket_monitor(socket_, nullptr, 0); }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
 
   [[nodiscard]] void* handle() { return events_.handle(); }
 
@@ -60,11 +60,11 @@ class SocketEvents::Parts {
 };
 
 SocketEvents::SocketEvents(zmq::context_t& context, void* socket, int kinds)
-    : parts_(std::make_unique<Parts>(context, socket, kinds)) {}
+    : impl_(std::make_unique<Impl>(context, socket, kinds)) {}
 
 SocketEvents::~SocketEvents() = default;
 
-void* SocketEvents::handle() const { return parts_->handle(); }
-std::optional<SocketEvent> SocketEvents::take() { return parts_->take(); }
+void* SocketEvents::handle() const { return impl_->handle(); }
+std::optional<SocketEvent> SocketEvents::take() { return impl_->take(); }
 
 }  // namespace proofmass::wire

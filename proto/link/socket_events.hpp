@@ -34,8 +34,8 @@ class SocketEvents {
   [[nodiscard]] std::optional<SocketEvent> take();
 
  private:
-  class Parts;
-  std::unique_ptr<Parts> parts_;
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass::wire

@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "coordinator/dispatch/dispatch.hpp"
-#include "coordinator/net/worker_desk.hpp"
+#include "coordinator/net/worker_gateway.hpp"
 #include "core/error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/wire/client_codec.hpp"
@@ -99,7 +99,7 @@ class World final : public coordinator::Outbox {
   }
 
  private:
-  coordinator::WorkerDesk::Surroundings surroundings() {
+  coordinator::WorkerGateway::Surroundings surroundings() {
     return {.transmit =
                 [this](const std::string&, const std::string& bytes) {
                   note_sent(bytes);
@@ -241,7 +241,7 @@ class World final : public coordinator::Outbox {
 
   TimePoint now_{};
   coordinator::State state_;
-  coordinator::WorkerDesk gateway_;
+  coordinator::WorkerGateway gateway_;
   std::set<std::pair<CampaignId, RunIndex>> handed_over_;
   std::deque<wire::LeasedResult> to_commit_;
   std::deque<std::pair<wire::WorkerId, wire::LeasedResult>> to_compare_;

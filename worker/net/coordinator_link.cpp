@@ -26,10 +26,10 @@ std::chrono::milliseconds milliseconds_up(Duration time) {
 
 }  // namespace
 
-class CoordinatorLink::Parts {
+class CoordinatorLink::Impl {
  public:
-  Parts(const std::string& endpoint, const wire::ClientSecurity& security,
-        const std::optional<wire::FaultPlan>& faults)
+  Impl(const std::string& endpoint, const wire::ClientSecurity& security,
+       const std::optional<wire::FaultPlan>& faults)
       : socket_(wire::make_dealer(context_, security)),
         monitor_(context_, socket_, endpoint, security, time_now()) {
     if (faults) {
@@ -107,11 +107,11 @@ class CoordinatorLink::Parts {
 
 CoordinatorLink::CoordinatorLink(const std::string& endpoint, const wire::ClientSecurity& security,
                                  const std::optional<wire::FaultPlan>& faults)
-    : endpoint_(endpoint), security_(security), faults_(faults), parts_(make_parts()) {}
+    : endpoint_(endpoint), security_(security), faults_(faults), impl_(make_parts()) {}
 
-std::unique_ptr<CoordinatorLink::Parts> CoordinatorLink::make_parts() const {
+std::unique_ptr<CoordinatorLink::Impl> CoordinatorLink::make_parts() const {
   try {
-    return std::make_unique<Parts>(endpoint_, security_, faults_);
+    return std::make_unique<Impl>(endpoint_, security_, faults_);
   } catch (const zmq::error_t& error) {
     throw Error(fmt::format("connect = {} ({})", endpoint_, error.what()));
   }
@@ -120,24 +120,22 @@ std::unique_ptr<CoordinatorLink::Parts> CoordinatorLink::make_parts() const {
 CoordinatorLink::~CoordinatorLink() = default;
 
 void CoordinatorLink::reconnect() {
-  parts_->drop_unsent();
-  parts_ = make_parts();
+  impl_->drop_unsent();
+  impl_ = make_parts();
 }
 
 void CoordinatorLink::wait(std::span<const int> descriptors, Duration time_max) {
-  parts_->wait(descriptors, time_max);
+  impl_->wait(descriptors, time_max);
 }
 
-void CoordinatorLink::send(std::string bytes, TimePoint now) {
-  parts_->send(std::move(bytes), now);
-}
+void CoordinatorLink::send(std::string bytes, TimePoint now) { impl_->send(std::move(bytes), now); }
 
 void CoordinatorLink::receive(TimePoint now, const std::function<bool(std::string_view)>& handle) {
-  parts_->receive(now, handle);
+  impl_->receive(now, handle);
 }
 
-bool CoordinatorLink::take_connected() { return parts_->take_connected(); }
+bool CoordinatorLink::take_connected() { return impl_->take_connected(); }
 
-std::optional<std::string> CoordinatorLink::take_refusal() { return parts_->take_refusal(); }
+std::optional<std::string> CoordinatorLink::take_refusal() { return impl_->take_refusal(); }
 
 }  // namespace proofmass::worker

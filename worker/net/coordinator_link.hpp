@@ -45,13 +45,13 @@ class CoordinatorLink {
   [[nodiscard]] std::optional<std::string> take_refusal();
 
  private:
-  class Parts;
-  [[nodiscard]] std::unique_ptr<Parts> make_parts() const;
+  class Impl;
+  [[nodiscard]] std::unique_ptr<Impl> make_parts() const;
 
   std::string endpoint_;
   wire::ClientSecurity security_;
   std::optional<wire::FaultPlan> faults_;
-  std::unique_ptr<Parts> parts_;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass::worker

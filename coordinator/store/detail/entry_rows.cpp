@@ -36,7 +36,7 @@ constexpr std::string_view insert_failure_sql =
 EntryRows::EntryRows(const Database& database)
     : database_(database),
       results_(database),
-      standouts_(database),
+      largest_errors_(database),
       workers_(database),
       insert_delivery_(database.prepare("INSERT INTO delivery VALUES (?, ?, ?, ?, ?)")),
       select_failures_(database.prepare("SELECT EXISTS (SELECT 1 FROM run_failure)")),
@@ -78,7 +78,7 @@ void EntryRows::write_entry(const Delivery& delivery) {
   insert_delivery_.run(delivery.result.run.value, worker, delivery.attempt.value,
                        delivery.compute_s, now_unix_s_);
   if (has_failures_) delete_failure_.run(delivery.result.run.value);
-  standouts_.add(delivery.result);
+  largest_errors_.add(delivery.result);
   workers_.count_result(worker, delivery.compute_s);
   ++summary_.num_new;
 }

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/largest_error_rows.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
-#include "coordinator/store/detail/standout_rows.hpp"
 #include "coordinator/store/detail/worker_rows.hpp"
 #include "coordinator/store/records.hpp"
 
@@ -48,7 +48,7 @@ class EntryRows {
 
   const Database& database_;
   ResultRows results_;
-  StandoutRows standouts_;
+  LargestErrorRows largest_errors_;
   WorkerRows workers_;
   Statement insert_delivery_;
   Statement select_failures_;

@@ -12,9 +12,9 @@
 #include <string>
 #include <string_view>
 
+#include "coordinator/store/detail/largest_error_rows.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
-#include "coordinator/store/detail/standout_rows.hpp"
 #include "coordinator/store/detail/worker_rows.hpp"
 #include "core/campaign/model.hpp"
 
@@ -48,7 +48,7 @@ bool has_row(Statement& select, RunIndex run, std::uint64_t number) {
 }
 
 // `overrun` and `worst_run` follow from the results.
-void check_standouts(const Database& database) {
+void check_largest_errors(const Database& database) {
   const std::vector<double> objectives = read_objectives(database);
   const std::vector<Quantity>& quantities = model().results().quantities;
   WorstRunTable worst(quantities.size());
@@ -171,7 +171,7 @@ void check_integrity(const Database& database) {
   check_schema(database, schema_version());
   check_references(database);
   check_single_rows(database);
-  check_standouts(database);
+  check_largest_errors(database);
   check_workers(database);
   check_audits(database);
 }

@@ -1,8 +1,8 @@
 #include "coordinator/store/detail/private_copy.hpp"
 
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/detail/parts.hpp"
 #include "coordinator/store/detail/schema.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
 
 namespace proofmass::coordinator::detail {
 

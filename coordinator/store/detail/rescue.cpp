@@ -6,9 +6,9 @@
 #include <string>
 
 #include "coordinator/store/detail/file_system.hpp"
-#include "coordinator/store/detail/parts.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

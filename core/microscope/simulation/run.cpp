@@ -118,8 +118,8 @@ bool are_in_range(const ParameterArray& values) { return std::ranges::all_of(val
 
 }  // namespace
 
-struct RunPlan::Parts {
-  Parts(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
+struct RunPlan::Impl {
+  Impl(const MicroscopeCampaign& c, const EstimationMethodInfo& m)
       : campaign(c),
         method(m),
         orbit(c.scenario.orbit),
@@ -160,7 +160,7 @@ struct RunPlan::Parts {
 
   /// Makes the weights of a session, block by block.
   struct Readers {
-    explicit Readers(const Parts& parts, std::size_t i)
+    explicit Readers(const Impl& parts, std::size_t i)
         : lines(parts.weights[i]),
           known(parts.known_weights[i].begin(), parts.known_weights[i].end()),
           buffer(weights_buffer_size(lines.weights().num_fit_lines(), known.size())) {
@@ -264,14 +264,14 @@ struct RunPlan::Parts {
 RunPlan::RunPlan(const MicroscopeCampaign& campaign)
     : RunPlan(campaign, estimation_method(campaign.scenario.estimation.method)) {}
 RunPlan::RunPlan(const MicroscopeCampaign& campaign, const EstimationMethodInfo& method)
-    : parts_(std::make_unique<Parts>(campaign, method)) {}
+    : impl_(std::make_unique<Impl>(campaign, method)) {}
 RunPlan::~RunPlan() = default;
 RunPlan::RunPlan(RunPlan&&) noexcept = default;
 RunPlan& RunPlan::operator=(RunPlan&&) noexcept = default;
 
 int RunPlan::num_orbits() const {
   int total = 0;
-  for (const Session& session : parts_->campaign.scenario.sessions) total += session.num_orbits;
+  for (const Session& session : impl_->campaign.scenario.sessions) total += session.num_orbits;
   return total;
 }
 
@@ -289,13 +289,13 @@ RunRecord RunPlan::observe(RunIndex run, std::span<const double> table_values,
 RunRecord RunPlan::record_alone(RunIndex run, std::span<const double> table_values,
                                 const SampleObserver* observer,
                                 const std::function<void(int)>& progress) const {
-  const Scenario& scenario = parts_->campaign.scenario;
-  const AcceptedDraw draw = draw_instrument(parts_->campaign, run, table_values);
+  const Scenario& scenario = impl_->campaign.scenario;
+  const AcceptedDraw draw = draw_instrument(impl_->campaign, run, table_values);
   RunRecord recorded = drawn_record(scenario, run, draw);
   if (!draw.instrument) return recorded;
   SessionProgress sessions(scenario, progress);
   for (std::size_t i = 0; i < scenario.sessions.size(); ++i) {
-    parts_->record_session_of_run(i, *draw.instrument, observer, sessions, recorded);
+    impl_->record_session_of_run(i, *draw.instrument, observer, sessions, recorded);
     sessions.end_session(i);
   }
   return recorded;
@@ -325,25 +325,25 @@ std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> request
   std::vector<Lane> lanes;
   for (std::size_t i = 0; i < requests.size(); ++i) {
     const auto& [run, table_values] = requests[i];
-    const AcceptedDraw draw = draw_instrument(parts_->campaign, run, table_values);
-    records.push_back(drawn_record(parts_->campaign.scenario, run, draw));
+    const AcceptedDraw draw = draw_instrument(impl_->campaign, run, table_values);
+    records.push_back(drawn_record(impl_->campaign.scenario, run, draw));
     if (draw.instrument) lanes.push_back({.run = run, .instrument = *draw.instrument, .index = i});
   }
   if (lanes.empty()) return records;
-  SessionProgress sessions(parts_->campaign.scenario, progress);
-  for (std::size_t i = 0; i < parts_->weights.size(); ++i) {
-    parts_->record_session_batch(i, lanes, batch_kernel(set), sessions, records);
+  SessionProgress sessions(impl_->campaign.scenario, progress);
+  for (std::size_t i = 0; i < impl_->weights.size(); ++i) {
+    impl_->record_session_batch(i, lanes, batch_kernel(set), sessions, records);
     sessions.end_session(i);
   }
   return records;
 }
 
 Estimation RunPlan::estimation(const RunRecord& record) const {
-  return parts_->method.estimate(record.phasors, parts_->campaign.scenario);
+  return impl_->method.estimate(record.phasors, impl_->campaign.scenario);
 }
 
 RunResult RunPlan::estimate(const RunRecord& record) const {
-  const Scenario& scenario = parts_->campaign.scenario;
+  const Scenario& scenario = impl_->campaign.scenario;
   RunResult result{.run = record.run, .num_draws = record.num_draws};
   if (!record.has_draw) {
     result.status = RunStatus::no_draw;

@@ -92,11 +92,11 @@ class RunPlan final : public Plan {
   [[nodiscard]] int num_orbits() const override;
 
  private:
-  struct Parts;
+  struct Impl;
   [[nodiscard]] RunRecord record_alone(RunIndex run, std::span<const double> table_values,
                                        const SampleObserver* observer,
                                        const std::function<void(int)>& progress) const;
-  std::unique_ptr<Parts> parts_;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace proofmass

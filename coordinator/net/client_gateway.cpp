@@ -1,4 +1,4 @@
-#include "coordinator/net/client_desk.hpp"
+#include "coordinator/net/client_gateway.hpp"
 
 #include <fmt/format.h>
 
@@ -38,10 +38,10 @@ Decoded decode(std::string_view bytes) {
 
 }  // namespace
 
-ClientDesk::ClientDesk(Background& background, Surroundings surroundings)
+ClientGateway::ClientGateway(Background& background, Surroundings surroundings)
     : background_(background), surroundings_(std::move(surroundings)) {}
 
-void ClientDesk::receive(const Incoming& message) {
+void ClientGateway::receive(const Incoming& message) {
   try {
     take(message);
   } catch (const std::exception& error) {
@@ -49,7 +49,7 @@ void ClientDesk::receive(const Incoming& message) {
   }
 }
 
-void ClientDesk::take(const Incoming& message) {
+void ClientGateway::take(const Incoming& message) {
   const Waiter unknown{.routing_id = message.from.routing_id, .request = 0};
   if (!surroundings_.asker_of(message.from.key)) {
     return send(unknown,
@@ -77,9 +77,9 @@ void ClientDesk::take(const Incoming& message) {
   if (ticket) carry_out(*ticket, message.from.key, std::move(request));
 }
 
-void ClientDesk::take_part(const Address& from, std::uint64_t request,
-                           const wire::RequestPart& part) {
-  RequestParts::Outcome outcome = parts_.take(from.routing_id, request, part, surroundings_.now());
+void ClientGateway::take_part(const Address& from, std::uint64_t request,
+                              const wire::RequestPart& part) {
+  RequestParts::Outcome outcome = impl_.take(from.routing_id, request, part, surroundings_.now());
   const Waiter waiter{.routing_id = from.routing_id, .request = request};
   if (const auto* const next = std::get_if<wire::PartReply>(&outcome)) return send(waiter, *next);
   if (const auto* const error = std::get_if<wire::ErrorReply>(&outcome)) {
@@ -89,10 +89,10 @@ void ClientDesk::take_part(const Address& from, std::uint64_t request,
   take_whole(from, request, std::move(std::get<RequestParts::Whole>(outcome).bytes));
 }
 
-void ClientDesk::take_whole(const Address& from, std::uint64_t request, std::string bytes) {
+void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::string bytes) {
   const std::size_t size = bytes.size();
   const auto begun = begin(from, request, bytes);
-  if (!begun) return parts_.release(size);
+  if (!begun) return impl_.release(size);
   const std::uint64_t ticket = *begun;
   const auto shared = std::make_shared<std::string>(std::move(bytes));
   const bool is_posted =
@@ -100,7 +100,7 @@ void ClientDesk::take_whole(const Address& from, std::uint64_t request, std::str
         const auto decoded = std::make_shared<Decoded>(decode(*shared));
         std::string().swap(*shared);
         return [this, ticket, decoded, size, key] {
-          parts_.release(size);
+          impl_.release(size);
           if (const auto* const error = std::get_if<wire::DecodeError>(decoded.get())) {
             return respond(ticket, refusal(error->text));
           }
@@ -108,13 +108,13 @@ void ClientDesk::take_whole(const Address& from, std::uint64_t request, std::str
         };
       });
   if (is_posted) return;
-  parts_.release(size);
+  impl_.release(size);
   respond(ticket, refusal(fmt::format("requests = {} (are under way, as many as may be; try again "
                                       "later)",
                                       Background::num_pending_max)));
 }
 
-void ClientDesk::carry_out(std::uint64_t ticket, const std::string& key, Request request) {
+void ClientGateway::carry_out(std::uint64_t ticket, const std::string& key, Request request) {
   try {
     const std::optional<Asker> asker = surroundings_.asker_of(key);
     if (!asker) throw Error(fmt::format("key = {} (is not authorized any more)", key));
@@ -126,8 +126,8 @@ void ClientDesk::carry_out(std::uint64_t ticket, const std::string& key, Request
   }
 }
 
-std::optional<std::uint64_t> ClientDesk::begin(const Address& from, std::uint64_t request,
-                                               std::string_view bytes) {
+std::optional<std::uint64_t> ClientGateway::begin(const Address& from, std::uint64_t request,
+                                                  std::string_view bytes) {
   const std::size_t hash = std::hash<std::string_view>()(bytes);
   const Waiter waiter{.routing_id = from.routing_id, .request = request};
   for (auto& [ticket, pending] : pending_) {
@@ -150,7 +150,7 @@ std::optional<std::uint64_t> ClientDesk::begin(const Address& from, std::uint64_
   return ticket;
 }
 
-void ClientDesk::respond(std::uint64_t ticket, const wire::ClientReply& reply) {
+void ClientGateway::respond(std::uint64_t ticket, const wire::ClientReply& reply) {
   const auto found = pending_.find(ticket);
   if (found == pending_.end()) return;
   const std::vector<Waiter> waiters = std::move(found->second.waiters);
@@ -158,7 +158,7 @@ void ClientDesk::respond(std::uint64_t ticket, const wire::ClientReply& reply) {
   for (const Waiter& waiter : waiters) send(waiter, reply);
 }
 
-void ClientDesk::send(const Waiter& waiter, const wire::ClientReply& reply) {
+void ClientGateway::send(const Waiter& waiter, const wire::ClientReply& reply) {
   std::string bytes;
   try {
     bytes = wire::encode(wire::ReplyPacket{.id = waiter.request, .reply = reply});
@@ -168,9 +168,9 @@ void ClientDesk::send(const Waiter& waiter, const wire::ClientReply& reply) {
   surroundings_.transmit(waiter.routing_id, bytes);
 }
 
-void ClientDesk::review() {
+void ClientGateway::review() {
   const TimePoint now = surroundings_.now();
-  parts_.drop_stale(now);
+  impl_.drop_stale(now);
   for (auto& [ticket, pending] : pending_) {
     if (now - pending.told_at < told_every) continue;
     pending.told_at = now;

@@ -20,7 +20,7 @@ using detail::Statement;
 using test::campaign_of;
 using test::delivery_of;
 
-class StoreStandout : public test::StoreTest {
+class StoreLargestErrors : public test::StoreTest {
  protected:
   [[nodiscard]] std::string text(const std::string& sql) const {
     return Database(file(), Access::read_only).text(sql);
@@ -41,7 +41,7 @@ Delivery delivery_with_error(std::uint64_t run, double error) {
 
 void commit(Store& store, const Delivery& delivery) { store.commit({&delivery, 1}); }
 
-TEST_F(StoreStandout, ErrorsInLongFormAreThoseOfTheResults) {
+TEST_F(StoreLargestErrors, ErrorsInLongFormAreThoseOfTheResults) {
   Store store = Store::create(file(), campaign_of(10), "");
   std::vector<Delivery> deliveries = test::deliveries_of(0, 4);
   deliveries[1].result.status = RunStatus::not_finite;
@@ -68,7 +68,7 @@ TEST_F(StoreStandout, ErrorsInLongFormAreThoseOfTheResults) {
 }
 
 // All runs in one order, and in another in many transactions: the same ten, ties to the first.
-TEST_F(StoreStandout, WorstRunsAreTheSameInWhateverOrderTheyCome) {
+TEST_F(StoreLargestErrors, WorstRunsAreTheSameInWhateverOrderTheyCome) {
   std::vector<Delivery> deliveries;
   for (std::uint64_t run = 0; run < 60; ++run) {
     // 1/16, 3/16, ... 39/16, three times each, with alternating signs.
@@ -97,7 +97,7 @@ TEST_F(StoreStandout, WorstRunsAreTheSameInWhateverOrderTheyCome) {
   store.check_integrity();
 }
 
-TEST_F(StoreStandout, WorstRunsAreKnownAgainWhenAFileIsOpened) {
+TEST_F(StoreLargestErrors, WorstRunsAreKnownAgainWhenAFileIsOpened) {
   {
     Store store = Store::create(file(), campaign_of(60), "");
     commit(store, delivery_with_error(7, 3.0));
@@ -110,7 +110,7 @@ TEST_F(StoreStandout, WorstRunsAreKnownAgainWhenAFileIsOpened) {
 
 // Ten of them are there: a smaller error of a later coordinator's is none, a larger one drops the
 // smallest.
-TEST_F(StoreStandout, WorstRunsAreNoMoreThanTenAfterAFileIsOpened) {
+TEST_F(StoreLargestErrors, WorstRunsAreNoMoreThanTenAfterAFileIsOpened) {
   {
     Store store = Store::create(file(), campaign_of(60), "");
     for (std::uint64_t run = 0; run < 10; ++run) commit(store, delivery_with_error(run, 3.0));
@@ -123,7 +123,7 @@ TEST_F(StoreStandout, WorstRunsAreNoMoreThanTenAfterAFileIsOpened) {
   store.check_integrity();
 }
 
-TEST_F(StoreStandout, OverrunsAreErrorsAboveTheObjectiveOnly) {
+TEST_F(StoreLargestErrors, OverrunsAreErrorsAboveTheObjectiveOnly) {
   const double objective = MicroscopeCampaign{}.objectives()[4];
   Store store = Store::create(file(), campaign_of(10), "");
   std::vector<Delivery> deliveries{
@@ -148,7 +148,7 @@ TEST_F(StoreStandout, OverrunsAreErrorsAboveTheObjectiveOnly) {
   store.check_integrity();
 }
 
-TEST_F(StoreStandout, ASecondResultOfARunChangesNothing) {
+TEST_F(StoreLargestErrors, ASecondResultOfARunChangesNothing) {
   Store store = Store::create(file(), campaign_of(10), "");
   commit(store, delivery_with_error(3, 0.0));
   commit(store, delivery_with_error(3, 1.0));

@@ -1,4 +1,4 @@
-#include "coordinator/net/request_desk.hpp"
+#include "coordinator/net/request_service.hpp"
 
 #include <fmt/format.h>
 
@@ -26,18 +26,19 @@ std::set<std::string> quarantined_hosts(const State& state) {
 
 }  // namespace
 
-RequestDesk::RequestDesk(Surroundings surroundings)
+RequestService::RequestService(Surroundings surroundings)
     : surroundings_(std::move(surroundings)), began_at_(surroundings_.now()) {}
 
 template <>
-void RequestDesk::take(Submission&& submission, const Asker& asker, const Respond& respond) {
+void RequestService::take(Submission&& submission, const Asker& asker, const Respond& respond) {
   surroundings_.submissions.submit(std::make_shared<const Submission>(std::move(submission)), asker,
                                    respond);
 }
 
 template <>
-void RequestDesk::take(wire::ControlRequest&& request, const Asker& asker, const Respond& respond) {
-  CampaignDesk& campaigns = surroundings_.campaigns;
+void RequestService::take(wire::ControlRequest&& request, const Asker& asker,
+                          const Respond& respond) {
+  CampaignService& campaigns = surroundings_.campaigns;
   const auto campaign = campaigns.find(request.campaign);
   if (!campaign) {
     require_right(asker, Right::submit);
@@ -48,8 +49,8 @@ void RequestDesk::take(wire::ControlRequest&& request, const Asker& asker, const
   respond(campaigns.control(campaign->id, request.action));
 }
 
-void RequestDesk::control_ended(const CampaignDesk::Entry& campaign, wire::ControlAction action,
-                                const Respond& respond) {
+void RequestService::control_ended(const CampaignService::Entry& campaign,
+                                   wire::ControlAction action, const Respond& respond) {
   const wire::CampaignStatus status = surroundings_.campaigns.status_of(campaign.id);
   if (status.phase == Phase::finished) {
     throw Error(fmt::format("campaign = {} (is finished)", status.name));
@@ -61,11 +62,12 @@ void RequestDesk::control_ended(const CampaignDesk::Entry& campaign, wire::Contr
 }
 
 template <>
-void RequestDesk::take(wire::StatusRequest&& request, const Asker& asker, const Respond& respond) {
+void RequestService::take(wire::StatusRequest&& request, const Asker& asker,
+                          const Respond& respond) {
   require_right(asker, Right::observe);
   const State& state = surroundings_.state;
-  const CampaignDesk& campaigns = surroundings_.campaigns;
-  const DirectoryDesk& directory = surroundings_.directory;
+  const CampaignService& campaigns = surroundings_.campaigns;
+  const DirectoryService& directory = surroundings_.directory;
   const Duration uptime = surroundings_.now() - began_at_;
   wire::StatusReply reply{
       .version = surroundings_.version,
@@ -87,7 +89,8 @@ void RequestDesk::take(wire::StatusRequest&& request, const Asker& asker, const 
 }
 
 template <>
-void RequestDesk::take(wire::WorkersRequest&& request, const Asker& asker, const Respond& respond) {
+void RequestService::take(wire::WorkersRequest&& request, const Asker& asker,
+                          const Respond& respond) {
   require_right(asker, Right::observe);
   const State& state = surroundings_.state;
   const TimePoint now = surroundings_.now();
@@ -110,8 +113,8 @@ void RequestDesk::take(wire::WorkersRequest&& request, const Asker& asker, const
 }
 
 template <>
-void RequestDesk::take(wire::ReleaseHostRequest&& request, const Asker& asker,
-                       const Respond& respond) {
+void RequestService::take(wire::ReleaseHostRequest&& request, const Asker& asker,
+                          const Respond& respond) {
   require_right(asker, Right::control);
   if (!on_release_host(surroundings_.state, request.host, surroundings_.now(),
                        surroundings_.outbox)) {
@@ -122,11 +125,11 @@ void RequestDesk::take(wire::ReleaseHostRequest&& request, const Asker& asker,
 }
 
 template <>
-void RequestDesk::take(wire::RequestPart&&, const Asker&, const Respond&) {
+void RequestService::take(wire::RequestPart&&, const Asker&, const Respond&) {
   throw Error("request = a part (must be a request when its parts are together)");
 }
 
-void RequestDesk::carry_out(Request request, const Asker& asker, Respond respond) {
+void RequestService::carry_out(Request request, const Asker& asker, Respond respond) {
   std::visit([&](auto& content) { take(std::move(content), asker, respond); }, request);
 }
 

@@ -1,4 +1,4 @@
-#include "coordinator/net/submission_desk.hpp"
+#include "coordinator/net/submission_service.hpp"
 
 #include <fmt/format.h>
 
@@ -33,16 +33,16 @@ CampaignControl control_of(const Submission& request) {
 
 }  // namespace
 
-SubmissionDesk::SubmissionDesk(Surroundings surroundings)
+SubmissionService::SubmissionService(Surroundings surroundings)
     : surroundings_(std::move(surroundings)), campaigns_(surroundings_.campaigns) {}
 
-void SubmissionDesk::submit(const Submitted& request, const Asker& asker, Respond respond) {
+void SubmissionService::submit(const Submitted& request, const Asker& asker, Respond respond) {
   const std::string& name = request->campaign->name;
   if (surroundings_.files == nullptr) {
     throw Error(fmt::format(
         "submit = {} (this coordinator serves the campaigns that it began with)", name));
   }
-  const std::optional<CampaignDesk::Entry> entry = campaigns_.find(name);
+  const std::optional<CampaignService::Entry> entry = campaigns_.find(name);
   if (entry) {
     require_control(asker, name, entry->owner);
   } else {
@@ -62,13 +62,13 @@ void SubmissionDesk::submit(const Submitted& request, const Asker& asker, Respon
   }
 }
 
-bool SubmissionDesk::is_busy(const std::string& name) const {
+bool SubmissionService::is_busy(const std::string& name) const {
   if (under_way_.contains(name)) return true;
-  const std::optional<CampaignDesk::Entry> entry = campaigns_.find(name);
+  const std::optional<CampaignService::Entry> entry = campaigns_.find(name);
   return entry && !entry->has_ended && campaigns_.is_held(entry->id);
 }
 
-void SubmissionDesk::review() {
+void SubmissionService::review() {
   for (const Deferred& waiting : std::exchange(deferred_, {})) {
     try {
       submit(waiting.request, waiting.asker, waiting.respond);
@@ -80,9 +80,10 @@ void SubmissionDesk::review() {
 
 // Files of nobody's, and all of a coordinator without keys, are not limited: whoever may reach it
 // may fill its disk in other ways.
-void SubmissionDesk::check_limits(const std::string& owner, std::uint64_t size, bool is_new) const {
+void SubmissionService::check_limits(const std::string& owner, std::uint64_t size,
+                                     bool is_new) const {
   if (owner.empty() || !is_new) return;
-  CampaignDesk::Holdings holdings = campaigns_.holdings_of(owner);
+  CampaignService::Holdings holdings = campaigns_.holdings_of(owner);
   for (const auto& [name, under_way] : under_way_) {
     if (under_way.owner != owner) continue;
     ++holdings.num_campaigns;
@@ -101,8 +102,8 @@ void SubmissionDesk::check_limits(const std::string& owner, std::uint64_t size, 
   }
 }
 
-void SubmissionDesk::open_file(const Submitted& request, const Asker& asker,
-                               const std::string& owner, Respond respond) {
+void SubmissionService::open_file(const Submitted& request, const Asker& asker,
+                                  const std::string& owner, Respond respond) {
   CampaignFiles& files = *surroundings_.files;
   serve_opened(
       request->campaign->name, {.owner = owner, .size = definition_size(*request->campaign)},
@@ -110,7 +111,7 @@ void SubmissionDesk::open_file(const Submitted& request, const Asker& asker,
       control_of(*request), std::move(respond));
 }
 
-void SubmissionDesk::reopen(const CampaignDesk::Entry& campaign, Respond respond) {
+void SubmissionService::reopen(const CampaignService::Entry& campaign, Respond respond) {
   const wire::CampaignStatus status = campaigns_.status_of(campaign.id);
   if (under_way_.contains(status.name)) {
     throw Error(
@@ -123,9 +124,9 @@ void SubmissionDesk::reopen(const CampaignDesk::Entry& campaign, Respond respond
       std::move(respond));
 }
 
-void SubmissionDesk::serve_opened(const std::string& name, UnderWay under_way,
-                                  std::function<ServedCampaign()> open,
-                                  std::optional<CampaignControl> control, Respond respond) {
+void SubmissionService::serve_opened(const std::string& name, UnderWay under_way,
+                                     std::function<ServedCampaign()> open,
+                                     std::optional<CampaignControl> control, Respond respond) {
   const auto work = [this, name, open = std::move(open), control, respond]() -> Background::Finish {
     // Copyable, as the function is.
     const auto prepared = std::make_shared<std::optional<PreparedCampaign>>();
@@ -154,7 +155,7 @@ void SubmissionDesk::serve_opened(const std::string& name, UnderWay under_way,
   under_way_.emplace(name, std::move(under_way));
 }
 
-void SubmissionDesk::change_served(CampaignId id, const Submitted& request, Respond respond) {
+void SubmissionService::change_served(CampaignId id, const Submitted& request, Respond respond) {
   const StopPlan plan = plan_of(*request);
   const std::uint64_t num_runs =
       horizon_of(plan, request->campaign->num_runs, campaigns_.num_runs_of(id));
@@ -162,10 +163,10 @@ void SubmissionDesk::change_served(CampaignId id, const Submitted& request, Resp
   campaigns_.take_hold(id);
   const auto work = [this, id, request, plan, num_runs, has_new_plan, respond,
                      file = campaigns_.file_of(id)]() -> Background::Finish {
-    CampaignDesk::Change change{.definition = nullptr,
-                                .plan = plan,
-                                .priority = request->priority,
-                                .audit_fraction = request->audit_fraction};
+    CampaignService::Change change{.definition = nullptr,
+                                   .plan = plan,
+                                   .priority = request->priority,
+                                   .audit_fraction = request->audit_fraction};
     std::string failure;
     try {
       const std::unique_ptr<Campaign> wanted = request->campaign->clone();

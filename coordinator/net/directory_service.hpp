@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "coordinator/net/background.hpp"
-#include "coordinator/net/campaign_desk.hpp"
 #include "coordinator/net/campaign_files.hpp"
+#include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
 #include "proto/wire/client_messages.hpp"
 
@@ -19,11 +19,11 @@ namespace proofmass::coordinator {
 /// damaged is served once it can be, and one that is put into the directory is served as well. The
 /// closed file of a campaign that has ended is looked at when it changes: an older copy in its
 /// place is served, and a file that was removed takes its campaign from the list.
-class DirectoryDesk {
+class DirectoryService {
  public:
   /// What it works with; all of that outlives it.
   struct Surroundings {
-    CampaignDesk& campaigns;
+    CampaignService& campaigns;
     Background& background;
     Outbox& outbox;
     const CampaignDirectory* directory;  ///< Null if there is none.
@@ -31,7 +31,7 @@ class DirectoryDesk {
     CoordinatorStart start;
   };
 
-  explicit DirectoryDesk(Surroundings surroundings);
+  explicit DirectoryService(Surroundings surroundings);
 
   /// Serves, lists or notes what came of looking at a file.
   void take(FileOutcome outcome);

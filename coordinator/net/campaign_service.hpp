@@ -26,7 +26,7 @@ namespace proofmass::coordinator {
 /// The campaigns of a coordinator: those that are served, and those that have ended and whose files
 /// are closed. Keeps in the files what must outlive the process. Status comes from memory alone;
 /// what may wait for a disk is done in the background.
-class CampaignDesk {
+class CampaignService {
  public:
   /// What it works with; all of that outlives it.
   struct Surroundings {
@@ -60,10 +60,10 @@ class CampaignDesk {
     double audit_fraction = 0.0;
   };
 
-  explicit CampaignDesk(Surroundings surroundings);
-  ~CampaignDesk();  ///< Waits for statistics that are being computed.
-  CampaignDesk(const CampaignDesk&) = delete;
-  CampaignDesk& operator=(const CampaignDesk&) = delete;
+  explicit CampaignService(Surroundings surroundings);
+  ~CampaignService();  ///< Waits for statistics that are being computed.
+  CampaignService(const CampaignService&) = delete;
+  CampaignService& operator=(const CampaignService&) = delete;
 
   /// Begins to serve a campaign, one that has ended before perhaps.
   /// @throws Error if one of that name or number is served already.

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "coordinator/net/background.hpp"
-#include "coordinator/net/campaign_desk.hpp"
 #include "coordinator/net/campaign_files.hpp"
-#include "coordinator/net/client_desk.hpp"
+#include "coordinator/net/campaign_service.hpp"
+#include "coordinator/net/client_gateway.hpp"
 #include "coordinator/net/request.hpp"
 #include "coordinator/net/rights.hpp"
 #include "coordinator/net/submission_limits.hpp"
@@ -21,11 +21,11 @@ namespace proofmass::coordinator {
 
 /// Takes campaigns that clients submit: makes, opens and extends their files in the background, so
 /// that the service goes on meanwhile.
-class SubmissionDesk {
+class SubmissionService {
  public:
   /// What it works with; all of that outlives it.
   struct Surroundings {
-    CampaignDesk& campaigns;
+    CampaignService& campaigns;
     StoreWriter& writer;
     Background& background;
     CampaignFiles* files;                ///< Null if nothing can be submitted.
@@ -34,7 +34,7 @@ class SubmissionDesk {
     CoordinatorStart start;
   };
 
-  explicit SubmissionDesk(Surroundings surroundings);
+  explicit SubmissionService(Surroundings surroundings);
 
   /// Takes a new campaign, or more runs of one that is there. Waits while the campaign is being
   /// changed, opened or closed.
@@ -44,7 +44,7 @@ class SubmissionDesk {
 
   /// Opens the file of a campaign that has ended and goes on with it.
   /// @throws Error if too much is under way.
-  void reopen(const CampaignDesk::Entry& campaign, Respond respond);
+  void reopen(const CampaignService::Entry& campaign, Respond respond);
 
   /// Takes what had to wait. To be called some times a second.
   void review();
@@ -76,7 +76,7 @@ class SubmissionDesk {
                     Respond respond);
 
   Surroundings surroundings_;
-  CampaignDesk& campaigns_;
+  CampaignService& campaigns_;
   std::map<std::string, UnderWay> under_way_;  ///< By the campaign's name.
   std::vector<Deferred> deferred_;
 };

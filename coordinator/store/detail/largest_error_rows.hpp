@@ -56,9 +56,9 @@ using WorstRunTable = std::vector<WorstRuns>;
 
 /// Keeps `overrun` and `worst_run` in step with `run_result`. Knows the rows that are there: to be
 /// thrown away with a transaction that is rolled back.
-class StandoutRows {
+class LargestErrorRows {
  public:
-  explicit StandoutRows(const Database& database);
+  explicit LargestErrorRows(const Database& database);
 
   /// @pre The result was stored just now, for the first time.
   void add(const RunResult& result);

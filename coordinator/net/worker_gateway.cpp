@@ -1,4 +1,4 @@
-#include "coordinator/net/worker_desk.hpp"
+#include "coordinator/net/worker_gateway.hpp"
 
 #include <fmt/format.h>
 
@@ -30,10 +30,10 @@ bool is_of_a_worker(const wire::Message& message) {
 
 }  // namespace
 
-WorkerDesk::WorkerDesk(State& state, wire::Epoch epoch, Surroundings surroundings)
+WorkerGateway::WorkerGateway(State& state, wire::Epoch epoch, Surroundings surroundings)
     : state_(state), epoch_(epoch), surroundings_(std::move(surroundings)) {}
 
-void WorkerDesk::receive(const Incoming& message, TimePoint now, Outbox& outbox) {
+void WorkerGateway::receive(const Incoming& message, TimePoint now, Outbox& outbox) {
   if (peers_.is_closed_out(message.from.routing_id)) return;
   if (!surroundings_.is_allowed(message.from.key, now)) {
     return close_out(message.from, RejectReason::revoked, revoked_text(message.from), now, outbox);
@@ -58,8 +58,8 @@ void WorkerDesk::receive(const Incoming& message, TimePoint now, Outbox& outbox)
   on_packet(state_, *worker, message.from.key, *std::move(packet), now, outbox);
 }
 
-std::optional<wire::Packet> WorkerDesk::decode(const Incoming& message, TimePoint now,
-                                               Outbox& outbox) {
+std::optional<wire::Packet> WorkerGateway::decode(const Incoming& message, TimePoint now,
+                                                  Outbox& outbox) {
   if (message.frames.size() != 1) {
     close_out(message.from, RejectReason::malformed,
               fmt::format("message = {} frames (must be one)", message.frames.size()), now, outbox);
@@ -81,8 +81,8 @@ std::optional<wire::Packet> WorkerDesk::decode(const Incoming& message, TimePoin
   return std::move(packet);
 }
 
-void WorkerDesk::close_out(const Address& from, RejectReason reason, const std::string& text,
-                           TimePoint now, Outbox& outbox) {
+void WorkerGateway::close_out(const Address& from, RejectReason reason, const std::string& text,
+                              TimePoint now, Outbox& outbox) {
   wire::Fields fields = fields_of(from);
   fields.push_back(Field::reason(text));
   outbox.log(
@@ -102,7 +102,7 @@ void WorkerDesk::close_out(const Address& from, RejectReason reason, const std::
   peers_.close_out(from.routing_id);
 }
 
-void WorkerDesk::send(WorkerId worker, wire::Message message) {
+void WorkerGateway::send(WorkerId worker, wire::Message message) {
   const Address* const address = peers_.address_of(worker);
   if (address == nullptr) return;
   const bool is_lease = is_a<wire::RunLease>(message);
@@ -113,16 +113,16 @@ void WorkerDesk::send(WorkerId worker, wire::Message message) {
   if (is_acknowledgement) wire::kill_point(KillPoint::after_acknowledge);
 }
 
-void WorkerDesk::send_definition(WorkerId worker, const wire::CampaignRequest& request,
-                                 const std::shared_ptr<const Campaign>& definition) {
+void WorkerGateway::send_definition(WorkerId worker, const wire::CampaignRequest& request,
+                                    const std::shared_ptr<const Campaign>& definition) {
   send(worker, definitions_.part(request, definition));
 }
 
-void WorkerDesk::send_packet(const Address& to, const wire::Packet& packet) {
+void WorkerGateway::send_packet(const Address& to, const wire::Packet& packet) {
   if (!surroundings_.transmit(to.routing_id, wire::encode(packet))) ++num_unsent_;
 }
 
-void WorkerDesk::review(TimePoint now, Outbox& outbox) {
+void WorkerGateway::review(TimePoint now, Outbox& outbox) {
   for (const WorkerId worker : peers_.workers()) {
     const Address address = *peers_.address_of(worker);
     if (surroundings_.is_allowed(address.key, now)) continue;

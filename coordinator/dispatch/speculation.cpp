@@ -166,7 +166,7 @@ bool waits_for_a_store(const State& state) {
 
 }  // namespace
 
-void share_tail(State& state, TimePoint now, Outbox& outbox) {
+void speculate(State& state, TimePoint now, Outbox& outbox) {
   if (!state.is_lending || is_reattaching(state, now) || waits_for_a_store(state)) return;
   std::vector<WorkerId> idle = idle_workers(state, now);
   if (idle.empty()) return;

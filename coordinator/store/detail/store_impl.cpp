@@ -1,4 +1,4 @@
-#include "coordinator/store/detail/parts.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
 
 #include <fmt/format.h>
 
@@ -82,7 +82,7 @@ std::optional<std::string> bring_to_rest(Database& database) {
 
 }  // namespace detail
 
-Store::Parts::Parts(const std::filesystem::path& file)
+Store::Impl::Impl(const std::filesystem::path& file)
     : path(file), database(file, Access::read_only) {
   detail::configure(database);
   detail::check_campaign_file(database, file);
@@ -94,7 +94,7 @@ Store::Parts::Parts(const std::filesystem::path& file)
   detail::check_that_log_is_there(database, file);
 }
 
-Store::Parts::Parts(const std::filesystem::path& file, std::unique_ptr<detail::StoreLock> held_lock)
+Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::StoreLock> held_lock)
     : path(file),
       lock(std::move(held_lock)),
       place(std::make_unique<detail::FilePlace>(file)),
@@ -125,7 +125,7 @@ Store::Parts::Parts(const std::filesystem::path& file, std::unique_ptr<detail::S
 
 // Readers cannot open a file in WAL mode on read-only media, so that a closed one is in the other.
 // With somebody reading, a step fails at once and the log stays: nothing is lost by that.
-Store::Parts::~Parts() {
+Store::Impl::~Impl() {
   if (!place) return;
   try {
     rows.reset();
@@ -145,12 +145,12 @@ Store::Parts::~Parts() {
   if (is_perhaps_marked_) database.leave_files_alone();
 }
 
-void Store::Parts::change(const std::function<void(Database&)>& action) {
+void Store::Impl::change(const std::function<void(Database&)>& action) {
   commit(action);
   check_place();
 }
 
-void Store::Parts::check_place() const {
+void Store::Impl::check_place() const {
   switch (place ? place->look() : detail::Placement::in_place) {
     case detail::Placement::in_place:
       return;
@@ -166,7 +166,7 @@ void Store::Parts::check_place() const {
 }
 
 // Leaving the mode folds the log in, which is still open, and entering it makes another one.
-void Store::Parts::renew_log() {
+void Store::Impl::renew_log() {
   rows.reset();
   if (const std::optional<std::string> reason = rest()) database.refuse(*reason);
   database.execute(without_log);
@@ -175,7 +175,7 @@ void Store::Parts::renew_log() {
   place->remember_log();
 }
 
-void Store::Parts::commit(const std::function<void(Database&)>& action) {
+void Store::Impl::commit(const std::function<void(Database&)>& action) {
   mark_log_as_needed();
   Transaction transaction(database);
   action(database);
@@ -184,14 +184,14 @@ void Store::Parts::commit(const std::function<void(Database&)>& action) {
 
 // The mark reaches the file itself before anything that a copy of the file alone would lack. A
 // reader of an old state may hold it up: the next change tries again.
-void Store::Parts::mark_log_as_needed() {
+void Store::Impl::mark_log_as_needed() {
   if (!place || is_marked_) return;
   is_perhaps_marked_ = true;
   database.execute("UPDATE campaign SET is_log_needed = 1 WHERE NOT is_log_needed");
   is_marked_ = database.fold_log(detail::Fold::what_no_reader_needs);
 }
 
-std::optional<std::string> Store::Parts::rest() {
+std::optional<std::string> Store::Impl::rest() {
   if (!is_perhaps_marked_ && database.log_size() == 0) return std::nullopt;
   is_marked_ = false;
   is_perhaps_marked_ = true;

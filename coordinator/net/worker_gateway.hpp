@@ -26,7 +26,7 @@ struct Incoming {
 /// socket nor clock.
 ///
 /// Whoever breaks the rules is told once and is not listened to any more on that connection.
-class WorkerDesk {
+class WorkerGateway {
  public:
   /// What it needs from the service.
   struct Surroundings {
@@ -39,7 +39,7 @@ class WorkerDesk {
   };
 
   /// @param state  Outlives the gateway.
-  WorkerDesk(State& state, wire::Epoch epoch, Surroundings surroundings);
+  WorkerGateway(State& state, wire::Epoch epoch, Surroundings surroundings);
 
   void receive(const Incoming& message, TimePoint now, Outbox& outbox);
 

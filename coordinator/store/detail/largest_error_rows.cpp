@@ -1,4 +1,4 @@
-#include "coordinator/store/detail/standout_rows.hpp"
+#include "coordinator/store/detail/largest_error_rows.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -65,7 +65,7 @@ std::uint64_t exceeded_objectives(const RunResult& result, std::span<const doubl
   return exceeded;
 }
 
-StandoutRows::StandoutRows(const Database& database)
+LargestErrorRows::LargestErrorRows(const Database& database)
     : objectives_(read_objectives(database)),
       worst_(read_worst_runs(database)),
       insert_overrun_(database.prepare("INSERT INTO overrun VALUES (?, ?)")),
@@ -73,7 +73,7 @@ StandoutRows::StandoutRows(const Database& database)
       delete_worst_(
           database.prepare("DELETE FROM worst_run WHERE parameter = ? AND run_index = ?")) {}
 
-void StandoutRows::add(const RunResult& result) {
+void LargestErrorRows::add(const RunResult& result) {
   if (!result.has_estimate()) return;
   const std::uint64_t exceeded = exceeded_objectives(result, objectives_);
   if (exceeded != 0) insert_overrun_.run(result.run.value, exceeded);

@@ -29,14 +29,14 @@ void check_that_log_is_there(const Database& database, const std::filesystem::pa
 }  // namespace detail
 
 /// What a Store consists of.
-struct Store::Parts {
+struct Store::Impl {
   /// Opens a file for reading.
-  explicit Parts(const std::filesystem::path& file);
+  explicit Impl(const std::filesystem::path& file);
   /// Opens a file for its coordinator.
-  Parts(const std::filesystem::path& file, std::unique_ptr<detail::StoreLock> held_lock);
-  ~Parts();
-  Parts(const Parts&) = delete;
-  Parts& operator=(const Parts&) = delete;
+  Impl(const std::filesystem::path& file, std::unique_ptr<detail::StoreLock> held_lock);
+  ~Impl();
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
 
   /// Stores what `action` changes, durable in the open file when it returns, or nothing.
   void commit(const std::function<void(detail::Database&)>& action);

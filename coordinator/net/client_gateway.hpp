@@ -14,7 +14,7 @@
 #include "coordinator/net/request.hpp"
 #include "coordinator/net/request_parts.hpp"
 #include "coordinator/net/rights.hpp"
-#include "coordinator/net/worker_desk.hpp"
+#include "coordinator/net/worker_gateway.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -25,7 +25,7 @@ using Respond = std::function<void(wire::ClientReply)>;
 /// Between the clients' socket and what carries requests out: puts large requests together from
 /// their parts, reads them in the background, and sends each reply to whoever waits for it. Knows
 /// no socket. Nothing that a client sends makes one of its functions throw.
-class ClientDesk {
+class ClientGateway {
  public:
   /// What it needs from the service.
   struct Surroundings {
@@ -43,7 +43,7 @@ class ClientDesk {
   static constexpr std::size_t waiters_max = 16;
 
   /// @param background  Outlives the gateway.
-  ClientDesk(Background& background, Surroundings surroundings);
+  ClientGateway(Background& background, Surroundings surroundings);
 
   /// Handles one message, anything at all.
   void receive(const Incoming& message);
@@ -80,7 +80,7 @@ class ClientDesk {
 
   Background& background_;
   Surroundings surroundings_;
-  RequestParts parts_;
+  RequestParts impl_;
   std::map<std::uint64_t, Pending> pending_;  ///< By ticket.
   std::uint64_t next_ticket_ = 1;
 };

@@ -1,4 +1,4 @@
-#include "coordinator/net/client_desk.hpp"
+#include "coordinator/net/client_gateway.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,12 +14,12 @@ namespace proofmass::coordinator {
 namespace {
 
 /// A gateway whose requests are carried out when the test says so.
-class ClientDeskTest : public testing::Test {
+class ClientGatewayTest : public testing::Test {
  protected:
   void ask(const std::string& routing_id, std::uint64_t id) {
     const std::string bytes =
         wire::encode(wire::RequestPacket{.id = id, .request = wire::ReleaseHostRequest{"n7"}});
-    campaign_desk_.receive(
+    campaign_service_.receive(
         {.from = {.routing_id = routing_id, .key = {}, .host = {}}, .frames = {bytes}});
   }
 
@@ -34,7 +34,7 @@ class ClientDeskTest : public testing::Test {
   std::function<void()> before_carrying_out = [] {};
 
  private:
-  ClientDesk::Surroundings surroundings() {
+  ClientGateway::Surroundings surroundings() {
     return {.transmit = [this](const std::string& routing_id,
                                const std::string& bytes) { note(routing_id, bytes); },
             .asker_of =
@@ -59,10 +59,10 @@ class ClientDeskTest : public testing::Test {
 
   std::map<std::string, std::vector<std::pair<std::uint64_t, std::string>>> replies_;
   Background background_{[] {}};
-  ClientDesk campaign_desk_{background_, surroundings()};
+  ClientGateway campaign_service_{background_, surroundings()};
 };
 
-TEST_F(ClientDeskTest, CarriesARepeatedRequestOutOnceAndTellsAllWhoWait) {
+TEST_F(ClientGatewayTest, CarriesARepeatedRequestOutOnceAndTellsAllWhoWait) {
   ask("a", 5);
   ask("b", 5);
   ASSERT_EQ(carried_out.size(), 1U);
@@ -76,8 +76,8 @@ TEST_F(ClientDeskTest, CarriesARepeatedRequestOutOnceAndTellsAllWhoWait) {
   EXPECT_EQ(carried_out.size(), 2U);
 }
 
-TEST_F(ClientDeskTest, LimitsHowManyWaitForTheSame) {
-  for (std::size_t i = 0; i < ClientDesk::waiters_max; ++i) ask(std::to_string(i), 5);
+TEST_F(ClientGatewayTest, LimitsHowManyWaitForTheSame) {
+  for (std::size_t i = 0; i < ClientGateway::waiters_max; ++i) ask(std::to_string(i), 5);
   ask("late", 5);
   ASSERT_EQ(replies_to("late").size(), 1U);
   EXPECT_EQ(replies_to("late")[0].second,
@@ -88,7 +88,7 @@ TEST_F(ClientDeskTest, LimitsHowManyWaitForTheSame) {
   EXPECT_EQ(replies_to("15").size(), 1U);
 }
 
-TEST_F(ClientDeskTest, OutlivesWhateverIsThrown) {
+TEST_F(ClientGatewayTest, OutlivesWhateverIsThrown) {
   before_carrying_out = [] { throw std::bad_alloc(); };
   ask("a", 5);
   before_carrying_out = [] {};

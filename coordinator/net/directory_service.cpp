@@ -1,4 +1,4 @@
-#include "coordinator/net/directory_desk.hpp"
+#include "coordinator/net/directory_service.hpp"
 
 #include <algorithm>
 #include <exception>
@@ -20,10 +20,10 @@ std::filesystem::path file_of(const FileOutcome& outcome) {
 
 }  // namespace
 
-DirectoryDesk::Findings DirectoryDesk::look(const CampaignDirectory& directory,
-                                            KnownCampaigns known,
-                                            const std::vector<EndedFile>& ended,
-                                            const CoordinatorStart& start) {
+DirectoryService::Findings DirectoryService::look(const CampaignDirectory& directory,
+                                                  KnownCampaigns known,
+                                                  const std::vector<EndedFile>& ended,
+                                                  const CoordinatorStart& start) {
   Findings findings;
   try {
     for (const EndedFile& one : ended) {
@@ -39,9 +39,10 @@ DirectoryDesk::Findings DirectoryDesk::look(const CampaignDirectory& directory,
   return findings;
 }
 
-DirectoryDesk::DirectoryDesk(Surroundings surroundings) : surroundings_(std::move(surroundings)) {}
+DirectoryService::DirectoryService(Surroundings surroundings)
+    : surroundings_(std::move(surroundings)) {}
 
-void DirectoryDesk::take(FileOutcome outcome) {
+void DirectoryService::take(FileOutcome outcome) {
   const std::filesystem::path file = file_of(outcome);
   try {
     if (auto* const failure = std::get_if<FileFailure>(&outcome)) return note(std::move(*failure));
@@ -57,7 +58,7 @@ void DirectoryDesk::take(FileOutcome outcome) {
   surroundings_.outbox.log({.kind = "campaign_file_served", .fields = {{"file", file.string()}}});
 }
 
-void DirectoryDesk::note(FileFailure failure) {
+void DirectoryService::note(FileFailure failure) {
   FileFailure& known = unserved_[failure.file];
   const bool is_news = known.reason != failure.reason;
   known = std::move(failure);
@@ -67,7 +68,7 @@ void DirectoryDesk::note(FileFailure failure) {
                             .fields = {Field::reason(known.reason)}});
 }
 
-void DirectoryDesk::review(TimePoint now) {
+void DirectoryService::review(TimePoint now) {
   const auto& [campaigns, background, outbox, directory, retry_after, start] = surroundings_;
   if (directory == nullptr || is_looking_ || now - looked_at_ < retry_after) return;
   is_looking_ = true;
@@ -79,7 +80,7 @@ void DirectoryDesk::review(TimePoint now) {
   });
 }
 
-void DirectoryDesk::finish(Findings findings, TimePoint now) {
+void DirectoryService::finish(Findings findings, TimePoint now) {
   is_looking_ = false;
   looked_at_ = now;
   std::set<std::filesystem::path> seen;
@@ -99,26 +100,26 @@ void DirectoryDesk::finish(Findings findings, TimePoint now) {
   for (const std::filesystem::path& file : gone) forget(file);
 }
 
-void DirectoryDesk::unlist(const EndedFile& changed, bool is_there) {
+void DirectoryService::unlist(const EndedFile& changed, bool is_there) {
   if (!surroundings_.campaigns.unlist(changed) || is_there) return;
   surroundings_.outbox.log({.severity = Severity::warning,
                             .kind = "campaign_file_gone",
                             .fields = {{"file", changed.file.string()}}});
 }
 
-void DirectoryDesk::forget(const std::filesystem::path& file) {
+void DirectoryService::forget(const std::filesystem::path& file) {
   unserved_.erase(file);
   const bool is_served = surroundings_.campaigns.known().files.contains(file);
   surroundings_.outbox.log({.kind = is_served ? "campaign_file_served" : "campaign_file_gone",
                             .fields = {{"file", file.string()}}});
 }
 
-bool DirectoryDesk::is_all_served() const {
+bool DirectoryService::is_all_served() const {
   return std::all_of(unserved_.begin(), unserved_.end(),
                      [](const auto& item) { return item.second.is_copy; });
 }
 
-std::vector<wire::UnservedFile> DirectoryDesk::unserved(std::size_t count_max) const {
+std::vector<wire::UnservedFile> DirectoryService::unserved(std::size_t count_max) const {
   std::vector<wire::UnservedFile> files;
   for (const auto& [file, failure] : unserved_) {
     if (files.size() == count_max) break;

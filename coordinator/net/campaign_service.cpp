@@ -1,4 +1,4 @@
-#include "coordinator/net/campaign_desk.hpp"
+#include "coordinator/net/campaign_service.hpp"
 
 #include <fmt/format.h>
 
@@ -24,16 +24,16 @@ bool is_over(Phase phase) { return phase == Phase::finished || phase == Phase::c
 
 }  // namespace
 
-CampaignDesk::CampaignDesk(Surroundings surroundings)
+CampaignService::CampaignService(Surroundings surroundings)
     : surroundings_(std::move(surroundings)),
       state_(surroundings_.state),
       writer_(surroundings_.writer),
       outbox_(surroundings_.outbox),
       files_(surroundings_.files) {}
 
-CampaignDesk::~CampaignDesk() = default;
+CampaignService::~CampaignService() = default;
 
-void CampaignDesk::serve(PreparedCampaign prepared) {
+void CampaignService::serve(PreparedCampaign prepared) {
   ServedCampaign& campaign = prepared.campaign;
   const CampaignId id = campaign.store.id();
   const std::string& name = campaign.definition->name;
@@ -62,7 +62,7 @@ void CampaignDesk::serve(PreparedCampaign prepared) {
   on_campaign(state_, id, prepared.stored, now, outbox_);
 }
 
-void CampaignDesk::list(EndedCampaign campaign) {
+void CampaignService::list(EndedCampaign campaign) {
   const CampaignId id = campaign.id;
   if (find(campaign.status.name) || served_.contains(id) || ended_.contains(id)) {
     throw Error(fmt::format("campaign = {} in {} (is served already, from another file)",
@@ -73,7 +73,7 @@ void CampaignDesk::list(EndedCampaign campaign) {
   order_.push_back(id);
 }
 
-std::optional<CampaignDesk::Entry> CampaignDesk::find(std::string_view name) const {
+std::optional<CampaignService::Entry> CampaignService::find(std::string_view name) const {
   for (const auto& [id, served] : served_) {
     if (served.name == name) return Entry{.id = id, .file = served.file, .owner = served.owner};
   }
@@ -84,7 +84,7 @@ std::optional<CampaignDesk::Entry> CampaignDesk::find(std::string_view name) con
   return std::nullopt;
 }
 
-KnownCampaigns CampaignDesk::known() const {
+KnownCampaigns CampaignService::known() const {
   KnownCampaigns known;
   for (const auto& [id, served] : served_) {
     known.files.insert(served.file);
@@ -99,7 +99,7 @@ KnownCampaigns CampaignDesk::known() const {
   return known;
 }
 
-std::vector<EndedFile> CampaignDesk::ended_files() const {
+std::vector<EndedFile> CampaignService::ended_files() const {
   std::vector<EndedFile> files;
   for (const auto& [id, ended] : ended_) {
     files.push_back(
@@ -108,7 +108,7 @@ std::vector<EndedFile> CampaignDesk::ended_files() const {
   return files;
 }
 
-bool CampaignDesk::unlist(const EndedFile& changed) {
+bool CampaignService::unlist(const EndedFile& changed) {
   const auto found = ended_.find(changed.id);
   if (found == ended_.end() || found->second.stamp != changed.stamp) return false;
   ended_.erase(found);
@@ -117,7 +117,7 @@ bool CampaignDesk::unlist(const EndedFile& changed) {
   return true;
 }
 
-CampaignDesk::Holdings CampaignDesk::holdings_of(std::string_view owner) const {
+CampaignService::Holdings CampaignService::holdings_of(std::string_view owner) const {
   Holdings holdings;
   for (const auto& [id, served] : served_) {
     if (served.owner != owner || is_over(phase_of(id))) continue;
@@ -127,7 +127,7 @@ CampaignDesk::Holdings CampaignDesk::holdings_of(std::string_view owner) const {
   return holdings;
 }
 
-void CampaignDesk::take_hold(CampaignId id) {
+void CampaignService::take_hold(CampaignId id) {
   const CampaignState& campaign = state_.campaigns.at(id);
   if (!campaign.storage_failure.empty()) throw Error(campaign.storage_failure);
   Served& served = served_.at(id);
@@ -138,7 +138,7 @@ void CampaignDesk::take_hold(CampaignId id) {
   served.is_held = true;
 }
 
-void CampaignDesk::change(CampaignId id, const Change& change) {
+void CampaignService::change(CampaignId id, const Change& change) {
   Served& served = served_.at(id);
   served.is_held = false;
   extend(id, change.definition);
@@ -151,19 +151,19 @@ void CampaignDesk::change(CampaignId id, const Change& change) {
   review();
 }
 
-void CampaignDesk::extend(CampaignId id, std::shared_ptr<const Campaign> definition) {
+void CampaignService::extend(CampaignId id, std::shared_ptr<const Campaign> definition) {
   if (definition->num_runs <= state_.campaigns.at(id).definition->num_runs) return;
   served_.at(id).is_decided = false;
   on_extended(state_, id, std::move(definition), surroundings_.now(), outbox_);
 }
 
-void CampaignDesk::resume(CampaignId id) {
+void CampaignService::resume(CampaignId id) {
   const Phase phase = state_.campaigns.at(id).phase;
   if (phase != Phase::paused && phase != Phase::cancelled) return;
   on_resume(state_, id, surroundings_.now(), outbox_);
 }
 
-wire::ClientReply CampaignDesk::control(CampaignId id, wire::ControlAction action) {
+wire::ClientReply CampaignService::control(CampaignId id, wire::ControlAction action) {
   if (state_.campaigns.at(id).phase == Phase::finished) {
     return wire::ErrorReply{fmt::format("campaign = {} (is finished)", served_.at(id).name)};
   }
@@ -182,8 +182,8 @@ wire::ClientReply CampaignDesk::control(CampaignId id, wire::ControlAction actio
   return done_reply(id);
 }
 
-std::vector<wire::CampaignStatus> CampaignDesk::statuses(std::size_t first,
-                                                         std::size_t count_max) const {
+std::vector<wire::CampaignStatus> CampaignService::statuses(std::size_t first,
+                                                            std::size_t count_max) const {
   std::vector<wire::CampaignStatus> statuses;
   for (std::size_t i = first; i < order_.size() && statuses.size() < count_max; ++i) {
     statuses.push_back(status_of(order_[i]));
@@ -191,12 +191,12 @@ std::vector<wire::CampaignStatus> CampaignDesk::statuses(std::size_t first,
   return statuses;
 }
 
-wire::CampaignStatus CampaignDesk::status_of(CampaignId id) const {
+wire::CampaignStatus CampaignService::status_of(CampaignId id) const {
   const auto ended = ended_.find(id);
   return ended == ended_.end() ? status_of_served(id) : ended->second.status;
 }
 
-wire::CampaignStatus CampaignDesk::status_of_served(CampaignId id) const {
+wire::CampaignStatus CampaignService::status_of_served(CampaignId id) const {
   const CampaignState& campaign = state_.campaigns.at(id);
   const Served& served = served_.at(id);
   const double rate_hz = served.rate.rate_hz(surroundings_.now());
@@ -217,7 +217,7 @@ wire::CampaignStatus CampaignDesk::status_of_served(CampaignId id) const {
           .owner = served.owner};
 }
 
-Phase CampaignDesk::phase_of(CampaignId id) const {
+Phase CampaignService::phase_of(CampaignId id) const {
   const Phase phase = state_.campaigns.at(id).phase;
   const Served& served = served_.at(id);
   const bool is_undecided = !served.plan.stop_rule.empty() && !served.is_decided;
@@ -225,7 +225,7 @@ Phase CampaignDesk::phase_of(CampaignId id) const {
   return phase;
 }
 
-void CampaignDesk::review() {
+void CampaignService::review() {
   const TimePoint now = surroundings_.now();
   std::vector<CampaignId> ended;
   for (auto& [id, served] : served_) {
@@ -249,7 +249,7 @@ void CampaignDesk::review() {
   close_surplus(std::move(ended), now);
 }
 
-void CampaignDesk::review_failures(CampaignId id, const Served& served) {
+void CampaignService::review_failures(CampaignId id, const Served& served) {
   if (!served.plan.failures_max) return;
   const CampaignState& campaign = state_.campaigns.at(id);
   if (campaign.phase != Phase::active && campaign.phase != Phase::paused) return;
@@ -264,7 +264,7 @@ void CampaignDesk::review_failures(CampaignId id, const Served& served) {
       id);
 }
 
-void CampaignDesk::review_control(CampaignId id, Served& served) {
+void CampaignService::review_control(CampaignId id, Served& served) {
   const CampaignState& campaign = state_.campaigns.at(id);
   const CampaignControl control{.phase = phase_of(id),
                                 .priority = campaign.priority,
@@ -278,7 +278,7 @@ void CampaignDesk::review_control(CampaignId id, Served& served) {
   served.written = control;
 }
 
-void CampaignDesk::review_summary(CampaignId id, Served& served) {
+void CampaignService::review_summary(CampaignId id, Served& served) {
   if (served.summary.valid()) {
     if (served.summary.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     take_summary(id, served);
@@ -290,7 +290,7 @@ void CampaignDesk::review_summary(CampaignId id, Served& served) {
   if (is_due || is_undecided) begin_summary(id, served);
 }
 
-void CampaignDesk::take_summary(CampaignId id, Served& served) {
+void CampaignService::take_summary(CampaignId id, Served& served) {
   const auto [failure, num_runs] = served.summary.get();
   const Campaign& definition = *state_.campaigns.at(id).definition;
   // A rule that cannot be checked stops: nobody knows how much further it would go.
@@ -314,7 +314,7 @@ void CampaignDesk::take_summary(CampaignId id, Served& served) {
   }
 }
 
-void CampaignDesk::go_on_to(CampaignId id, std::uint64_t num_runs) {
+void CampaignService::go_on_to(CampaignId id, std::uint64_t num_runs) {
   Served& served = served_.at(id);
   served.is_decided = false;
   served.is_held = true;
@@ -341,7 +341,7 @@ void CampaignDesk::go_on_to(CampaignId id, std::uint64_t num_runs) {
   });
 }
 
-void CampaignDesk::begin_summary(CampaignId id, Served& served) {
+void CampaignService::begin_summary(CampaignId id, Served& served) {
   served.num_summarised = state_.campaigns.at(id).num_committed_here;
   served.summary = std::async(
       std::launch::async,
@@ -358,7 +358,7 @@ void CampaignDesk::begin_summary(CampaignId id, Served& served) {
       });
 }
 
-bool CampaignDesk::has_ended(CampaignId id, const Served& served) const {
+bool CampaignService::has_ended(CampaignId id, const Served& served) const {
   const CampaignState& campaign = state_.campaigns.at(id);
   const bool has_statistics = !served.is_summary_due && !served.summary.valid();
   const bool is_quiet =
@@ -368,7 +368,7 @@ bool CampaignDesk::has_ended(CampaignId id, const Served& served) const {
 }
 
 // A file that is open can be restored if somebody removes it. So the last ones stay open.
-void CampaignDesk::close_surplus(std::vector<CampaignId> ended, TimePoint now) {
+void CampaignService::close_surplus(std::vector<CampaignId> ended, TimePoint now) {
   const std::optional<std::size_t> count_max = surroundings_.finished_open_max;
   if (!count_max || ended.size() <= *count_max) return;
   const auto ended_at = [this](CampaignId id) { return served_.at(id).ended_at; };
@@ -380,7 +380,7 @@ void CampaignDesk::close_surplus(std::vector<CampaignId> ended, TimePoint now) {
   }
 }
 
-void CampaignDesk::review_rest(CampaignId id, Served& served) {
+void CampaignService::review_rest(CampaignId id, Served& served) {
   const CampaignState& campaign = state_.campaigns.at(id);
   const bool is_quiet = campaign.lent.empty() && campaign.audits.empty() &&
                         campaign.delivered.empty() && campaign.num_comparing == 0;
@@ -391,7 +391,7 @@ void CampaignDesk::review_rest(CampaignId id, Served& served) {
 }
 
 // Nobody must be reading an old state of the file: then it is closed later.
-void CampaignDesk::begin_closing(CampaignId id) {
+void CampaignService::begin_closing(CampaignId id) {
   served_.at(id).is_held = true;
   surroundings_.background.post_next([this, id]() -> Background::Finish {
     bool is_folded = false;
@@ -410,7 +410,7 @@ void CampaignDesk::begin_closing(CampaignId id) {
 }
 
 // The dispatch forgets the campaign first: nothing is written any more when the file is closed.
-void CampaignDesk::close_ended(CampaignId id) {
+void CampaignService::close_ended(CampaignId id) {
   const std::filesystem::path file = served_.at(id).file;
   EndedCampaign ended{.id = id, .file = file, .status = status_of_served(id), .stamp = {}};
   ended.status.rate_hz = 0.0;
@@ -442,13 +442,13 @@ void CampaignDesk::close_ended(CampaignId id) {
       });
 }
 
-void CampaignDesk::say_not_closed(std::string_view reason) {
+void CampaignService::say_not_closed(std::string_view reason) {
   outbox_.log({.severity = Severity::warning,
                .kind = "campaign_not_closed",
                .fields = {Field::reason(reason)}});
 }
 
-bool CampaignDesk::is_all_done() const {
+bool CampaignService::is_all_done() const {
   return std::all_of(state_.campaigns.begin(), state_.campaigns.end(), [&](const auto& item) {
     const auto& [id, campaign] = item;
     const bool is_undecided = campaign.phase == Phase::finished && phase_of(id) != Phase::finished;
@@ -456,7 +456,7 @@ bool CampaignDesk::is_all_done() const {
   });
 }
 
-std::vector<ServedCampaign> CampaignDesk::close() {
+std::vector<ServedCampaign> CampaignService::close() {
   std::vector<ServedCampaign> campaigns;
   for (const CampaignId id : order_) {
     if (!served_.contains(id)) continue;
@@ -476,7 +476,7 @@ std::vector<ServedCampaign> CampaignDesk::close() {
   return campaigns;
 }
 
-wire::DoneReply CampaignDesk::done_reply(CampaignId id) const {
+wire::DoneReply CampaignService::done_reply(CampaignId id) const {
   const wire::CampaignStatus status = status_of(id);
   return {.text = fmt::format("campaign {}: {}, {} runs, {} of them done", status.name,
                               wire::name_of(status.phase), status.num_runs, status.num_done)};
