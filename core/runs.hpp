@@ -26,20 +26,20 @@ struct RunRange {
 /// Largest number of runs of one campaign; keeps run indices exact in SQLite and in counters.
 inline constexpr std::uint64_t num_runs_max = 1'000'000'000;
 
-/// All that a campaign may have.
+/// All runs that a campaign may have.
 inline constexpr RunRange all_runs{{0}, num_runs_max};
 
 /// Largest seed: campaign files and SQLite hold integers of 63 bits.
 inline constexpr std::uint64_t seed_max = (std::uint64_t{1} << 63) - 1;
 
-/// @pre No run is in two of the ranges.
+/// The number of runs in ranges. @pre No run is in two of them.
 [[nodiscard]] constexpr std::uint64_t num_runs_in(std::span<const RunRange> ranges) {
   std::uint64_t num_runs = 0;
   for (const RunRange& range : ranges) num_runs += range.count;
   return num_runs;
 }
 
-/// Adds a run to ranges that end before it.
+/// Adds a run to ascending ranges that all end before it.
 inline void append(std::vector<RunRange>& ranges, RunIndex run) {
   if (ranges.empty() || ranges.back().end() != run.value) ranges.push_back({run, 0});
   ++ranges.back().count;

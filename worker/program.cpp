@@ -16,6 +16,7 @@
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
+#include "proto/link/host_name.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
 #include "worker/net/serve.hpp"

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "core/error.hpp"
-#include "proto/wire/names.hpp"
+#include "proto/link/host_name.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -11,7 +11,7 @@
 #include <variant>
 
 #include "core/error.hpp"
-#include "proto/wire/names.hpp"
+#include "proto/link/host_name.hpp"
 
 namespace proofmass::coordinator {
 namespace {

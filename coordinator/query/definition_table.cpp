@@ -27,6 +27,9 @@ struct DefinitionEntry {
   // A value has the type that it has in the campaign file, hence none is declared.
   static constexpr const char* declaration =
       "CREATE TABLE definition_entry(key TEXT, value, campaign TEXT HIDDEN)";
+  static constexpr const char* module = "proofmass_definition";
+  static constexpr const char* creation =
+      "CREATE VIRTUAL TABLE IF NOT EXISTS temp.definition_entry USING proofmass_definition";
 
   using Made = Definition;
   struct Cursor : sqlite3_vtab_cursor {

@@ -26,6 +26,9 @@ struct Draw {
   static constexpr const char* declaration =
       "CREATE TABLE draw(run_index INTEGER, quantity TEXT, unit TEXT, value REAL, "
       "campaign TEXT HIDDEN)";
+  static constexpr const char* module = "proofmass_draw";
+  static constexpr const char* creation =
+      "CREATE VIRTUAL TABLE IF NOT EXISTS temp.draw USING proofmass_draw";
 
   using Made = DrawnCampaign;
   struct Cursor : sqlite3_vtab_cursor {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <fmt/format.h>
 #include <sqlite3ext.h>
 
 #include <map>
@@ -72,9 +71,12 @@ class MadeOfDatabases {
 
 /// A table of one connection, as SQLite calls it. Its `Kind` has
 ///
-///     name, declaration  for SQLite
-///     Made               what is made of the campaign of a database
-///     Cursor             a place in a statement that names the table; an sqlite3_vtab_cursor
+///     name         of the table, for errors
+///     module       its name for SQLite
+///     declaration  the SQL of its columns
+///     creation     the SQL that makes it, in the temporary database of a connection
+///     Made         what is made of the campaign of a database
+///     Cursor       a place in a statement that names the table; an sqlite3_vtab_cursor
 ///
 /// and the functions choose_plan, filter, next, is_at_end, column and row_identifier, which SQLite
 /// calls xBestIndex, xFilter, xNext, xEof, xColumn and xRowid.
@@ -87,17 +89,13 @@ struct VirtualTable : sqlite3_vtab {
     return *static_cast<VirtualTable*>(cursor.pVtab);
   }
 
-  /// Makes the table known to a connection, in its temporary database.
+  /// Makes the table known to a connection.
   /// @returns SQLite's result code.
   static int add_to(sqlite3* connection) {
     static constexpr sqlite3_module module = make_module();
-    const std::string module_name = fmt::format("proofmass_{}", Kind::name);
-    const int code =
-        sqlite3_create_module_v2(connection, module_name.c_str(), &module, nullptr, nullptr);
+    const int code = sqlite3_create_module_v2(connection, Kind::module, &module, nullptr, nullptr);
     if (code != SQLITE_OK) return code;
-    const std::string sql =
-        fmt::format("CREATE VIRTUAL TABLE IF NOT EXISTS temp.{} USING {}", Kind::name, module_name);
-    return sqlite3_exec(connection, sql.c_str(), nullptr, nullptr, nullptr);
+    return sqlite3_exec(connection, Kind::creation, nullptr, nullptr, nullptr);
   }
 
  private:

@@ -84,7 +84,7 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
 
 }  // namespace
 
-Store::Store(std::unique_ptr<Impl> parts) : impl_(std::move(parts)) {}
+Store::Store(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Store::~Store() {
   if (impl_ == nullptr) return;

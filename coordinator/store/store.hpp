@@ -231,7 +231,7 @@ class Store {
 
  private:
   struct Impl;
-  explicit Store(std::unique_ptr<Impl> parts);
+  explicit Store(std::unique_ptr<Impl> impl);
 
   std::unique_ptr<Impl> impl_;
 };

@@ -5,15 +5,17 @@
 
 namespace proofmass {
 
-/// FNV-1a, 64 bits [RFC 9923], of nothing yet. It guards against accidents, not against malice.
+/// Where a hash FNV-1a of 64 bits [RFC 9923] begins. It guards against accidents, not against
+/// malice.
 inline constexpr std::uint64_t fnv1a_basis = 0xcbf29ce484222325;
 
-/// The hash of what it was of before, and a byte; or, where only we compare, a word.
+/// The hash after one more byte. Where nobody else computes the same hash, a part may be a word of
+/// 64 bits.
 [[nodiscard]] constexpr std::uint64_t fnv1a(std::uint64_t hash, std::uint64_t part) {
   return (hash ^ part) * 0x100000001b3;
 }
 
-/// FNV-1a of bytes.
+/// The hash of bytes.
 [[nodiscard]] constexpr std::uint64_t fnv1a(std::string_view bytes) {
   std::uint64_t hash = fnv1a_basis;
   for (const char byte : bytes) hash = fnv1a(hash, static_cast<unsigned char>(byte));
@@ -28,7 +30,7 @@ inline constexpr std::uint64_t fnv1a_basis = 0xcbf29ce484222325;
   return number ^ (number >> 31);
 }
 
-/// In [0, 1), from the first 53 bits.
+/// A number in [0, 1) made of the upper 53 bits.
 [[nodiscard]] constexpr double fraction_of(std::uint64_t bits) {
   return static_cast<double>(bits >> 11) * 0x1.0p-53;
 }

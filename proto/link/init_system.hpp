@@ -37,9 +37,12 @@ class ServiceNotices {
 
   explicit ServiceNotices(InitSystem init_system = InitSystem::from_environment());
 
-  void ready();     ///< The first time only.
-  void stopping();  ///< The first time only.
-  /// Says in time that the service lives, and every 5 s what it does. To be called often.
+  /// The service is ready. Only the first call says so.
+  void ready();
+  /// The service is ending. Only the first call says so.
+  void stopping();
+  /// Says that the service lives, as often as the init system wants to hear it, and every 5 s what
+  /// it does. To be called several times a second.
   void on_tick(TimePoint now, const std::function<std::string()>& status);
 
  private:

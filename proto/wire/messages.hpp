@@ -277,7 +277,8 @@ inline constexpr bool is_among<Content, std::variant<Contents...>> =
 using Message = detail::Joined<WorkerMessage, CoordinatorMessage>::type;
 
 /// Calls the handler with what the message holds if that is one of `Messages`, which is
-/// WorkerMessage or CoordinatorMessage. The handler must take all of these.
+/// WorkerMessage or CoordinatorMessage. The handler must take all of these, and gets the message
+/// itself if that is a temporary one.
 /// @return False if it is none of them.
 template <typename Messages, typename AnyMessage, typename Handler>
 bool visit_if(AnyMessage&& message, const Handler& handle) {

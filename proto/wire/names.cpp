@@ -1,9 +1,6 @@
 #include "proto/wire/names.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <array>
 #include <cstddef>
 
 namespace proofmass::wire {
@@ -29,12 +26,6 @@ std::string name_from(std::string_view text) {
   std::replace_if(
       name.begin(), name.end(), [](char c) { return !may_be_in_name(c); }, '-');
   return name.empty() ? "unnamed" : name;
-}
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  gethostname(name.data(), name.size() - 1);
-  return name_from(name.data());
 }
 
 }  // namespace proofmass::wire

@@ -13,7 +13,4 @@ namespace proofmass::wire {
 /// nothing is left.
 [[nodiscard]] std::string name_from(std::string_view text);
 
-/// Of this machine, as such a name.
-[[nodiscard]] std::string host_name();
-
 }  // namespace proofmass::wire

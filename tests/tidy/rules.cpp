@@ -52,7 +52,7 @@ std::string broken_layer(const SourceFile& file, const std::string& include) {
   if (matches(include, "^sqlite3(ext)?\\.h") &&
       !(matches(file.path, "^coordinator/(store|query)/") &&
         (is_source || file.path.ends_with("-inl.hpp")))) {
-    return "SQLite stays in coordinator/store/*.cpp and coordinator/query/*.cpp";
+    return "SQLite stays in *.cpp and *-inl.hpp of coordinator/store and coordinator/query";
   }
   if (matches(include, "^zmq") &&
       !(matches(file.path, "^(coordinator/net|worker/net|proto/link)/") && is_source)) {

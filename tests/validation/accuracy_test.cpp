@@ -35,8 +35,9 @@ TEST(Accuracy, FirstOrderMeansAreThePapersWhereItSaysWhatItDid) {
   using enum Parameter;
   const CampaignStatistics statistics = statistics_of(Correction::first_order);
   EXPECT_EQ(statistics.num_estimated, num_runs);
-  // The mean of n absolute errors scatters by std/√n, about 0.8/√96 = 8 % here and 0.8/√100 in the
-  // paper, and by 13 % where the error is a product of two drawn quantities.
+  // The mean of n absolute errors scatters by std/√n, about 0.8/√96 = 8 % here and 0.8/√100 = 8 %
+  // in the paper, and by 13 % where the error is a product of two drawn quantities. A factor 1.7 is
+  // five (three) standard errors of the ratio of both.
   for (const Parameter parameter : {k2d, k2c, a_c12, a_c13, a_c11_delta_x, a_c11_delta_y}) {
     const test::ParameterInfo& info = test::parameter_infos()[index(parameter)];
     const double ratio = statistics.accuracy[index(parameter)].mean / info.published->mean;

@@ -107,9 +107,9 @@ class CoordinatorLink::Impl {
 
 CoordinatorLink::CoordinatorLink(const std::string& endpoint, const wire::ClientSecurity& security,
                                  const std::optional<wire::FaultPlan>& faults)
-    : endpoint_(endpoint), security_(security), faults_(faults), impl_(make_parts()) {}
+    : endpoint_(endpoint), security_(security), faults_(faults), impl_(make_impl()) {}
 
-std::unique_ptr<CoordinatorLink::Impl> CoordinatorLink::make_parts() const {
+std::unique_ptr<CoordinatorLink::Impl> CoordinatorLink::make_impl() const {
   try {
     return std::make_unique<Impl>(endpoint_, security_, faults_);
   } catch (const zmq::error_t& error) {
@@ -121,7 +121,7 @@ CoordinatorLink::~CoordinatorLink() = default;
 
 void CoordinatorLink::reconnect() {
   impl_->drop_unsent();
-  impl_ = make_parts();
+  impl_ = make_impl();
 }
 
 void CoordinatorLink::wait(std::span<const int> descriptors, Duration time_max) {

@@ -46,7 +46,7 @@ class CoordinatorLink {
 
  private:
   class Impl;
-  [[nodiscard]] std::unique_ptr<Impl> make_parts() const;
+  [[nodiscard]] std::unique_ptr<Impl> make_impl() const;
 
   std::string endpoint_;
   wire::ClientSecurity security_;

@@ -97,9 +97,9 @@ class Supervisor {
     _exit(exit_code);  // The supervisor ends the program; this is a part of it.
   }
 
-  /// Hands requests on until the child has ended, and returns how it did. Whoever is continued
-  /// continues the child: one that is forked while its group is stopped and continued may stay
-  /// stopped, and could not even end.
+  /// Hands requests on until the child has ended, and returns how it did. When this process is
+  /// continued (SIGCONT) or asked to end, the child is continued, too: a child that is forked while
+  /// its process group is stopped and continued may stay stopped, and then it could not even end.
   int wait_for(pid_t child) {
     int status = 0;
     while (waitpid(child, &status, WNOHANG) != child) {

@@ -39,14 +39,14 @@ inline void add_json_flag(CLI::App& command, OutputFormat& format) {
 
 inline constexpr const char* database_text = "Database of a campaign";
 
-// A function for each command, in the file of its name; arguments as of add_command(). What fails
-// is thrown: see run_program() for what becomes of it.
+// Each of these functions declares the command of its name, see add_command(), and stands in the
+// file of that name. What a command throws becomes an exit code in run_program().
 
 void add_run(CLI::App& app, Command& chosen);
 void add_init(CLI::App& app, Command& chosen);
 void add_keygen(CLI::App& app, Command& chosen);
 
-// Of databases.
+// Commands that read or change a database.
 void add_report(CLI::App& app, Command& chosen);
 void add_sensitivity(CLI::App& app, Command& chosen);
 void add_query(CLI::App& app, Command& chosen);
@@ -58,7 +58,7 @@ void add_list(CLI::App& app, Command& chosen);
 void add_tag(CLI::App& app, Command& chosen);
 void add_note(CLI::App& app, Command& chosen);
 
-// Of clients of a coordinator.
+// Commands that ask a coordinator.
 void add_submit(CLI::App& app, Command& chosen);
 void add_status(CLI::App& app, Command& chosen);
 void add_watch(CLI::App& app, Command& chosen);

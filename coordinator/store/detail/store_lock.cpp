@@ -13,7 +13,7 @@
 #include <system_error>
 
 #include "coordinator/store/store_error.hpp"
-#include "proto/wire/names.hpp"
+#include "proto/link/host_name.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

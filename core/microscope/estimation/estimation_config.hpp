@@ -16,6 +16,7 @@ enum class Correction : std::uint8_t { first_order = 1, second_order = 2, hardy2
 [[nodiscard]] std::span<const std::string_view> names_of(EstimationMethod);
 [[nodiscard]] std::span<const std::string_view> names_of(Correction);
 
+/// How the parameters are estimated from the sessions of a run.
 struct EstimationConfig {
   EstimationMethod method{1};  ///< `hardy2013`.
   Correction correction = Correction::second_order;

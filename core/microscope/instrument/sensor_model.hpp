@@ -9,7 +9,7 @@
 
 namespace proofmass {
 
-/// Of each sensor.
+/// What is the same for all sensors.
 struct SensorConfig {
   /// Largest acceleration that a sensor reports on an axis, m/s²; a larger one reads as this.
   double range_m_s2 = 1e-5;

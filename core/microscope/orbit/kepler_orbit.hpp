@@ -9,7 +9,7 @@
 
 namespace proofmass {
 
-/// Of the satellite about the Earth.
+/// The orbit of the satellite about the Earth.
 struct OrbitConfig {
   double period_s = 5950.0;
   double eccentricity = 5e-3;

@@ -9,7 +9,7 @@
 
 namespace proofmass {
 
-/// Of all sessions.
+/// What is the same for all sessions of a run.
 struct SimulationConfig {
   double sample_period_s = 0.25;
   double settling_s = 4000.0;  ///< Time that the loops run before a session's record begins.

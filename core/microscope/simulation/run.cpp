@@ -160,11 +160,11 @@ struct RunPlan::Impl {
 
   /// Makes the weights of a session, block by block.
   struct Readers {
-    explicit Readers(const Impl& parts, std::size_t i)
-        : lines(parts.weights[i]),
-          known(parts.known_weights[i].begin(), parts.known_weights[i].end()),
+    explicit Readers(const Impl& impl, std::size_t i)
+        : lines(impl.weights[i]),
+          known(impl.known_weights[i].begin(), impl.known_weights[i].end()),
           buffer(weights_buffer_size(lines.weights().num_fit_lines(), known.size())) {
-      if (parts.is_quiet(i)) residual.emplace(*parts.residual_weights[i]);
+      if (impl.is_quiet(i)) residual.emplace(*impl.residual_weights[i]);
     }
     WeightReader lines;
     std::vector<WeightReader> known;  ///< Of the known lines, if the method wants them.
