@@ -12,7 +12,6 @@
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/report/digest.hpp"
-#include "coordinator/report/digest_check.hpp"
 #include "core/campaign/model.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/comparison.hpp"

@@ -4,9 +4,9 @@
 #include <functional>
 
 #include "coordinator/archive/archive_error.hpp"
-#include "coordinator/archive/drawn_columns.hpp"
+#include "coordinator/archive/result_columns.hpp"
 #include "coordinator/archive/text_output.hpp"
-#include "coordinator/report/digest_check.hpp"
+#include "coordinator/report/digest.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/run_result.hpp"
 

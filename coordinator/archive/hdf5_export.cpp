@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/archive/draft_file.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
+#include "coordinator/archive/text_output.hpp"
 #include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {

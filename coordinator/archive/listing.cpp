@@ -3,12 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/archive/campaign_mark.hpp"
+#include "coordinator/report/text_cells.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
+#include "proto/text/visible_text.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -50,6 +56,58 @@ std::vector<std::filesystem::path> campaign_files_in(const std::filesystem::path
   return files;
 }
 
+using Json = nlohmann::ordered_json;
+
+constexpr std::array<TextColumn, 7> columns{{{"file", 18, true},
+                                             {"campaign", 14, true},
+                                             {"phase", 10, true},
+                                             {"done", 9},
+                                             {"runs", 9},
+                                             {"seed", 9},
+                                             {"created", 11}}};
+
+std::string tag_lines(std::span<const std::string> tags) {
+  if (tags.empty()) return "";
+  constexpr std::size_t columns_max = 80;
+  std::string text, line = "  tags:";
+  const std::string indent(line.size(), ' ');
+  for (const std::string& tag : tags) {
+    if (line.size() + 1 + tag.size() > columns_max) {
+      text += line + "\n";
+      line = indent;
+    }
+    line += fmt::format(" {}", wire::visible_text(tag));
+  }
+  return text + line + "\n";
+}
+
+std::string entry(const ListedCampaign& campaign) {
+  const std::string file = wire::visible_text(campaign.file.filename().string());
+  if (!campaign.problem.empty()) return file + "\n  " + campaign.problem + "\n";
+  constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10Z.
+  std::string text = table_row(
+      columns,
+      std::array{file, wire::visible_text(campaign.name),
+                 std::string(wire::name_of(campaign.phase)), std::to_string(campaign.num_finished),
+                 std::to_string(campaign.num_runs), std::to_string(campaign.seed),
+                 wire::visible_text(campaign.created_utc.substr(0, date_size))});
+  return text + tag_lines(campaign.tags);
+}
+
+Json json_of(const ListedCampaign& campaign) {
+  const std::string file = campaign.file.string();
+  if (!campaign.problem.empty()) return {{"file", file}, {"problem", campaign.problem}};
+  return {{"file", file},
+          {"problem", nullptr},
+          {"name", campaign.name},
+          {"seed", std::to_string(campaign.seed)},
+          {"phase", wire::name_of(campaign.phase)},
+          {"num_runs", campaign.num_runs},
+          {"num_finished", campaign.num_finished},
+          {"created_utc", campaign.created_utc},
+          {"tags", campaign.tags}};
+}
+
 }  // namespace
 
 std::vector<ListedCampaign> list_campaigns(std::span<const std::filesystem::path> places) {
@@ -65,6 +123,20 @@ std::vector<ListedCampaign> list_campaigns(std::span<const std::filesystem::path
     campaigns.push_back(listed(place));
   }
   return campaigns;
+}
+
+std::string listing_text(std::span<const ListedCampaign> campaigns) {
+  if (campaigns.empty()) return "no campaigns\n";
+  std::string text = table_heading(columns);
+  for (const ListedCampaign& campaign : campaigns) text += entry(campaign);
+  return text;
+}
+
+std::string listing_json(std::span<const ListedCampaign> campaigns) {
+  constexpr int indent = 2;
+  Json json{{"campaigns", Json::array()}};
+  for (const ListedCampaign& campaign : campaigns) json["campaigns"].push_back(json_of(campaign));
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace proofmass::coordinator

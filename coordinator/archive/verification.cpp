@@ -6,9 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "coordinator/archive/campaign_mark.hpp"
 #include "coordinator/archive/derived_checks.hpp"
-#include "coordinator/archive/redraw.hpp"
 #include "coordinator/archive/resimulation.hpp"
 #include "coordinator/archive/result_scan.hpp"
 #include "coordinator/archive/stored_campaign.hpp"

@@ -10,7 +10,6 @@
 #include <thread>
 #include <vector>
 
-#include "coordinator/bench/bench_bits.hpp"
 #include "coordinator/bench/bench_parts.hpp"
 #include "coordinator/bench/bench_report.hpp"
 #include "coordinator/cli/commands/commands.hpp"

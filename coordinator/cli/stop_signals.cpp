@@ -1,6 +1,9 @@
 #include "coordinator/cli/stop_signals.hpp"
 
+#include <condition_variable>
 #include <csignal>
+#include <mutex>
+#include <stop_token>
 
 #include "coordinator/cli/exit_code.hpp"
 #include "proto/command_line/standard_error.hpp"
@@ -16,6 +19,14 @@ static_assert(std::atomic<StopRequest>::is_always_lock_free);
 void on_signal(int signal) {
   const bool is_first_terminate = signal == SIGTERM && request == StopRequest::none;
   request = is_first_terminate ? request_of_first_terminate.load() : StopRequest::now;
+}
+
+void run_handlers(const std::stop_token& stop) {
+  const sigset_t signals = SignalThread::signals();
+  pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+  std::mutex mutex;
+  std::unique_lock lock(mutex);
+  std::condition_variable_any().wait(lock, stop, [] { return false; });
 }
 
 }  // namespace
@@ -36,6 +47,26 @@ int run_until_stopped(const std::function<int(const IsStopped&)>& work) {
     wire::say("proofmass: interrupted\n");
     return exit_interrupted;
   }
+}
+
+SignalThread::SignalThread() {
+  const sigset_t blocked = signals();
+  pthread_sigmask(SIG_BLOCK, &blocked, &former_mask_);
+  thread_ = std::jthread(run_handlers);
+}
+
+SignalThread::~SignalThread() {
+  thread_.request_stop();
+  thread_.join();
+  pthread_sigmask(SIG_SETMASK, &former_mask_, nullptr);
+}
+
+sigset_t SignalThread::signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGTERM);
+  return set;
 }
 
 }  // namespace proofmass::coordinator

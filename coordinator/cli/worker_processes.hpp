@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "coordinator/cli/progress_display.hpp"
+#include "coordinator/net/service.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::coordinator {
@@ -58,6 +60,30 @@ class WorkerProcesses {
   std::string endpoint_;
   std::vector<Process> processes_;
   std::uint64_t num_oom_kills_;  ///< As the kernel counted them when last looked at.
+};
+
+/// The local workers of a campaign: starts them, and others in the place of those that die.
+class LocalWorkers {
+ public:
+  /// @param service, display  Outlive this object.
+  LocalWorkers(Service& service, ProgressDisplay& display);
+
+  void start(std::uint64_t num_workers);
+
+  /// @throws Error if workers end again and again without finishing a run, unless that is the fault
+  ///         of single runs, which the dispatch finds out.
+  void replace_dead();
+
+ private:
+  void replace(const WorkerProcesses::Exit& exit);
+  void check(const WorkerProcesses::Exit& exit, const std::string& runs);
+
+  Service& service_;
+  ProgressDisplay& display_;
+  WorkerProcesses processes_;
+  std::string host_;
+  int num_failures_ = 0;  ///< In a row, without a finished run.
+  std::uint64_t num_done_at_failure_ = 0;
 };
 
 }  // namespace proofmass::coordinator

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "coordinator/dispatch/outbox.hpp"
-#include "coordinator/net/handshake_watch.hpp"
+#include "coordinator/net/refusal_log.hpp"
 #include "coordinator/net/rights.hpp"
 #include "proto/link/security.hpp"
 

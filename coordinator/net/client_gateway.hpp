@@ -12,7 +12,6 @@
 
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/request.hpp"
-#include "coordinator/net/request_parts.hpp"
 #include "coordinator/net/rights.hpp"
 #include "coordinator/net/worker_gateway.hpp"
 #include "proto/wire/client_codec.hpp"

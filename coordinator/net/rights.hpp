@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -52,5 +53,11 @@ void require_right(const Asker& asker, Right right);
 /// @param owner  Name of the key that submitted it; empty if not known.
 /// @throws Error reading `campaign = NAME (rule)` or as require_right() does.
 void require_control(const Asker& asker, std::string_view campaign, std::string_view owner);
+
+/// What one key may have submitted and not finished.
+struct SubmissionLimits {
+  std::size_t campaigns_max = 100;
+  std::uint64_t size_max = std::uint64_t{1} << 30;  ///< Of their definitions, bytes.
+};
 
 }  // namespace proofmass::coordinator

@@ -11,7 +11,7 @@
 #include <vector>
 #include <zmq.hpp>
 
-#include "coordinator/net/handshake_watch.hpp"
+#include "coordinator/net/refusal_log.hpp"
 #include "core/error.hpp"
 #include "proto/link/socket.hpp"
 

@@ -9,9 +9,9 @@
 
 #include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/worker_gateway.hpp"
+#include "proto/link/connection_monitor.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/security.hpp"
-#include "proto/link/socket_events.hpp"
 
 namespace zmq {
 class context_t;

@@ -11,7 +11,6 @@
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
-#include "coordinator/net/descriptor_limit.hpp"
 #include "coordinator/net/directory_service.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
 #include "coordinator/net/request_service.hpp"

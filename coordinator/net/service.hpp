@@ -14,7 +14,7 @@
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/campaign_files.hpp"
-#include "coordinator/net/submission_limits.hpp"
+#include "coordinator/net/rights.hpp"
 #include "coordinator/store/store_writer.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/wire/client_messages.hpp"

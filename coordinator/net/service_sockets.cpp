@@ -1,6 +1,7 @@
 #include "coordinator/net/service_sockets.hpp"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <array>
 #include <cerrno>
@@ -15,7 +16,7 @@
 #include "coordinator/net/router_socket.hpp"
 #include "core/error.hpp"
 #include "proto/link/key_files.hpp"
-#include "proto/link/wake.hpp"
+#include "proto/link/socket.hpp"
 #include "proto/wire/endpoint.hpp"
 
 namespace proofmass::coordinator {
@@ -198,6 +199,14 @@ bool ServiceSockets::send_to_worker(const std::string& routing_id, const std::st
 bool ServiceSockets::send_to_client(const std::string& routing_id, const std::string& bytes,
                                     TimePoint now) {
   return impl_->clients() != nullptr && impl_->clients()->send(routing_id, bytes, now);
+}
+
+void raise_descriptor_limit() {
+  rlimit limit{};
+  PROOFMASS_EXPECT(getrlimit(RLIMIT_NOFILE, &limit) == 0);
+  limit.rlim_cur = limit.rlim_max;
+  // Where even this is forbidden, the service has what it was given.
+  [[maybe_unused]] const int status = setrlimit(RLIMIT_NOFILE, &limit);
 }
 
 }  // namespace proofmass::coordinator

@@ -14,7 +14,6 @@
 #include "coordinator/net/client_gateway.hpp"
 #include "coordinator/net/request.hpp"
 #include "coordinator/net/rights.hpp"
-#include "coordinator/net/submission_limits.hpp"
 #include "coordinator/store/store_writer.hpp"
 
 namespace proofmass::coordinator {

@@ -8,7 +8,6 @@
 #include <string_view>
 #include <utility>
 
-#include "coordinator/query/draw_scan.hpp"
 #include "coordinator/query/drawn_campaign.hpp"
 #include "coordinator/query/functions.hpp"
 #include "coordinator/query/virtual_table-inl.hpp"

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -53,6 +54,21 @@ class DrawnCampaign {
   std::shared_ptr<const Campaign> campaign_;
   std::optional<RunIndex> last_run_;  ///< A join asks for the quantities of a run one by one.
   std::vector<double> last_values_;
+};
+
+/// A comparison that SQL makes with a run index.
+enum class RunComparison : std::uint8_t { equal, above, at_least, below, at_most };
+
+/// The rows of draw() that a statement wants: at least those, as SQLite looks at each row again.
+struct DrawScan {
+  std::uint64_t first_run = 0;
+  std::uint64_t end_run = 0;            ///< One behind the last.
+  std::optional<std::size_t> quantity;  ///< Index into Model::drawn(); empty for all.
+
+  /// Leaves out runs that cannot hold `run_index <comparison> bound`.
+  void narrow(RunComparison comparison, std::int64_t bound);
+  void narrow(RunComparison comparison, double bound);
+  void leave_none() { end_run = first_run; }
 };
 
 }  // namespace proofmass::coordinator

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "coordinator/store/detail/private_copy.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/store.hpp"
 #include "coordinator/store/store_error.hpp"
 

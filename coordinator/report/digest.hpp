@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -36,5 +38,39 @@ class Digest {
 
 /// Digest of the results in a campaign file, without that of their health.
 [[nodiscard]] std::string digest_of(const Store& store);
+
+/// What the digest that is stored with a file's statistics says of its results.
+enum class DigestCheck : std::uint8_t {
+  holds,        ///< It is that of the results.
+  not_checked,  ///< It is of fewer results, or there is none yet.
+};
+
+/// Holds the results of a file against the digest that is stored with its statistics.
+///
+/// @param num_results  All results of the file, in the state of the file that is being read.
+/// @param digests      Theirs.
+/// @throws StoreError `campaign file = x.db (is damaged: ...)` if the digest is of as many results
+///         and another one, if it is of more results, if the counts beside it do not add up, or if
+///         there are statistics and none is there.
+[[nodiscard]] DigestCheck check_digest(const Store& store, std::uint64_t num_results,
+                                       const ResultDigests& digests);
+
+/// What one walk over all results of a file tells of them.
+struct WalkedResults {
+  std::uint64_t num_results = 0;
+  std::string digest;
+  DigestCheck check = DigestCheck::holds;
+};
+
+/// Calls visit(result) for each result of a file, in run order and of one state of the file, and
+/// holds them against the stored digest at the end.
+/// @throws StoreError as check_digest() and Store::for_each_result() do.
+[[nodiscard]] WalkedResults walk_checked(const Store& store,
+                                         const std::function<void(const RunResult&)>& visit);
+
+/// Holds what defines a campaign, its environment and its tables of drawn values against the digest
+/// that is stored with them.
+/// @throws StoreError `campaign file = x.db (is damaged: ...)`.
+void check_definition_digest(const Store& store);
 
 }  // namespace proofmass::coordinator

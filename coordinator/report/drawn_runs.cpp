@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "coordinator/report/digest_check.hpp"
+#include "coordinator/report/digest.hpp"
 #include "core/campaign/model.hpp"
 #include "core/runs.hpp"
 

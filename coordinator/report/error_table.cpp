@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "coordinator/report/probability_text.hpp"
 #include "coordinator/report/report.hpp"
+#include "coordinator/report/requirement_text.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "core/campaign/model.hpp"
 #include "core/statistics/interval.hpp"

@@ -7,7 +7,7 @@
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "core/campaign/model.hpp"
-#include "core/campaign/statistics_passes.hpp"
+#include "core/campaign/statistics.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "coordinator/report/digest_check.hpp"
+#include "coordinator/report/digest.hpp"
 #include "coordinator/report/run_totals.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"

@@ -7,9 +7,9 @@
 #include <iterator>
 #include <vector>
 
-#include "coordinator/report/exceedances.hpp"
-#include "coordinator/report/probability_text.hpp"
+#include "coordinator/report/missing_estimates.hpp"
 #include "coordinator/report/report.hpp"
+#include "coordinator/report/requirement_text.hpp"
 #include "core/campaign/model_rules.hpp"
 #include "core/statistics/value_passes.hpp"
 

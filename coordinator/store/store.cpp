@@ -10,12 +10,11 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/store/detail/annotation_rows.hpp"
 #include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/entry_rows.hpp"
-#include "coordinator/store/detail/file_log.hpp"
+#include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/detail/integrity.hpp"
 #include "coordinator/store/detail/rescue.hpp"
@@ -24,7 +23,6 @@
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/detail/store_lock.hpp"
-#include "coordinator/store/detail/table_digest.hpp"
 #include "core/campaign/model.hpp"
 #include "proto/link/kill_point.hpp"
 #include "proto/text/visible_text.hpp"

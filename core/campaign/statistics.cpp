@@ -1,38 +1,12 @@
 #include "core/campaign/statistics.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <span>
+#include <utility>
 
 #include "core/error.hpp"
-#include "core/statistics/bootstrap.hpp"
-#include "core/statistics/moments.hpp"
-#include "core/statistics/order.hpp"
 
 namespace proofmass {
-namespace {
-
-std::vector<double> magnitudes_of(std::span<const double> errors) {
-  std::vector<double> magnitudes(errors.size());
-  std::ranges::transform(errors, magnitudes.begin(), [](double error) { return std::abs(error); });
-  return magnitudes;
-}
-
-std::array<PercentileStatistic, percentile_levels.size()> percentiles_of(
-    std::span<const double> magnitudes) {
-  const std::vector<double> ascending = sorted(magnitudes);
-  std::array<PercentileStatistic, percentile_levels.size()> percentiles;
-  for (std::size_t i = 0; i < percentile_levels.size(); ++i) {
-    const double level = percentile_levels[i];
-    percentiles[i] = {.level = level,
-                      .value = percentile(ascending, level),
-                      .interval = percentile_interval(ascending, level, default_confidence)};
-  }
-  return percentiles;
-}
-
-}  // namespace
 
 std::optional<Interval> CampaignStatistics::within_objectives(std::uint64_t num_given_up) const {
   const std::uint64_t num_draws = num_runs + num_given_up;
@@ -62,53 +36,92 @@ std::vector<double> CampaignStatistics::mean_errors() const {
   return errors;
 }
 
-void StatisticsAccumulator::add(const RunResult& result) {
+StatisticsPasses::StatisticsPasses(std::vector<double> objectives, std::size_t num_kept_max)
+    : objectives_(std::move(objectives)) {
+  const ValuePasses::Wanted of_magnitudes{
+      .levels = {percentile_levels.begin(), percentile_levels.end()},
+      .has_deviation_interval = true};
+  for (std::size_t i = 0; i < objectives_.size(); ++i) {
+    quantities_.push_back({.errors = ValuePasses({}, num_kept_max),
+                           .magnitudes = ValuePasses(of_magnitudes, num_kept_max),
+                           .worst_run = {}});
+  }
+}
+
+void StatisticsPasses::add(const RunResult& result) {
   PROOFMASS_EXPECT(!last_run_ || *last_run_ < result.run);
   last_run_ = result.run;
+  if (is_first_pass_) count(result);
+  if (!result.has_estimate()) return;
+  bool is_within = true;
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    QuantityPasses& quantity = quantities_[i];
+    const double error = result.error(i);
+    const double magnitude = std::abs(error);
+    quantity.errors.add(error);
+    quantity.magnitudes.add(magnitude);
+    if (!is_first_pass_) continue;
+    if (counts_.num_estimated == 1 || magnitude > quantity.worst) {
+      quantity.worst = magnitude;
+      quantity.worst_run = result.run;
+    }
+    if (magnitude <= objectives_[i]) continue;
+    ++quantity.num_beyond;
+    is_within = false;
+  }
+  if (is_first_pass_ && is_within) ++counts_.num_within_objectives;
+}
+
+void StatisticsPasses::count(const RunResult& result) {
   ++counts_.num_runs;
   if (result.status == RunStatus::not_converged) ++counts_.num_not_converged;
   if (result.status == RunStatus::not_finite) ++counts_.num_not_finite;
   if (result.status == RunStatus::no_draw) ++counts_.num_no_draw;
   if (result.status == RunStatus::lost) ++counts_.num_lost;
-  if (!result.has_estimate()) return;
-
-  ++counts_.num_estimated;
-  estimated_runs_.push_back(result.run);
-  bool is_within = true;
-  for (std::size_t i = 0; i < errors_.size(); ++i) {
-    errors_[i].push_back(result.error(i));
-    if (std::abs(errors_[i].back()) > objectives_[i]) is_within = false;
-  }
-  if (is_within) ++counts_.num_within_objectives;
+  if (result.has_estimate()) ++counts_.num_estimated;
 }
 
-CampaignStatistics StatisticsAccumulator::statistics() const {
+bool StatisticsPasses::end_pass() {
+  is_first_pass_ = false;
+  last_run_.reset();
+  bool is_another_needed = false;
+  for (QuantityPasses& quantity : quantities_) {
+    if (quantity.errors.end_pass()) is_another_needed = true;
+    if (quantity.magnitudes.end_pass()) is_another_needed = true;
+  }
+  return is_another_needed;
+}
+
+CampaignStatistics StatisticsPasses::statistics() const {
   CampaignStatistics statistics = counts_;
-  statistics.accuracy.resize(errors_.size());
-  if (estimated_runs_.empty()) return statistics;
-  for (std::size_t i = 0; i < errors_.size(); ++i) statistics.accuracy[i] = accuracy(i);
+  statistics.accuracy.resize(quantities_.size());
+  if (counts_.num_estimated == 0) return statistics;
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    statistics.accuracy[i] = accuracy(quantities_[i]);
+  }
   return statistics;
 }
 
-AccuracyStatistic StatisticsAccumulator::accuracy(std::size_t quantity) const {
-  const std::vector<double> magnitudes = magnitudes_of(errors_[quantity]);
-  const Extreme worst = extremes(magnitudes).largest;
-  const double objective = objectives_[quantity];
-  const auto num_beyond =
-      std::ranges::count_if(magnitudes, [&](double error) { return error > objective; });
-  const Moments about = moments(magnitudes);
-  return {.worst = worst.value,
-          .worst_run = estimated_runs_[worst.index],
-          .mean = about.mean,
-          .standard_deviation = about.standard_deviation,
-          .num_beyond_objective = static_cast<std::uint64_t>(num_beyond),
-          .beyond_objective =
-              probability_interval(static_cast<double>(num_beyond),
-                                   static_cast<double>(magnitudes.size()), default_confidence),
-          .mean_interval = mean_interval(about, default_confidence),
-          .deviation_interval = bootstrap_deviation_interval(magnitudes, default_confidence),
-          .percentiles = percentiles_of(magnitudes),
-          .error = error_statistic(moments(errors_[quantity]))};
+AccuracyStatistic StatisticsPasses::accuracy(const QuantityPasses& quantity) const {
+  const Moments& about = quantity.magnitudes.moments();
+  AccuracyStatistic accuracy{.worst = quantity.worst,
+                             .worst_run = quantity.worst_run,
+                             .mean = about.mean,
+                             .standard_deviation = about.standard_deviation,
+                             .num_beyond_objective = quantity.num_beyond,
+                             .beyond_objective = probability_interval(
+                                 static_cast<double>(quantity.num_beyond),
+                                 static_cast<double>(counts_.num_estimated), default_confidence),
+                             .mean_interval = mean_interval(about, default_confidence),
+                             .deviation_interval = quantity.magnitudes.deviation_interval(),
+                             .error = error_statistic(quantity.errors.moments())};
+  for (std::size_t i = 0; i < percentile_levels.size(); ++i) {
+    const double level = percentile_levels[i];
+    accuracy.percentiles[i] = {.level = level,
+                               .value = quantity.magnitudes.percentile(level),
+                               .interval = quantity.magnitudes.percentile_interval(level)};
+  }
+  return accuracy;
 }
 
 }  // namespace proofmass

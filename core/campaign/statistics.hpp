@@ -12,6 +12,7 @@
 #include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/sum.hpp"
+#include "core/statistics/value_passes.hpp"
 
 namespace proofmass {
 
@@ -75,36 +76,42 @@ struct CampaignStatistics {
   [[nodiscard]] std::vector<double> mean_errors() const;
 };
 
-/// Accumulates results in run order, so that the statistics do not depend on the order in which
-/// runs arrived at the store. Keeps 88 bytes a run, as order statistics and second passes need all;
-/// StatisticsPasses yields the same bits of results that are too many for that.
-class StatisticsAccumulator {
+/// Computes the statistics of a campaign's results in one pass over them, or in several if they are
+/// too many to be kept: the bits are the same. Results come in run order, so that statistics do not
+/// depend on the order in which they arrived at the store. Memory does not grow with the runs: it
+/// is some 130 MB at most.
+class StatisticsPasses {
  public:
-  /// @param objectives  Largest acceptable |error| of each quantity, SI.
-  explicit StatisticsAccumulator(std::vector<double> objectives)
-      : objectives_(std::move(objectives)), errors_(objectives_.size()) {}
+  /// @param objectives    Largest acceptable |error| of each quantity, SI.
+  /// @param num_kept_max  Runs that are kept, and up to which one pass is enough; for tests.
+  explicit StatisticsPasses(std::vector<double> objectives,
+                            std::size_t num_kept_max = num_passed_values_kept);
 
-  /// @pre Runs are added in strictly ascending order.
+  /// @pre Runs of a pass are added in strictly ascending order.
   void add(const RunResult& result);
-  /// Takes some 1 s for a million runs.
+  /// @return True if another pass, with the same results, is needed.
+  [[nodiscard]] bool end_pass();
+  /// @pre No further pass is needed.
   [[nodiscard]] CampaignStatistics statistics() const;
 
-  /// The runs that have an estimate, ascending.
-  [[nodiscard]] const std::vector<RunIndex>& estimated_runs() const { return estimated_runs_; }
-
-  /// estimate − truth of the runs that have an estimate, in run order, SI.
-  [[nodiscard]] const std::vector<double>& errors(std::size_t quantity) const {
-    return errors_[quantity];
-  }
-
  private:
-  [[nodiscard]] AccuracyStatistic accuracy(std::size_t quantity) const;
+  /// What is computed of one quantity.
+  struct QuantityPasses {
+    ValuePasses errors;      ///< estimate − truth.
+    ValuePasses magnitudes;  ///< |estimate − truth|.
+    double worst = 0.0;
+    RunIndex worst_run;
+    std::uint64_t num_beyond = 0;
+  };
+
+  void count(const RunResult& result);
+  [[nodiscard]] AccuracyStatistic accuracy(const QuantityPasses& quantity) const;
 
   std::vector<double> objectives_;
   CampaignStatistics counts_;
-  std::optional<RunIndex> last_run_;
-  std::vector<RunIndex> estimated_runs_;
-  std::vector<std::vector<double>> errors_;  ///< Of each quantity and of estimated_runs_.
+  bool is_first_pass_ = true;
+  std::optional<RunIndex> last_run_;  ///< Of this pass.
+  std::vector<QuantityPasses> quantities_;
 };
 
 }  // namespace proofmass

@@ -11,15 +11,6 @@
 
 namespace proofmass {
 
-Extremes extremes(std::span<const double> values) {
-  detail::check_values("values", values, 1);
-  const auto place = [&](auto it) {
-    return Extreme{*it, static_cast<std::size_t>(it - values.begin())};
-  };
-  return {.smallest = place(std::min_element(values.begin(), values.end())),
-          .largest = place(std::max_element(values.begin(), values.end()))};
-}
-
 std::vector<double> sorted(std::span<const double> values) {
   detail::check_values("values", values, 1);
   std::vector<double> ascending(values.begin(), values.end());

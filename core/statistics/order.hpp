@@ -6,20 +6,6 @@
 
 namespace proofmass {
 
-/// A value and its place among the others, from 0.
-struct Extreme {
-  double value = 0.0;
-  std::size_t index = 0;  ///< The first place that has the value.
-};
-
-struct Extremes {
-  Extreme smallest;
-  Extreme largest;
-};
-
-/// @throws InvalidArgument if there is no value or one is not finite.
-[[nodiscard]] Extremes extremes(std::span<const double> values);
-
 /// The values in ascending order.
 /// @throws InvalidArgument if there is no value or one is not finite.
 [[nodiscard]] std::vector<double> sorted(std::span<const double> values);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,6 +14,34 @@ class socket_t;
 }  // namespace zmq
 
 namespace proofmass::wire {
+
+/// Something that happened to a connection of a socket, as in zmq_socket_monitor(3).
+struct SocketEvent {
+  int kind = 0;             ///< ZMQ_EVENT_...
+  std::uint32_t value = 0;  ///< What it means depends on the kind.
+};
+
+/// What happens to the connections of one socket.
+class SocketEvents {
+ public:
+  /// @param socket  Handle of a socket of that context; outlives the object.
+  /// @param kinds   ZMQ_EVENT_... to be seen, joined by |.
+  /// @throws Error if the socket cannot be watched.
+  SocketEvents(zmq::context_t& context, void* socket, int kinds);
+  ~SocketEvents();
+  SocketEvents(const SocketEvents&) = delete;
+  SocketEvents& operator=(const SocketEvents&) = delete;
+
+  /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t.
+  [[nodiscard]] void* handle() const;
+
+  /// The next event; nothing if none has happened.
+  [[nodiscard]] std::optional<SocketEvent> take();
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 /// Keeps a DEALER connected and says why it is not. ZeroMQ by itself tells nobody about a refusal,
 /// and after one it never tries again: a key that is put on the list later would not help.

@@ -4,7 +4,7 @@
 #include <array>
 #include <span>
 
-#include "proto/text/characters.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::wire {
 namespace {

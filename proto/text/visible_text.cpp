@@ -1,12 +1,11 @@
 #include "proto/text/visible_text.hpp"
 
 #include <fmt/format.h>
+#include <utf8.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
-
-#include "proto/text/characters.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -41,6 +40,16 @@ std::string escaped(const Character& character, std::string_view bytes) {
 }
 
 }  // namespace
+
+Character first_character(std::string_view text) {
+  try {
+    const char* at = text.data();
+    const char32_t code = utf8::next(at, text.data() + text.size());
+    return {.code = code, .size = static_cast<std::size_t>(at - text.data()), .is_valid = true};
+  } catch (const utf8::exception&) {
+    return {};
+  }
+}
 
 std::string visible_text(std::string_view text) {
   std::string visible;

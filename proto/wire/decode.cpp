@@ -4,7 +4,6 @@
 #include "proto/proofmass.pb.h"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/codec.hpp"
-#include "proto/wire/field_count.hpp"
 #include "proto/wire/message_reader.hpp"
 
 namespace proofmass::wire {

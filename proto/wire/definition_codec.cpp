@@ -10,7 +10,6 @@
 #include "proto/proofmass.pb.h"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/definition_message.hpp"
-#include "proto/wire/field_count.hpp"
 
 namespace proofmass::wire {
 namespace {

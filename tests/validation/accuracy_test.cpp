@@ -20,15 +20,16 @@ CampaignStatistics statistics_of(Correction correction) {
   campaign.seed = 20130501;
   campaign.scenario.estimation.correction = correction;
   const RunPlan plan(campaign);
-  StatisticsAccumulator statistics(campaign.objectives());
+  StatisticsPasses passes(campaign.objectives());
   for (std::uint64_t first = 0; first < num_runs; first += batch_lanes) {
     std::vector<RunRequest> requests;
     for (std::uint64_t i = 0; i < batch_lanes; ++i) requests.push_back({RunIndex{first + i}, {}});
     for (const RunResult& result : plan.simulate_batch(requests, best_instruction_set())) {
-      statistics.add(result);
+      passes.add(result);
     }
   }
-  return statistics.statistics();
+  EXPECT_FALSE(passes.end_pass());
+  return passes.statistics();
 }
 
 TEST(Accuracy, FirstOrderMeansAreThePapersWhereItSaysWhatItDid) {

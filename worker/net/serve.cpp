@@ -12,7 +12,7 @@
 #include "proto/link/kill_point.hpp"
 #include "proto/wire/codec.hpp"
 #include "worker/net/coordinator_link.hpp"
-#include "worker/spool/spooler.hpp"
+#include "worker/spool/spool.hpp"
 
 namespace proofmass::worker {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "proto/link/faults.hpp"
 #include "proto/link/security.hpp"
-#include "proto/link/wake.hpp"
+#include "proto/link/socket.hpp"
 #include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"
 #include "worker/net/conversation.hpp"

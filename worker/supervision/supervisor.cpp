@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
@@ -167,6 +168,16 @@ class Supervisor {
 };
 
 }  // namespace
+
+std::optional<RestartConfig::Duration> RestartPolicy::on_crash(
+    std::chrono::steady_clock::time_point now) {
+  while (!crashes_.empty() && now - crashes_.front() > config_.window) crashes_.pop_front();
+  crashes_.push_back(now);
+  if (crashes_.size() >= config_.num_crashes_max) return std::nullopt;
+  RestartConfig::Duration delay = config_.delay;
+  for (std::size_t i = 1; i < crashes_.size() && delay < config_.delay_max; ++i) delay *= 2;
+  return std::min(delay, config_.delay_max);
+}
 
 int handed_on_signal() { return SIGRTMIN; }
 

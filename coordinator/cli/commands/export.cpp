@@ -10,8 +10,8 @@
 #include <string_view>
 #include <system_error>
 
-#include "coordinator/archive/campaign_mark.hpp"
-#include "coordinator/archive/drawn_columns.hpp"
+#include "coordinator/archive/result_columns.hpp"
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/stop_signals.hpp"

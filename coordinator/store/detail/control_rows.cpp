@@ -12,7 +12,7 @@
 #include <span>
 #include <string>
 
-#include "coordinator/store/detail/table_digest.hpp"
+#include "coordinator/store/detail/integrity.hpp"
 #include "coordinator/store/detail/worker_rows.hpp"
 #include "coordinator/store/store_error.hpp"
 

@@ -8,7 +8,7 @@
 #include <limits>
 #include <system_error>
 
-#include "coordinator/store/detail/file_log.hpp"
+#include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "proto/text/visible_text.hpp"
 

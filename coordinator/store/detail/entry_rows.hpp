@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "coordinator/store/detail/database.hpp"
-#include "coordinator/store/detail/largest_error_rows.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
+#include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/worker_rows.hpp"
 #include "coordinator/store/records.hpp"
 

@@ -2,19 +2,43 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sqlite3.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <string_view>
 #include <system_error>
 
-#include "coordinator/store/detail/file_log.hpp"
 #include "coordinator/store/store_error.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
+
+// SQLite's file format, section 4.1: a log begins with this number, whose last bit is the byte
+// order of its checksums; 32 bytes are followed by frames of a header of 24 bytes and a page.
+constexpr std::uint32_t log_magic = 0x377f0682;
+constexpr std::size_t log_header_size = 32;
+constexpr std::size_t frame_header_size = 24;
+
+// SQLite takes only an address of a file for one that nobody changes, and then reads no log.
+std::string address_of(const std::filesystem::path& file) {
+  std::string address = "file://";
+  for (const char character : std::filesystem::absolute(file).string()) {
+    const bool has_meaning = character == '%' || character == '?' || character == '#';
+    address += has_meaning ? fmt::format("%{:02X}", static_cast<int>(character))
+                           : std::string(1, character);
+  }
+  return address + "?immutable=1";
+}
 
 // By its canonical name, so that a directory that the process leaves changes nothing.
 std::filesystem::path canonical_path(const std::filesystem::path& path) {
@@ -51,6 +75,48 @@ int open_and_lock(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+std::filesystem::path log_path(const std::filesystem::path& file) {
+  return std::filesystem::path(file).concat("-wal");
+}
+
+bool has_log(const std::filesystem::path& file) {
+  std::ifstream stream(log_path(file), std::ios::binary);
+  std::array<unsigned char, log_header_size + frame_header_size + 1> bytes{};
+  stream.read(reinterpret_cast<char*>(bytes.data()), bytes.size());
+  if (!stream) return false;
+  std::uint32_t magic = 0;
+  for (std::size_t i = 0; i < sizeof magic; ++i) magic = magic << 8 | bytes[i];
+  return (magic & ~std::uint32_t{1}) == log_magic;
+}
+
+bool is_sound_without_log(const std::filesystem::path& file) {
+  sqlite3* opened = nullptr;
+  const int code = sqlite3_open_v2(address_of(file).c_str(), &opened,
+                                   SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
+  const std::unique_ptr<sqlite3, int (*)(sqlite3*)> connection(opened, &sqlite3_close_v2);
+  if (code != SQLITE_OK) return false;
+  bool is_sound = false;
+  const auto take = [](void* result, int, char** texts, char**) {
+    *static_cast<bool*>(result) = texts[0] != nullptr && std::string_view(texts[0]) == "ok";
+    return 0;
+  };
+  const int end = sqlite3_exec(opened, "PRAGMA trusted_schema = OFF; PRAGMA quick_check(1)", take,
+                               &is_sound, nullptr);
+  return end == SQLITE_OK && is_sound;
+}
+
+void check_absence(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::exists(file, ignored)) {
+    throw StoreError(fmt::format("campaign file = {} (exists already)", file.string()));
+  }
+  if (!has_log(file)) return;
+  throw StoreError(fmt::format(
+      "campaign file = {0} (is gone, but its log {1} is there: put the file back, or move {1} away "
+      "and begin anew)",
+      file.string(), log_path(file).filename().string()));
+}
 
 FilePlace::FilePlace(const std::filesystem::path& file)
     : path_(canonical_path(file)), descriptor_(open_and_lock(path_)), file_(identity_at(path_)) {}

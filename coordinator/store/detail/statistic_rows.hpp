@@ -1,10 +1,15 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/records.hpp"
 #include "core/campaign/error_budget.hpp"
+#include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -21,5 +26,65 @@ void replace_summary(const Database& database, const CampaignStatistics& statist
 /// estimate. Leaves none without a budget.
 void replace_budgets(Database& database, const std::optional<ErrorBudget>& budget,
                      const CampaignStatistics& statistics);
+
+/// Runs that are kept for each parameter in `worst_run`.
+inline constexpr std::size_t num_worst_runs = 10;
+
+/// A run and its |error| of some parameter, SI.
+struct WorstRun {
+  double magnitude = 0.0;
+  RunIndex run;
+
+  bool operator==(const WorstRun&) const = default;
+};
+
+/// The runs with the largest |error| of one parameter: the same ones in whatever order runs come.
+class WorstRuns {
+ public:
+  /// What became of a run that was offered.
+  struct Change {
+    bool is_taken = false;
+    std::optional<RunIndex> dropped;  ///< In its place.
+  };
+
+  /// Takes a run if its |error| is among the largest; of equal ones the first run counts as larger.
+  Change offer(const WorstRun& offered);
+
+  /// Largest first.
+  [[nodiscard]] const std::vector<WorstRun>& runs() const { return runs_; }
+
+ private:
+  std::vector<WorstRun> runs_;
+};
+
+/// The worst runs of each parameter, by its index.
+using WorstRunTable = std::vector<WorstRuns>;
+
+/// The rows of `worst_run`.
+[[nodiscard]] WorstRunTable read_worst_runs(const Database& database);
+
+/// Largest acceptable |error| of each parameter, SI; infinite if there is none.
+[[nodiscard]] std::vector<double> read_objectives(const Database& database);
+
+/// Which parameters have an |error| above their objective: bit i for the one with index i.
+[[nodiscard]] std::uint64_t exceeded_objectives(const RunResult& result,
+                                                std::span<const double> objectives);
+
+/// Keeps `overrun` and `worst_run` in step with `run_result`. Knows the rows that are there: to be
+/// thrown away with a transaction that is rolled back.
+class LargestErrorRows {
+ public:
+  explicit LargestErrorRows(const Database& database);
+
+  /// @pre The result was stored just now, for the first time.
+  void add(const RunResult& result);
+
+ private:
+  std::vector<double> objectives_;
+  WorstRunTable worst_;
+  Statement insert_overrun_;
+  Statement insert_worst_;
+  Statement delete_worst_;
+};
 
 }  // namespace proofmass::coordinator::detail

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "coordinator/store/detail/file_log.hpp"
+#include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/detail/schema.hpp"
 
 namespace proofmass::coordinator {
@@ -78,6 +78,14 @@ std::optional<std::string> bring_to_rest(Database& database) {
   }
   if (!database.fold_log(Fold::all_and_empty_it)) return std::string(reader_in_the_way);
   return std::nullopt;
+}
+
+sqlite3* open_private_copy(const std::filesystem::path& file) {
+  Database database(file, Access::read_only);
+  configure(database);
+  check_campaign_file(database, file);
+  migrate_privately(database);
+  return database.release();
 }
 
 }  // namespace detail

@@ -12,6 +12,8 @@
 #include "coordinator/store/detail/store_lock.hpp"
 #include "coordinator/store/store.hpp"
 
+struct sqlite3;
+
 namespace proofmass::coordinator {
 
 namespace detail {
@@ -25,6 +27,11 @@ void check_that_log_is_there(const Database& database, const std::filesystem::pa
 /// Folds the log into the file; returns why it is still needed. @pre No coordinator serves the file
 /// but the caller.
 [[nodiscard]] std::optional<std::string> bring_to_rest(Database& database);
+
+/// A connection to a private copy of a campaign file of an older version, brought up to date; see
+/// Database::go_on_with_private_copy(). The caller closes it.
+/// @throws StoreError as Store::open_read_only() does.
+[[nodiscard]] sqlite3* open_private_copy(const std::filesystem::path& file);
 
 }  // namespace detail
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "coordinator/cli/signal_thread.hpp"
+#include "coordinator/cli/stop_signals.hpp"
 #include "core/error.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "coordinator/store/detail/file_log.hpp"
+#include "coordinator/store/detail/file_place.hpp"
 #include "tests/coordinator/store/before_writes.hpp"
 #include "tests/coordinator/store/writer_fixture.hpp"
 

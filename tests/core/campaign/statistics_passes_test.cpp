@@ -1,5 +1,3 @@
-#include "core/campaign/statistics_passes.hpp"
-
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -10,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "core/campaign/statistics.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/statistics_in_memory.hpp"
 
 namespace proofmass {
 namespace {
@@ -46,9 +46,9 @@ CampaignStatistics in_passes(std::uint64_t num_runs, std::size_t num_kept) {
 }
 
 CampaignStatistics in_memory(std::uint64_t num_runs) {
-  StatisticsAccumulator accumulator(objectives());
-  for (std::uint64_t run = 0; run < num_runs; ++run) accumulator.add(result_of(run));
-  return accumulator.statistics();
+  test::StatisticsInMemory results(objectives());
+  for (std::uint64_t run = 0; run < num_runs; ++run) results.add(result_of(run));
+  return results.statistics();
 }
 
 /// All numbers of a parameter as bits.

@@ -36,14 +36,6 @@ TEST(Percentile, RefusesNoValues) {
             "values = 0 values (must be at least 1)");
 }
 
-TEST(Extremes, NameTheFirstPlaceOfEach) {
-  const Extremes found = extremes(std::vector<double>{2.0, -1.0, 5.0, -1.0, 5.0});
-  EXPECT_EQ(found.smallest.value, -1.0);
-  EXPECT_EQ(found.smallest.index, 1u);
-  EXPECT_EQ(found.largest.value, 5.0);
-  EXPECT_EQ(found.largest.index, 2u);
-}
-
 TEST(AverageRanks, AreSharedByEqualValues) {
   EXPECT_THAT(average_ranks(std::vector<double>{3.0, 1.0, 3.0, 2.0, 3.0}),
               ElementsAre(4.0, 1.0, 4.0, 2.0, 4.0));

@@ -10,8 +10,8 @@
 #include <string>
 #include <zmq.hpp>
 
+#include "proto/link/connection_monitor.hpp"
 #include "proto/link/socket.hpp"
-#include "proto/link/socket_events.hpp"
 #include "tests/proto/link/raw_peer.hpp"
 
 namespace proofmass::wire {

@@ -1,4 +1,4 @@
-#include "coordinator/store/detail/largest_error_rows.hpp"
+#include "coordinator/store/detail/statistic_rows.hpp"
 
 #include <gmock/gmock.h>
 

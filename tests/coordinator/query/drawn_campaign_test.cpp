@@ -1,4 +1,4 @@
-#include "coordinator/query/draw_scan.hpp"
+#include "coordinator/query/drawn_campaign.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "coordinator/cli/signal_thread.hpp"
+#include "coordinator/cli/stop_signals.hpp"
 
 #include <gtest/gtest.h>
 #include <poll.h>

@@ -1,4 +1,4 @@
-#include "coordinator/net/descriptor_limit.hpp"
+#include "coordinator/net/service_sockets.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

@@ -1,4 +1,4 @@
-#include "coordinator/bench/bench_bits.hpp"
+#include "coordinator/bench/bench_parts.hpp"
 
 #include <gtest/gtest.h>
 
