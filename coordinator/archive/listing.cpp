@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "coordinator/archive/archive_error.hpp"
-#include "coordinator/archive/campaign_mark.hpp"
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
@@ -81,17 +81,15 @@ std::string tag_lines(std::span<const std::string> tags) {
   return text + line + "\n";
 }
 
-std::string entry(const ListedCampaign& campaign) {
-  const std::string file = wire::visible_text(campaign.file.filename().string());
-  if (!campaign.problem.empty()) return file + "\n  " + campaign.problem + "\n";
+std::vector<std::string> cells_of(const ListedCampaign& campaign) {
   constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10Z.
-  std::string text = table_row(
-      columns,
-      std::array{file, wire::visible_text(campaign.name),
-                 std::string(wire::name_of(campaign.phase)), std::to_string(campaign.num_finished),
-                 std::to_string(campaign.num_runs), std::to_string(campaign.seed),
-                 wire::visible_text(campaign.created_utc.substr(0, date_size))});
-  return text + tag_lines(campaign.tags);
+  return {wire::visible_text(campaign.file.filename().string()),
+          wire::visible_text(campaign.name),
+          std::string(wire::name_of(campaign.phase)),
+          std::to_string(campaign.num_finished),
+          std::to_string(campaign.num_runs),
+          std::to_string(campaign.seed),
+          wire::visible_text(campaign.created_utc.substr(0, date_size))};
 }
 
 Json json_of(const ListedCampaign& campaign) {
@@ -125,10 +123,20 @@ std::vector<ListedCampaign> list_campaigns(std::span<const std::filesystem::path
   return campaigns;
 }
 
-std::string listing_text(std::span<const ListedCampaign> campaigns) {
+std::string listing_text(std::span<const ListedCampaign> campaigns, std::size_t line_width_max) {
   if (campaigns.empty()) return "no campaigns\n";
-  std::string text = table_heading(columns);
-  for (const ListedCampaign& campaign : campaigns) text += entry(campaign);
+  std::vector<std::vector<std::string>> rows;
+  for (const ListedCampaign& campaign : campaigns) rows.push_back(cells_of(campaign));
+  const std::vector<TextColumn> wide = widened(columns, rows, line_width_max);
+  std::string text = table_heading(wide);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const ListedCampaign& campaign = campaigns[i];
+    if (campaign.problem.empty()) {
+      text += table_row(wide, rows[i]) + tag_lines(campaign.tags);
+    } else {
+      text += rows[i].front() + "\n  " + campaign.problem + "\n";
+    }
+  }
   return text;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
@@ -31,8 +32,10 @@ struct ListedCampaign {
 [[nodiscard]] std::vector<ListedCampaign> list_campaigns(
     std::span<const std::filesystem::path> places);
 
-/// A line a campaign, at most 80 characters wide, and below it tags or what is wrong.
-[[nodiscard]] std::string listing_text(std::span<const ListedCampaign> campaigns);
+/// A line a campaign, and below it tags or what is wrong. The table is 80 columns wide, or wider if
+/// names are long and `line_width_max` has room for them.
+[[nodiscard]] std::string listing_text(std::span<const ListedCampaign> campaigns,
+                                       std::size_t line_width_max);
 
 /// The same as JSON, complete.
 [[nodiscard]] std::string listing_json(std::span<const ListedCampaign> campaigns);

@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "coordinator/campaign_file/data_file.hpp"
@@ -34,6 +35,12 @@ std::vector<Assignment> assignments_of(const Overrides& overrides) {
   if (overrides.seed) {
     assignments.push_back(count_assignment("--seed", "campaign.seed", *overrides.seed));
   }
+  std::set<std::string> paths;
+  for (const Assignment& assignment : assignments) {
+    if (paths.insert(assignment.path).second) continue;
+    throw DefinitionError(
+        fmt::format("{}: {} is set more than once", assignment.origin, assignment.path));
+  }
   return assignments;
 }
 
@@ -47,6 +54,7 @@ class DataFilesIn final : public DataFiles {
     const auto known = texts_.find(file);
     if (known != texts_.end()) return known->second;
     try {
+      detail::require_regular_file(folder_ / file);
       return texts_[file] = detail::read_text_file(folder_ / file, data_file_size_max);
     } catch (const detail::UnreadableFile& error) {
       throw document_.located(ConfigError(path, fmt::format("\"{}\"", file), error.what()));

@@ -15,8 +15,7 @@ namespace proofmass::coordinator {
 
 /// What a command line changes in a campaign file.
 struct Overrides {
-  std::vector<std::string> assignments =
-      {};  ///< `estimation.correction=second_order`; the last wins.
+  std::vector<std::string> assignments = {};  ///< `estimation.correction=second_order`.
   std::optional<std::uint64_t> num_runs = {};
   std::optional<std::uint64_t> seed = {};
 };
@@ -33,7 +32,8 @@ inline constexpr std::uintmax_t data_file_size_max = std::uintmax_t{64} << 20;
 /// sessions are the paper's. `noise.preset` applies before the other keys of noise, the law of a
 /// dispersion group before those of its elements.
 ///
-/// @throws DefinitionError naming file, line, field, value and rule.
+/// @throws DefinitionError naming file, line, field, value and rule, or a key that is overridden
+///         twice.
 [[nodiscard]] std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
                                                       const Overrides& overrides = {});
 

@@ -8,6 +8,12 @@
 
 namespace proofmass::coordinator::detail {
 
+void require_regular_file(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(file, error);
+  if (std::filesystem::is_other(status)) throw UnreadableFile("is a pipe, a socket or a device");
+}
+
 std::string read_text_file(const std::filesystem::path& file, std::uintmax_t size_max) {
   std::error_code error;
   if (std::filesystem::is_directory(file, error)) throw UnreadableFile("is a directory");

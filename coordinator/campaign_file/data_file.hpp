@@ -14,6 +14,9 @@ class UnreadableFile : public Error {
   using Error::Error;
 };
 
+/// @throws UnreadableFile if it is a pipe, a socket or a device, which may never end.
+void require_regular_file(const std::filesystem::path& file);
+
 /// All bytes of a file.
 /// @throws UnreadableFile
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& file,

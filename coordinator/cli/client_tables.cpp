@@ -45,16 +45,12 @@ std::string counted(std::uint64_t count, std::string_view thing) {
   return fmt::format("{} {}{}", count, thing, count == 1 ? "" : "s");
 }
 
-bool is_over(CampaignPhase phase) {
-  return phase == CampaignPhase::finished || phase == CampaignPhase::cancelled;
-}
-
 std::uint64_t percent_done(const CampaignStatus& campaign) {
   return campaign.num_done * 100 / std::max<std::uint64_t>(1, campaign.num_runs);
 }
 
 std::string time_left(const CampaignStatus& campaign) {
-  const bool is_known = campaign.remaining_s && !is_over(campaign.phase);
+  const bool is_known = campaign.remaining_s && !is_over(campaign);
   return is_known ? duration_text(*campaign.remaining_s) : "-";
 }
 
@@ -87,13 +83,27 @@ std::vector<std::string> notes_about(const CampaignStatus& campaign) {
   return notes;
 }
 
-std::string campaign_row(const CampaignStatus& campaign) {
-  return table_row(
-      status_columns,
-      std::array{campaign.name, std::string(wire::name_of(campaign.phase)),
-                 std::to_string(campaign.priority), std::to_string(campaign.num_done),
-                 std::to_string(campaign.num_runs), std::to_string(percent_done(campaign)),
-                 rate(campaign), time_left(campaign)});
+/// A row for each thing, below the titles.
+template <typename Thing, typename CellsOf>
+std::string table_of(std::span<const TextColumn> columns, const std::vector<Thing>& things,
+                     const CellsOf& cells_of, std::size_t line_width_max) {
+  std::vector<std::vector<std::string>> rows;
+  for (const Thing& thing : things) rows.push_back(cells_of(thing));
+  const std::vector<TextColumn> wide = widened(columns, rows, line_width_max);
+  std::string text = table_heading(wide);
+  for (const auto& cells : rows) text += table_row(wide, cells);
+  return text;
+}
+
+std::vector<std::string> campaign_cells(const CampaignStatus& campaign) {
+  return {campaign.name,
+          std::string(wire::name_of(campaign.phase)),
+          std::to_string(campaign.priority),
+          std::to_string(campaign.num_done),
+          std::to_string(campaign.num_runs),
+          std::to_string(percent_done(campaign)),
+          rate(campaign),
+          time_left(campaign)};
 }
 
 std::string service_line(const wire::StatusReply& status) {
@@ -125,12 +135,10 @@ std::string ago(double seconds) {
   return fmt::format("{} d", total / 86400);
 }
 
-std::string worker_row(const WorkerStatus& worker) {
-  return table_row(worker_columns,
-                   std::array{count_cell(worker.id.value), "  " + worker.name, worker.host,
-                              count_cell(worker.process_id), count_cell(worker.num_slots),
-                              count_cell(worker.num_lent), count_cell(worker.num_results),
-                              ago(worker.silent_s)});
+std::vector<std::string> worker_cells(const WorkerStatus& worker) {
+  return {count_cell(worker.id.value),    "  " + worker.name,           worker.host,
+          count_cell(worker.process_id),  count_cell(worker.num_slots), count_cell(worker.num_lent),
+          count_cell(worker.num_results), ago(worker.silent_s)};
 }
 
 std::string further(std::uint64_t count, std::size_t num_shown, std::string_view thing) {
@@ -157,11 +165,14 @@ std::string service_notes(const wire::StatusReply& status) {
 
 }  // namespace
 
-std::string status_table(const wire::StatusReply& status) {
+bool is_over(const CampaignStatus& campaign) {
+  return campaign.phase == CampaignPhase::finished || campaign.phase == CampaignPhase::cancelled;
+}
+
+std::string status_table(const wire::StatusReply& status, std::size_t line_width_max) {
   std::string text = service_line(status);
   if (status.campaigns.empty()) return text + "no campaigns\n" + service_notes(status);
-  text += table_heading(status_columns);
-  for (const CampaignStatus& campaign : status.campaigns) text += campaign_row(campaign);
+  text += table_of(status_columns, status.campaigns, campaign_cells, line_width_max);
   for (const CampaignStatus& campaign : status.campaigns) {
     for (const std::string& note : notes_about(campaign)) {
       text += fmt::format("{}: {}\n", campaign.name, note);
@@ -171,10 +182,9 @@ std::string status_table(const wire::StatusReply& status) {
   return text + service_notes(status);
 }
 
-std::string workers_table(const wire::WorkersReply& workers) {
+std::string workers_table(const wire::WorkersReply& workers, std::size_t line_width_max) {
   if (workers.workers.empty()) return "no workers\n";
-  std::string text = table_heading(worker_columns);
-  for (const WorkerStatus& worker : workers.workers) text += worker_row(worker);
+  std::string text = table_of(worker_columns, workers.workers, worker_cells, line_width_max);
   for (const WorkerStatus& worker : workers.workers) {
     if (!worker.is_quarantined) continue;
     text += fmt::format("{}: in quarantine, is lent nothing: too many crashes on {}\n",
@@ -188,7 +198,7 @@ std::string campaign_line(const CampaignStatus& campaign) {
   std::string text =
       fmt::format("{} {}: {} of {}, {} %", campaign.name, wire::name_of(campaign.phase),
                   campaign.num_done, counted(campaign.num_runs, "run"), percent_done(campaign));
-  if (!is_over(campaign.phase)) {
+  if (!is_over(campaign)) {
     if (campaign.rate_hz > 0.0) text += fmt::format(", {} runs/s", rate(campaign));
     if (campaign.remaining_s) text += fmt::format(", {} left", time_left(campaign));
   }

@@ -7,13 +7,12 @@
 #include <cmath>
 #include <cstddef>
 
+#include "coordinator/cli/standard_output.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-constexpr std::size_t columns_max = 79;
 
 std::uint64_t percent(const wire::CampaignStatus& status) {
   return status.num_done * 100 / std::max<std::uint64_t>(1, status.num_runs);
@@ -49,14 +48,11 @@ std::string duration_text(double seconds) {
   return fmt::format("{} d {} h", total / 86400, total % 86400 / 3600);
 }
 
-std::string progress_bar(const wire::CampaignStatus& status) {
+std::string progress_bar(const wire::CampaignStatus& status, std::size_t columns_max) {
   const std::string left = fmt::format("{}/{} runs [", status.num_done, status.num_runs);
   const std::string right = fmt::format("] {}", figures(status));
   const std::size_t used = left.size() + right.size();
-  constexpr std::size_t width_max = 30;
-  constexpr std::size_t width_min = 1;
-  const std::size_t room = columns_max > used ? columns_max - used : 0;
-  const std::size_t width = std::clamp(room, width_min, width_max);
+  const std::size_t width = columns_max > used ? columns_max - used : 1;
   const std::size_t filled = width * percent(status) / 100;
   const std::string line =
       left + std::string(filled, '#') + std::string(width - filled, '.') + right;
@@ -92,7 +88,7 @@ void ProgressDisplay::update(const wire::CampaignStatus& status) {
 }
 
 void ProgressDisplay::show_bar(const wire::CampaignStatus& status) {
-  std::string line = progress_bar(status);
+  std::string line = progress_bar(status, screen_size_of(stream_).columns - 1);
   if (has_bar_ && line == shown_) return;
   // The longer line before it is wiped by the erasure to the end of the line.
   wire::say_on(stream_, fmt::format("\r{}\033[K", line));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <string>
@@ -16,9 +17,9 @@ enum class DisplayMode : std::uint8_t {
   quiet,  ///< Notes only.
 };
 
-/// A line of at most 79 columns: runs done, percent, rate, time left; or that nothing can be
-/// stored.
-[[nodiscard]] std::string progress_bar(const wire::CampaignStatus& status);
+/// A line of at most `columns_max` columns: runs done, percent, rate, time left; or that nothing
+/// can be stored.
+[[nodiscard]] std::string progress_bar(const wire::CampaignStatus& status, std::size_t columns_max);
 
 /// The same without a bar.
 [[nodiscard]] std::string progress_line(const wire::CampaignStatus& status);

@@ -1,10 +1,12 @@
 #include "coordinator/cli/standard_output.hpp"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
+#include <limits>
 
 #include "core/error.hpp"
 #include "proto/text/visible_text.hpp"
@@ -17,6 +19,18 @@ namespace {
 }
 
 }  // namespace
+
+ScreenSize screen_size_of(std::FILE* stream) {
+  winsize size{};
+  const bool is_known = ioctl(fileno(stream), TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  if (!is_known) return {};
+  return {.columns = size.ws_col, .rows = size.ws_row};
+}
+
+std::size_t line_width_max_of(std::FILE* stream) {
+  if (isatty(fileno(stream)) == 0) return std::numeric_limits<std::size_t>::max();
+  return screen_size_of(stream).columns - 1;
+}
 
 void print_lines(std::string_view text) { write_standard_output(wire::visible_lines(text)); }
 

@@ -1,9 +1,9 @@
 #include "coordinator/cli/watch_display.hpp"
 
 #include <fmt/format.h>
-#include <sys/ioctl.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <utility>
 
 #include "coordinator/cli/client_json.hpp"
@@ -22,29 +22,36 @@ std::string gist_of(const wire::CampaignStatus& campaign) {
                      campaign.num_given_up, campaign.num_mismatches, campaign.storage_failure);
 }
 
+/// Campaigns that are over come last: they are the ones that a small screen leaves out.
+wire::StatusReply with_open_ones_first(wire::StatusReply status) {
+  std::ranges::stable_partition(status.campaigns,
+                                [](const auto& campaign) { return !is_over(campaign); });
+  return status;
+}
+
 }  // namespace
 
 Drawing drawn_over(std::size_t num_lines_before, std::string_view text, ScreenSize size) {
   // The cursor stands below the last line, so one row stays free.
   const std::size_t rows_max = std::max<std::size_t>(2, size.rows) - 1;
+  const auto num_lines = static_cast<std::size_t>(std::ranges::count(text, '\n')) +
+                         (text.empty() || text.ends_with('\n') ? 0 : 1);
+  const std::size_t num_shown = num_lines > rows_max ? rows_max - 1 : num_lines;
   Drawing drawing;
   if (num_lines_before > 0) drawing.text = fmt::format("\033[{}A", num_lines_before);
-  while (!text.empty() && drawing.num_lines < rows_max) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    // What a longer line left behind is erased to the end of the line.
-    drawing.text += shortened(text.substr(0, end), size.columns) + "\033[K\n";
-    text.remove_prefix(std::min(end + 1, text.size()));
+  // What a longer line left behind is erased to the end of the line.
+  const auto draw = [&](std::string_view line) {
+    drawing.text += shortened(line, size.columns) + "\033[K\n";
     ++drawing.num_lines;
+  };
+  while (drawing.num_lines < num_shown) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    draw(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
   }
+  if (num_shown < num_lines) draw(fmt::format("and {} more lines", num_lines - num_shown));
   drawing.text += "\033[J";
   return drawing;
-}
-
-ScreenSize screen_size_of(std::FILE* stream) {
-  winsize size{};
-  const bool is_known = ioctl(fileno(stream), TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
-  if (!is_known) return {};
-  return {.columns = size.ws_col, .rows = size.ws_row};
 }
 
 WatchDisplay::WatchDisplay(WatchMode mode, std::FILE* stream) : mode_(mode), stream_(stream) {}
@@ -65,8 +72,10 @@ void WatchDisplay::update(const wire::StatusReply& status) {
 }
 
 void WatchDisplay::show_screen(const wire::StatusReply& status) {
-  const std::string table = wire::visible_lines(status_table(status));
-  const Drawing drawing = drawn_over(num_lines_drawn_, table, screen_size_of(stream_));
+  const ScreenSize size = screen_size_of(stream_);
+  const std::string table =
+      wire::visible_lines(status_table(with_open_ones_first(status), size.columns - 1));
+  const Drawing drawing = drawn_over(num_lines_drawn_, table, size);
   fmt::print(stream_, "{}", drawing.text);
   num_lines_drawn_ = drawing.num_lines;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "coordinator/cli/standard_output.hpp"
 #include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
@@ -17,11 +18,6 @@ enum class WatchMode : std::uint8_t {
   json,    ///< An object a line, each time.
 };
 
-struct ScreenSize {
-  std::size_t columns = 80;
-  std::size_t rows = 24;
-};
-
 /// A text and what makes it take the place of the one drawn before.
 struct Drawing {
   std::string text;
@@ -29,12 +25,10 @@ struct Drawing {
 };
 
 /// Text cut to the screen, lines ended by `\n`, to be drawn over `num_lines_before` lines that end
-/// right above the cursor.
+/// right above the cursor. If there are more lines than the screen has rows, the last one says how
+/// many are left out.
 [[nodiscard]] Drawing drawn_over(std::size_t num_lines_before, std::string_view text,
                                  ScreenSize size);
-
-/// Size of the terminal; the default if it is none.
-[[nodiscard]] ScreenSize screen_size_of(std::FILE* stream);
 
 /// Shows where campaigns stand, again and again.
 class WatchDisplay {

@@ -83,7 +83,7 @@ void log_loss(const Lease& lease, const RunSet& runs, LossReason reason, const R
   if (!blamed.empty()) fields.emplace_back("blamed", to_text(blamed));
   const bool is_wanted = reason == LossReason::retracted;
   outbox.log({.severity = is_wanted ? Severity::info : Severity::warning,
-              .kind = "runs_lost",
+              .kind = is_wanted ? "runs_taken_back" : "runs_lost",
               .fields = std::move(fields)},
              lease.campaign);
 }

@@ -420,26 +420,26 @@ void CampaignService::close_ended(CampaignId id) {
   on_ended(state_, id, ended.status.num_runs);
   served_.erase(id);
   ended_.emplace(id, std::move(ended));
-  surroundings_.background.post_next(
-      [this, id, file, epoch = surroundings_.start.epoch]() -> Background::Finish {
-        try {
-          Store store = writer_.close(id);
-          std::vector<coordinator::Entry> entries;
-          for (const SessionId session : store.attached_sessions()) {
-            entries.emplace_back(WorkerEnded{.session = session, .reason = LossReason::drained});
-          }
-          if (!entries.empty()) (void)store.write(entries);
-          store.end_coordinator(epoch);
-        } catch (const std::exception& error) {
-          return [this, reason = std::string(error.what())] { say_not_closed(reason); };
-        }
-        return [this, id, stamp = stamp_of(file)] {
-          const auto found = ended_.find(id);
-          if (found == ended_.end()) return;
-          found->second.stamp = stamp;
-          outbox_.log({.kind = "campaign_closed", .fields = {{"name", found->second.status.name}}});
-        };
-      });
+  surroundings_.background.post_next([this, id, file,
+                                      epoch = surroundings_.start.epoch]() -> Background::Finish {
+    try {
+      Store store = writer_.close(id);
+      std::vector<coordinator::Entry> entries;
+      for (const SessionId session : store.attached_sessions()) {
+        entries.emplace_back(WorkerEnded{.session = session, .reason = LossReason::drained});
+      }
+      if (!entries.empty()) (void)store.write(entries);
+      store.end_coordinator(epoch);
+    } catch (const std::exception& error) {
+      return [this, reason = std::string(error.what())] { say_not_closed(reason); };
+    }
+    return [this, id, stamp = stamp_of(file)] {
+      const auto found = ended_.find(id);
+      if (found == ended_.end()) return;
+      found->second.stamp = stamp;
+      outbox_.log({.kind = "campaign_closed", .fields = {{"campaign", found->second.status.name}}});
+    };
+  });
 }
 
 void CampaignService::say_not_closed(std::string_view reason) {

@@ -138,9 +138,14 @@ class Service::Impl final : public Outbox {
 
   using Outbox::log;
   void log(Event event, CampaignId campaign) override {
+    if (campaign == CampaignId{} || campaign_service_.is_served(campaign)) {
+      writer_.record_event(campaign, entry_of(event));
+    }
+    const auto served = state_.campaigns.find(campaign);
+    if (served != state_.campaigns.end()) {
+      event.fields.emplace_back("campaign", served->second.definition->name);
+    }
     log_(event);
-    if (campaign != CampaignId{} && !campaign_service_.is_served(campaign)) return;
-    writer_.record_event(campaign, entry_of(event));
   }
 
  private:
@@ -407,9 +412,7 @@ class Service::Impl final : public Outbox {
     has_storage_failed_ = true;
     log({.severity = Severity::error,
          .kind = "results_not_stored",
-         .fields = {{"name", campaign.definition->name},
-                    {"runs", campaign.delivered.size()},
-                    Field::reason(campaign.storage_failure)}},
+         .fields = {{"runs", campaign.delivered.size()}, Field::reason(campaign.storage_failure)}},
         id);
   }
 

@@ -203,8 +203,15 @@ std::string markdown_text(std::string_view text) {
   return escaped;
 }
 
-/// Columns side by side under their names, numbers to the right. Shows the first rows; cuts text,
-/// never a number, to fit the terminal, and elsewhere to 100 columns.
+// The other formats have all digits.
+std::string figure_text(const Cell& cell) {
+  const auto* real = std::get_if<double>(&cell);
+  return real == nullptr ? cell_text(cell) : fmt::format("{:.6g}", *real);
+}
+
+/// Columns side by side under their names, numbers to the right and with six significant digits.
+/// Shows the first rows. Cuts text, never a number, to fit the terminal, and elsewhere to 100
+/// columns; rows that do not fit even so are written as records, a line a value.
 class TableWriter : public RowWriter {
  public:
   TableWriter(const TableLimits& limits, TextSink sink);
@@ -221,7 +228,8 @@ class TableWriter : public RowWriter {
     std::vector<bool> is_number;
   };
 
-  void fit();
+  [[nodiscard]] bool fit();
+  void write_records();
   void write_names();
   void write_row(std::size_t row);
 
@@ -251,7 +259,7 @@ bool TableWriter::row(std::span<const Cell> cells) {
     const bool is_text = !is_number(cells[i]) && !std::holds_alternative<std::monostate>(cells[i]);
     // No more than this is ever shown, and a text may have megabytes.
     const std::string text =
-        wire::visible_text(std::string_view(cell_text(cells[i])).substr(0, 1000));
+        wire::visible_text(std::string_view(figure_text(cells[i])).substr(0, 1000));
     column.texts.push_back(shortened(text, text_width_max));
     column.is_number.push_back(is_number(cells[i]));
     column.has_text = column.has_text || is_text;
@@ -261,17 +269,33 @@ bool TableWriter::row(std::span<const Cell> cells) {
   return true;
 }
 
-// Takes from the widest column of text, one at a time.
-void TableWriter::fit() {
-  if (!limits_.num_columns || columns_.empty()) return;
+// Takes from the widest column of text, one at a time. False if the lines stay too wide.
+bool TableWriter::fit() {
+  if (!limits_.num_columns) return true;
   std::size_t total = gap.size() * (columns_.size() - 1);
   for (const Column& column : columns_) total += column.width;
   const auto room = [](const Column& column) { return column.has_text ? column.width : 0; };
   while (total > *limits_.num_columns) {
     Column& widest = *std::ranges::max_element(columns_, {}, room);
-    if (room(widest) <= text_width_min) return;
+    if (room(widest) <= text_width_min) return false;
     --widest.width;
     --total;
+  }
+  return true;
+}
+
+void TableWriter::write_records() {
+  std::size_t name_width = 0;
+  for (const Column& column : columns_) {
+    name_width = std::max(name_width, display_width(column.name));
+  }
+  for (std::size_t row = 0; row < num_rows_; ++row) {
+    write_line(sink_, fmt::format("row {}", row + 1));
+    for (const Column& column : columns_) {
+      const std::string line =
+          fmt::format("  {}  {}", left_aligned(column.name, name_width), column.texts[row]);
+      write_line(sink_, shortened(line, *limits_.num_columns));
+    }
   }
 }
 
@@ -302,9 +326,12 @@ void TableWriter::write_row(std::size_t row) {
 
 void TableWriter::end() {
   if (columns_.empty()) return;
-  fit();
-  write_names();
-  for (std::size_t row = 0; row < num_rows_; ++row) write_row(row);
+  if (!fit() && num_rows_ > 0) {
+    write_records();
+  } else {
+    write_names();
+    for (std::size_t row = 0; row < num_rows_; ++row) write_row(row);
+  }
   if (has_more_) sink_(fmt::format("the first {} rows (more with --rows-max)\n", num_rows_));
 }
 

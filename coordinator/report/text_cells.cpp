@@ -47,6 +47,24 @@ std::string table_row(std::span<const TextColumn> columns, std::span<const std::
   return text + "\n";
 }
 
+std::vector<TextColumn> widened(std::span<const TextColumn> columns,
+                                std::span<const std::vector<std::string>> rows,
+                                std::size_t line_width_max) {
+  std::vector<TextColumn> wide(columns.begin(), columns.end());
+  std::size_t line_width = 0;
+  for (const TextColumn& column : wide) line_width += column.width;
+  for (std::size_t i = 0; i < wide.size(); ++i) {
+    if (!wide[i].is_text) continue;
+    std::size_t needed = wide[i].width;
+    for (const auto& cells : rows) needed = std::max(needed, display_width(cells[i]) + 1);
+    const std::size_t room = line_width_max > line_width ? line_width_max - line_width : 0;
+    const std::size_t more = std::min(needed - wide[i].width, room);
+    wide[i].width += more;
+    line_width += more;
+  }
+  return wide;
+}
+
 std::string table_heading(std::span<const TextColumn> columns) {
   std::vector<std::string> titles;
   std::size_t width = 0;

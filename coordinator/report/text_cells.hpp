@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "proto/text/display_width.hpp"
 
@@ -29,6 +30,13 @@ struct TextColumn {
   std::size_t width;  ///< A space at least stays between it and the next.
   bool is_text = false;
 };
+
+/// The columns with room for the longest text of each as far as a line of `line_width_max` columns
+/// of a terminal allows, the first ones first; none becomes narrower.
+/// @param rows  As many cells each as there are columns.
+[[nodiscard]] std::vector<TextColumn> widened(std::span<const TextColumn> columns,
+                                              std::span<const std::vector<std::string>> rows,
+                                              std::size_t line_width_max);
 
 /// A line of a table, of as many cells as there are columns; what does not fit is shortened.
 [[nodiscard]] std::string table_row(std::span<const TextColumn> columns,

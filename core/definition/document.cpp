@@ -157,7 +157,7 @@ bool Document::read(const std::string& path, std::int64_t& value, const Range& r
   if (found == nullptr) return false;
   const auto* const integer = found->as_integer();
   if (integer == nullptr) {
-    refuse(path, "must be a whole number");
+    refuse(path, "must be a whole number without point or exponent");
     return false;
   }
   if (!range.contains(static_cast<double>(integer->get()))) {

@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
+#include <set>
 #include <string_view>
+
+#include "core/definition/nearest_name.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -13,6 +17,32 @@ namespace {
 std::string with_equals_sign(std::string text) {
   if (const std::size_t colon = text.find(": "); colon != text.npos) text.replace(colon, 1, " =");
   return text;
+}
+
+std::string with_nearest(std::string rule, std::string_view name,
+                         const std::set<std::string>& candidates) {
+  const std::optional<std::string> nearest = nearest_name(name, candidates);
+  return nearest ? fmt::format("{}; nearest is {}", rule, *nearest) : rule;
+}
+
+std::string refusal_of_command(const CLI::App& app, const std::string& name) {
+  std::set<std::string> commands;
+  for (const CLI::App* command : app.get_subcommands({})) commands.insert(command->get_name());
+  return fmt::format("command = {} ({})", name,
+                     with_nearest("must be one that --help lists", name, commands));
+}
+
+/// @param name  Begins with a hyphen, and may have a value behind =.
+std::string refusal_of_option(const CLI::App& app, const std::string& name) {
+  const std::vector<CLI::App*> chosen = app.get_subcommands();
+  const CLI::App& command = chosen.empty() ? app : *chosen.front();
+  std::set<std::string> options;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& known : option->get_lnames()) options.insert("--" + known);
+  }
+  return fmt::format("option = {} ({})", name,
+                     with_nearest("must be one that --help lists",
+                                  std::string_view(name).substr(0, name.find('=')), options));
 }
 
 // What CLI11 says of arguments and option files, worded as everything else.
@@ -46,7 +76,14 @@ std::string refusal_of(const CLI::App& app, const CLI::ParseError& error) {
   if (dynamic_cast<const CLI::ValidationError*>(&error) != nullptr) return with_equals_sign(text);
   const bool needs_command = app.get_require_subcommand_min() > 0;
   if (needs_command && app.get_subcommands().empty() && app.remaining_size() > 0) {
-    return "command = " + app.remaining().front() + " (must be one that --help lists)";
+    return refusal_of_command(app, app.remaining().front());
+  }
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
+    const std::vector<std::string> unknown = app.remaining(true);
+    const auto option = std::ranges::find_if(unknown, [](const std::string& argument) {
+      return argument.size() > 1 && argument.starts_with('-');
+    });
+    if (option != unknown.end()) return refusal_of_option(app, *option);
   }
   return reworded(text);
 }

@@ -6,7 +6,9 @@
 #include <charconv>
 #include <map>
 #include <string>
+#include <string_view>
 #include <system_error>
+#include <type_traits>
 #include <vector>
 
 namespace proofmass::wire {
@@ -22,7 +24,8 @@ template <typename Number>
     const auto parsed = std::from_chars(text.data(), end, number);
     const bool is_number = parsed.ec == std::errc{} && parsed.ptr == end;
     if (is_number && number >= minimum && number <= maximum) return std::string();
-    return fmt::format("{} (must be in [{}, {}])", text, minimum, maximum);
+    const std::string_view kind = std::is_integral_v<Number> && !is_number ? "a whole number " : "";
+    return fmt::format("{} (must be {}in [{}, {}])", text, kind, minimum, maximum);
   };
   return CLI::Validator(check, fmt::format("[{}, {}]", minimum, maximum), "in_range");
 }

@@ -228,7 +228,7 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
     case FileUse::list: {
       const std::array<fs::path, 1> places{file};
       const auto campaigns = list_campaigns(places);
-      (void)listing_text(campaigns);
+      (void)listing_text(campaigns, 80);
       (void)listing_json(campaigns);
       return;
     }

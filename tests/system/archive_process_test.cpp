@@ -167,7 +167,7 @@ TEST_F(ArchiveProcess, RefusesWhatMakesNoSense) {
   EXPECT_EQ(proofmass("hdf5", {"export", "done.db", "--format", "hdf5"}).wait(), 2);
   EXPECT_EQ(proofmass("extra", {"report", "done.db", "--all"}).wait(), 2);
   EXPECT_EQ(errors_of("extra"),
-            "proofmass: error: argument = --all (not expected; --help tells what is)\n");
+            "proofmass: error: option = --all (must be one that --help lists)\n");
   EXPECT_EQ(proofmass("config", {"--config", "none.toml", "list"}).wait(), 2);
   EXPECT_EQ(errors_of("config"), "proofmass: error: config = none.toml (cannot be read)\n");
   std::ofstream(path("options.toml")) << "[query]\nrows = 3\n";

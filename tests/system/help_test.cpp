@@ -80,10 +80,13 @@ class Usage : public Help {
 
 TEST_F(Usage, IsRefusedWithTheRule) {
   const std::vector<std::pair<Arguments, std::string>> cases{
-      {{"raport", "a.db"}, "command = raport (must be one that --help lists)"},
-      {{"run", "a.toml", "--runs", "-1"}, "--runs = -1 (must be in [1, 1000000000])"},
-      {{"run", "a.toml", "--seed", "-1"}, "--seed = -1 (must be in [0, 9223372036854775807])"},
-      {{"run", "a.toml", "--failures", "-1"}, "--failures = -1 (must be in [0, 1000000000])"},
+      {{"raport", "a.db"}, "command = raport (must be one that --help lists; nearest is report)"},
+      {{"run", "a.toml", "--runs", "-1"},
+       "--runs = -1 (must be a whole number in [1, 1000000000])"},
+      {{"run", "a.toml", "--seed", "-1"},
+       "--seed = -1 (must be a whole number in [0, 9223372036854775807])"},
+      {{"run", "a.toml", "--failures", "-1"},
+       "--failures = -1 (must be a whole number in [0, 1000000000])"},
       {{"run", "a.toml", "--audit", "2"}, "--audit = 2 (must be in [0, 1])"},
       {{"run", "a.toml", "--workers", "0"}, "--workers = 0 (must be in [1, 1024])"},
       {{"run", "a.toml", "--until", "std(k2c) within 5"},
@@ -91,7 +94,8 @@ TEST_F(Usage, IsRefusedWithTheRule) {
        "\"all objectives within PERCENT%\" or \"REQUIREMENT decided\")"},
       {{"export", "a.db", "--format", "xml"}, "--format = xml (must be one of csv, hdf5, json)"},
       {{"tag", "a.db", "delete"}, "ACTION = delete (must be one of add, remove)"},
-      {{"sensitivity", "a.db", "--run", "one"}, "--run = one (must be in [0, 999999999])"},
+      {{"sensitivity", "a.db", "--run", "one"},
+       "--run = one (must be a whole number in [0, 999999999])"},
   };
   for (const auto& [arguments, rule] : cases) {
     EXPECT_EQ(refusal_of("proofmass", arguments), "proofmass: error: " + rule + "\n");

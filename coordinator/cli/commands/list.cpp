@@ -17,8 +17,9 @@ struct ListOptions {
 int list_databases(const ListOptions& options) {
   const std::vector<std::filesystem::path> here{"."};
   const auto campaigns = list_campaigns(options.places.empty() ? here : options.places);
-  const auto print = options.format == OutputFormat::json ? listing_json : listing_text;
-  print_lines(print(campaigns));
+  print_lines(options.format == OutputFormat::json
+                  ? listing_json(campaigns)
+                  : listing_text(campaigns, line_width_max_of(stdout)));
   return exit_done;
 }
 

@@ -11,8 +11,9 @@ namespace {
 int show_status(const ClientOptions& options) {
   return with_connection(options, [&](const Ask& ask) {
     const wire::StatusReply status = whole_status(ask);
-    print_lines(options.format == OutputFormat::json ? status_json(status, JsonLayout::indented)
-                                                     : status_table(status));
+    print_lines(options.format == OutputFormat::json
+                    ? status_json(status, JsonLayout::indented)
+                    : status_table(status, line_width_max_of(stdout)));
     return exit_done;
   });
 }

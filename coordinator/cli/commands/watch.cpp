@@ -8,17 +8,13 @@
 #include <cstdio>
 #include <thread>
 
+#include "coordinator/cli/client_tables.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/watch_display.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-bool is_over(const wire::CampaignStatus& campaign) {
-  return campaign.phase == wire::CampaignPhase::finished ||
-         campaign.phase == wire::CampaignPhase::cancelled;
-}
 
 [[noreturn]] void fail_unknown(const wire::StatusReply& status, const std::string& name) {
   std::string names;

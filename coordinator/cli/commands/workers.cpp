@@ -11,8 +11,9 @@ namespace {
 int show_workers(const ClientOptions& options) {
   return with_connection(options, [&](const Ask& ask) {
     const wire::WorkersReply workers = all_workers(ask);
-    print_lines(options.format == OutputFormat::json ? workers_json(workers)
-                                                     : workers_table(workers));
+    print_lines(options.format == OutputFormat::json
+                    ? workers_json(workers)
+                    : workers_table(workers, line_width_max_of(stdout)));
     return exit_done;
   });
 }

@@ -74,6 +74,11 @@ EnvironmentTable parse_environment(std::string_view text, const std::string& nam
 MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
   MicroscopeCampaign campaign = read_definition(document);
   document.check();
+  // A file without a name may be empty by mistake, and would be the paper's campaign.
+  if (document.find("campaign.name") == nullptr) {
+    document.refuse_absence("campaign.name", "every campaign needs one");
+    document.check();
+  }
   read_environment(campaign, files);
   read_columns(campaign, files);
   try {

@@ -142,7 +142,7 @@ TEST_F(BitFlips, EndNoVerificationAndNoListing) {
       EXPECT_FALSE(holds) << what;
       return std::string();
     });
-    (void)printed([&] { return listing_text(list_campaigns(std::vector{path})); });
+    (void)printed([&] { return listing_text(list_campaigns(std::vector{path}), 80); });
   });
 }
 

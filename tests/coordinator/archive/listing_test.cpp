@@ -81,7 +81,7 @@ TEST_F(Listing, SaysWhatIsWrongWithACampaignFile) {
   EXPECT_THAT(campaigns[1].problem, HasSubstr("damaged"));
   EXPECT_THAT(campaigns[2].problem, HasSubstr("is newer than this program"));
   EXPECT_THAT(campaigns[3].problem, HasSubstr("was made before the first release"));
-  const std::string text = listing_text(campaigns);
+  const std::string text = listing_text(campaigns, 80);
   EXPECT_THAT(text, HasSubstr("damaged.db\n  " + campaigns[1].problem + "\n"));
 }
 
@@ -131,7 +131,7 @@ TEST_F(Listing, NamesDamagedFilesThatAreNamed) {
 
 TEST_F(Listing, OfNothingSaysSo) {
   EXPECT_THAT(list(), IsEmpty());
-  EXPECT_EQ(listing_text({}), "no campaigns\n");
+  EXPECT_EQ(listing_text({}, 80), "no campaigns\n");
   EXPECT_EQ(nlohmann::json::parse(listing_json({}))["campaigns"].size(), 0U);
 }
 
@@ -146,7 +146,7 @@ const ListedCampaign extreme{.file = "/some/where/a-file-with-a-rather-long-name
                              .tags = {"a", "thesis"}};
 
 TEST(ListingText, FitsATerminal) {
-  const std::string text = listing_text({&extreme, 1});
+  const std::string text = listing_text({&extreme, 1}, 80);
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) EXPECT_LE(display_width(line), 80U) << line;
   EXPECT_THAT(text, HasSubstr("a-file-with-a-ra… "));
@@ -158,7 +158,7 @@ TEST(ListingText, BreaksTagsBetweenLines) {
   ListedCampaign campaign = extreme;
   const std::string longest(64, 'a');
   campaign.tags = {longest, "bcdefg", "h", longest};
-  EXPECT_THAT(listing_text({&campaign, 1}),
+  EXPECT_THAT(listing_text({&campaign, 1}, 80),
               HasSubstr("\n  tags: " + longest + " bcdefg\n        h " + longest + "\n"));
 }
 

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <string>
 
@@ -26,6 +27,33 @@ TEST(CampaignFileErrors, NameAnUnknownKeyAndTheNearestOne) {
             "dispersion.offcentring_m.maximum)");
 }
 
+TEST(CampaignFileErrors, SayThatACampaignNeedsAName) {
+  for (const char* text : {"", "# a comment\n", "noise.scale = 0\n"}) {
+    const test::ScratchFolder folder;
+    const std::string file = folder.write("campaign.toml", text).string();
+    try {
+      (void)read_campaign(file);
+      FAIL() << text;
+    } catch (const DefinitionError& error) {
+      EXPECT_EQ(error.what(), file + ": campaign.name is missing (every campaign needs one)");
+    }
+  }
+}
+
+TEST(CampaignFileErrors, SayThatAKeyIsSetTwice) {
+  EXPECT_EQ(refusal_of("", {.assignments = {"noise.scale=0", "noise.scale=1"}}),
+            "--set noise.scale=1: noise.scale is set more than once");
+  EXPECT_EQ(refusal_of("", {.assignments = {"campaign.runs=5"}, .num_runs = 7}),
+            "--runs 7: campaign.runs is set more than once");
+}
+
+TEST(CampaignFileErrors, NameAPipeAsDataFileAndDoNotWaitForIt) {
+  const test::ScratchFolder folder;
+  ASSERT_EQ(::mkfifo((folder.path() / "table.csv").c_str(), 0600), 0);  // Nobody writes to it.
+  EXPECT_EQ(refusal_of("[environment]\nkind = \"file\"\nfile = \"table.csv\"\n", folder),
+            "campaign.toml:3: environment.file = \"table.csv\" (is a pipe, a socket or a device)");
+}
+
 TEST(CampaignFileErrors, NameAWrongType) {
   EXPECT_EQ(refusal_of("noise.scale = \"off\""),
             "campaign.toml:1: noise.scale = \"off\" (must be a number)");
@@ -36,9 +64,11 @@ TEST(CampaignFileErrors, NameAWrongType) {
   EXPECT_EQ(refusal_of("noise.scale = 2024-01-01"),
             "campaign.toml:1: noise.scale = a date or time (must be a number)");
   EXPECT_EQ(refusal_of("estimation.num_rounds_max = 3.0"),
-            "campaign.toml:1: estimation.num_rounds_max = 3 (must be a whole number)");
+            "campaign.toml:1: estimation.num_rounds_max = 3 (must be a whole number without point "
+            "or exponent)");
   EXPECT_EQ(refusal_of("campaign.runs = \"many\""),
-            "campaign.toml:1: campaign.runs = \"many\" (must be a whole number)");
+            "campaign.toml:1: campaign.runs = \"many\" (must be a whole number without point or "
+            "exponent)");
   EXPECT_EQ(refusal_of("campaign.name = 5"), "campaign.toml:1: campaign.name = 5 (must be a text)");
   EXPECT_EQ(refusal_of("noise = 5"), "campaign.toml:1: noise = 5 (must be a table)");
   EXPECT_EQ(refusal_of("noise.preset = \"design\""),

@@ -17,11 +17,11 @@ using ::testing::IsEmpty;
 
 MicroscopeCampaign campaign_of(std::string_view text, const Overrides& overrides = {}) {
   const test::ScratchFolder folder;
-  return test::microscope(*read_campaign(folder.write("campaign.toml", text), overrides));
+  return test::microscope(*test::campaign_of_text(text, folder, overrides));
 }
 
-TEST(ReadCampaign, CompletesAnEmptyFileWithTheNominalValues) {
-  const MicroscopeCampaign campaign = campaign_of("");
+TEST(ReadCampaign, CompletesAFileThatHasANameAloneWithTheNominalValues) {
+  const MicroscopeCampaign campaign = campaign_of("campaign.name = \"hardy2013\"");
   EXPECT_THAT(definition_differences(campaign, MicroscopeCampaign{}), IsEmpty());
   EXPECT_EQ(campaign.num_runs, 100u);
   EXPECT_EQ(campaign.scenario.estimation.correction, Correction::second_order);
@@ -115,7 +115,7 @@ TEST(ReadCampaign, ReadsDataFilesBesideTheCampaignFile) {
   folder.write("draws.csv", "a,b\n1,10\n2,20\n3,30\n");
   const MicroscopeCampaign campaign =
       test::microscope(*read_campaign(folder.write("campaign.toml", R"(
-    campaign.runs = 3
+    campaign = { name = "tables", runs = 3 }
     [environment]
     kind = "file"
     file = "env.csv"
@@ -132,11 +132,10 @@ TEST(ReadCampaign, ReadsDataFilesBesideTheCampaignFile) {
   EXPECT_THAT(campaign.table_values(RunIndex{2}), ElementsAre(30, 3));
 }
 
-TEST(Overrides, WinOverTheFileAndTheLastOneWins) {
+TEST(Overrides, WinOverTheFile) {
   const Overrides overrides{
-      .assignments = {"noise.scale=0.5", "estimation.correction=first_order", "noise.scale=0.25",
-                      "campaign.name=\"quoted\"", "campaign.runs=5",
-                      "dispersion.offcentring_m.x.maximum=1e-6"},
+      .assignments = {"noise.scale=0.25", "estimation.correction=first_order",
+                      "campaign.name=\"quoted\"", "dispersion.offcentring_m.x.maximum=1e-6"},
       .num_runs = 12,
       .seed = 34};
   const MicroscopeCampaign campaign = campaign_of("campaign.runs = 3\nnoise.scale = 9", overrides);

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -37,12 +39,24 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
+/// The campaign of a file with this text, which is given the name that it needs if it has none.
+inline std::unique_ptr<Campaign> campaign_of_text(std::string_view text,
+                                                  const ScratchFolder& folder,
+                                                  coordinator::Overrides overrides = {}) {
+  const auto is_name = [](std::string_view key) { return key.starts_with("campaign.name"); };
+  const bool has_name = text.find("campaign.name") != text.npos ||
+                        text.find("[campaign]\n    name") != text.npos ||
+                        std::ranges::any_of(overrides.assignments, is_name);
+  if (!has_name) overrides.assignments.push_back("campaign.name=test");
+  return coordinator::read_campaign(folder.write("campaign.toml", text), overrides);
+}
+
 /// What read_campaign() says against a file `campaign.toml` with this text, the folder taken off;
 /// empty if it says nothing.
 inline std::string refusal_of(std::string_view text, const ScratchFolder& folder,
                               const coordinator::Overrides& overrides = {}) {
   try {
-    (void)coordinator::read_campaign(folder.write("campaign.toml", text), overrides);
+    (void)campaign_of_text(text, folder, overrides);
     return "";
   } catch (const DefinitionError& error) {
     std::string message = error.what();

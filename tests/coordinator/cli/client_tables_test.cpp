@@ -54,7 +54,7 @@ TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {
   status.num_unserved_files = 2;
   status.quarantined_hosts = {"n7"};
   status.num_quarantined_hosts = 1;
-  const std::string text = status_table(status);
+  const std::string text = status_table(status, 79);
   EXPECT_TRUE(
       text.ends_with("and 2 more campaigns\n"
                      "not served, tried again: campaign file = d/b.db (is locked)\n"
@@ -69,7 +69,7 @@ TEST(StatusTable, ShowsAReasonInOneLine) {
   wire::StatusReply status = status_of({campaign("a", 1)});
   status.campaigns[0].storage_failure = "full\nb: all is well";
   status.unserved_files = {{.file = "d/b.db", .reason = "d/b.db: campaign b\nc \x1b[2J"}};
-  const std::string text = status_table(status);
+  const std::string text = status_table(status, 79);
   EXPECT_TRUE(
       text.ends_with("a: nothing can be stored: full\\nb: all is well\n"
                      "not served, tried again: d/b.db: campaign b\\nc \\u001b[2J\n"))
@@ -88,7 +88,7 @@ TEST(StatusTable, ShowsCampaignsAndWhatIsOutOfTheOrdinary) {
   second.num_without_estimate = 2;
   second.num_audited = 10;
   second.num_mismatches = 3;
-  EXPECT_EQ(status_table(status_of({first, second})),
+  EXPECT_EQ(status_table(status_of({first, second}), 79),
             R"(Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min
 12 workers with 48 slots, 16 runs lent
 
@@ -103,7 +103,7 @@ second-order: 10 results compared with a second computation: 3 differ (none may)
 }
 
 TEST(StatusTable, SaysThatThereIsNoCampaign) {
-  EXPECT_EQ(status_table(status_of({})),
+  EXPECT_EQ(status_table(status_of({}), 79),
             "Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min\n"
             "12 workers with 48 slots, 0 runs lent\n\nno campaigns\n");
 }
@@ -111,21 +111,32 @@ TEST(StatusTable, SaysThatThereIsNoCampaign) {
 TEST(StatusTable, SaysWhyNothingCanBeStored) {
   wire::CampaignStatus status = campaign("a", 0);
   status.storage_failure = "a.db: disk full";
-  EXPECT_NE(status_table(status_of({status})).find("\na: nothing can be stored: a.db: disk full\n"),
-            std::string::npos);
+  EXPECT_NE(
+      status_table(status_of({status}), 79).find("\na: nothing can be stored: a.db: disk full\n"),
+      std::string::npos);
 }
 
 TEST(StatusTable, ShowsNoTimeLeftOfACampaignThatIsOver) {
   wire::CampaignStatus status = campaign("a", 100);
   status.phase = wire::CampaignPhase::finished;
   status.remaining_s = 0.0;
-  EXPECT_NE(status_table(status_of({status})).find("100  100       -           -\n"),
+  EXPECT_NE(status_table(status_of({status}), 79).find("100  100       -           -\n"),
             std::string::npos);
 }
 
 TEST(StatusTable, KeepsALongNameApartFromTheNextColumn) {
-  const std::string text = status_table(status_of({campaign(std::string(128, 'x'), 1)}));
+  const std::string text = status_table(status_of({campaign(std::string(128, 'x'), 1)}), 79);
   EXPECT_NE(text.find("\nxxxxxxxxxxxxxxx… active "), std::string::npos) << text;
+}
+
+TEST(StatusTable, GivesALongNameTheRoomThatTheLineHas) {
+  const std::string name(30, 'x');
+  const wire::StatusReply status = status_of({campaign(name, 1), campaign("b", 1)});
+  const std::string text = status_table(status, 200);
+  EXPECT_NE(text.find("\n" + name + " active "), std::string::npos) << text;
+  EXPECT_NE(text.find("\nb" + std::string(30, ' ') + "active "), std::string::npos) << text;
+  expect_width_at_most(status_table(status, 85), 85);
+  EXPECT_NE(status_table(status, 85).find("\nxxxxxxxxxxxxxxxxxxxxx… active "), std::string::npos);
 }
 
 TEST(StatusTable, HasAtMost79Columns) {
@@ -139,7 +150,7 @@ TEST(StatusTable, HasAtMost79Columns) {
     wire::StatusReply status = status_of({wide});
     status.version = std::string(128, 'v');
     status.num_slots = std::numeric_limits<std::uint64_t>::max();
-    expect_width_at_most(status_table(status), 79);
+    expect_width_at_most(status_table(status, 79), 79);
   }
 }
 
@@ -147,7 +158,7 @@ TEST(WorkersTable, ShowsWorkersAndWhoIsInQuarantine) {
   wire::WorkerStatus second = worker(1234, "local-2");
   second.silent_s = 3.0 * 3600.0;
   second.is_quarantined = true;
-  EXPECT_EQ(workers_table({.workers = {worker(7, "local-1"), second}}),
+  EXPECT_EQ(workers_table({.workers = {worker(7, "local-1"), second}}, 79),
             R"(      id  worker         host               pid slots    lent  results    heard
 ───────────────────────────────────────────────────────────────────────────────
        7  local-1        n7                4711     4      64     1234      2 s
@@ -156,7 +167,7 @@ TEST(WorkersTable, ShowsWorkersAndWhoIsInQuarantine) {
 )");
 }
 
-TEST(WorkersTable, SaysThatThereIsNoWorker) { EXPECT_EQ(workers_table({}), "no workers\n"); }
+TEST(WorkersTable, SaysThatThereIsNoWorker) { EXPECT_EQ(workers_table({}, 79), "no workers\n"); }
 
 TEST(WorkersTable, HasAtMost79Columns) {
   constexpr auto most = std::numeric_limits<std::uint64_t>::max();
@@ -164,7 +175,7 @@ TEST(WorkersTable, HasAtMost79Columns) {
   wide.host = std::string(128, 'y');
   wide.process_id = wide.num_slots = wide.num_lent = wide.num_results = most;
   wide.silent_s = 1e300;
-  expect_width_at_most(workers_table({.workers = {wide}}), 79);
+  expect_width_at_most(workers_table({.workers = {wide}}, 79), 79);
 }
 
 TEST(CampaignLine, SaysHowFarItIsAndHowFast) {

@@ -30,21 +30,30 @@ TEST(Duration, IsWrittenInItsTwoLargestUnits) {
 }
 
 TEST(ProgressBar, ShowsRunsPercentRateAndTimeLeft) {
-  EXPECT_EQ(progress_bar(progress(42, 100, 0.5)),
+  EXPECT_EQ(progress_bar(progress(42, 100, 0.5), 79),
             "42/100 runs [############.................]  42 %  0.50 runs/s  1 min 56 s left");
-  EXPECT_EQ(progress_bar(progress(100, 100, 25.0)),
+  EXPECT_EQ(progress_bar(progress(100, 100, 25.0), 62),
             "100/100 runs [##############################] 100 %  25 runs/s");
 }
 
 TEST(ProgressBar, ShowsNoRateBeforeThereIsOne) {
-  EXPECT_EQ(progress_bar(progress(0, 100, 0.0)),
+  EXPECT_EQ(progress_bar(progress(0, 100, 0.0), 49),
             "0/100 runs [..............................]   0 %");
 }
 
-TEST(ProgressBar, NeverFillsALineOf80Columns) {
+TEST(ProgressBar, FillsTheLine) {
+  for (const std::size_t columns_max : {59U, 79U, 199U}) {
+    EXPECT_EQ(progress_bar(progress(42, 100, 0.0), columns_max).size(), columns_max);
+  }
+}
+
+TEST(ProgressBar, IsNeverWiderThanTheLine) {
   for (std::uint64_t num_runs = 1; num_runs <= num_runs_max; num_runs *= 10) {
     for (const double rate_hz : {0.0, 1e-9, 0.05, 0.5, 20.0, 1e6}) {
-      EXPECT_LE(progress_bar(progress(num_runs - 1, num_runs, rate_hz)).size(), 79U);
+      for (const std::size_t columns_max : {20U, 79U}) {
+        EXPECT_LE(progress_bar(progress(num_runs - 1, num_runs, rate_hz), columns_max).size(),
+                  columns_max);
+      }
     }
   }
 }
@@ -72,7 +81,7 @@ TEST(ProgressDisplay, BeginsAgainWhenThereAreMoreRuns) {
 TEST(ProgressDisplay, ShowsThatNothingCanBeStored) {
   wire::CampaignStatus failing = progress(42, 100, 0.5);
   failing.storage_failure = "campaign file = a.db (the disk is full)";
-  EXPECT_EQ(progress_bar(failing),
+  EXPECT_EQ(progress_bar(failing, 73),
             "42/100 runs [############..................]  42 %  nothing can be stored");
   const std::string text =
       output_of<ProgressDisplay>(DisplayMode::lines, [&](ProgressDisplay& display) {
@@ -99,9 +108,8 @@ TEST(ProgressDisplay, WritesTheBarOverItself) {
         display.update(progress(1, 2, 0.0));  // Nothing new: not written again.
         display.update(progress(2, 2, 0.0));
       });
-  EXPECT_EQ(text,
-            "\r1/2 runs [###############...............]  50 %\033[K"
-            "\r2/2 runs [##############################] 100 %\033[K\n");
+  EXPECT_EQ(text, "\r" + progress_bar(progress(1, 2, 0.0), 79) + "\033[K\r" +
+                      progress_bar(progress(2, 2, 0.0), 79) + "\033[K\n");
 }
 
 TEST(ProgressDisplay, DoesNotTearTheBarWithANote) {
@@ -111,7 +119,7 @@ TEST(ProgressDisplay, DoesNotTearTheBarWithANote) {
         display.note("a note");
         display.update(progress(2, 2, 0.0));
       });
-  const std::string bar = "\r2/2 runs [##############################] 100 %\033[K";
+  const std::string bar = "\r" + progress_bar(progress(2, 2, 0.0), 79) + "\033[K";
   EXPECT_EQ(text, bar + "\r\033[Ka note\n" + bar + "\n");
 }
 

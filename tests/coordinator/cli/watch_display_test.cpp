@@ -36,9 +36,15 @@ TEST(Drawing, TakesThePlaceOfTheOneBefore) {
 // A line that wraps, or one that scrolls the others away, would make the next drawing miss its
 // place.
 TEST(Drawing, FitsOnTheScreen) {
-  const Drawing drawing = drawn_over(0, "abcdef\nb\nc\nd\n", {.columns = 4, .rows = 3});
+  const Drawing drawing = drawn_over(0, "abcdef\nb\n", {.columns = 4, .rows = 3});
   EXPECT_EQ(drawing.text, "abc…\033[K\nb\033[K\n\033[J");
   EXPECT_EQ(drawing.num_lines, 2U);
+}
+
+TEST(Drawing, SaysHowManyLinesItLeavesOut) {
+  const Drawing drawing = drawn_over(0, "a\nb\nc\nd", {.columns = 80, .rows = 4});
+  EXPECT_EQ(drawing.text, "a\033[K\nb\033[K\nand 2 more lines\033[K\n\033[J");
+  EXPECT_EQ(drawing.num_lines, 3U);
 }
 
 TEST(Drawing, NeedsNoEndOfTheLastLine) {

@@ -131,7 +131,7 @@ TEST_F(ServiceClients, LearnThatAPausedCampaignFailsTooOften) {
   (void)client->done(wire::ControlRequest{ControlAction::pause, "a"});
   worker.deliver(lease, RunStatus::no_draw);
   EXPECT_EQ(wait_for_event("too_many_failures"),
-            "too_many_failures without_estimate=1 failures_max=0");
+            "too_many_failures without_estimate=1 failures_max=0 campaign=a");
 }
 
 TEST_F(ServiceClients, GiveACampaignABudgetOfFailuresThatHoldsAtOnce) {
@@ -141,7 +141,7 @@ TEST_F(ServiceClients, GiveACampaignABudgetOfFailuresThatHoldsAtOnce) {
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow(1), RunStatus::no_draw);
   EXPECT_EQ(wait_for_event("too_many_failures"),
-            "too_many_failures without_estimate=1 failures_max=0");
+            "too_many_failures without_estimate=1 failures_max=0 campaign=a");
 }
 
 TEST_F(ServiceClients, SubmitACancelledCampaignAgain) {

@@ -202,7 +202,7 @@ TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
     PlayingWorker worker(endpoint.address());
     worker.deliver(worker.borrow());
     (void)worker.receive<wire::ResultAck>();
-    wait_for_event("campaign_closed name=a");
+    wait_for_event("campaign_closed campaign=a");
     worker.send(wire::Bye{});
     wait_for_event("worker_left");
   }
@@ -251,7 +251,7 @@ TEST_F(ServiceWithADirectory, ServesAnOlderCopyInPlaceOfAFileThatWasClosed) {
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
   (void)worker.receive<wire::ResultAck>();
-  wait_for_event("campaign_closed name=a");
+  wait_for_event("campaign_closed campaign=a");
   fs::rename(directory / "older", directory / "a.db");
   while (folder.num_loads() < 2) std::this_thread::yield();
   EXPECT_EQ(worker.receive<wire::RunLease>().runs.first, RunIndex{0});
@@ -280,7 +280,7 @@ TEST_F(ServiceWithADirectory, ComputesStatisticsAgainThatADiskPrevented) {
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
   (void)worker.receive<wire::ResultAck>();
-  wait_for_event("campaign_closed name=a");
+  wait_for_event("campaign_closed campaign=a");
   EXPECT_EQ(num_failures, 4);
   EXPECT_EQ(num_events("statistics_failed"), 1);
   EXPECT_EQ(num_events("campaign_summarised"), 1);

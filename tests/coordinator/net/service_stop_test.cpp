@@ -96,7 +96,8 @@ TEST_F(ServiceStop, EndsACampaignWhoseRuleCannotBeChecked) {
   test::PlayingWorker worker(endpoint.address());
   worker.work();
   wait_for_end();
-  EXPECT_EQ(wait_for_event("statistics_failed"), "statistics_failed reason=\"no disk is there\"");
+  EXPECT_EQ(wait_for_event("statistics_failed"),
+            "statistics_failed reason=\"no disk is there\" campaign=a");
   EXPECT_EQ(num_stored("a"), 1U);
 }
 
@@ -110,7 +111,7 @@ TEST_F(ServiceStop, CancelsACampaignWithMoreFailuresThanItMayHave) {
   EXPECT_EQ(file_of_a().control().phase, CampaignPhase::active);
   two.deliver(two.borrow(1), RunStatus::not_finite);
   EXPECT_EQ(wait_for_event("too_many_failures"),
-            "too_many_failures without_estimate=2 failures_max=1");
+            "too_many_failures without_estimate=2 failures_max=1 campaign=a");
   end(StopRequest::now);
   EXPECT_EQ(file_of_a().control().phase, CampaignPhase::cancelled);
   EXPECT_EQ(num_stored("a"), 2U);
@@ -128,7 +129,7 @@ TEST_F(ServiceStop, CountsRunsThatAreGivenUpAsFailures) {
   test::PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow(1), RunStatus::no_draw);
   EXPECT_EQ(wait_for_event("too_many_failures"),
-            "too_many_failures without_estimate=2 failures_max=1");
+            "too_many_failures without_estimate=2 failures_max=1 campaign=a");
 }
 
 TEST_F(ServiceStop, DoesNotCheckARuleAgainThatItsPredecessorDid) {
@@ -157,7 +158,7 @@ TEST_F(ServiceStop, CountsTheFailuresOfItsPredecessor) {
   test::PlayingWorker another(endpoint.address(), 1002);
   another.deliver(another.borrow(1), RunStatus::no_draw);
   EXPECT_EQ(wait_for_event("too_many_failures"),
-            "too_many_failures without_estimate=2 failures_max=1");
+            "too_many_failures without_estimate=2 failures_max=1 campaign=a");
 }
 
 }  // namespace

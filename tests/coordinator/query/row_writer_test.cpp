@@ -163,17 +163,31 @@ TEST(TableRows, WantNoneBeyondTheFirstThatIsNotShown) {
 }
 
 TEST(TableRows, CutTextToFitTheTerminalAndNeverANumber) {
-  const std::vector<Row> rows{{text("a long text that goes on and on"), 0.1234567890123456}};
+  const std::vector<Row> rows{{text("a long text that goes on and on"), integer(123456789)}};
   EXPECT_EQ(
-      written(RowFormat::table, {"text", "value"}, rows, {.num_rows_max = 10, .num_columns = 34}),
-      "text                         value\n"
-      "──────────────  ──────────────────\n"
-      "a long text t…  0.1234567890123456\n");
+      written(RowFormat::table, {"text", "value"}, rows, {.num_rows_max = 10, .num_columns = 25}),
+      "text                value\n"
+      "──────────────  ─────────\n"
+      "a long text t…  123456789\n");
+}
+
+TEST(TableRows, HaveSixSignificantDigits) {
+  EXPECT_EQ(written(RowFormat::table, {"a"}, {{0.1234567890123456}, {1.0 / 3e12}, {2.5}}),
+            "          a\n───────────\n   0.123457\n3.33333e-13\n        2.5\n");
+}
+
+// The second line below a row is cut at the 16 columns of the terminal; a table of these two
+// columns takes at least 8 + 2 + 9.
+TEST(TableRows, ThatAreWiderThanTheTerminalAreRecords) {
+  const std::vector<Row> rows{{text("a long text"), integer(123456789)}, {null, integer(2)}};
   EXPECT_EQ(
-      written(RowFormat::table, {"text", "value"}, rows, {.num_rows_max = 10, .num_columns = 10}),
-      "text                   value\n"
-      "────────  ──────────────────\n"
-      "a long …  0.1234567890123456\n");
+      written(RowFormat::table, {"text", "value"}, rows, {.num_rows_max = 10, .num_columns = 16}),
+      "row 1\n"
+      "  text   a long…\n"
+      "  value  123456…\n"
+      "row 2\n"
+      "  text\n"
+      "  value  2\n");
 }
 
 TEST(TableRows, CutVeryLongText) {

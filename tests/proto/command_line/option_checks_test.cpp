@@ -22,7 +22,7 @@ TEST(InRange, RefusesOthersWithTheRule) {
   EXPECT_EQ(check("1025"), "1025 (must be in [0, 1024])");
   for (const std::string text :
        {"-1", "18446744073709551617", "1.5", "1e3", "0x10", "one", "7 ", ""}) {
-    EXPECT_EQ(check(text), text + " (must be in [0, 1024])");
+    EXPECT_EQ(check(text), text + " (must be a whole number in [0, 1024])");
   }
   for (const std::string text : {"-0.001", "1.001", "nan", "inf", "half"}) {
     EXPECT_EQ(in_range(0.0, 1.0)(text), text + " (must be in [0, 1])");
@@ -34,6 +34,36 @@ TEST(OneOf, NamesTheWordsThatItTakes) {
   EXPECT_EQ(check("json"), "");
   EXPECT_EQ(check("xml"), "xml (must be one of csv, json)");
   EXPECT_EQ(check("JSON"), "JSON (must be one of csv, json)");
+}
+
+/// What a program with `run --runs N` and `report` says of these arguments.
+std::string refusal(const std::string& arguments) {
+  CLI::App app;
+  app.require_subcommand(1);
+  std::uint64_t num_runs = 0;
+  app.add_subcommand("run", "")->add_option("--runs", num_runs, "");
+  app.add_subcommand("report", "");
+  try {
+    app.parse(arguments);
+  } catch (const CLI::ParseError& error) {
+    return refusal_of(app, error);
+  }
+  return {};
+}
+
+TEST(Refusal, NamesTheNearestCommandAndOption) {
+  EXPECT_EQ(refusal("raport"),
+            "command = raport (must be one that --help lists; nearest is report)");
+  EXPECT_EQ(refusal("run --rnus 3"),
+            "option = --rnus (must be one that --help lists; nearest is --runs)");
+  EXPECT_EQ(refusal("run --rnus=3"),
+            "option = --rnus=3 (must be one that --help lists; nearest is --runs)");
+}
+
+TEST(Refusal, NamesNoneIfNoneIsNear) {
+  EXPECT_EQ(refusal("simulate"), "command = simulate (must be one that --help lists)");
+  EXPECT_EQ(refusal("run --database"), "option = --database (must be one that --help lists)");
+  EXPECT_EQ(refusal("report more"), "argument = more (not expected; --help tells what is)");
 }
 
 TEST(Choice, SetsTheValueOfItsWord) {
