@@ -88,6 +88,12 @@ std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
   return model().read_campaign(document, files);
 }
 
+std::unique_ptr<Campaign> example_campaign() {
+  Document document("example", model().example(), {});
+  DataFilesIn files(document, {});
+  return model().read_campaign(document, files);
+}
+
 void require_identity(const Campaign& defined, const StoredIdentity& stored) {
   const auto require_same = [](std::string_view field, const std::string& value,
                                const std::string& expected) {

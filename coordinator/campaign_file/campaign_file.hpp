@@ -37,6 +37,9 @@ inline constexpr std::uintmax_t data_file_size_max = std::uintmax_t{64} << 20;
 [[nodiscard]] std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
                                                       const Overrides& overrides = {});
 
+/// The campaign of the file that `proofmass init` writes.
+[[nodiscard]] std::unique_ptr<Campaign> example_campaign();
+
 /// What a database says of its campaign besides the definition, as text.
 struct StoredIdentity {
   std::string name;

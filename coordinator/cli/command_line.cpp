@@ -16,7 +16,7 @@ int run_proofmass(int argc, char** argv,
       ->envname("PROOFMASS_CONFIG");
   app.allow_config_extras(CLI::config_extras_mode::error);
   Command chosen;
-  for (const auto add : {add_run, add_init, add_keygen}) add(app, chosen);
+  for (const auto add : {add_run, add_init, add_check, add_keygen}) add(app, chosen);
   add_further_commands(app, chosen);
   for (const auto add : {add_report, add_sensitivity, add_query, add_verify, add_export, add_backup,
                          add_compare, add_list, add_tag, add_note, add_submit, add_status,

@@ -44,6 +44,7 @@ inline constexpr const char* database_text = "Database of a campaign";
 
 void add_run(CLI::App& app, Command& chosen);
 void add_init(CLI::App& app, Command& chosen);
+void add_check(CLI::App& app, Command& chosen);
 void add_keygen(CLI::App& app, Command& chosen);
 
 // Commands that read or change a database.
