@@ -15,7 +15,12 @@ class WakingTime {
 
   /// The time, without what was longer than `gap_max` between two calls.
   /// @param steady  Not before the one of any earlier call.
-  [[nodiscard]] TimePoint at(TimePoint steady);
+  [[nodiscard]] TimePoint at(TimePoint steady) {
+    const Duration gap = steady - asked_at_;
+    if (gap > gap_max) slept_ += gap - gap_max;
+    asked_at_ = steady;
+    return steady - slept_;
+  }
 
   /// Several times the longest time between two calls of a process that is awake.
   static constexpr std::chrono::milliseconds gap_max{500};

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/text/display_width.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 

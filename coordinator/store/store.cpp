@@ -17,7 +17,6 @@
 #include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/detail/integrity.hpp"
-#include "coordinator/store/detail/rescue.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"

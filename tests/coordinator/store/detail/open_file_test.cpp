@@ -1,4 +1,4 @@
-#include "coordinator/store/detail/waiting_entries.hpp"
+#include "coordinator/store/detail/open_file.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,6 @@
 // What a campaign file keeps beside its results, and what verification says if it is not so.
 
-#include "coordinator/archive/derived_checks.hpp"
+#include "coordinator/archive/result_scan.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
