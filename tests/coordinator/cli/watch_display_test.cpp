@@ -59,6 +59,16 @@ TEST(ScreenSize, IsTheUsualOneWhereThereIsNoTerminal) {
   EXPECT_EQ(size.rows, 24U);
 }
 
+// A small screen leaves out the last lines.
+TEST(WatchDisplay, ShowsCampaignsThatAreOverLast) {
+  wire::StatusReply status = status_of("over", 100);
+  status.campaigns[0].phase = wire::CampaignPhase::finished;
+  status.campaigns.push_back(status_of("open", 1).campaigns[0]);
+  const std::string text = output_of<WatchDisplay>(
+      WatchMode::screen, [&](WatchDisplay& display) { display.update(status); });
+  EXPECT_LT(text.find("\nopen"), text.find("\nover"));
+}
+
 TEST(WatchDisplay, WritesALineEveryTenPercent) {
   const std::string text = output_of<WatchDisplay>(WatchMode::lines, [](WatchDisplay& display) {
     for (std::uint64_t i = 0; i <= 30; ++i) display.update(status_of("a", i));

@@ -58,7 +58,9 @@ TEST_F(TailTest, AnIdleWorkerGetsWhatWaitsAtOthers) {
   EXPECT_EQ(lease.runs, (RunRange{{3}, 2}));
   EXPECT_EQ(lease.attempt, Attempt{2});
   EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::retracted);
-  (void)outbox.take_events();
+  EXPECT_EQ(
+      outbox.take_events(),
+      std::vector<std::string>{"runs_taken_back worker=1 runs=3..4 attempt=1 reason=retracted"});
 }
 
 TEST_F(TailTest, ItIsAskedForOnlyOnceInAWhile) {
