@@ -294,7 +294,7 @@ void TableWriter::write_records() {
     for (const Column& column : columns_) {
       const std::string line =
           fmt::format("  {}  {}", left_aligned(column.name, name_width), column.texts[row]);
-      write_line(sink_, shortened(line, *limits_.num_columns));
+      write_line(sink_, column.is_number[row] ? line : shortened(line, *limits_.num_columns));
     }
   }
 }

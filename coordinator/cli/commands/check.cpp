@@ -24,8 +24,9 @@ struct CheckOptions {
 std::string differences_text(const Campaign& campaign) {
   const std::vector<DefinitionDifference> differences =
       campaign.differences_from(*example_campaign());
-  if (differences.empty()) return "All values are those that `proofmass init` writes.\n";
-  std::string text = "Values other than those that `proofmass init` writes:\n";
+  if (differences.empty())
+    return "Beside the number of runs, nothing differs from what `proofmass init` writes.\n";
+  std::string text = "Beside the number of runs, these differ from what `proofmass init` writes:\n";
   for (const auto& [field, own, example] : differences) {
     text += fmt::format("  {} = {} (instead of {})\n", field, own, example);
   }

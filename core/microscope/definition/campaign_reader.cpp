@@ -74,7 +74,7 @@ EnvironmentTable parse_environment(std::string_view text, const std::string& nam
 MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
   MicroscopeCampaign campaign = read_definition(document);
   document.check();
-  // A file without a name may be empty by mistake, and would be the paper's campaign.
+  // A file that is empty by mistake would be the nominal campaign.
   if (document.find("campaign.name") == nullptr) {
     document.refuse_absence("campaign.name", "every campaign needs one");
     document.check();

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
+#include <string>
 
 #include "coordinator/cli/exit_code.hpp"
 #include "tests/coordinator/cli/program.hpp"
@@ -24,11 +26,12 @@ TEST_F(Check, SaysThatTheFileOfInitChangesNothing) {
   (void)test::answer_of({"init", file});
   const test::Answer answer = test::answer_of({"check", file});
   EXPECT_EQ(answer.exit_code, exit_done);
-  EXPECT_EQ(answer.output, file.string() +
-                               " is valid\n"
-                               "Campaign  hardy2013, seed 1\n"
-                               "Runs      100 of 140 orbits\n\n"
-                               "All values are those that `proofmass init` writes.\n");
+  EXPECT_EQ(answer.output,
+            file.string() +
+                " is valid\n"
+                "Campaign  hardy2013, seed 1\n"
+                "Runs      100 of 140 orbits\n\n"
+                "Beside the number of runs, nothing differs from what `proofmass init` writes.\n");
 }
 
 TEST_F(Check, ShowsWhatAFileAndTheOptionsChange) {
@@ -40,11 +43,20 @@ TEST_F(Check, ShowsWhatAFileAndTheOptionsChange) {
                 " is valid\n"
                 "Campaign  mine, seed 3\n"
                 "Runs      7 of 140 orbits\n\n"
-                "Values other than those that `proofmass init` writes:\n"
+                "Beside the number of runs, these differ from what `proofmass init` writes:\n"
                 "  name = \"mine\" (instead of \"hardy2013\")\n"
                 "  seed = 3 (instead of 1)\n"
                 "  noise.scale = 0 (instead of 1)\n"
                 "  estimation.correction = \"second_order\" (instead of \"hardy2013\")\n");
+}
+
+TEST_F(Check, CountsTheNumberOfRunsAsNoDifference) {
+  const auto file = directory_ / "a.toml";
+  (void)test::answer_of({"init", file});
+  const std::string output = test::answer_of({"check", file, "--runs", "7"}).output;
+  EXPECT_NE(output.find("Runs      7 of 140 orbits\n\nBeside the number of runs, nothing differs"),
+            std::string::npos)
+      << output;
 }
 
 TEST_F(Check, RefusesWhatRunWouldRefuse) {

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdio>
+#include <limits>
 
 #include "tests/coordinator/cli/display_output.hpp"
 
@@ -57,6 +60,12 @@ TEST(ScreenSize, IsTheUsualOneWhereThereIsNoTerminal) {
   std::fclose(file);
   EXPECT_EQ(size.columns, 80U);
   EXPECT_EQ(size.rows, 24U);
+}
+
+TEST(LineWidth, HasNoLimitWhereThereIsNoTerminal) {
+  std::FILE* const file = std::tmpfile();
+  EXPECT_EQ(line_width_max_of(file), std::numeric_limits<std::size_t>::max());
+  std::fclose(file);
 }
 
 // A small screen leaves out the last lines.

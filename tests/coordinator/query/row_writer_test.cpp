@@ -176,15 +176,15 @@ TEST(TableRows, HaveSixSignificantDigits) {
             "          a\n───────────\n   0.123457\n3.33333e-13\n        2.5\n");
 }
 
-// The second line below a row is cut at the 16 columns of the terminal; a table of these two
-// columns takes at least 8 + 2 + 9.
+// A table of these two columns takes at least 8 + 2 + 9 of the 16 columns of the terminal. In a
+// record text is cut and a number is not.
 TEST(TableRows, ThatAreWiderThanTheTerminalAreRecords) {
   const std::vector<Row> rows{{text("a long text"), integer(123456789)}, {null, integer(2)}};
   EXPECT_EQ(
       written(RowFormat::table, {"text", "value"}, rows, {.num_rows_max = 10, .num_columns = 16}),
       "row 1\n"
       "  text   a long…\n"
-      "  value  123456…\n"
+      "  value  123456789\n"
       "row 2\n"
       "  text\n"
       "  value  2\n");
