@@ -143,7 +143,7 @@ TEST_F(ArchiveProcess, NeedsNobodyToHearItsMessages) {
 TEST_F(ArchiveProcess, EndsInOrderWhenItIsInterrupted) {
   // Sessions so long that their simulation is not over before the signal comes.
   change("done.db",
-         "UPDATE campaign SET definition = replace(definition, 'orbits = 5', "
+         "UPDATE campaign SET definition = replace(definition, 'orbits = 2', "
          "'orbits = 200')");
   Process verify = proofmass("verify", {"verify", "done.db", "--fraction", "1"});
   wait_until("the simulation", [&] { return contains(output_of("verify"), "digest "); });

@@ -25,15 +25,15 @@ inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// A directory with a campaign whose batches take a tenth of a second or two: the paper's, with
-/// sessions of five orbits.
+/// A directory with a campaign whose batches take a tenth of a second: the paper's, with
+/// sessions of two orbits.
 class CampaignProcess : public testing::Test {
  protected:
   void SetUp() override {
     ASSERT_EQ(
         Process(directory / "", "init", programs + "/proofmass", {"init", "paper.toml"}).wait(), 0);
     std::string text = read_file(directory / "paper.toml");
-    text = std::regex_replace(text, std::regex("\norbits = [0-9]+"), "\norbits = 5");
+    text = std::regex_replace(text, std::regex("\norbits = [0-9]+"), "\norbits = 2");
     text = std::regex_replace(text, std::regex("\nruns = [0-9]+"),
                               "\nruns = " + std::to_string(num_runs));
     text = std::regex_replace(text, std::regex("\nsample_period_s = [0-9.]+"),
