@@ -12,7 +12,7 @@
 
 namespace proofmass::coordinator {
 
-// All results of a campaign file, in run order, in formats that others read. Numbers are SI and
+// All results of a campaign database, in run order, in formats that others read. Numbers are SI and
 // keep all bits; columns are named as in the table `run_result`. README.md describes the formats.
 // Memory does not grow with the runs, and a coordinator may write meanwhile: what is exported are
 // the runs that were stored at one instant.

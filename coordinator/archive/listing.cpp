@@ -37,7 +37,7 @@ ListedCampaign listed(const std::filesystem::path& file) {
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& place, std::string_view what) {
-  throw ArchiveError(fmt::format("campaign file = {} ({})", place.string(), what));
+  throw ArchiveError(fmt::format("campaign database = {} ({})", place.string(), what));
 }
 
 std::vector<std::filesystem::path> campaign_files_in(const std::filesystem::path& directory) {

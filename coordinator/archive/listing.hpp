@@ -11,7 +11,7 @@
 
 namespace proofmass::coordinator {
 
-/// A campaign file among others.
+/// A campaign database among others.
 struct ListedCampaign {
   std::filesystem::path file;
   std::string problem;  ///< Why it cannot be opened; if not empty, the rest means nothing.
@@ -25,7 +25,7 @@ struct ListedCampaign {
 };
 
 /// The campaigns of some files, and of the files *.db of some directories (not of those below), by
-/// name within each. Files of other kinds are left out of directories; campaign files that are
+/// name within each. Files of other kinds are left out of directories; campaign databases that are
 /// damaged, older or newer than this program, or may not be read, are listed with the reason.
 ///
 /// @throws ArchiveError if a place does not exist, cannot be read, or is a file of another kind.

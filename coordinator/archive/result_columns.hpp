@@ -21,7 +21,7 @@ enum class ValueKind : std::uint8_t { truth, estimate, error, standard_error, he
 /// `truth`, `estimate`, `error`, `standard_error`, `health`.
 [[nodiscard]] std::string_view name_of(ValueKind kind);
 
-/// True if both are the same to the last bit; zeros have no sign, as in a campaign file.
+/// True if both are the same to the last bit; zeros have no sign, as in a campaign database.
 [[nodiscard]] inline bool have_same_bits(double a, double b) {
   return std::bit_cast<std::uint64_t>(a + 0.0) == std::bit_cast<std::uint64_t>(b + 0.0);
 }

@@ -12,8 +12,8 @@
 
 namespace proofmass::coordinator {
 
-/// What one pass over all results of a campaign file finds. Runs are ranges: memory does not grow
-/// with them unless every other one is missing.
+/// What one pass over all results of a campaign database finds. Runs are ranges: memory does not
+/// grow with them unless every other one is missing.
 struct ResultScan {
   std::vector<RunRange> runs;  ///< Finished ones, ascending.
   ResultDigests digests;       ///< Of their results.
@@ -31,7 +31,7 @@ inline constexpr std::uint64_t violations_named_max = 10;
 [[nodiscard]] ResultScan scan_results(const Store& store, const Campaign& campaign,
                                       const IsStopped& is_stopped);
 
-// Checks of what a campaign file keeps beside the results that it follows from, and that people
+// Checks of what a campaign database keeps beside the results that it follows from, and that people
 // read. All that is handed over is of one state of the file.
 
 /// Holds `statistic`, `budget_entry` and `summary` against the results that the summary is of. A

@@ -260,11 +260,11 @@ void check_arguments(const std::filesystem::path& file, const VerifyOptions& opt
   }
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) {
-    throw ArchiveError(fmt::format("campaign file = {} (does not exist)", file.string()));
+    throw ArchiveError(fmt::format("campaign database = {} (does not exist)", file.string()));
   }
   if (!may_be_campaign(file)) {
     throw ArchiveError(
-        fmt::format("campaign file = {} (is not a Proofmass campaign)", file.string()));
+        fmt::format("campaign database = {} (is not a Proofmass campaign)", file.string()));
   }
 }
 

@@ -22,7 +22,7 @@ enum class Verdict : std::uint8_t {
 /// Details that a Check names of many.
 inline constexpr std::size_t details_named_max = 10;
 
-/// One thing that a campaign file was checked for.
+/// One thing that a campaign database was checked for.
 struct Check {
   std::string_view name;  ///< `integrity`, `digest` ...
   Verdict verdict = Verdict::holds;
@@ -44,7 +44,7 @@ struct VerifyOptions {
   std::string_view model_version = model().version();  ///< That of the simulation.
 };
 
-/// Checks whether a campaign file is whole and holds what its definition yields, in this order:
+/// Checks whether a campaign database is whole and holds what its definition yields, in this order:
 /// file, integrity, definition, model, results, digest, statistics, stop_checks, audit, draws,
 /// simulation.
 /// A check that fails ends none of the others that can still be made. Nothing is written, and a
@@ -52,8 +52,8 @@ struct VerifyOptions {
 ///
 /// @param report  Called with each check as soon as it is made.
 /// @return True if no check fails.
-/// @throws ArchiveError if there is no such file, if it is no campaign file or if the fraction is
-///         out of range; Interrupted.
+/// @throws ArchiveError if there is no such file, if it is no campaign database or if the fraction
+/// is out of range; Interrupted.
 [[nodiscard]] bool verify(const std::filesystem::path& file, const VerifyOptions& options,
                           const std::function<void(const Check&)>& report,
                           const IsStopped& is_stopped);

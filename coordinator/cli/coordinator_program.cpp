@@ -37,7 +37,7 @@ constexpr std::uint64_t bytes_per_key_max = std::uint64_t{1} << 50;
 
 /// Arguments of `proofmass-coordinator`.
 struct ServeOptions {
-  std::filesystem::path directory;              ///< Of the campaign files.
+  std::filesystem::path directory;              ///< Of the campaign databases.
   std::string endpoint;                         ///< For workers.
   std::optional<std::string> clients_endpoint;  ///< By default a socket in the directory.
   std::optional<std::filesystem::path> keys;    ///< Directory of `proofmass keygen`.

@@ -10,7 +10,7 @@
 
 namespace proofmass::coordinator {
 
-/// A thread for what takes long: reading large requests, making and opening campaign files. One
+/// A thread for what takes long: reading large requests, making and opening campaign databases. One
 /// thing at a time, in the order in which they were handed over.
 class Background {
  public:

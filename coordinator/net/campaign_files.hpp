@@ -13,7 +13,7 @@
 
 namespace proofmass::coordinator {
 
-/// A campaign file that is served, and what it defines.
+/// A campaign database that is served, and what it defines.
 struct ServedCampaign {
   std::filesystem::path file;
   Store store;
@@ -34,7 +34,7 @@ enum class GivenUpRuns : std::uint8_t {
   retry,  ///< They are lent like all others.
 };
 
-/// What a service wants done with campaign files and does not know how to do.
+/// What a service wants done with campaign databases and does not know how to do.
 class CampaignFiles {
  public:
   virtual ~CampaignFiles() = default;
@@ -72,12 +72,12 @@ class CampaignFiles {
       const std::function<void(const std::function<void(Store&)>&)>& write) = 0;
 };
 
-/// A directory whose campaign files are all to be served. Called in a background thread.
+/// A directory whose campaign databases are all to be served. Called in a background thread.
 class CampaignDirectory {
  public:
   virtual ~CampaignDirectory() = default;
 
-  /// The campaign files that are there now, by name.
+  /// The campaign databases that are there now, by name.
   /// @throws Error if the directory cannot be read.
   [[nodiscard]] virtual std::vector<std::filesystem::path> list() const = 0;
 

@@ -15,8 +15,8 @@
 
 namespace proofmass::coordinator {
 
-// What a service must know of a campaign file before it serves it. Reading that takes as long as
-// the disk does, so it is done before the service begins or in a background thread.
+// What a service must know of a campaign database before it serves it. Reading that takes as long
+// as the disk does, so it is done before the service begins or in a background thread.
 
 /// A campaign that can be served at once.
 struct PreparedCampaign {

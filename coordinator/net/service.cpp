@@ -37,7 +37,7 @@ constexpr int worker_messages_per_turn_max = 1000;
 // ... nor workers by clients that ask much.
 constexpr int client_messages_per_turn_max = 16;
 
-/// What is logged of a campaign file that lost its name and has it back.
+/// What is logged of a campaign database that lost its name and has it back.
 std::string_view kind_of(FileReturn file_return) {
   switch (file_return) {
     case FileReturn::restored:

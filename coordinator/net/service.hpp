@@ -64,7 +64,7 @@ struct ServiceConfig {
 };
 
 /// A coordinator: lends the runs of its campaigns to the workers that connect, stores their results
-/// and answers clients. One thread serves all sockets; another writes to the campaign files.
+/// and answers clients. One thread serves all sockets; another writes to the campaign databases.
 class Service {
  public:
   /// Binds the sockets and begins to serve the campaigns, and those of the directory. A file of the

@@ -8,7 +8,7 @@
 
 namespace proofmass::coordinator {
 
-/// Keeps in the campaign files which workers were lent their runs, so that the next coordinator
+/// Keeps in the campaign databases which workers were lent their runs, so that the next coordinator
 /// knows whom to wait for, and how each of them ended. A worker that comes, or goes, without runs
 /// of a campaign changes nothing in its file.
 class WorkerHistory {

@@ -19,7 +19,7 @@ namespace {
 void check(int code, sqlite3* connection, const std::filesystem::path& file) {
   if (code == SQLITE_OK) return;
   throw StoreError(
-      fmt::format("campaign file = {} ({})", file.string(), sqlite3_errmsg(connection)));
+      fmt::format("campaign database = {} ({})", file.string(), sqlite3_errmsg(connection)));
 }
 
 Connection opened(const std::string& name, int flags, const std::filesystem::path& file) {
@@ -62,7 +62,7 @@ void copy_older(sqlite3* connection, const std::string& database,
   check(sqlite3_backup_finish(backup), connection, file);
 }
 
-// Store knows a campaign file and says what is wrong with others.
+// Store knows a campaign database and says what is wrong with others.
 bool is_older(const std::filesystem::path& file) {
   return Store::open_read_only(file).is_of_older_version();
 }

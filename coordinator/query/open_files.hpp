@@ -13,8 +13,8 @@ struct CloseConnection {
 };
 using Connection = std::unique_ptr<sqlite3, CloseConnection>;
 
-/// A connection to campaign files that cannot write to them; each is checked first. Of a file of an
-/// older version it has a private copy, brought up to date.
+/// A connection to campaign databases that cannot write to them; each is checked first. Of a file
+/// of an older version it has a private copy, brought up to date.
 /// @throws StoreError if a file is none of a campaign or cannot be read.
 [[nodiscard]] Connection open_files(const QueryFiles& files);
 

@@ -174,10 +174,10 @@ void Reader::fail(int code, const std::string& sql) const {
     case SQLITE_SCHEMA:  // What a query without FROM gets for an unknown name.
       fail_query(sql);
     case SQLITE_CORRUPT:
-      throw StoreError(fmt::format("campaign file = {} (is damaged: {}; restore it from a copy)",
-                                   files_text_, text));
+      throw StoreError(fmt::format(
+          "campaign database = {} (is damaged: {}; restore it from a copy)", files_text_, text));
     default:
-      throw StoreError(fmt::format("campaign file = {} ({})", files_text_, text));
+      throw StoreError(fmt::format("campaign database = {} ({})", files_text_, text));
   }
 }
 

@@ -27,7 +27,7 @@ class TimeLimitError : public Error {
   using Error::Error;
 };
 
-/// Another campaign file, whose tables a query finds under `name.`.
+/// Another campaign database, whose tables a query finds under `name.`.
 struct AttachedFile {
   std::string name;  ///< Checked by check_attached_name().
   std::filesystem::path file;
@@ -67,8 +67,8 @@ enum class QueryEnd : std::uint8_t { complete, interrupted };
 /// Longest query that is read, bytes.
 inline constexpr std::size_t sql_size_max = 1'000'000;
 
-/// Asks one question of campaign files, also while coordinators write to them. The statement may
-/// read, and nothing else; it sees each file as it was when it began.
+/// Asks one question of campaign databases, also while coordinators write to them. The statement
+/// may read, and nothing else; it sees each file as it was when it began.
 ///
 /// @param writer  Has got part of the rows if an exception comes after begin().
 /// The limits are looked at between steps of the query; see run_query_in_process() for calls that

@@ -36,7 +36,7 @@ class Digest {
   bool has_health_ = false;
 };
 
-/// Digest of the results in a campaign file, without that of their health.
+/// Digest of the results in a campaign database, without that of their health.
 [[nodiscard]] std::string digest_of(const Store& store);
 
 /// What the digest that is stored with a file's statistics says of its results.
@@ -49,9 +49,9 @@ enum class DigestCheck : std::uint8_t {
 ///
 /// @param num_results  All results of the file, in the state of the file that is being read.
 /// @param digests      Theirs.
-/// @throws StoreError `campaign file = x.db (is damaged: ...)` if the digest is of as many results
-///         and another one, if it is of more results, if the counts beside it do not add up, or if
-///         there are statistics and none is there.
+/// @throws StoreError `campaign database = x.db (is damaged: ...)` if the digest is of as many
+/// results and another one, if it is of more results, if the counts beside it do not add up, or if
+/// there are statistics and none is there.
 [[nodiscard]] DigestCheck check_digest(const Store& store, std::uint64_t num_results,
                                        const ResultDigests& digests);
 
@@ -70,7 +70,7 @@ struct WalkedResults {
 
 /// Holds what defines a campaign, its environment and its tables of drawn values against the digest
 /// that is stored with them.
-/// @throws StoreError `campaign file = x.db (is damaged: ...)`.
+/// @throws StoreError `campaign database = x.db (is damaged: ...)`.
 void check_definition_digest(const Store& store);
 
 }  // namespace proofmass::coordinator

@@ -14,7 +14,7 @@ namespace proofmass::coordinator {
 /// What was drawn for runs that have an estimate, and how far their estimates are off. Draws are
 /// made again from the definition; no file holds them.
 struct DrawnRuns {
-  std::uint64_t num_with_estimate = 0;         ///< In the whole campaign file.
+  std::uint64_t num_with_estimate = 0;         ///< In the whole campaign database.
   std::optional<RunIndex> last_with_estimate;  ///< Empty if there is none.
   std::uint64_t num_first = 0;                 ///< Runs that are here as the first ones.
   std::vector<RunIndex> runs;                  ///< Ascending; n of them.
@@ -26,7 +26,7 @@ struct DrawnRuns {
   std::vector<std::vector<double>> errors;   ///< estimate − truth, SI; shape [quantities][n].
 };
 
-/// The first runs of a campaign file that have an estimate, `num_runs_max` of them at most.
+/// The first runs of a campaign database that have an estimate, `num_runs_max` of them at most.
 /// @param campaign  The definition in the file.
 /// @param also      A run that is kept in any case if it has an estimate.
 /// @throws StoreError as walk_checked() does.

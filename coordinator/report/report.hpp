@@ -56,7 +56,7 @@ namespace proofmass::coordinator {
                                        const CampaignStatistics& statistics,
                                        const std::optional<RunTotals>& totals);
 
-/// What the results of a campaign file yield.
+/// What the results of a campaign database yield.
 struct ReadResults {
   CampaignStatistics statistics;
   ResultDigests digests;

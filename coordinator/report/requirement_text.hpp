@@ -39,8 +39,8 @@ struct RequirementAnswer {
   MissingEstimates missing;  ///< The exceedances for want of an estimate.
 };
 
-/// Holds requirements against the results in a campaign file; runs without an estimate, and those
-/// that were given up, count as exceedances.
+/// Holds requirements against the results in a campaign database; runs without an estimate, and
+/// those that were given up, count as exceedances.
 ///
 /// @param objectives  Those of the campaign's scenario.
 /// @param texts       See parse_requirement().

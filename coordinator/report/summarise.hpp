@@ -12,8 +12,8 @@
 
 namespace proofmass::coordinator {
 
-/// Brings the statistics of a campaign file up to its results, which are those of all runs that it
-/// is to have for now, and checks its stop rule with them.
+/// Brings the statistics of a campaign database up to its results, which are those of all runs that
+/// it is to have for now, and checks its stop rule with them.
 ///
 /// @param write  Lets its argument use the file where it is written.
 /// @return The number of runs that the stop rule asks for next; empty if there is none, if it is
@@ -35,7 +35,8 @@ std::optional<std::uint64_t> summarise_file(
 [[nodiscard]] std::vector<std::string> stop_check_differences(const Store& store,
                                                               std::span<const double> objectives);
 
-/// @throws StoreError `campaign file = x.db (is damaged: ...)` with the first of these differences.
+/// @throws StoreError `campaign database = x.db (is damaged: ...)` with the first of these
+/// differences.
 void check_stop_checks(const Store& store, std::span<const double> objectives);
 
 /// What came of a campaign's stop rule, in lines of at most 80 characters unless the rule is

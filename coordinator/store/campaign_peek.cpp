@@ -40,7 +40,7 @@ bool has_journal(const std::filesystem::path& path) {
 CampaignPeek peek_campaign(const std::filesystem::path& path, PeekDepth depth) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored)) {
-    throw StoreError(fmt::format("campaign file = {} (is no file)", path.string()));
+    throw StoreError(fmt::format("campaign database = {} (is no file)", path.string()));
   }
   Database database(path, detail::Access::immutable);
   database.execute("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");

@@ -9,7 +9,7 @@
 
 namespace proofmass::coordinator {
 
-/// What a campaign file says about itself at a glance.
+/// What a campaign database says about itself at a glance.
 struct CampaignPeek {
   wire::CampaignId id;
   std::string name;
@@ -34,11 +34,11 @@ enum class PeekDepth : std::uint8_t {
 /// that stand there.
 [[nodiscard]] bool has_journal(const std::filesystem::path& path);
 
-/// Reads a few rows of a campaign file without opening it for anybody else to notice: no lock, no
-/// log, no write, whether a coordinator has it or not. What stands in the log of a file that is
+/// Reads a few rows of a campaign database without opening it for anybody else to notice: no lock,
+/// no log, no write, whether a coordinator has it or not. What stands in the log of a file that is
 /// being written is not seen.
-/// @throws StoreError if it is missing, no campaign file, newer than this program or damaged where
-///         it is looked at; also if it lacks pages that stand in its log.
+/// @throws StoreError if it is missing, no campaign database, newer than this program or damaged
+/// where it is looked at; also if it lacks pages that stand in its log.
 [[nodiscard]] CampaignPeek peek_campaign(const std::filesystem::path& path,
                                          PeekDepth depth = PeekDepth::rows);
 

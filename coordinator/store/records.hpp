@@ -15,7 +15,7 @@
 
 namespace proofmass::coordinator {
 
-// What goes into a campaign file, and what comes back when a coordinator starts.
+// What goes into a campaign database, and what comes back when a coordinator starts.
 
 /// A result and where it comes from.
 struct Delivery {
@@ -78,7 +78,7 @@ struct CampaignControl {
   bool operator==(const CampaignControl&) const = default;
 };
 
-/// One thing to be written to a campaign file.
+/// One thing to be written to a campaign database.
 using Entry = std::variant<Delivery, SecondDelivery, LostRuns, GivenUpRun, EventEntry, WorkerJoined,
                            WorkerEnded, CampaignControl>;
 
@@ -128,7 +128,7 @@ struct AddNote {
   std::string text;
 };
 
-/// What people add to a campaign file, also while a coordinator serves it.
+/// What people add to a campaign database, also while a coordinator serves it.
 using Annotation = std::variant<AddTag, RemoveTag, AddNote>;
 
 /// When a campaign ends before all of its runs are finished.
@@ -190,7 +190,7 @@ struct Summary {
   bool operator==(const Summary&) const = default;
 };
 
-/// How a campaign file got back the name that it had lost.
+/// How a campaign database got back the name that it had lost.
 enum class FileReturn : std::uint8_t {
   restored,       ///< Nothing had the name.
   replaced,       ///< An older copy of the campaign had it.

@@ -13,8 +13,8 @@ namespace detail {
 class Database;
 }  // namespace detail
 
-/// Results of a campaign file, one after the other, of one state of the file. The Store that made
-/// it outlives it.
+/// Results of a campaign database, one after the other, of one state of the file. The Store that
+/// made it outlives it.
 class ResultReader {
  public:
   /// Reads all results.

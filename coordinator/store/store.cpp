@@ -38,7 +38,7 @@ void check_presence(const std::filesystem::path& path) {
   std::error_code ignored;
   if (std::filesystem::is_regular_file(path, ignored)) return;
   throw StoreError(
-      fmt::format("campaign file = {} ({})", path.string(),
+      fmt::format("campaign database = {} ({})", path.string(),
                   std::filesystem::exists(path, ignored) ? "is no file" : "does not exist"));
 }
 
@@ -48,7 +48,7 @@ void check_that_name_is_the_only_one(const std::filesystem::path& path) {
   const std::uintmax_t num_names = std::filesystem::hard_link_count(path, ignored);
   if (num_names == 1) return;
   throw StoreError(
-      fmt::format("campaign file = {} (has {} names (hard links), must have one; make copies "
+      fmt::format("campaign database = {} (has {} names (hard links), must have one; make copies "
                   "instead)",
                   path.string(), num_names));
 }
@@ -56,7 +56,7 @@ void check_that_name_is_the_only_one(const std::filesystem::path& path) {
 // Lock and draft are named after the file, and would be made in a directory without it.
 void check_name(const std::filesystem::path& path) {
   if (path.has_filename()) return;
-  throw StoreError(fmt::format("campaign file = {} (names no file)", path.string()));
+  throw StoreError(fmt::format("campaign database = {} (names no file)", path.string()));
 }
 
 // Nothing if a coordinator serves the file, which can be written to all the same.

@@ -23,14 +23,14 @@
 
 namespace proofmass::coordinator {
 
-/// A campaign file: one SQLite database with everything about one campaign (see README.md).
+/// A campaign database: one SQLite database with everything about one campaign (see README.md).
 ///
 /// What a function has stored when it returns survives a crash of the process and of the machine;
 /// what a function has not stored when it throws is not in the file in part either. For one thread.
 /// All functions throw StoreError if the file cannot be read or written.
 class Store {
  public:
-  /// Makes a new campaign file, complete or not at all, and opens it like open().
+  /// Makes a new campaign database, complete or not at all, and opens it like open().
   ///
   /// @param campaign    Validated.
   /// @param definition  The campaign as canonical TOML, for whoever opens the file.
@@ -38,15 +38,16 @@ class Store {
   static Store create(const std::filesystem::path& path, const Campaign& campaign,
                       std::string_view definition);
 
-  /// Opens a campaign file for its coordinator: takes the lock, brings an older file up to date.
+  /// Opens a campaign database for its coordinator: takes the lock, brings an older file up to
+  /// date.
   /// @throws StoreError if the file is missing, foreign, newer than this program or damaged, or if
   ///         another coordinator has it; on a network file system; if it has another hard link.
   ///         A file without the log that it needs is opened as it is; see has_lost_its_log().
   static Store open(const std::filesystem::path& path);
 
-  /// Opens a campaign file for reading, also while a coordinator writes to it. Of a file that is
-  /// older than this program a private copy is read, as the file was when it was opened and brought
-  /// up to date; the file stays as it is.
+  /// Opens a campaign database for reading, also while a coordinator writes to it. Of a file that
+  /// is older than this program a private copy is read, as the file was when it was opened and
+  /// brought up to date; the file stays as it is.
   /// @throws StoreError as open() does, but for lock, file system and hard links; if the file lacks
   ///         the log that it needs; if there is no room for the copy of an older file.
   static Store open_read_only(const std::filesystem::path& path);
@@ -138,8 +139,7 @@ class Store {
   /// Writes all entries in order, or, if it throws, none. A run is stored once: a second delivery
   /// is only compared.
   /// @throws StoreError if a delivery's run is not one of the campaign's or a number that matters
-  /// is
-  ///         not finite.
+  /// is not finite.
   CommitSummary write(std::span<const Entry> entries);
 
   /// To be called when nothing more is expected: folds the write-ahead log into the file, which is
@@ -202,7 +202,7 @@ class Store {
       std::span<const StopCheckRow> expected) const;
   /// True if statistics are there: a summary was written with them.
   [[nodiscard]] bool has_statistics() const;
-  /// @throws StoreError `campaign file = path (is damaged: what; restore it from a copy)`.
+  /// @throws StoreError `campaign database = path (is damaged: what; restore it from a copy)`.
   [[noreturn]] void refuse_as_damaged(std::string_view what) const;
 
   /// Appends to the campaign's log, of which the newest 10,000 entries are kept.

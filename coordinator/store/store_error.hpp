@@ -4,7 +4,7 @@
 
 namespace proofmass::coordinator {
 
-/// A campaign file cannot be used as asked; reads `campaign file = path (what is wrong)`.
+/// A campaign database cannot be used as asked; reads `campaign database = path (what is wrong)`.
 class StoreError : public Error {
  public:
   using Error::Error;

@@ -48,7 +48,7 @@ struct Compared {
 /// each `retry_after`; said once until StoreRecovered.
 struct StoreFailed {
   wire::CampaignId campaign;
-  std::string text;  ///< `campaign file = path (the disk is full; ...)`.
+  std::string text;  ///< `campaign database = path (the disk is full; ...)`.
 };
 
 /// All is well again, and what was waiting is written.
@@ -82,8 +82,8 @@ struct LogFolded {
   wire::CampaignId campaign;
 };
 
-/// A campaign file had been removed, renamed or replaced by an older copy, and has its name back,
-/// with all that was stored in it.
+/// A campaign database had been removed, renamed or replaced by an older copy, and has its name
+/// back, with all that was stored in it.
 struct FileReturned {
   wire::CampaignId campaign;
   FileReturn kind = FileReturn::restored;
@@ -92,7 +92,7 @@ struct FileReturned {
 using Completion = std::variant<FileReturned, Committed, Compared, StoreFailed, StoreRecovered,
                                 LogGrown, LogShrunk, LogKept, LogFolded>;
 
-/// Writes to campaign files, in a thread of its own: a service never waits for a disk.
+/// Writes to campaign databases, in a thread of its own: a service never waits for a disk.
 ///
 /// What is handed over is written in that order, many entries in one durable transaction. The
 /// functions may be called from any thread, and return at once unless they say otherwise. The

@@ -14,8 +14,8 @@ enum class KillPoint : std::uint8_t {
   after_commit,       ///< They are durable, and nobody knows.
   after_acknowledge,  ///< The acknowledgement is handed to the socket.
   after_lend,         ///< A lease is handed to the socket.
-  after_open,         ///< A campaign file is open and locked.
-  while_migrating,    ///< The tables of a campaign file are made or changed, not committed.
+  after_open,         ///< A campaign database is open and locked.
+  while_migrating,    ///< The tables of a campaign database are made or changed, not committed.
   // Worker.
   after_lease,    ///< A lease is received, and nothing is computed.
   before_result,  ///< Results are computed, and not yet sent.

@@ -45,7 +45,7 @@ struct Epoch {
   auto operator<=>(const Epoch&) const = default;
 };
 
-/// A campaign file, by a random number from when it was made; not 0.
+/// A campaign database, by a random number from when it was made; not 0.
 struct CampaignId {
   std::uint64_t value = 0;
   auto operator<=>(const CampaignId&) const = default;

@@ -4,7 +4,7 @@
 Usage: dispatch_benchmark.py BIN_DIRECTORY [options]
 
 Prints a table and, with --json, writes the figures to a file. Exit code 1 if a limit is missed.
-The campaign files are written below --directory, which should be on a disk: commits are durable.
+The campaign databases are written below --directory, which should be on a disk: commits are durable.
 """
 
 import argparse
@@ -223,7 +223,7 @@ def rows_of(figures):
         row("  processor time of the coordinator", batches["coordinator_cpu_ms_per_run"], "ms/run"),
         row("  processor time of the workers", batches["worker_cpu_ms_per_run"], "ms/run"),
         row("  memory of the coordinator, at most", batches["coordinator_memory_mb"], "MB", 300.0),
-        row("  campaign file", batches["file_mb"], "MB"),
+        row("  campaign database", batches["file_mb"], "MB"),
         row(f"one by one, {single['num_runs']} runs, {single['num_workers']} workers",
             single["ms_per_run"], "ms/run", 0.1),
         row("  processor time of the coordinator", single["coordinator_cpu_ms_per_run"], "ms/run"),
@@ -262,7 +262,7 @@ def read_options():
     parser.add_argument("--swarm-workers", type=int, default=1000)
     parser.add_argument("--idle-s", type=float, default=10.0, help="how long the swarm is idle")
     parser.add_argument("--peer-runs", type=int, default=20_000, help="0: without other systems")
-    parser.add_argument("--directory", type=pathlib.Path, help="for campaign files")
+    parser.add_argument("--directory", type=pathlib.Path, help="for campaign databases")
     parser.add_argument("--json", type=pathlib.Path, help="file for the figures")
     return parser.parse_args()
 

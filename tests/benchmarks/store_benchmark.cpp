@@ -1,4 +1,4 @@
-// What a campaign file of many runs costs: to write, to open, to ask. See README.md.
+// What a campaign database of many runs costs: to write, to open, to ask. See README.md.
 
 #include <fmt/format.h>
 #include <sys/resource.h>
@@ -190,7 +190,7 @@ void measure(const std::filesystem::path& file, std::uint64_t num_runs) {
 }  // namespace proofmass::test
 
 int main(int argc, char** argv) {
-  CLI::App app("Measures a campaign file of many runs");
+  CLI::App app("Measures a campaign database of many runs");
   std::uint64_t num_runs = 1'000'000;
   std::string directory = std::filesystem::temp_directory_path();
   app.add_option("--runs", num_runs, "Runs in the file")->capture_default_str();

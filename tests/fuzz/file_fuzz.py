@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Uses mutated campaign files in several processes, and goes on after those that a process died of.
+"""Uses mutated campaign databases in several processes, and goes on after those that a process died of.
 
     tests/fuzz/file_fuzz.py --program build/asan/bin/proofmass_fuzz_files --files 1:100000 --jobs 2
 

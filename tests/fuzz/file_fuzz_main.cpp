@@ -1,5 +1,5 @@
-// Uses many mutated campaign files, by hand: proofmass_fuzz_files FIRST LAST DIRECTORY. The number
-// of each file is written to DIRECTORY/number before it is used, so that whoever starts this
+// Uses many mutated campaign databases, by hand: proofmass_fuzz_files FIRST LAST DIRECTORY. The
+// number of each file is written to DIRECTORY/number before it is used, so that whoever starts this
 // program knows which one it died of; file_fuzz.py does.
 
 #include <sys/time.h>

@@ -1,4 +1,5 @@
-// Files that hold anything: campaign files by all that reads them, and the texts that people write.
+// Files that hold anything: campaign databases by all that reads them, and the texts that people
+// write.
 
 #include <gtest/gtest.h>
 

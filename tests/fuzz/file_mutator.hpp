@@ -8,8 +8,8 @@
 
 namespace proofmass::test {
 
-/// Makes campaign files from others that a disk, a crash, an editor or an enemy could have made.
-/// The same seed makes the same file.
+/// Makes campaign databases from others that a disk, a crash, an editor or an enemy could have
+/// made. The same seed makes the same file.
 class FileMutator {
  public:
   explicit FileMutator(std::uint64_t seed) : random_(seed) {}

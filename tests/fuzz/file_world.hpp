@@ -7,7 +7,7 @@
 
 namespace proofmass::test {
 
-/// What is done with a campaign file: each is what a command of the programs does, without the
+/// What is done with a campaign database: each is what a command of the programs does, without the
 /// printing.
 enum class FileUse : std::uint8_t {
   list,
@@ -27,8 +27,8 @@ enum class FileUse : std::uint8_t {
 
 inline constexpr std::size_t num_file_uses = 13;
 
-/// Makes three campaign files: one that is finished, one half done after losses, crashes and second
-/// results, and one whose environment and draws come from tables.
+/// Makes three campaign databases: one that is finished, one half done after losses, crashes and
+/// second results, and one whose environment and draws come from tables.
 ///
 /// @param directory  Exists and is empty.
 /// @return Their paths.
@@ -38,7 +38,7 @@ inline constexpr std::size_t num_file_uses = 13;
 /// Uses a file that may hold anything. Being refused with a proofmass::Error is as good as being
 /// read; any other exception is returned as text, as it would end a program without a reason.
 ///
-/// @param pristine  Another campaign file, to compare with.
+/// @param pristine  Another campaign database, to compare with.
 [[nodiscard]] std::string use_file(FileUse use, const std::filesystem::path& file,
                                    const std::filesystem::path& pristine);
 

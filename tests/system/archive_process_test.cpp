@@ -1,4 +1,4 @@
-// What people do with campaign files, by real processes: while a coordinator writes, with pipes
+// What people do with campaign databases, by real processes: while a coordinator writes, with pipes
 // that close, on disks that are full, and interrupted.
 
 #include <gtest/gtest.h>
@@ -174,10 +174,10 @@ TEST_F(ArchiveProcess, RefusesWhatMakesNoSense) {
   EXPECT_EQ(proofmass("option", {"--config", "options.toml", "list"}).wait(), 2);
   EXPECT_EQ(errors_of("option"), "proofmass: error: config = query.rows (is no option)\n");
   EXPECT_EQ(proofmass("none", {"verify", "none.db"}).wait(), 1);
-  EXPECT_EQ(errors_of("none"), "proofmass: error: campaign file = none.db (does not exist)\n");
+  EXPECT_EQ(errors_of("none"), "proofmass: error: campaign database = none.db (does not exist)\n");
   EXPECT_EQ(proofmass("foreign", {"list", "short.toml"}).wait(), 1);
   EXPECT_EQ(errors_of("foreign"),
-            "proofmass: error: campaign file = short.toml (is not a Proofmass campaign)\n");
+            "proofmass: error: campaign database = short.toml (is not a Proofmass campaign)\n");
 }
 
 }  // namespace

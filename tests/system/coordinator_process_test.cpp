@@ -219,7 +219,7 @@ TEST_F(CoordinatorProcess, ServesTheCampaignOfHigherPriorityFirst) {
   write_campaign("low", 64);
   write_campaign("high", 64);
   Process coordinator = start_coordinator({"low.toml"});
-  wait_until("campaign file", [&] { return std::filesystem::exists(path("served/low.db")); });
+  wait_until("campaign database", [&] { return std::filesystem::exists(path("served/low.db")); });
   Process submit(directory / "", "submit", programs + "/proofmass",
                  {"submit", "high.toml", "--priority", "5", "--connect", clients_endpoint()});
   ASSERT_EQ(submit.wait(), 0) << errors_of("submit");
@@ -236,7 +236,8 @@ TEST_F(CoordinatorProcess, ServesTheCampaignOfHigherPriorityFirst) {
 
 TEST_F(CoordinatorProcess, IsTheOnlyOneOfItsDirectory) {
   Process coordinator = start_coordinator();
-  wait_until("campaign file", [&] { return std::filesystem::exists(path("served/hardy2013.db")); });
+  wait_until("campaign database",
+             [&] { return std::filesystem::exists(path("served/hardy2013.db")); });
   Process second(directory / "", "second", programs + "/proofmass-coordinator",
                  {"--directory", "served", "--bind", "ipc://" + path("other").string()});
   EXPECT_EQ(second.wait(), 1);

@@ -83,7 +83,8 @@ TEST_F(ServedDirectory, GetsACopyBackForAFileThatIsDamaged) {
   fs::copy_file(file_of("null"), path("copy.db"));
   fs::resize_file(file_of("null"), 5000);
   const Process coordinator = this->coordinator("coordinator", {"--time-scale", "0.05"});
-  wait_for_log("coordinator", "campaign_not_served reason=\"campaign file = served/null.db (is ");
+  wait_for_log("coordinator",
+               "campaign_not_served reason=\"campaign database = served/null.db (is ");
   fs::rename(path("copy.db"), file_of("null"));
   const Process worker = null_worker("worker", {"--run-time", "0"});
   expect_finished_here();

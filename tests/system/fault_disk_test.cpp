@@ -90,7 +90,7 @@ TEST_F(FaultyDisk, HasNoRoomForACampaign) {
   EXPECT_EQ(submit.wait(), 1);
   EXPECT_EQ(
       errors_of("submit"),
-      "proofmass: error: campaign file = served/null.db.unfinished (the disk is full; what was "
+      "proofmass: error: campaign database = served/null.db.unfinished (the disk is full; what was "
       "committed before is safe, free space and try again)\n");
   EXPECT_FALSE(fs::exists(file_of("null")));
   fs::remove(path("served/ballast"));

@@ -1,4 +1,4 @@
-// Campaign files that somebody else uses or has spoilt.
+// Campaign databases that somebody else uses or has spoilt.
 
 #include <gtest/gtest.h>
 #include <sys/mount.h>
@@ -103,7 +103,7 @@ TEST_F(CampaignFiles, ThatCannotBeServedAreNamedAndLeftAlone) {
   const Process coordinator = this->coordinator("second", {});
   wait_for_log("second", "coordinator_started");
   for (const auto& [name, reason] : reasons) {
-    EXPECT_EQ(num_log_lines("second", "campaign_not_served reason=\"campaign file = served/" +
+    EXPECT_EQ(num_log_lines("second", "campaign_not_served reason=\"campaign database = served/" +
                                           name + ".db (" + reason),
               1U)
         << name << "\n"
@@ -122,7 +122,7 @@ TEST_F(CampaignFiles, ThatAreDamagedAreNotReplaced) {
   EXPECT_EQ(coordinator.wait(), 1);
   EXPECT_TRUE(
       contains(errors_of("second"),
-               "proofmass-coordinator: error: campaign file = served/null.db (is damaged: "))
+               "proofmass-coordinator: error: campaign database = served/null.db (is damaged: "))
       << errors_of("second");
   EXPECT_EQ(fs::file_size(file_of("null")), 5000U);
 }
@@ -218,7 +218,7 @@ class NetworkFileSystem : public FaultTest {
 TEST_F(NetworkFileSystem, HasCampaignsForReadersOnly) {
   const std::string before = undisturbed_digest("null");
   const std::string refusal =
-      "(is on the network file system fuse.sshfs, where a campaign file may "
+      "(is on the network file system fuse.sshfs, where a campaign database may "
       "be damaged; use a local disk)\n";
   Process made = start_behind({}, "made", "proofmass", {"run", "null.toml", "--db", "served/a.db"});
   EXPECT_EQ(made.wait(), 1);

@@ -51,7 +51,7 @@ TEST_F(RunFault, OfARemovedDatabaseIsNoSuccessWithoutResults) {
   }
   EXPECT_EQ(exit_code, 1) << errors_of("removed");
   EXPECT_EQ(tables, "");
-  EXPECT_TRUE(contains(errors_of("removed"), "campaign file = removed.db ("))
+  EXPECT_TRUE(contains(errors_of("removed"), "campaign database = removed.db ("))
       << errors_of("removed");
 }
 
@@ -81,7 +81,8 @@ TEST_F(RunFault, OfAnOlderCopyInPlaceOfTheDatabaseIsNoSuccessWithoutResults) {
     return;
   }
   EXPECT_EQ(exit_code, 1) << errors_of("copied");
-  EXPECT_TRUE(contains(errors_of("copied"), "campaign file = copied.db (")) << errors_of("copied");
+  EXPECT_TRUE(contains(errors_of("copied"), "campaign database = copied.db ("))
+      << errors_of("copied");
 }
 
 TEST_F(RunFault, OfARemovedDatabaseIsToldToWhoInterrupts) {
@@ -99,7 +100,7 @@ TEST_F(RunFault, OfARemovedDatabaseIsToldToWhoInterrupts) {
     return;
   }
   EXPECT_EQ(exit_code, 1);
-  EXPECT_TRUE(contains(errors_of("removed"), "campaign file = removed.db ("))
+  EXPECT_TRUE(contains(errors_of("removed"), "campaign database = removed.db ("))
       << errors_of("removed");
 }
 
@@ -128,10 +129,11 @@ TEST_F(RunFault, OfAReaderThatIsThereAtTheEndIsTold) {
     wait_for_runs("read", 16);
     const OpenReader reader(path("read.db"));
     EXPECT_EQ(run.wait(), 0) << errors_of("read");
-    EXPECT_TRUE(contains(errors_of("read"),
-                         "proofmass: warning: campaign file = read.db (somebody reads an old state "
-                         "of the file, and its log is still needed; copy read.db-wal with it, or "
-                         "make copies with `proofmass backup`)\n"))
+    EXPECT_TRUE(
+        contains(errors_of("read"),
+                 "proofmass: warning: campaign database = read.db (somebody reads an old state "
+                 "of the file, and its log is still needed; copy read.db-wal with it, or "
+                 "make copies with `proofmass backup`)\n"))
         << errors_of("read");
     EXPECT_GT(fs::file_size(path("read.db-wal")), 0U);
   }
@@ -179,7 +181,8 @@ TEST_F(RunFault, OfADiskThatFailsAtTheEndIsToldOrHarmless) {
   ASSERT_GE(num_syncs, 4U);
   for (std::uint32_t first = 1; first <= num_syncs; ++first) {
     const int exit_code = run_with(first)->wait();
-    EXPECT_TRUE(exit_code == 0 || contains(errors_of("synced"), "proofmass: error: campaign file"))
+    EXPECT_TRUE(exit_code == 0 ||
+                contains(errors_of("synced"), "proofmass: error: campaign database"))
         << first << ": " << exit_code << errors_of("synced");
     if (exit_code != 0) continue;
     Process report(directory / "", "report", programs + "/proofmass", {"report", file.string()});
@@ -212,7 +215,7 @@ class RunOnAFullDisk : public CampaignProcess {
     }
     wait_until("note", [&] { return contains(errors_of(name), "tried again every 5 s\n"); });
     EXPECT_TRUE(contains(errors_of(name),
-                         "error: campaign file = disk/" + name + ".db (the disk is full; "))
+                         "error: campaign database = disk/" + name + ".db (the disk is full; "))
         << errors_of(name);
     wait_until("progress",
                [&] { return contains(errors_of(name), " %  nothing can be stored\n"); });

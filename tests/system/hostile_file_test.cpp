@@ -130,7 +130,7 @@ std::string obeyed(const std::string& text) {
   return found == text.end() ? "" : std::string(1, *found);
 }
 
-/// Table and column of each text in a campaign file.
+/// Table and column of each text in a campaign database.
 std::vector<std::pair<std::string, std::string>> text_columns(const fs::path& file) {
   sqlite3* database = nullptr;
   EXPECT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);

@@ -126,7 +126,7 @@ class Load:
                 process.wait()
 
     def problems_of_file(self):
-        """Ends the coordinator in order and checks the campaign file, but for what null results are
+        """Ends the coordinator in order and checks the campaign database, but for what null results are
         not: simulated."""
         if self.end(self.coordinator, signal.SIGTERM) != 0:
             raise NotReached("an end in order: " + self.log()[-2000:])

@@ -89,7 +89,7 @@ TEST_F(QueryProcess, AttachesOtherFiles) {
   EXPECT_EQ(query({"SELECT 1", "--attach", "main=x.db"}), 2);
   EXPECT_THAT(errors(), HasSubstr("--attach main=x.db (name = main (must be 1 to 64 letters"));
   EXPECT_EQ(query({"SELECT 1", "--attach", "b=none.db"}), 1);
-  EXPECT_EQ(errors(), "proofmass: error: campaign file = none.db (does not exist)\n");
+  EXPECT_EQ(errors(), "proofmass: error: campaign database = none.db (does not exist)\n");
   std::vector<std::string> arguments{"SELECT 1"};
   for (int i = 0; i < 11; ++i) {
     arguments.push_back("--attach");

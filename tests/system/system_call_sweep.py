@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Fails each system call on a campaign file once, or from then on, and looks at what is left.
+"""Fails each system call on a campaign database once, or from then on, and looks at what is left.
 
     tests/system/system_call_sweep.py --programs build/release/bin --jobs 4
     tests/system/system_call_sweep.py --programs build/release/bin --sample 60 --seed 7
@@ -319,7 +319,7 @@ def read_options():
     parser.add_argument("--sample", type=int, help="so many points, drawn from all")
     parser.add_argument("--seed", type=int, default=1, help="of the sample")
     parser.add_argument("--point", nargs="+", help="repeat PHASE:CALL:ERROR:NUMBER:once|on")
-    parser.add_argument("--directory", type=pathlib.Path, help="for campaign files")
+    parser.add_argument("--directory", type=pathlib.Path, help="for campaign databases")
     options = parser.parse_args()
     options.programs = options.programs.resolve()
     if options.faulty_calls is None:

@@ -191,7 +191,7 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
 void require_in_place(const Store& store, const std::filesystem::path& database) {
   if (store.is_in_place()) return;
   throw StoreError(fmt::format(
-      "campaign file = {} (was removed or replaced while the campaign ran; results that "
+      "campaign database = {} (was removed or replaced while the campaign ran; results that "
       "are not in what is there now are lost, and the same command computes them again)",
       database.string()));
 }
@@ -210,7 +210,7 @@ void bring_to_rest(Store& store, const std::filesystem::path& database) {
   const std::optional<std::string> reason = store.rest();
   if (!reason) return;
   wire::say(
-      fmt::format("proofmass: warning: campaign file = {0} ({1}; copy {2}-wal with it, or make "
+      fmt::format("proofmass: warning: campaign database = {0} ({1}; copy {2}-wal with it, or make "
                   "copies with `proofmass backup`)\n",
                   database.string(), *reason, database.filename().string()));
 }

@@ -87,7 +87,7 @@ void insert_dispersion_values(Database& database, const Campaign& campaign,
 
 void check_same(std::string_view field, const std::string& given, const std::string& stored) {
   if (given == stored) return;
-  throw StoreError(fmt::format("{} = {} (the campaign file has {})", field, given, stored));
+  throw StoreError(fmt::format("{} = {} (the campaign database has {})", field, given, stored));
 }
 
 // All values are finite: they differ in the sign of a zero if equal, and that the file does not
@@ -95,16 +95,17 @@ void check_same(std::string_view field, const std::string& given, const std::str
 void check_same_values(std::string_view drawn_name, const std::vector<double>& given,
                        const std::vector<double>& stored, std::uint64_t num_runs) {
   if (stored.size() != num_runs) {
-    throw StoreError(fmt::format("dispersion.{} = table (the campaign file holds no values for it)",
-                                 drawn_name));
+    throw StoreError(fmt::format(
+        "dispersion.{} = table (the campaign database holds no values for it)", drawn_name));
   }
   if (given.size() < stored.size()) {
-    throw StoreError(fmt::format("dispersion.{} = table of {} values (the campaign file has {})",
-                                 drawn_name, given.size(), stored.size()));
+    throw StoreError(
+        fmt::format("dispersion.{} = table of {} values (the campaign database has {})", drawn_name,
+                    given.size(), stored.size()));
   }
   for (std::size_t run = 0; run < stored.size(); ++run) {
     if (given[run] == stored[run]) continue;
-    throw StoreError(fmt::format("dispersion.{} = {} (for run {} the campaign file has {})",
+    throw StoreError(fmt::format("dispersion.{} = {} (for run {} the campaign database has {})",
                                  drawn_name, given[run], run, stored[run]));
   }
 }
@@ -265,14 +266,14 @@ void check_extension(const Database& database, const Campaign& campaign) {
   if (campaign.num_runs < num_runs) {
     throw StoreError(
         fmt::format("campaign.runs = {} (must be at least {}, as in the campaign "
-                    "file)",
+                    "database)",
                     campaign.num_runs, num_runs));
   }
   const std::vector<DataTable> stored = read_data_tables(database);
   const std::vector<DataTable> given = campaign.definition(TableColumns::left_out).tables;
   if (stored != given) {
     const std::string& key = (given.empty() ? stored : given).front().key;
-    throw StoreError(fmt::format("{} = {} (its rows are not those of the campaign file)", key,
+    throw StoreError(fmt::format("{} = {} (its rows are not those of the campaign database)", key,
                                  text_at(campaign, key)));
   }
   const std::vector<std::string_view> names = table_quantity_names(campaign);

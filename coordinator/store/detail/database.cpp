@@ -236,7 +236,7 @@ Database::Database(const std::filesystem::path& path, Access access) : path_(pat
   sqlite3_limit(connection, SQLITE_LIMIT_SQL_LENGTH, sql_size_max);
   const bool is_reader = access == Access::read_only || access == Access::immutable;
   if (!is_reader && sqlite3_db_readonly(connection, "main") != 0) {
-    throw StoreError(fmt::format("campaign file = {} (is not writable)", path_.string()));
+    throw StoreError(fmt::format("campaign database = {} (is not writable)", path_.string()));
   }
 }
 
@@ -346,7 +346,7 @@ void Database::fold_log_at_close() {
 void Database::refuse(std::string_view what) const {
   // It may quote the file.
   throw StoreError(
-      fmt::format("campaign file = {} ({})", path_.string(), wire::visible_text(what)));
+      fmt::format("campaign database = {} ({})", path_.string(), wire::visible_text(what)));
 }
 
 void Database::refuse_as_damaged(std::string_view what) const { refuse(damage(path_, what)); }

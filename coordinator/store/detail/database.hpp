@@ -148,14 +148,14 @@ class Database {
   /// Takes that back: as usual, the last connection copies the log into the file and removes it.
   void fold_log_at_close();
 
-  /// @throws StoreError `campaign file = path (what)`.
+  /// @throws StoreError `campaign database = path (what)`.
   [[noreturn]] void refuse(std::string_view what) const;
 
-  /// @throws StoreError `campaign file = path (is damaged: what; restore it from a copy)`, or with
-  ///         the remedy for a log that is not that of the file.
+  /// @throws StoreError `campaign database = path (is damaged: what; restore it from a copy)`, or
+  /// with the remedy for a log that is not that of the file.
   [[noreturn]] void refuse_as_damaged(std::string_view what) const;
 
-  /// @throws StoreError `campaign file = path (what went wrong, with a remedy)`.
+  /// @throws StoreError `campaign database = path (what went wrong, with a remedy)`.
   [[noreturn]] void fail(int code) const;
 
  private:

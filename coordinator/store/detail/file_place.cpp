@@ -66,17 +66,17 @@ int open_and_lock(const std::filesystem::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
   if (descriptor < 0) {
     const int error = errno;
-    throw StoreError(fmt::format("campaign file = {} ({})", path.string(),
+    throw StoreError(fmt::format("campaign database = {} ({})", path.string(),
                                  error == EACCES || error == EROFS
                                      ? std::string("is not writable")
                                      : fmt::format("cannot be opened: {}", std::strerror(error))));
   }
   if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) return descriptor;
   ::close(descriptor);
-  throw StoreError(
-      fmt::format("campaign file = {} (another coordinator has it; a campaign has one coordinator "
-                  "at a time)",
-                  path.string()));
+  throw StoreError(fmt::format(
+      "campaign database = {} (another coordinator has it; a campaign has one coordinator "
+      "at a time)",
+      path.string()));
 }
 
 [[noreturn]] void refuse(const Database& other, const std::string& what) {
@@ -160,13 +160,14 @@ bool is_sound_without_log(const std::filesystem::path& file) {
 void check_absence(const std::filesystem::path& file) {
   std::error_code ignored;
   if (std::filesystem::exists(file, ignored)) {
-    throw StoreError(fmt::format("campaign file = {} (exists already)", file.string()));
+    throw StoreError(fmt::format("campaign database = {} (exists already)", file.string()));
   }
   if (!has_log(file)) return;
-  throw StoreError(fmt::format(
-      "campaign file = {0} (is gone, but its log {1} is there: put the file back, or move {1} away "
-      "and begin anew)",
-      file.string(), log_path(file).filename().string()));
+  throw StoreError(
+      fmt::format("campaign database = {0} (is gone, but its log {1} is there: put the file back, "
+                  "or move {1} away "
+                  "and begin anew)",
+                  file.string(), log_path(file).filename().string()));
 }
 
 FilePlace::FilePlace(const std::filesystem::path& file)

@@ -35,7 +35,7 @@ enum class Placement : std::uint8_t {
   without_directory,  ///< Its directory was removed or renamed.
 };
 
-/// Holds an open campaign file by the file itself, whatever becomes of its name: no two
+/// Holds an open campaign database by the file itself, whatever becomes of its name: no two
 /// coordinators have one file, also where both lock files were removed. The advisory lock ends with
 /// the process.
 ///

@@ -105,7 +105,7 @@ void check_directory_of(const std::filesystem::path& path) {
   if (!name.empty()) {
     throw StoreError(
         fmt::format("directory = {} (is on the network file system {}, where a campaign "
-                    "file may be damaged; use a local disk)",
+                    "database may be damaged; use a local disk)",
                     directory, name));
   }
 }
@@ -151,7 +151,7 @@ void appear_complete(const std::filesystem::path& path, IfThere if_there,
   try {
     write(draft);
     if (!rename_to(draft, path, if_there)) {
-      throw StoreError(fmt::format("campaign file = {} (cannot be given its name: {})",
+      throw StoreError(fmt::format("campaign database = {} (cannot be given its name: {})",
                                    path.string(), std::strerror(errno)));
     }
   } catch (...) {

@@ -19,7 +19,7 @@ using TimePoint = std::chrono::steady_clock::time_point;
 /// Whether a worker waits for its acknowledgement.
 [[nodiscard]] bool is_result(const Entry& entry);
 
-/// What waits to be written to one campaign file, in the order in which it was handed over.
+/// What waits to be written to one campaign database, in the order in which it was handed over.
 class WaitingEntries {
  public:
   /// @param num_records_max  Losses and events beyond this many are counted and dropped.
@@ -48,7 +48,7 @@ class WaitingEntries {
   std::optional<TimePoint> urgent_since_;
 };
 
-/// One campaign file of a StoreWriter. The writer's thread alone uses `store` and `writing`,
+/// One campaign database of a StoreWriter. The writer's thread alone uses `store` and `writing`,
 /// without the writer's lock.
 struct OpenFile {
   Store store;

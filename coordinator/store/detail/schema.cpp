@@ -59,16 +59,16 @@ std::int64_t version_of(const Database& database, const std::filesystem::path& p
   const std::int64_t version = database.integer("PRAGMA user_version");
   if (version > schema_version()) {
     throw StoreError(
-        fmt::format("campaign file = {} (is newer than this program: its user_version "
+        fmt::format("campaign database = {} (is newer than this program: its user_version "
                     "is {}, the newest known one {})",
                     path.string(), version, schema_version()));
   }
   if (version < 1) database.refuse_as_damaged(fmt::format("user_version = {}", version));
   if (version < oldest_schema_version) {
-    throw StoreError(
-        fmt::format("campaign file = {} (was made before the first release: its user_version is "
-                    "{}, the oldest known one {})",
-                    path.string(), version, oldest_schema_version));
+    throw StoreError(fmt::format(
+        "campaign database = {} (was made before the first release: its user_version is "
+        "{}, the oldest known one {})",
+        path.string(), version, oldest_schema_version));
   }
   return version;
 }
@@ -129,7 +129,7 @@ void check_kind(Database& database, const std::filesystem::path& path) {
   const std::int64_t id = database.integer("PRAGMA application_id");
   if (id != application_id) {
     throw StoreError(fmt::format(
-        "campaign file = {} (is not a Proofmass campaign: its application_id is {}, not {})",
+        "campaign database = {} (is not a Proofmass campaign: its application_id is {}, not {})",
         path.string(), id, application_id));
   }
   // A coordinator that brings the file up to date changes version and schema together.
@@ -179,7 +179,7 @@ void check_up_to_date(const Database& database, const std::filesystem::path& pat
   const std::int64_t version = database.integer("PRAGMA user_version");
   if (version == schema_version()) return;
   throw StoreError(
-      fmt::format("campaign file = {} (is older than this program: its user_version is "
+      fmt::format("campaign database = {} (is older than this program: its user_version is "
                   "{}, not {}; resuming the campaign brings it up to date)",
                   path.string(), version, schema_version()));
 }

@@ -12,7 +12,7 @@
 
 namespace proofmass::coordinator::detail {
 
-/// `PrMs`: marks an SQLite database as a campaign file.
+/// `PrMs`: marks an SQLite database as a campaign database.
 inline constexpr std::int64_t application_id = 0x50724D73;
 
 /// The version of the first file of schema/, the oldest that this program reads.
@@ -28,9 +28,9 @@ inline constexpr std::int64_t oldest_schema_version = 8;
 /// The version that this program reads and writes.
 [[nodiscard]] std::int64_t schema_version();
 
-/// Checks that a database is a campaign file, of a version that this program reads, and that its
-/// tables, views and indexes are those of its version and that there is nothing else. Nothing that
-/// the file defines is evaluated before its definition has been compared.
+/// Checks that a database is a campaign database, of a version that this program reads, and that
+/// its tables, views and indexes are those of its version and that there is nothing else. Nothing
+/// that the file defines is evaluated before its definition has been compared.
 /// @param path  For the message.
 /// @throws StoreError otherwise.
 void check_kind(Database& database, const std::filesystem::path& path);
@@ -59,12 +59,12 @@ void check_after_unclean_end(const Database& database);
 /// @throws StoreError naming the first that is not.
 void check_schema(const Database& database, std::int64_t version);
 
-/// Checks that a campaign file has the version of this program: a reader cannot migrate it.
+/// Checks that a campaign database has the version of this program: a reader cannot migrate it.
 /// @param path  For the message.
 /// @throws StoreError otherwise.
 void check_up_to_date(const Database& database, const std::filesystem::path& path);
 
-/// Whether a campaign file has an older version than this program writes.
+/// Whether a campaign database has an older version than this program writes.
 [[nodiscard]] bool is_older(const Database& database);
 
 /// Brings the schema up to date, step by step. @pre Inside a transaction.

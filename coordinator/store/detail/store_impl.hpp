@@ -18,7 +18,7 @@ namespace proofmass::coordinator {
 
 namespace detail {
 
-/// Settings of every connection to a campaign file. A file from elsewhere is data.
+/// Settings of every connection to a campaign database. A file from elsewhere is data.
 void configure(Database& database);
 
 /// @throws StoreError if the file says that it needs a log, and there is none.
@@ -28,8 +28,8 @@ void check_that_log_is_there(const Database& database, const std::filesystem::pa
 /// but the caller.
 [[nodiscard]] std::optional<std::string> bring_to_rest(Database& database);
 
-/// A connection to a private copy of a campaign file of an older version, brought up to date; see
-/// Database::go_on_with_private_copy(). The caller closes it.
+/// A connection to a private copy of a campaign database of an older version, brought up to date;
+/// see Database::go_on_with_private_copy(). The caller closes it.
 /// @throws StoreError as Store::open_read_only() does.
 [[nodiscard]] sqlite3* open_private_copy(const std::filesystem::path& file);
 

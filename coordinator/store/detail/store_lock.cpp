@@ -33,7 +33,7 @@ int open_lock_file(const std::filesystem::path& path) {
   if (descriptor >= 0) return descriptor;
   const int error = errno;
   throw StoreError(
-      fmt::format("lock = {} (cannot be created: {}; the directory of a campaign file "
+      fmt::format("lock = {} (cannot be created: {}; the directory of a campaign database "
                   "must be writable)",
                   path.string(), std::strerror(error)));
 }

@@ -4,8 +4,9 @@
 
 namespace proofmass::coordinator::detail {
 
-/// Exclusive right to write a campaign file, held through an advisory lock on `<file>.lock`. The
-/// kernel releases it when the process ends in whatever way; a file left behind holds nothing back.
+/// Exclusive right to write a campaign database, held through an advisory lock on `<file>.lock`.
+/// The kernel releases it when the process ends in whatever way; a file left behind holds nothing
+/// back.
 class StoreLock {
  public:
   /// @throws StoreError naming the holder if the lock is taken, or if the directory is not

@@ -25,7 +25,7 @@ enum class FurtherRows : std::uint8_t { refuse, ignore };
 /// `statistic.mean of k2d = 1 (must be 25.5)`. Numbers are equal if their bits are.
 ///
 /// @param write  Writes to a new file in memory what is expected. The same functions as those that
-/// write to a campaign file: nothing is said twice of what a table holds.
+/// write to a campaign database: nothing is said twice of what a table holds.
 [[nodiscard]] std::vector<std::string> table_differences(
     const Database& database, const std::function<void(Database&)>& write,
     std::span<const ComparedTable> tables, FurtherRows further = FurtherRows::refuse);

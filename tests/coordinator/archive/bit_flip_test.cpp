@@ -1,4 +1,4 @@
-// A disk that changes bits: whatever is read from a campaign file is what was stored, or is
+// A disk that changes bits: whatever is read from a campaign database is what was stored, or is
 // refused.
 
 #include <gtest/gtest.h>
@@ -152,8 +152,8 @@ class RowsOutOfOrder : public BitFlips {
   void expect_refusal(const std::string& reason) {
     const auto message = [&](const auto& action) { return test::error_of(action); };
     const Store store = Store::open_read_only(file());
-    const std::string expected = "campaign file = " + file().string() + " (is damaged: " + reason +
-                                 "; restore it from a copy)";
+    const std::string expected = "campaign database = " + file().string() +
+                                 " (is damaged: " + reason + "; restore it from a copy)";
     EXPECT_EQ(message([&] { (void)report_text(store, MicroscopeCampaign{}); }), expected);
     EXPECT_EQ(message([&] { (void)read_results(store, MicroscopeCampaign{}); }), expected);
     EXPECT_EQ(message([&] {
@@ -191,7 +191,7 @@ TEST_F(RowsOutOfOrder, OfDeliveriesAreRefused) {
   test::swap_keys(file(), "delivery", 5, 12);
   const Store store = Store::open_read_only(file());
   EXPECT_EQ(test::error_of([&] { (void)store.finished_runs(); }),
-            "campaign file = " + file().string() +
+            "campaign database = " + file().string() +
                 " (is damaged: run 6 comes after run 12; restore it from a copy)");
 }
 

@@ -87,9 +87,9 @@ TEST_F(Listing, SaysWhatIsWrongWithACampaignFile) {
 
 TEST_F(Listing, RefusesAFileOfAnotherKindThatIsNamed) {
   const std::string path = file().string();
-  EXPECT_EQ(refusal(file()), "campaign file = " + path + " (does not exist)");
+  EXPECT_EQ(refusal(file()), "campaign database = " + path + " (does not exist)");
   test::write_file(file(), "text");
-  EXPECT_EQ(refusal(file()), "campaign file = " + path + " (is not a Proofmass campaign)");
+  EXPECT_EQ(refusal(file()), "campaign database = " + path + " (is not a Proofmass campaign)");
 }
 
 TEST_F(Listing, SaysWhichDirectoryItCannotRead) {
@@ -114,7 +114,7 @@ TEST_F(Listing, NamesAFileThatItMayNotRead) {
   for (const auto& place : {directory(), closed}) {
     const auto campaigns = list_campaigns({&place, 1});
     ASSERT_EQ(campaigns.size(), 1U);
-    EXPECT_EQ(campaigns[0].problem, "campaign file = " + closed.string() +
+    EXPECT_EQ(campaigns[0].problem, "campaign database = " + closed.string() +
                                         " (unable to open database file: Permission denied)");
   }
 }
@@ -126,7 +126,7 @@ TEST_F(Listing, NamesDamagedFilesThatAreNamed) {
   const std::vector<std::filesystem::path> places{file()};
   const auto campaigns = list_campaigns(places);
   ASSERT_EQ(campaigns.size(), 1U);
-  EXPECT_THAT(campaigns[0].problem, StartsWith("campaign file = " + file().string()));
+  EXPECT_THAT(campaigns[0].problem, StartsWith("campaign database = " + file().string()));
 }
 
 TEST_F(Listing, OfNothingSaysSo) {

@@ -1,4 +1,4 @@
-// What a campaign file keeps beside its results, and what verification says if it is not so.
+// What a campaign database keeps beside its results, and what verification says if it is not so.
 
 #include "coordinator/archive/result_scan.hpp"
 

@@ -258,10 +258,10 @@ TEST_F(Verification, NeedsACampaignFileAndAFraction) {
   const auto ignore = [](const Check&) {};
   const std::string path = file().string();
   EXPECT_EQ(test::error_of([&] { (void)verify(file(), {}, ignore, test::never_stopped); }),
-            "campaign file = " + path + " (does not exist)");
+            "campaign database = " + path + " (does not exist)");
   test::write_file(file(), "something else");
   EXPECT_EQ(test::error_of([&] { (void)verify(file(), {}, ignore, test::never_stopped); }),
-            "campaign file = " + path + " (is not a Proofmass campaign)");
+            "campaign database = " + path + " (is not a Proofmass campaign)");
   for (const double fraction : {-0.1, 1.1, std::nan("")}) {
     EXPECT_THAT(test::error_of([&] {
                   (void)verify(file(), {.fraction = fraction}, ignore, test::never_stopped);

@@ -50,14 +50,14 @@ void expect_width_at_most(const std::string& text, std::size_t width) {
 TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {
   wire::StatusReply status = status_of({campaign("a", 1)});
   status.num_campaigns = 3;
-  status.unserved_files = {{.file = "d/b.db", .reason = "campaign file = d/b.db (is locked)"}};
+  status.unserved_files = {{.file = "d/b.db", .reason = "campaign database = d/b.db (is locked)"}};
   status.num_unserved_files = 2;
   status.quarantined_hosts = {"n7"};
   status.num_quarantined_hosts = 1;
   const std::string text = status_table(status, 79);
   EXPECT_TRUE(
       text.ends_with("and 2 more campaigns\n"
-                     "not served, tried again: campaign file = d/b.db (is locked)\n"
+                     "not served, tried again: campaign database = d/b.db (is locked)\n"
                      "and 1 more such file\n"
                      "host n7 is in quarantine: too many workers crashed there; "
                      "`proofmass release n7`\n"))

@@ -80,7 +80,7 @@ TEST(ProgressDisplay, BeginsAgainWhenThereAreMoreRuns) {
 
 TEST(ProgressDisplay, ShowsThatNothingCanBeStored) {
   wire::CampaignStatus failing = progress(42, 100, 0.5);
-  failing.storage_failure = "campaign file = a.db (the disk is full)";
+  failing.storage_failure = "campaign database = a.db (the disk is full)";
   EXPECT_EQ(progress_bar(failing, 73),
             "42/100 runs [############..................]  42 %  nothing can be stored");
   const std::string text =

@@ -31,7 +31,7 @@ inline MicroscopeCampaign campaign_of(const std::string& name, std::uint64_t num
   return campaign;
 }
 
-/// Campaign files of a test: one NAME.db each, and no look at what is in them.
+/// Campaign databases of a test: one NAME.db each, and no look at what is in them.
 class PlainFiles final : public coordinator::CampaignFiles {
  public:
   explicit PlainFiles(const TemporaryDirectory& directory) : directory_(directory) {}

@@ -26,7 +26,7 @@ std::string content_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// Campaign files of two seeds and numbers of runs.
+/// Campaign databases of two seeds and numbers of runs.
 class Attach : public QueryTest {
  protected:
   Attach() {
@@ -116,14 +116,14 @@ TEST_F(Attach, ChecksEachFileAsTheMainOne) {
     return store_error_of([&] { (void)ask(QueryFiles(file(), {{"b", path}}), "SELECT 1"); });
   };
   EXPECT_EQ(text_with(broken),
-            "campaign file = " + broken.string() + " (is not an SQLite database)");
+            "campaign database = " + broken.string() + " (is not an SQLite database)");
   EXPECT_EQ(text_with(directory() / "none.db"),
-            "campaign file = " + (directory() / "none.db").string() + " (does not exist)");
+            "campaign database = " + (directory() / "none.db").string() + " (does not exist)");
   sqlite3* connection = nullptr;
   ASSERT_EQ(sqlite3_open(other_file().c_str(), &connection), SQLITE_OK);
   sqlite3_exec(connection, "CREATE VIEW trap AS SELECT 1", nullptr, nullptr, nullptr);
   sqlite3_close(connection);
-  EXPECT_EQ(text_with(other_file()), "campaign file = " + other_file().string() +
+  EXPECT_EQ(text_with(other_file()), "campaign database = " + other_file().string() +
                                          " (has what is no part of a campaign: view trap)");
 }
 

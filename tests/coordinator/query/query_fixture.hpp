@@ -52,7 +52,7 @@ class RecordingWriter : public coordinator::RowWriter {
   }
 };
 
-/// A test with a campaign file.
+/// A test with a campaign database.
 class QueryTest : public StoreTest {
  protected:
   /// Makes the file, with results of the first runs.

@@ -185,9 +185,9 @@ TEST_F(QueryRefusal, AnswersWhatIsTooLarge) {
 TEST_F(QueryRefusal, AnswersAFileThatDefinesMoreThanACampaign) {
   for (const std::string body : {"load_extension('evil')", "fts3_tokenizer('simple')", "1"}) {
     tamper("DROP VIEW IF EXISTS trap; CREATE VIEW trap AS SELECT " + body + " AS a");
-    EXPECT_EQ(
-        store_error_of([&] { (void)rows_of("SELECT 1"); }),
-        "campaign file = " + file().string() + " (has what is no part of a campaign: view trap)");
+    EXPECT_EQ(store_error_of([&] { (void)rows_of("SELECT 1"); }),
+              "campaign database = " + file().string() +
+                  " (has what is no part of a campaign: view trap)");
   }
 }
 

@@ -149,10 +149,11 @@ TEST_F(Query, ReadsNoFurtherThanItsWriterWants) {
 TEST_F(Query, SaysWhatIsWrongWithTheFile) {
   RecordingWriter writer;
   const auto ask = [&] { (void)run_query(file(), "SELECT 1", {}, writer); };
-  EXPECT_EQ(test::store_error_of(ask), "campaign file = " + file().string() + " (does not exist)");
+  EXPECT_EQ(test::store_error_of(ask),
+            "campaign database = " + file().string() + " (does not exist)");
   test::write_file(file(), "no database, but long enough that SQLite looks at what it says");
   EXPECT_EQ(test::store_error_of(ask),
-            "campaign file = " + file().string() + " (is not an SQLite database)");
+            "campaign database = " + file().string() + " (is not an SQLite database)");
 }
 
 }  // namespace

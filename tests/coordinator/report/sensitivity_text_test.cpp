@@ -250,7 +250,7 @@ TEST_F(DrawnRunsTest, AreRefusedIfTheDefinitionYieldsNone) {
   campaign.scenario.acceptance.a_d11_max = 1e-300;
   EXPECT_EQ(
       test::store_error_of([&] { (void)read_drawn_runs(store, campaign, 3); }),
-      "campaign file = " + file().string() +
+      "campaign database = " + file().string() +
           " (is damaged: run 0 has an estimate, and its definition yields no draw; restore it "
           "from a copy)");
 }

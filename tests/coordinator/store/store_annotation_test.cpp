@@ -1,4 +1,4 @@
-// Tags, notes and the stop plan of a campaign file.
+// Tags, notes and the stop plan of a campaign database.
 
 #include <gmock/gmock.h>
 
@@ -128,10 +128,10 @@ TEST_F(StoreAnnotation, LeavesOneFile) {
 TEST_F(StoreAnnotation, RefusesFilesThatAreMissingOrHaveTwoNames) {
   const std::filesystem::path missing = directory() / "missing.db";
   EXPECT_EQ(store_error_of([&] { Store::annotate(missing, {AddTag{"a"}}); }),
-            "campaign file = " + missing.string() + " (does not exist)");
+            "campaign database = " + missing.string() + " (does not exist)");
   std::filesystem::create_hard_link(file(), directory() / "other.db");
   EXPECT_EQ(error_of(AddTag{"a"}),
-            "campaign file = " + file().string() +
+            "campaign database = " + file().string() +
                 " (has 2 names (hard links), must have one; make copies instead)");
 }
 

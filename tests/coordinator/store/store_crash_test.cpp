@@ -62,7 +62,7 @@ TEST_F(StoreCrash, OfTheDiskFailsTheCommitAndKeepsTheEarlierOnes) {
   {
     const FileSizeLimit limit(300'000);
     const std::string error = store_error_of([&] { store.commit(deliveries_of(100, 5000)); });
-    EXPECT_EQ(error, "campaign file = " + file().string() +
+    EXPECT_EQ(error, "campaign database = " + file().string() +
                          " (disk I/O error; what was committed before is safe)");
     EXPECT_THAT(store.finished_runs(), ElementsAre(RunRange{RunIndex{0}, 100}));
   }

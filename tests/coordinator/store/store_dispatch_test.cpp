@@ -1,4 +1,5 @@
-// What a campaign file keeps for the next coordinator, and of workers, losses and second results.
+// What a campaign database keeps for the next coordinator, and of workers, losses and second
+// results.
 
 #include <gmock/gmock.h>
 
@@ -81,7 +82,7 @@ TEST_F(StoreDispatch, KeepsHowTheCampaignIsServed) {
 TEST_F(StoreDispatch, RefusesAnAuditOfMoreThanAllRuns) {
   Store store = create();
   EXPECT_EQ(store_error_of([&] { write(store, {CampaignControl{.audit_fraction = 1.5}}); }),
-            "campaign file = " + file().string() +
+            "campaign database = " + file().string() +
                 " (CHECK constraint failed: audit_fraction BETWEEN 0.0 AND 1.0)");
 }
 

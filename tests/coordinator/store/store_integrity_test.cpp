@@ -1,4 +1,4 @@
-// The full check of a campaign file, and copies of one.
+// The full check of a campaign database, and copies of one.
 
 #include <gmock/gmock.h>
 
@@ -38,7 +38,7 @@ class StoreIntegrity : public test::StoreTest {
   [[nodiscard]] std::string finding() const {
     const std::string error =
         store_error_of([&] { Store::open_read_only(file()).check_integrity(); });
-    const std::string before = "campaign file = " + file().string() + " (";
+    const std::string before = "campaign database = " + file().string() + " (";
     if (error.rfind(before, 0) != 0) return error;
     return error.substr(before.size(), error.size() - before.size() - 1);
   }
@@ -194,11 +194,11 @@ TEST_F(StoreBackup, TakesWhatIsStoredSoFar) {
 TEST_F(StoreBackup, RefusesAFileThatIsThere) {
   test::write_file(copy(), "precious");
   EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(copy()); }),
-            "campaign file = " + copy().string() + " (exists already)");
+            "campaign database = " + copy().string() + " (exists already)");
   EXPECT_EQ(std::filesystem::file_size(copy()), 8u);
   EXPECT_THAT(store_error_of([&] { Store::open(file()).back_up(file()); }), HasSubstr("(held by "));
   EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(file()); }),
-            "campaign file = " + file().string() + " (exists already)");
+            "campaign database = " + file().string() + " (exists already)");
 }
 
 TEST_F(StoreBackup, LeavesNothingIfTheDiskIsFull) {
@@ -206,7 +206,7 @@ TEST_F(StoreBackup, LeavesNothingIfTheDiskIsFull) {
   {
     const test::FileSizeLimit limit(100'000);
     EXPECT_EQ(store_error_of([&] { store.back_up(copy()); }),
-              "campaign file = " + copy().string() +
+              "campaign database = " + copy().string() +
                   ".unfinished (disk I/O error; what was committed before is safe)");
   }
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
@@ -219,7 +219,7 @@ TEST_F(StoreBackup, NeedsADirectory) {
   EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(missing); }),
             "lock = " + missing.string() +
                 ".lock (cannot be created: No such file or directory; the directory of a campaign "
-                "file must be writable)");
+                "database must be writable)");
 }
 
 }  // namespace

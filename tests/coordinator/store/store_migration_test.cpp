@@ -52,7 +52,7 @@ class StoreMigration : public test::StoreTest {
   void make_older_file() const { make_older(file()); }
 
   [[nodiscard]] std::string older_than_the_program() const {
-    return "campaign file = " + file().string() +
+    return "campaign database = " + file().string() +
            " (is older than this program: its user_version is 8, not 9; resuming the campaign "
            "brings it up to date)";
   }
@@ -108,7 +108,7 @@ TEST_F(StoreMigration, OfAFileThatIsReadLeavesItAsItIs) {
     EXPECT_EQ(store.control(), CampaignControl{});
     store.check_integrity();
     EXPECT_EQ(test::store_error_of([&] { store.record_event("note", ""); }),
-              "campaign file = " + file().string() + " (attempt to write a readonly database)");
+              "campaign database = " + file().string() + " (attempt to write a readonly database)");
     EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
   }
   EXPECT_TRUE(test::content_of(file()) == before);
@@ -174,7 +174,7 @@ TEST_F(StoreMigration, IsNotPossibleFromBeforeTheFirstVersion) {
   make_older_file();
   Database(file(), Access::read_write).execute("PRAGMA user_version = 7");
   EXPECT_EQ(test::store_error_of([&] { Store::open(file()); }),
-            "campaign file = " + file().string() +
+            "campaign database = " + file().string() +
                 " (was made before the first release: its user_version is 7, the oldest known one "
                 "8)");
 }
@@ -212,7 +212,7 @@ TEST_F(StoreMigration, OfAFileThatIsReadNeedsRoomForACopy) {
       .execute("UPDATE campaign SET definition = printf('%.*c', 8000000, 'x')");
   const test::FileSizeLimit limit(100'000);
   EXPECT_EQ(test::store_error_of([&] { Store::open_read_only(file()); }),
-            "campaign file = " + file().string() +
+            "campaign database = " + file().string() +
                 " (is older than this program, which reads a copy of it; the copy cannot be made "
                 "in the temporary directory, which TMPDIR names: disk I/O error)");
 }
@@ -221,8 +221,9 @@ TEST_F(StoreMigration, OfAFileThatIsReadNeedsRoomForACopy) {
 TEST_F(StoreMigration, ThatFailsLeavesTheFileAsItWas) {
   make_older_file();
   Database(file(), Access::read_write).execute("UPDATE note SET text = 'fails'");
-  EXPECT_EQ(test::store_error_of([&] { Store::open(file()); }),
-            "campaign file = " + file().string() + " (CHECK constraint failed: text <> 'fails')");
+  EXPECT_EQ(
+      test::store_error_of([&] { Store::open(file()); }),
+      "campaign database = " + file().string() + " (CHECK constraint failed: text <> 'fails')");
   const Database database(file(), Access::read_only);
   EXPECT_EQ(database.integer("PRAGMA user_version"), 8);
   EXPECT_EQ(database.text("SELECT text FROM note"), "fails");

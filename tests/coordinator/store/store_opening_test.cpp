@@ -69,7 +69,7 @@ class StoreOpening : public test::StoreTest {
   }
 
   [[nodiscard]] std::string damaged() const {
-    return "campaign file = " + file().string() +
+    return "campaign database = " + file().string() +
            " (is damaged: database disk image is malformed; restore it from a copy)";
   }
 };

@@ -229,7 +229,7 @@ TEST_F(StorePlace, WhoeverClosesAFileLearnsThatItIsLost) {
   store.commit(deliveries_of(0, 10));
   std::filesystem::remove(file());
   std::filesystem::create_directory(file());
-  EXPECT_THAT(test::store_error_of([&] { (void)store.rest(); }), HasSubstr("campaign file = "));
+  EXPECT_THAT(test::store_error_of([&] { (void)store.rest(); }), HasSubstr("campaign database = "));
 }
 
 // The connection to the lost file must not touch the log of what has its name now.
@@ -270,7 +270,7 @@ TEST_F(StorePlace, KeepsASecondCoordinatorAwayThoughBothLockFilesWereRemoved) {
   first.commit(deliveries_of(0, 10));
   std::filesystem::remove(file().string() + ".lock");
   EXPECT_EQ(test::store_error_of([&] { Store::open(file()); }),
-            "campaign file = " + file().string() +
+            "campaign database = " + file().string() +
                 " (another coordinator has it; a campaign has one coordinator at a time)");
   first.commit(deliveries_of(10, 20));
   EXPECT_EQ(num_readable(), 20u);

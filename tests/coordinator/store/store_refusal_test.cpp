@@ -22,9 +22,9 @@ using ::testing::MatchesRegex;
 
 class StoreRefusal : public test::StoreTest {
  protected:
-  /// `campaign file = <file()> (<reason>)`
+  /// `campaign database = <file()> (<reason>)`
   [[nodiscard]] std::string message(const std::string& reason) const {
-    return "campaign file = " + file().string() + " (" + reason + ")";
+    return "campaign database = " + file().string() + " (" + reason + ")";
   }
   [[nodiscard]] std::string error_of_open() const {
     return store_error_of([&] { Store::open(file()); });
@@ -296,12 +296,12 @@ TEST_F(StoreRefusal, OfAResultWithHealthThatThereIsNot) {
 
 TEST_F(StoreRefusal, ToMakeAFileWithoutAName) {
   const std::string folder = (directory() / "").string();
-  const std::string expected = "campaign file = " + folder + " (names no file)";
+  const std::string expected = "campaign database = " + folder + " (names no file)";
   EXPECT_EQ(store_error_of([&] { Store::create(folder, campaign_of(1), ""); }), expected);
   create();
   EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(folder); }), expected);
   EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(""); }),
-            "campaign file =  (names no file)");
+            "campaign database =  (names no file)");
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
 }
 
@@ -353,7 +353,7 @@ TEST_F(StoreRefusal, OfADirectoryThatIsNotWritable) {
   std::filesystem::permissions(directory(), std::filesystem::perms(0755));
   EXPECT_EQ(error,
             "lock = " + file().string() +
-                ".lock (cannot be created: Permission denied; the directory of a campaign file "
+                ".lock (cannot be created: Permission denied; the directory of a campaign database "
                 "must be writable)");
 }
 

@@ -1,4 +1,5 @@
-// When a campaign file is whole without its write-ahead log, and what is made of one that is not.
+// When a campaign database is whole without its write-ahead log, and what is made of one that is
+// not.
 
 #include <gmock/gmock.h>
 
@@ -47,7 +48,7 @@ class StoreRest : public test::WriterTest {
   };
 
   [[nodiscard]] std::string lacks_its_log(const std::filesystem::path& path) const {
-    return "campaign file = " + path.string() + " (lacks its log " + path.filename().string() +
+    return "campaign database = " + path.string() + " (lacks its log " + path.filename().string() +
            "-wal: results may be missing; copy both files, or make copies with `proofmass backup`; "
            "resuming the campaign computes what is missing)";
   }

@@ -281,25 +281,25 @@ TEST_F(StoreTest, RefusesToExtendToAnotherCampaign) {
     return store_error_of([&] { store.extend(campaign, ""); });
   };
   EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.name = "other"; }),
-            "campaign.name = other (the campaign file has hardy2013)");
+            "campaign.name = other (the campaign database has hardy2013)");
   EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.seed = 2; }),
-            "campaign.seed = 2 (the campaign file has 1)");
+            "campaign.seed = 2 (the campaign database has 1)");
   EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.num_runs = 2; }),
-            "campaign.runs = 2 (must be at least 3, as in the campaign file)");
+            "campaign.runs = 2 (must be at least 3, as in the campaign database)");
   EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) {
               campaign.environment_file = "e.csv";
               campaign.environment_table[0].linear_m_s2[0] *= 2.0;
             }),
-            "environment.file = e.csv (its rows are not those of the campaign file)");
+            "environment.file = e.csv (its rows are not those of the campaign database)");
   EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) { campaign.table_columns[1][2] = 0.5; }),
             "dispersion." + drawn_names()[17] +
-                " = 0.5 (for run 2 the campaign file has 17.285714285714285)");
-  EXPECT_EQ(
-      error_after([](MicroscopeCampaign& campaign) {
-        campaign.dispersions[18] = campaign.dispersions[17];
-        campaign.table_columns.push_back(campaign.table_columns[1]);
-      }),
-      "dispersion." + drawn_names()[18] + " = table (the campaign file holds no values for it)");
+                " = 0.5 (for run 2 the campaign database has 17.285714285714285)");
+  EXPECT_EQ(error_after([](MicroscopeCampaign& campaign) {
+              campaign.dispersions[18] = campaign.dispersions[17];
+              campaign.table_columns.push_back(campaign.table_columns[1]);
+            }),
+            "dispersion." + drawn_names()[18] +
+                " = table (the campaign database holds no values for it)");
   EXPECT_EQ(error_after([](Campaign&) {}), "");
 }
 

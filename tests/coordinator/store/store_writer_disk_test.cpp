@@ -28,14 +28,14 @@ using ::testing::IsEmpty;
 
 class StoreWriterDisk : public test::WriterTest {
  protected:
-  /// `failed campaign file = <file()> (<reason>)`
+  /// `failed campaign database = <file()> (<reason>)`
   [[nodiscard]] std::string failed(const std::string& reason) const {
-    return "failed campaign file = " + file().string() + " (" + reason + ")";
+    return "failed campaign database = " + file().string() + " (" + reason + ")";
   }
   const std::string io_error = "disk I/O error; what was committed before is safe";
 };
 
-constexpr rlim_t small_size = 150'000;  // More than a new campaign file needs.
+constexpr rlim_t small_size = 150'000;  // More than a new campaign database needs.
 
 TEST_F(StoreWriterDisk, KeepsEverythingThroughAFailureAndReportsItOnce) {
   StoreWriter& writer = start();
@@ -169,7 +169,7 @@ TEST_F(StoreWriterDisk, GoesOnWhenSpaceIsFreedOnAFullOne) {
   for (std::uint64_t run = 0; run < 1000; ++run) writer.deliver(id, delivery_of(run));
   writer.flush();
   EXPECT_THAT(take_completions(),
-              ElementsAre("failed campaign file = " + (mount / "campaign.db").string() +
+              ElementsAre("failed campaign database = " + (mount / "campaign.db").string() +
                           " (the disk is full; what was committed before is safe, free space and "
                           "try again)"));
   ballast.close();

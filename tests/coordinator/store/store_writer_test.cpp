@@ -196,7 +196,7 @@ TEST_F(StoreWriterTest, LetsOthersUseTheFileAfterAllThatWasHandedOver) {
   EXPECT_EQ(test::store_error_of([&] {
               writer.access(id, [](Store& store) { store.extend(campaign_of(150), ""); });
             }),
-            "campaign.runs = 150 (must be at least 200, as in the campaign file)");
+            "campaign.runs = 150 (must be at least 200, as in the campaign database)");
   EXPECT_THAT(take_completions(), ElementsAre("committed 99", "committed 199"));
 }
 

@@ -86,7 +86,7 @@ TEST(BootstrapDeviationInterval, RefusesWhatItCannotWorkWith) {
       "confidence = 0 (must be in (0, 1))");
 }
 
-// A campaign file may hold errors whose cubes no double can hold.
+// A campaign database may hold errors whose cubes no double can hold.
 TEST(BootstrapDeviationInterval, DoesNotDependOnTheUnit) {
   std::vector<double> values;
   for (int i = 0; i < 20; ++i) values.push_back((i * 7) % 11);

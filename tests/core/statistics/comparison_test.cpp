@@ -71,7 +71,7 @@ TEST(CompareUnpaired, IsWelchs) {
   EXPECT_NEAR(comparison.mean_p_value, 1.0 - s * (1.0 + 2.0 / (4.0 + t * t)), 1e-14);
 }
 
-// A campaign file may hold numbers up to 1e90, whose variance has a square beyond all doubles.
+// A campaign database may hold numbers up to 1e90, whose variance has a square beyond all doubles.
 TEST(CompareUnpaired, DoesNotDependOnTheUnit) {
   const double expected = compare_unpaired(Values{1, 2, 3}, Values{4, 5, 6}, 0.95).mean_p_value;
   for (const double unit : {0x1p300, 0x1p-300}) {

@@ -17,7 +17,7 @@ class DatabaseTest : public test::StoreTest {
     database_.execute("CREATE TABLE t (x INTEGER UNIQUE, y TEXT) STRICT");
   }
   [[nodiscard]] std::string message(const std::string& reason) const {
-    return "campaign file = " + file().string() + " (" + reason + ")";
+    return "campaign database = " + file().string() + " (" + reason + ")";
   }
   Database database_;
 };
@@ -81,7 +81,7 @@ TEST_F(DatabaseTest, ReportsWhatSqliteSaysOfAnythingElse) {
 TEST_F(DatabaseTest, ReportsWhyAFileCannotBeOpened) {
   const std::filesystem::path missing = directory() / "missing" / "campaign.db";
   EXPECT_EQ(store_error_of([&] { Database(missing, Access::create); }),
-            "campaign file = " + missing.string() +
+            "campaign database = " + missing.string() +
                 " (unable to open database file: No such file or directory)");
 }
 

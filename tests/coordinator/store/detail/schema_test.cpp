@@ -58,7 +58,7 @@ TEST_F(SchemaTest, TiesEveryNumberToTheStatus) {
       const std::string column = kind + name;
       EXPECT_EQ(test::store_error_of(
                     [&] { database.execute("UPDATE run_result SET " + column + " = NULL"); }),
-                "campaign file = " + file().string() + " (CHECK constraint failed: (" + column +
+                "campaign database = " + file().string() + " (CHECK constraint failed: (" + column +
                     " IS NULL) = (status " + (kind == "truth_" ? "= 4))" : "> 2))"));
     }
   }
