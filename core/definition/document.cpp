@@ -295,7 +295,14 @@ void Document::check() const {
 }
 
 DefinitionError Document::located(const ConfigError& error) const {
-  return DefinitionError(prefix(place_of(error.field())) + error.what());
+  // A table that holds for all of its elements has `mean` where the field is `x.mean`.
+  const std::string& field = error.field();
+  const std::string key = field.substr(field.rfind('.') + 1);
+  const std::string shared = path_of(parent_of(parent_of(field)), key);
+  const bool is_shared = value_at(field) == nullptr && value_at(shared) != nullptr;
+  const std::string& written = is_shared ? shared : field;
+  return DefinitionError(prefix(place_of(written)) + written +
+                         std::string(error.what()).substr(field.size()));
 }
 
 }  // namespace proofmass

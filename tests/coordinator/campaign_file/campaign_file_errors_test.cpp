@@ -220,7 +220,7 @@ TEST(DispersionErrors, NameTheLineOfAnInconsistentLaw) {
   EXPECT_EQ(refusal_of("[dispersion.offcentring_m.x]\nmaximum = -1"),
             "campaign.toml:2: dispersion.offcentring_m.x.maximum = -1 (must be > minimum, -2e-05)");
   EXPECT_EQ(refusal_of("[dispersion.offcentring_m]\nmaximum = -1"),
-            "campaign.toml:1: dispersion.offcentring_m.x.maximum = -1 (must be > minimum, -2e-05)");
+            "campaign.toml:2: dispersion.offcentring_m.maximum = -1 (must be > minimum, -2e-05)");
 }
 
 // --- data files ---
