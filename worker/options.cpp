@@ -81,7 +81,7 @@ void add_process(CLI::App& app, Options& options) {
   app.add_flag_callback(
       "--no-supervisor", [&options] { options.is_supervised = false; },
       "Do not watch the worker from a second process,\nwhich starts it again if it crashes");
-  app.add_option("--parent", options.parent, "Process to die with; used by `proofmass run`");
+  app.add_option("--parent", options.parent)->group("");  // For `proofmass run`.
   app.add_option_function<std::string>(
          "--faults",
          [&options](const std::string& text) { options.faults = wire::FaultPlan::parse(text); })

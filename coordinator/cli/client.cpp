@@ -32,7 +32,7 @@ void add_client_options(CLI::App& command, ClientOptions& options) {
   command
       .add_option("--connect", connection.endpoint,
                   "The coordinator's address for clients,\ne.g. tcp://127.0.0.1:5556")
-      ->envname("PROOFMASS_CONNECT_CLIENTS")
+      ->envname("PROOFMASS_CLIENT_CONNECT")
       ->required();
   command.add_option("--keys", connection.keys, "Directory with client.key and coordinator.pub")
       ->envname("PROOFMASS_KEYS");

@@ -9,7 +9,7 @@ int run_proofmass(int argc, char** argv,
                   const std::function<void(CLI::App&, Command&)>& add_further_commands) {
   CLI::App app("Proofmass validates the in-flight calibration of drag-free accelerometers.",
                "proofmass");
-  app.footer(exit_codes_text);
+  app.footer(exit_codes_text({}));  // Of the commands, unless they say otherwise.
   app.set_version_flag("--version", "proofmass " PROOFMASS_VERSION);
   app.require_subcommand(1);
   app.set_config("--config", "", "TOML file with options, a section a command")
@@ -23,6 +23,7 @@ int run_proofmass(int argc, char** argv,
                          add_watch, add_control, add_workers, add_release}) {
     add(app, chosen);
   }
+  app.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   return run_program(app, argc, argv, [&] { return chosen(); });
 }
 

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <algorithm>
+#include <initializer_list>
+#include <string>
+
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
@@ -12,6 +16,22 @@ enum ExitCode : int {
   exit_not_met = 3,         ///< A requirement is not met or undecided, a stop rule not reached.
   exit_interrupted = 130,   ///< SIGINT or SIGTERM; what is stored stands.
 };
+
+/// The end of `--help`.
+/// @param further  What the command may end with beside 0, 1 and 2.
+[[nodiscard]] inline std::string exit_codes_text(std::initializer_list<ExitCode> further) {
+  const auto may_be = [&](ExitCode code) { return std::ranges::count(further, code) > 0; };
+  std::string text =
+      "Exit codes:\n"
+      "  0    done\n"
+      "  1    cannot be done: disk, database, address, workers that crash, time limit\n"
+      "  2    wrong usage, campaign file or query";
+  if (may_be(exit_not_met)) text += "\n  3    a requirement or stop rule is not met";
+  if (may_be(exit_interrupted)) {
+    text += "\n  130  interrupted by SIGINT or SIGTERM; what is stored stands";
+  }
+  return text;
+}
 
 /// The user asked for something that makes no sense.
 class UsageError : public Error {

@@ -18,14 +18,6 @@
 
 namespace proofmass::coordinator {
 
-inline constexpr const char* exit_codes_text =
-    "Exit codes:\n"
-    "  0    done\n"
-    "  1    cannot be done: disk, database, address, workers that crash, time limit\n"
-    "  2    wrong usage, campaign file or query\n"
-    "  3    a requirement or stop rule is not met\n"
-    "  130  interrupted by SIGINT or SIGTERM; what is stored stands";
-
 /// Parses the arguments, does the work and turns what goes wrong into a message and an exit code.
 inline int run_program(CLI::App& app, int argc, char** argv, const std::function<int()>& work) {
   const auto fail = [&app](std::string_view what, int exit_code) {

@@ -34,6 +34,9 @@ std::string figures(const wire::CampaignStatus& status) {
   if (!status.storage_failure.empty()) {
     return fmt::format("{:3} %  nothing can be stored", percent(status));
   }
+  if (status.num_done == 0 && status.num_lent > 0) {
+    return fmt::format("{:3} %  the first {} are computed", percent(status), status.num_lent);
+  }
   return fmt::format("{:3} %{}{}", percent(status), rate_text(status.rate_hz), left_text(status));
 }
 
@@ -46,6 +49,15 @@ std::string duration_text(double seconds) {
   if (total < 3600) return fmt::format("{} min {} s", total / 60, total % 60);
   if (total < 86400) return fmt::format("{} h {} min", total / 3600, total % 3600 / 60);
   return fmt::format("{} d {} h", total / 86400, total % 86400 / 3600);
+}
+
+wire::CampaignStatus out_of(wire::CampaignStatus status, std::uint64_t num_runs) {
+  if (num_runs <= status.num_runs) return status;
+  status.num_runs = num_runs;
+  if (status.rate_hz > 0.0) {
+    status.remaining_s = static_cast<double>(num_runs - status.num_done) / status.rate_hz;
+  }
+  return status;
 }
 
 std::string progress_bar(const wire::CampaignStatus& status, std::size_t columns_max) {
@@ -79,10 +91,9 @@ void ProgressDisplay::update(const wire::CampaignStatus& status) {
   if (mode_ == DisplayMode::quiet) return;
   const std::uint64_t tenths = percent(status) / 10;
   const bool has_failed = !status.storage_failure.empty();
-  const bool is_further = status.num_runs != num_runs_shown_ || tenths > tenths_shown_;
+  const bool is_further = !tenths_shown_ || tenths > *tenths_shown_;
   if (!is_further && has_failed == is_failure_shown_) return;
   is_failure_shown_ = has_failed;
-  num_runs_shown_ = status.num_runs;
   tenths_shown_ = tenths;
   wire::say_on(stream_, progress_line(status) + "\n");
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -17,8 +18,13 @@ enum class DisplayMode : std::uint8_t {
   quiet,  ///< Notes only.
 };
 
+/// The progress of a campaign with a stop rule, which asks for more runs at each check, towards the
+/// most that it may take: so it never goes back.
+/// @param num_runs  The most; without a stop rule those of the campaign.
+[[nodiscard]] wire::CampaignStatus out_of(wire::CampaignStatus status, std::uint64_t num_runs);
+
 /// A line of at most `columns_max` columns: runs done, percent, rate, time left; or that nothing
-/// can be stored.
+/// can be stored. Before the first run is done, how many the workers have.
 [[nodiscard]] std::string progress_bar(const wire::CampaignStatus& status, std::size_t columns_max);
 
 /// The same without a bar.
@@ -48,9 +54,8 @@ class ProgressDisplay {
   std::FILE* stream_;
   bool has_bar_ = false;
   std::string shown_;
-  std::uint64_t tenths_shown_ = 0;
+  std::optional<std::uint64_t> tenths_shown_;
   bool is_failure_shown_ = false;
-  std::uint64_t num_runs_shown_ = 0;  ///< A stop rule asks for more and more.
 };
 
 /// `bar` if the stream is a terminal, `lines` otherwise.

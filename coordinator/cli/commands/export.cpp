@@ -93,6 +93,7 @@ void add_export(CLI::App& app, Command& chosen) {
       {"csv", ExportFormat::csv}, {"json", ExportFormat::json}, {"hdf5", ExportFormat::hdf5}};
   auto [command, options] = add_command<ExportOptions>(
       app, chosen, "export", "Write all results of a database for others", export_results);
+  command.footer(exit_codes_text({exit_interrupted}));
   command.add_option("DB", options.database, database_text)->required();
   wire::add_choice(command, "--format", options.format, formats, "csv (the default), json or hdf5");
   command.add_option("--output", options.output, "File; standard output by default");

@@ -119,6 +119,7 @@ void add_query(CLI::App& app, Command& chosen) {
                                                         {"markdown", RowFormat::markdown}};
   auto [command, options] = add_command<QueryOptions>(
       app, chosen, "query", "Ask a database a question in SQL", query_database);
+  command.footer(exit_codes_text({exit_interrupted}));
   command.add_option("DB", options.database, database_text)->required();
   command.add_option("SQL", options.sql, "One statement that reads; - for standard input")
       ->required();

@@ -56,6 +56,7 @@ int print_report(const ReportOptions& options) {
 void add_report(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<ReportOptions>(
       app, chosen, "report", "Print the tables of a database", print_report);
+  command.footer(exit_codes_text({exit_not_met}));
   command.add_option("DB", options.database, database_text)->required();
   command.add_option("--requirement", options.requirements,
                      "Answer instead whether it is met, as in\n"

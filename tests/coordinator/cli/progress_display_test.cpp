@@ -41,6 +41,24 @@ TEST(ProgressBar, ShowsNoRateBeforeThereIsOne) {
             "0/100 runs [..............................]   0 %");
 }
 
+TEST(ProgressBar, SaysThatTheFirstRunsAreComputed) {
+  wire::CampaignStatus status = progress(0, 100, 0.0);
+  status.num_lent = 32;
+  EXPECT_EQ(progress_bar(status, 60),
+            "0/100 runs [..............]   0 %  the first 32 are computed");
+  status.num_done = 16;
+  EXPECT_EQ(progress_line(status), "16/100 runs   16 %");
+}
+
+// What is done only grows, and so does the percentage, whenever a rule asks for more runs.
+TEST(ProgressBar, DoesNotGoBackWhenAStopRuleAsksForMore) {
+  EXPECT_EQ(progress_line(out_of(progress(768, 768, 10.0), 2000)),
+            "768/2000 runs   38 %  10 runs/s  2 min 4 s left");
+  EXPECT_EQ(progress_line(out_of(progress(768, 1024, 10.0), 2000)),
+            "768/2000 runs   38 %  10 runs/s  2 min 4 s left");
+  EXPECT_EQ(progress_line(out_of(progress(10, 20, 0.0), 20)), "10/20 runs   50 %");
+}
+
 TEST(ProgressBar, FillsTheLine) {
   for (const std::size_t columns_max : {59U, 79U, 199U}) {
     EXPECT_EQ(progress_bar(progress(42, 100, 0.0), columns_max).size(), columns_max);
