@@ -38,7 +38,8 @@ void extend_same(Store& store, const Campaign& wanted, const std::filesystem::pa
   const std::uint64_t num_runs = store.num_runs();
   if (wanted.num_runs < num_runs) {
     throw UsageError(
-        fmt::format("runs = {} (must be at least {}, the number that {} was asked for)",
+        fmt::format("campaign.runs = {} (must be at least {}, which {} was asked for; the number "
+                    "comes from --runs, or else from the campaign file)",
                     wanted.num_runs, num_runs, database.string()));
   }
   if (wanted.num_runs > num_runs) store.extend(wanted, text_of(wanted));

@@ -219,9 +219,10 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
 int run_proofmass_coordinator(int argc, char** argv) {
   CLI::App app(
       "Lends the runs of campaigns to workers and stores their results.\n"
-      "SIGTERM lets workers deliver what they hold; SIGINT, or a second one, does not.",
+      "SIGTERM lets workers deliver what they hold; SIGINT, or a second one, does not.\n"
+      "SIGHUP is for a restart: workers go on and wait for the next coordinator.",
       "proofmass-coordinator");
-  app.footer(exit_codes_text);
+  app.footer(exit_codes_text({exit_interrupted}));
   app.set_version_flag("--version", "proofmass-coordinator " PROOFMASS_VERSION);
   app.set_config("--config", "", "File with these options, as in\n`bind = \"tcp://*:5555\"`")
       ->envname("PROOFMASS_CONFIG");

@@ -40,7 +40,7 @@ void add_stop_options(CLI::App& command, StopOptions& options) {
       ->check(wire::in_range(std::uint64_t{0}, num_runs_max));
 }
 
-void add_audit_option(CLI::App& command, double& audit_fraction) {
+void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction) {
   command
       .add_option("--audit", audit_fraction,
                   "Fraction of the runs to compute a second time,\nelsewhere, and compare")

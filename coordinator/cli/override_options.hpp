@@ -28,6 +28,6 @@ void add_stop_options(CLI::App& command, StopOptions& options);
 
 /// Declares --audit.
 /// @param audit_fraction  Lives as long as the command.
-void add_audit_option(CLI::App& command, double& audit_fraction);
+void add_audit_option(CLI::App& command, std::optional<double>& audit_fraction);
 
 }  // namespace proofmass::coordinator

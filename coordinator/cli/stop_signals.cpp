@@ -17,8 +17,14 @@ std::atomic<StopRequest> request_of_first_terminate = StopRequest::now;
 static_assert(std::atomic<StopRequest>::is_always_lock_free);
 
 void on_signal(int signal) {
-  const bool is_first_terminate = signal == SIGTERM && request == StopRequest::none;
-  request = is_first_terminate ? request_of_first_terminate.load() : StopRequest::now;
+  const bool is_first = request == StopRequest::none;
+  if (is_first && signal == SIGTERM) {
+    request = request_of_first_terminate.load();
+  } else if (signal != SIGHUP) {
+    request = StopRequest::now;
+  } else if (is_first) {
+    request = StopRequest::leave;
+  }
 }
 
 void run_handlers(const std::stop_token& stop) {
@@ -36,6 +42,9 @@ const std::atomic<StopRequest>& catch_stop_signals(OnTerminate on_terminate) {
   request_of_first_terminate = drains ? StopRequest::drain : StopRequest::now;
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  // `nohup` ignores it, and that must stay so.
+  const bool leaves = drains && std::signal(SIGHUP, SIG_IGN) != SIG_IGN;
+  if (leaves) std::signal(SIGHUP, on_signal);
   return request;
 }
 
@@ -66,6 +75,7 @@ sigset_t SignalThread::signals() {
   sigemptyset(&set);
   sigaddset(&set, SIGINT);
   sigaddset(&set, SIGTERM);
+  sigaddset(&set, SIGHUP);
   return set;
 }
 

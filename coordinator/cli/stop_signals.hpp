@@ -12,11 +12,13 @@
 
 namespace proofmass::coordinator {
 
-/// What SIGTERM asks for; SIGINT, and any second signal, ask to stop now.
+/// What SIGTERM asks for; SIGINT, and any second one of both, ask to stop now. Where SIGTERM asks
+/// to drain, SIGHUP asks to leave the workers to the next coordinator, unless it was ignored
+/// before.
 enum class OnTerminate : std::uint8_t { stop_now, drain };
 
-/// From now on SIGINT and SIGTERM end no process: they set the request that is returned, which
-/// lives as long as the process.
+/// From now on these signals end no process: they set the request that is returned, which lives
+/// as long as the process.
 [[nodiscard]] const std::atomic<StopRequest>& catch_stop_signals(OnTerminate on_terminate);
 
 /// Does what reads a database and may take long; SIGINT and SIGTERM end it in order.
@@ -34,7 +36,7 @@ class SignalThread {
   SignalThread(const SignalThread&) = delete;
   SignalThread& operator=(const SignalThread&) = delete;
 
-  /// SIGINT and SIGTERM.
+  /// SIGINT, SIGTERM and SIGHUP.
   [[nodiscard]] static sigset_t signals();
 
  private:

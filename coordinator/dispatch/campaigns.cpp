@@ -19,6 +19,11 @@ void send_to_all(const State& state, CampaignId id, Outbox& outbox) {
   }
 }
 
+/// With one crash more a run is given up.
+std::uint32_t num_crashes_before_last(const State& state) {
+  return std::max(state.config.crashes_per_run_max, 2U) - 1;
+}
+
 /// Open runs that were blamed for crashes are suspects again. On which hosts is not known any more,
 /// so that one more crash at least, here, must speak against them.
 void restore_blame(State& state, CampaignId id, const StoredCampaign& stored, RunSet& open,
@@ -27,7 +32,7 @@ void restore_blame(State& state, CampaignId id, const StoredCampaign& stored, Ru
   for (const StoredCampaign::Blamed& blamed : stored.blamed) {
     if (blamed.num_crashes == 0 || !open.remove(blamed.run)) continue;
     campaign.suspects[blamed.run].num_crashes =
-        std::clamp(state.config.crashes_per_run_max - 1, 1U, blamed.num_crashes);
+        std::min(num_crashes_before_last(state), blamed.num_crashes);
     detail::make_pending(state, id, RunSet(RunRange{blamed.run, 1}), detail::after(blamed.attempt),
                          outbox);
   }
@@ -114,6 +119,21 @@ void on_control(State& state, CampaignId id, int priority, double audit_fraction
   campaign.priority = priority;
   campaign.audit_fraction = audit_fraction;
   detail::sort_served(state);
+}
+
+void on_retry(State& state, CampaignId id, TimePoint now, Outbox& outbox) {
+  CampaignState& campaign = state.campaigns.at(id);
+  const RunSet runs = std::exchange(campaign.given_up, {});
+  for (const RunRange& range : runs.ranges()) {
+    for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
+      campaign.suspects[run].num_crashes = num_crashes_before_last(state);
+    }
+  }
+  detail::make_pending(state, id, runs, {1}, outbox);
+  if (campaign.phase == Phase::finished && !runs.empty()) campaign.phase = Phase::active;
+  outbox.log({.kind = "given_up_runs_retried", .fields = {{"runs", runs.size()}}}, id);
+  detail::sort_served(state);
+  detail::settle(state, now, outbox);
 }
 
 void on_pause(State& state, CampaignId id, Outbox& outbox) {

@@ -33,6 +33,8 @@ void on_extended(State& state, CampaignId id, std::shared_ptr<const Campaign> de
 /// Its runs are lent earlier or later than before, and more or fewer of the results that come from
 /// now on are computed a second time.
 void on_control(State& state, CampaignId id, int priority, double audit_fraction);
+/// The runs that were given up are open again, as suspects.
+void on_retry(State& state, CampaignId id, TimePoint now, Outbox& outbox);
 /// Lends no more of it until on_resume(); runs that are not being computed are asked back.
 void on_pause(State& state, CampaignId id, Outbox& outbox);
 void on_resume(State& state, CampaignId id, TimePoint now, Outbox& outbox);

@@ -146,7 +146,9 @@ void CampaignService::change(CampaignId id, const Change& change) {
     served.plan = change.plan;
     served.is_decided = false;
   }
-  on_control(state_, id, change.priority, change.audit_fraction);
+  const CampaignState& campaign = state_.campaigns.at(id);
+  on_control(state_, id, change.priority.value_or(campaign.priority),
+             change.audit_fraction.value_or(campaign.audit_fraction));
   resume(id);
   review();
 }
@@ -163,11 +165,9 @@ void CampaignService::resume(CampaignId id) {
   on_resume(state_, id, surroundings_.now(), outbox_);
 }
 
-wire::ClientReply CampaignService::control(CampaignId id, wire::ControlAction action) {
-  if (state_.campaigns.at(id).phase == Phase::finished) {
-    return wire::ErrorReply{fmt::format("campaign = {} (is finished)", served_.at(id).name)};
-  }
-  switch (action) {
+wire::ClientReply CampaignService::control(CampaignId id, const wire::ControlRequest& request) {
+  const CampaignState& campaign = state_.campaigns.at(id);
+  switch (request.action) {
     case wire::ControlAction::pause:
       on_pause(state_, id, outbox_);
       break;
@@ -176,6 +176,13 @@ wire::ClientReply CampaignService::control(CampaignId id, wire::ControlAction ac
       break;
     case wire::ControlAction::cancel:
       on_cancel(state_, id, outbox_);
+      break;
+    case wire::ControlAction::set_priority:
+      on_control(state_, id, request.priority, campaign.audit_fraction);
+      break;
+    case wire::ControlAction::retry:
+      writer_.retry_given_up(id);
+      on_retry(state_, id, surroundings_.now(), outbox_);
       break;
   }
   review();

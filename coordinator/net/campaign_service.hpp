@@ -56,8 +56,8 @@ class CampaignService {
   struct Change {
     std::shared_ptr<const Campaign> definition;
     StopPlan plan;
-    int priority = 0;
-    double audit_fraction = 0.0;
+    std::optional<int> priority = {};  ///< Unset: as it is.
+    std::optional<double> audit_fraction = {};
   };
 
   explicit CampaignService(Surroundings surroundings);
@@ -102,8 +102,8 @@ class CampaignService {
     return state_.campaigns.at(id).definition->num_runs;
   }
 
-  /// Pauses, resumes or cancels a campaign that is served.
-  [[nodiscard]] wire::ClientReply control(CampaignId id, wire::ControlAction action);
+  /// Carries out an action on a campaign that is served.
+  [[nodiscard]] wire::ClientReply control(CampaignId id, const wire::ControlRequest& request);
   [[nodiscard]] wire::DoneReply done_reply(CampaignId id) const;
 
   /// Takes notice of what the dispatch did: rates, phases, campaigns that are finished. To be

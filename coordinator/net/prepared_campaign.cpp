@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <exception>
 #include <map>
 #include <optional>
@@ -55,6 +56,7 @@ EndedCampaign ended_campaign(const std::filesystem::path& file, const CampaignPe
                      .remaining_s = {},
                      .storage_failure = {},
                      .owner = peek.owner},
+          .created_utc = peek.created_utc,
           .stamp = stamp};
 }
 
@@ -102,6 +104,15 @@ FileOutcome opened(const CampaignDirectory& directory, const std::filesystem::pa
     return copy_of(file, campaign.definition->name);
   }
   return prepare(std::move(campaign), GivenUpRuns::keep, start);
+}
+
+/// When the campaign of a file was made; empty if the file cannot be opened.
+std::string created_utc(const FileOutcome& outcome) {
+  if (const auto* const prepared = std::get_if<PreparedCampaign>(&outcome)) {
+    return prepared->campaign.store.created_utc();
+  }
+  const auto* const ended = std::get_if<EndedCampaign>(&outcome);
+  return ended == nullptr ? "" : ended->created_utc;
 }
 
 }  // namespace
@@ -167,6 +178,8 @@ std::vector<FileOutcome> look_at_all(const CampaignDirectory& directory, KnownCa
     }
     known.add(outcomes.back());
   }
+  // The order of submission, which `status` shows and in which campaigns of one priority are lent.
+  std::ranges::stable_sort(outcomes, {}, created_utc);
   return outcomes;
 }
 

@@ -46,6 +46,7 @@ struct EndedCampaign {
   CampaignId id;
   std::filesystem::path file;
   wire::CampaignStatus status;
+  std::string created_utc = {};    ///< As in `2024-02-29T12:00:10Z`; of files found at the start.
   std::optional<FileStamp> stamp;  ///< Of the file when it was last looked at; empty until it was.
 };
 

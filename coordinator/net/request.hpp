@@ -19,8 +19,8 @@ namespace proofmass::coordinator {
 struct Submission {
   /// Valid, with its table columns; shared with the work that stores it.
   std::shared_ptr<const Campaign> campaign;
-  int priority = 0;
-  double audit_fraction = 0.0;
+  std::optional<int> priority = {};
+  std::optional<double> audit_fraction = {};
   std::string stop_rule = {};
   std::optional<std::uint64_t> failures_max = {};
 };

@@ -6,6 +6,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 
@@ -22,6 +23,20 @@ std::set<std::string> quarantined_hosts(const State& state) {
   std::set<std::string> names;
   for (const HostId& host : state.quarantined) names.insert(host.name);
   return names;
+}
+
+/// @throws Error if the action can have no effect. A finished campaign can only be retried, and
+/// only if runs were given up; a cancelled one must be resumed before it is retried or gets a
+/// priority.
+void require_possible(const wire::CampaignStatus& campaign, wire::ControlAction action) {
+  const auto refuse = [&](std::string_view why) {
+    throw Error(fmt::format("campaign = {} ({})", campaign.name, why));
+  };
+  const bool is_retry = action == wire::ControlAction::retry;
+  const bool needs_resume = is_retry || action == wire::ControlAction::set_priority;
+  if (campaign.phase == Phase::finished && !is_retry) refuse("is finished");
+  if (campaign.phase == Phase::cancelled && needs_resume) refuse("is cancelled; resume it first");
+  if (is_retry && campaign.num_given_up == 0) refuse("has no run that was given up");
 }
 
 }  // namespace
@@ -45,18 +60,15 @@ void RequestService::take(wire::ControlRequest&& request, const Asker& asker,
     throw Error(fmt::format("campaign = {} (is not served)", request.campaign));
   }
   require_control(asker, request.campaign, campaign->owner);
+  require_possible(campaigns.status_of(campaign->id), request.action);
   if (campaign->has_ended) return control_ended(*campaign, request.action, respond);
-  respond(campaigns.control(campaign->id, request.action));
+  respond(campaigns.control(campaign->id, request));
 }
 
 void RequestService::control_ended(const CampaignService::Entry& campaign,
                                    wire::ControlAction action, const Respond& respond) {
-  const wire::CampaignStatus status = surroundings_.campaigns.status_of(campaign.id);
-  if (status.phase == Phase::finished) {
-    throw Error(fmt::format("campaign = {} (is finished)", status.name));
-  }
-  if (action == wire::ControlAction::resume) {
-    return surroundings_.submissions.reopen(campaign, respond);
+  if (action == wire::ControlAction::resume || action == wire::ControlAction::retry) {
+    return surroundings_.submissions.reopen(campaign, action, respond);
   }
   respond(surroundings_.campaigns.done_reply(campaign.id));
 }

@@ -89,7 +89,7 @@ class Service::Impl final : public Outbox {
       turn();
       on_turn();
     }
-    end();
+    end(stop == StopRequest::leave);
   }
 
   void worker_ended(WorkerId worker, LossReason reason) {
@@ -248,7 +248,7 @@ class Service::Impl final : public Outbox {
 
   /// Carries out what is asked for; true if nothing remains to be done.
   bool is_over(const std::atomic<StopRequest>& stop) {
-    if (stop == StopRequest::now) return true;
+    if (stop == StopRequest::now || stop == StopRequest::leave) return true;
     if (stop == StopRequest::drain && !drained_until_) {
       log({.kind = "coordinator_draining"});
       drained_until_ = now() + config_.drain_max;
@@ -381,17 +381,17 @@ class Service::Impl final : public Outbox {
   }
 
   /// Results are acknowledged before their workers are told to end.
-  void end() {
+  void end(bool leaves_workers) {
     settle_background();
     writer_.flush();
     for (const Completion& completion : writer_.take_completions()) {
       std::visit([this](const auto& content) { complete(content); }, completion);
     }
     for (const auto& [id, campaign] : state_.campaigns) note_unstored(id, campaign);
-    dismiss_workers();
+    if (!leaves_workers) dismiss_workers();
     campaign_service_.review();
     settle_background();
-    history_.end_all(LossReason::drained);
+    if (!leaves_workers) history_.end_all(LossReason::drained);
   }
 
   /// Until all have gone: what is sent just before a socket is closed is sometimes lost, and a

@@ -25,7 +25,8 @@ namespace proofmass::coordinator {
 enum class StopRequest : std::uint8_t {
   none,
   drain,  ///< When the runs that workers hold are stored, or the time for that is over.
-  now,    ///< With what has been delivered.
+  now,    ///< With what has been delivered; workers end, too.
+  leave,  ///< With what has been delivered; workers go on and wait for the next coordinator.
 };
 
 /// When a service ends that nobody asks to.

@@ -20,11 +20,7 @@ StopPlan plan_of(const Submission& request) {
   return plan;
 }
 
-CampaignControl control_of(const Submission& request) {
-  return {.phase = Phase::active,
-          .priority = request.priority,
-          .audit_fraction = request.audit_fraction};
-}
+void write(Store& store, const Entry& entry) { (void)store.write({&entry, 1}); }
 
 [[noreturn]] void refuse_as_too_many() {
   throw Error(fmt::format("requests = {} (are under way, as many as may be; try again later)",
@@ -108,10 +104,18 @@ void SubmissionService::open_file(const Submitted& request, const Asker& asker,
   serve_opened(
       request->campaign->name, {.owner = owner, .size = definition_size(*request->campaign)},
       [&files, request, asker] { return files.open(*request->campaign, plan_of(*request), asker); },
-      control_of(*request), std::move(respond));
+      [request](Store& store) {
+        const CampaignControl control = store.control();
+        write(store, CampaignControl{.phase = Phase::active,
+                                     .priority = request->priority.value_or(control.priority),
+                                     .audit_fraction =
+                                         request->audit_fraction.value_or(control.audit_fraction)});
+      },
+      std::move(respond));
 }
 
-void SubmissionService::reopen(const CampaignService::Entry& campaign, Respond respond) {
+void SubmissionService::reopen(const CampaignService::Entry& campaign, wire::ControlAction action,
+                               Respond respond) {
   const wire::CampaignStatus status = campaigns_.status_of(campaign.id);
   if (under_way_.contains(status.name)) {
     throw Error(
@@ -120,23 +124,27 @@ void SubmissionService::reopen(const CampaignService::Entry& campaign, Respond r
   const CampaignDirectory& directory = *surroundings_.directory;
   serve_opened(
       status.name, {.owner = campaign.owner},
-      [&directory, file = campaign.file] { return directory.load(file); }, std::nullopt,
+      [&directory, file = campaign.file] { return directory.load(file); },
+      [action](Store& store) {
+        if (action == wire::ControlAction::retry) write(store, RetriedRuns{});
+        CampaignControl control = store.control();
+        control.phase = Phase::active;
+        write(store, control);
+      },
       std::move(respond));
 }
 
 void SubmissionService::serve_opened(const std::string& name, UnderWay under_way,
                                      std::function<ServedCampaign()> open,
-                                     std::optional<CampaignControl> control, Respond respond) {
-  const auto work = [this, name, open = std::move(open), control, respond]() -> Background::Finish {
+                                     std::function<void(Store&)> activate, Respond respond) {
+  const auto work = [this, name, open = std::move(open), activate = std::move(activate),
+                     respond]() -> Background::Finish {
     // Copyable, as the function is.
     const auto prepared = std::make_shared<std::optional<PreparedCampaign>>();
     std::string failure;
     try {
       ServedCampaign campaign = open();
-      CampaignControl active = control.value_or(campaign.store.control());
-      active.phase = Phase::active;
-      const Entry entry = active;
-      (void)campaign.store.write({&entry, 1});
+      activate(campaign.store);
       *prepared = prepare(std::move(campaign), GivenUpRuns::keep, surroundings_.start);
     } catch (const std::exception& error) {
       prepared->reset();

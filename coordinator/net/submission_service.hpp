@@ -42,8 +42,9 @@ class SubmissionService {
               Respond respond);
 
   /// Opens the file of a campaign that has ended and goes on with it.
+  /// @param action  resume or retry.
   /// @throws Error if too much is under way.
-  void reopen(const CampaignService::Entry& campaign, Respond respond);
+  void reopen(const CampaignService::Entry& campaign, wire::ControlAction action, Respond respond);
 
   /// Takes what had to wait. To be called some times a second.
   void review();
@@ -69,9 +70,9 @@ class SubmissionService {
   void change_served(CampaignId id, const std::shared_ptr<const Submission>& request,
                      Respond respond);
   /// Opens or makes a file with `open` in the background, and serves it.
-  /// @param control  Nothing if it is to be what the file has, but active.
+  /// @param activate  Stores what is to be different from now on, the phase at least.
   void serve_opened(const std::string& name, UnderWay under_way,
-                    std::function<ServedCampaign()> open, std::optional<CampaignControl> control,
+                    std::function<ServedCampaign()> open, std::function<void(Store&)> activate,
                     Respond respond);
 
   Surroundings surroundings_;

@@ -53,6 +53,7 @@ CampaignPeek peek_campaign(const std::filesystem::path& path, PeekDepth depth) {
   const CampaignControl control = detail::read_control(database);
   CampaignPeek peek{.id = {database.count("SELECT campaign_uid FROM campaign")},
                     .name = database.text("SELECT name FROM campaign"),
+                    .created_utc = database.text("SELECT created_utc FROM campaign"),
                     .num_runs = database.count("SELECT num_runs FROM campaign"),
                     .owner = database.text("SELECT owner FROM campaign")};
   peek.phase = control.phase;

@@ -13,6 +13,7 @@ namespace proofmass::coordinator {
 struct CampaignPeek {
   wire::CampaignId id;
   std::string name;
+  std::string created_utc;  ///< As in `2024-02-29T12:00:10Z`.
   wire::CampaignPhase phase = wire::CampaignPhase::active;
   int priority = 0;
   std::uint64_t num_runs = 0;

@@ -78,9 +78,12 @@ struct CampaignControl {
   bool operator==(const CampaignControl&) const = default;
 };
 
+/// All runs that were given up are open again.
+struct RetriedRuns {};
+
 /// One thing to be written to a campaign database.
-using Entry = std::variant<Delivery, SecondDelivery, LostRuns, GivenUpRun, EventEntry, WorkerJoined,
-                           WorkerEnded, CampaignControl>;
+using Entry = std::variant<Delivery, SecondDelivery, LostRuns, GivenUpRun, RetriedRuns, EventEntry,
+                           WorkerJoined, WorkerEnded, CampaignControl>;
 
 /// A coordinator process that begins to serve a campaign.
 struct CoordinatorStart {

@@ -410,6 +410,8 @@ void StoreWriter::set_control(wire::CampaignId campaign, const CampaignControl& 
   impl_->add(campaign, control);
 }
 
+void StoreWriter::retry_given_up(wire::CampaignId campaign) { impl_->add(campaign, RetriedRuns{}); }
+
 std::vector<Completion> StoreWriter::take_completions() {
   const std::lock_guard lock(impl_->mutex);
   return std::exchange(impl_->completions, {});

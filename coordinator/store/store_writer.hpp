@@ -132,6 +132,7 @@ class StoreWriter {
   /// To all files that have the worker without an end.
   void record_worker_ended(const WorkerEnded& ended);
   void set_control(wire::CampaignId campaign, const CampaignControl& control);
+  void retry_given_up(wire::CampaignId campaign);
 
   /// Nothing more is expected for a file: once all that was handed over is written, the write-ahead
   /// log is folded in, so that a copy of the file alone is whole. Later entries are written as

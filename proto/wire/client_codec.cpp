@@ -18,8 +18,8 @@ namespace {
 void write(const SubmitRequest& submit, proto::RequestEnvelope& envelope) {
   proto::SubmitRequest& message = *envelope.mutable_submit();
   detail::write_definition(submit.definition, *message.mutable_definition());
-  message.set_priority(submit.priority);
-  message.set_audit_fraction(submit.audit_fraction);
+  if (submit.priority) message.set_priority(*submit.priority);
+  if (submit.audit_fraction) message.set_audit_fraction(*submit.audit_fraction);
   message.set_stop_rule(submit.stop_rule);
   if (submit.failures_max) message.set_failures_max(*submit.failures_max);
 }
@@ -47,6 +47,7 @@ void write(const ControlRequest& control, proto::RequestEnvelope& envelope) {
   proto::ControlRequest& message = *envelope.mutable_control();
   message.set_action(static_cast<proto::ControlAction>(control.action));
   message.set_campaign(control.campaign);
+  message.set_priority(control.priority);
 }
 
 /// The text, cut to what may be sent, with `?` for what may not.
@@ -180,9 +181,9 @@ ClientRequest read(const proto::SubmitRequest& message) {
   require(fraction >= 0.0 && fraction <= 1.0, "audit", fmt::format("{}", fraction),
           "must be in [0, 1]");
   SubmitRequest submit{.definition = detail::read_definition(message.definition()),
-                       .priority = checked_priority(message.priority()),
-                       .audit_fraction = fraction,
                        .stop_rule = checked_stop_rule(message.stop_rule())};
+  if (message.has_priority()) submit.priority = checked_priority(message.priority());
+  if (message.has_audit_fraction()) submit.audit_fraction = fraction;
   if (message.has_failures_max()) {
     require_in(message.failures_max(), 0, num_runs_max, "failures");
     submit.failures_max = message.failures_max();
@@ -191,8 +192,9 @@ ClientRequest read(const proto::SubmitRequest& message) {
 }
 
 ClientRequest read(const proto::ControlRequest& message) {
-  return ControlRequest{.action = enumerator<ControlAction>(message.action(), 3, "action"),
-                        .campaign = checked_name(message.campaign(), "campaign")};
+  return ControlRequest{.action = enumerator<ControlAction>(message.action(), 5, "action"),
+                        .campaign = checked_name(message.campaign(), "campaign"),
+                        .priority = checked_priority(message.priority())};
 }
 
 ClientRequest read(const proto::RequestPart& message) {

@@ -15,9 +15,10 @@ namespace proofmass::wire {
 
 /// Asks for a campaign to be computed: a new one, or more runs of one that is there.
 struct SubmitRequest {
-  Definition definition;        ///< With its columns; what it says has not been looked at.
-  int priority = 0;             ///< -100 to 100; runs of a higher one are lent first.
-  double audit_fraction = 0.0;  ///< 0 to 1.
+  Definition definition;  ///< With its columns; what it says has not been looked at.
+  /// -100 to 100; runs of a higher one are lent first. Unset: as it is, 0 for a new campaign.
+  std::optional<int> priority = {};
+  std::optional<double> audit_fraction = {};  ///< 0 to 1. Likewise.
   /// See parse_stop_rule(): the campaign's runs are as many as it may take. Empty: all of them.
   std::string stop_rule = {};
   /// Runs without an estimate and given up; with more, the campaign is cancelled.
@@ -32,11 +33,19 @@ struct WorkersRequest {
   std::uint64_t after_worker_id = 0;  ///< Workers up to this number are left out.
 };
 
-enum class ControlAction : std::uint8_t { pause = 1, resume = 2, cancel = 3 };
+/// What a client does with a campaign. The values are sent: never renumber.
+enum class ControlAction : std::uint8_t {
+  pause = 1,
+  resume = 2,
+  cancel = 3,
+  set_priority = 4,
+  retry = 5,  ///< The runs that were given up are lent again.
+};
 
 struct ControlRequest {
   ControlAction action = ControlAction::pause;
   std::string campaign;  ///< Name; is_name() holds.
+  int priority = 0;      ///< For set_priority; -100 to 100.
 };
 
 /// Runs are lent to workers of this host again, though too many of them crashed.

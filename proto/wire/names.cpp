@@ -39,6 +39,10 @@ std::string_view name_of(ControlAction action) {
       return "resume";
     case ControlAction::cancel:
       return "cancel";
+    case ControlAction::set_priority:
+      return "set-priority";
+    case ControlAction::retry:
+      return "retry";
   }
   PROOFMASS_EXPECT(false);
 }

@@ -117,9 +117,10 @@ TEST_F(CampaignProcess, ALargerNumberOfRunsExtendsIt) {
 TEST_F(CampaignProcess, ASmallerNumberOfRunsIsRefused) {
   EXPECT_EQ(start("smaller", {"--runs", "2"}).wait(), 0);
   EXPECT_EQ(start("smaller", {"--runs", "1"}).wait(), 2);
-  EXPECT_EQ(errors_of("smaller"),
-            "proofmass: error: runs = 1 (must be at least 2, the number that smaller.db was asked "
-            "for)\n");
+  EXPECT_EQ(
+      errors_of("smaller"),
+      "proofmass: error: campaign.runs = 1 (must be at least 2, which smaller.db was asked for; "
+      "the number comes from --runs, or else from the campaign database)\n");
 }
 
 TEST_F(CampaignProcess, RefusesTheDatabaseOfAnotherCampaign) {

@@ -172,6 +172,24 @@ TEST_F(CoordinatorProcess, MayBeKilledAndStartedAgainUnderItsWorkers) {
             "1");
 }
 
+// SIGHUP is the planned restart.
+TEST_F(CoordinatorProcess, MayBeRestartedUnderItsWorkers) {
+  Process worker = start_worker("worker");
+  {
+    Process coordinator = start_coordinator();
+    wait_for_runs(served, 2);
+    coordinator.signal(SIGHUP);
+    EXPECT_EQ(coordinator.wait(), 130) << errors_of("coordinator");
+  }
+  ASSERT_LT(num_stored(path("served/hardy2013.db")), num_runs);
+  Process coordinator = start_coordinator();
+  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
+  EXPECT_EQ(worker.wait(), 0) << errors_of("worker");
+  const auto file = path("served/hardy2013.db");
+  EXPECT_EQ(stored_text(file, "SELECT count(*) FROM worker"), "1");
+  EXPECT_EQ(stored_text(file, "SELECT count(*) FROM attempt"), "0");
+}
+
 class CoordinatorKilled : public CoordinatorProcess,
                           public testing::WithParamInterface<std::string> {};
 

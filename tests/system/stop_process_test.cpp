@@ -12,9 +12,9 @@ namespace {
 
 class StopRule : public CampaignProcess {
  protected:
-  /// The rule of the mean of |error| of K2d. In sessions of two orbits noise makes that error: it is
-  /// normal, |error| scatters by √(π/2 − 1) of its mean, and 1.96 standard errors of the mean are
-  /// 13 % at 128 runs and 11 % at 192.
+  /// The rule of the mean of |error| of K2d. In sessions of two orbits noise makes that error: it
+  /// is normal, |error| scatters by √(π/2 − 1) of its mean, and 1.96 standard errors of the mean
+  /// are 13 % at 128 runs and 11 % at 192.
   [[nodiscard]] Process start_until(const std::string& name, const std::string& percent,
                                     const Arguments& further) const {
     Arguments arguments{"--until", "mean(k2d) within " + percent + "%"};

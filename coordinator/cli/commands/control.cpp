@@ -5,6 +5,7 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
+#include "proto/command_line/option_checks.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
@@ -16,11 +17,13 @@ struct ControlOptions {
   ClientOptions client;
   ControlAction action = ControlAction::pause;
   std::string campaign;
+  int priority = 0;  ///< For set_priority.
 };
 
 int control_campaign(const ControlOptions& options) {
   const wire::ControlRequest request{.action = options.action,
-                                     .campaign = checked_campaign_name(options.campaign)};
+                                     .campaign = checked_campaign_name(options.campaign),
+                                     .priority = options.priority};
   return with_connection(options.client, [&](const Ask& ask) {
     const auto done = reply_of<wire::DoneReply>(ask, request);
     const bool is_json = options.client.format == OutputFormat::json;
@@ -36,6 +39,11 @@ void add_action(CLI::App& app, Command& chosen, ControlAction action,
       app, chosen, std::string(wire::name_of(action)), description, control_campaign);
   options.action = action;
   command.add_option("NAME", options.campaign, "Campaign")->required();
+  if (action == ControlAction::set_priority) {
+    command.add_option("PRIORITY", options.priority, "-100 to 100; higher ones are computed first")
+        ->check(wire::in_range(-wire::priority_max, wire::priority_max))
+        ->required();
+  }
   add_client_options(command, options.client);
 }
 
@@ -45,6 +53,8 @@ void add_control(CLI::App& app, Command& chosen) {
   add_action(app, chosen, ControlAction::pause, "Lend no more runs of a campaign for now");
   add_action(app, chosen, ControlAction::resume, "Go on with a paused or cancelled campaign");
   add_action(app, chosen, ControlAction::cancel, "Drop a campaign's open runs; results stay");
+  add_action(app, chosen, ControlAction::set_priority, "Compute a campaign earlier or later");
+  add_action(app, chosen, ControlAction::retry, "Compute the runs that were given up again");
 }
 
 }  // namespace proofmass::coordinator

@@ -41,8 +41,8 @@ struct RunOptions {
   std::filesystem::path campaign_file;
   std::optional<std::filesystem::path> database;  ///< By default STEM.db in the current directory.
   Overrides overrides;
-  std::optional<unsigned> num_workers;  ///< By default one for each processor.
-  double audit_fraction = 0.0;          ///< Of the runs that are missing, computed twice; 0 to 1.
+  std::optional<unsigned> num_workers;   ///< By default one for each processor.
+  std::optional<double> audit_fraction;  ///< Of the runs that are missing, computed twice; 0 to 1.
   StopOptions stop;
   bool is_quiet = false;
 };
@@ -139,9 +139,10 @@ class StorageNotes {
 };
 
 void make_active(Store& store, const RunOptions& options) {
-  const Entry control = CampaignControl{.phase = wire::CampaignPhase::active,
-                                        .priority = store.control().priority,
-                                        .audit_fraction = options.audit_fraction};
+  CampaignControl active = store.control();
+  active.phase = wire::CampaignPhase::active;
+  active.audit_fraction = options.audit_fraction.value_or(0.0);
+  const Entry control = active;
   (void)store.write({&control, 1});
 }
 
@@ -175,7 +176,7 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
   const auto show = [&] {
     const wire::CampaignStatus status = service.campaigns().front();
     storage.update(status);
-    display.update(status);
+    display.update(out_of(status, num_runs));
   };
   workers.start(num_local);
   service.run(stop, [&] {
@@ -273,6 +274,7 @@ int run_campaign(const RunOptions& options) {
 void add_run(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<RunOptions>(
       app, chosen, "run", "Run a campaign, or what is missing of it", run_campaign);
+  command.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   command.add_option("FILE", options.campaign_file, "Campaign file (TOML)")->required();
   command.add_option("--db", options.database, "Database; FILE's stem with .db, here, by default");
   add_override_options(command, options.overrides);

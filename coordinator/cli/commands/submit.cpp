@@ -52,7 +52,9 @@ void add_submit(CLI::App& app, Command& chosen) {
       app, chosen, "submit", "Hand a campaign or more runs to a coordinator", submit_campaign);
   command.add_option("FILE", options.campaign_file, "Campaign file (TOML)")->required();
   command.add_option("--name", options.name, "Name of the campaign; the one in FILE by default");
-  command.add_option("--priority", options.priority, "Runs of a higher one are computed first")
+  command
+      .add_option("--priority", options.priority,
+                  "Runs of a higher one are computed first;\n0 by default, for more runs as it is")
       ->check(wire::in_range(-wire::priority_max, wire::priority_max));
   add_audit_option(command, options.audit_fraction);
   add_stop_options(command, options.stop);

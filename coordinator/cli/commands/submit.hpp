@@ -16,9 +16,9 @@ struct SubmitOptions {
   ClientOptions client;
   std::filesystem::path campaign_file;
   Overrides overrides;
-  std::optional<std::string> name;  ///< By default the one in the file.
-  int priority = 0;                 ///< -100 to 100.
-  double audit_fraction = 0.0;      ///< 0 to 1.
+  std::optional<std::string> name;       ///< By default the one in the file.
+  std::optional<int> priority;           ///< -100 to 100; as it is without one.
+  std::optional<double> audit_fraction;  ///< 0 to 1; likewise.
   StopOptions stop;
 };
 

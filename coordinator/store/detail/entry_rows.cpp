@@ -153,6 +153,11 @@ void EntryRows::write_entry(const GivenUpRun& given_up) {
   has_failures_ = true;
 }
 
+void EntryRows::write_entry(const RetriedRuns&) {
+  database_.prepare("DELETE FROM run_failure").run();
+  has_failures_ = false;
+}
+
 void EntryRows::write_entry(const EventEntry& event) {
   insert_event_.run(event.kind, event.text, event_text_size_max);
   trim_events_.run(num_events_max);

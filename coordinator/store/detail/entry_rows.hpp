@@ -34,6 +34,7 @@ class EntryRows {
   void write_entry(const SecondDelivery& second);
   void write_entry(const LostRuns& lost);
   void write_entry(const GivenUpRun& given_up);
+  void write_entry(const RetriedRuns& retried);
   void write_entry(const EventEntry& event);
   void write_entry(const WorkerJoined& joined) { workers_.write(joined); }
   void write_entry(const WorkerEnded& ended) { workers_.write(ended); }

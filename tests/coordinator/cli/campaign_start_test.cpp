@@ -70,8 +70,9 @@ TEST(CampaignStart, RefusesFewerRunsThanBefore) {
   const test::TemporaryDirectory directory;
   const auto database = directory / "a.db";
   (void)open_or_create(campaign_of(10), {}, database);
-  EXPECT_EQ(refusal(campaign_of(9), database), "runs = 9 (must be at least 10, the number that " +
-                                                   database.string() + " was asked for)");
+  EXPECT_EQ(refusal(campaign_of(9), database),
+            "campaign.runs = 9 (must be at least 10, which " + database.string() +
+                " was asked for; the number comes from --runs, or else from the campaign file)");
 }
 
 // A rule that has not been checked leaves a campaign unfinished.

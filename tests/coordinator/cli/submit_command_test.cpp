@@ -26,8 +26,8 @@ TEST_F(SubmitRequestOfAFile, HasItsCampaign) {
   const MicroscopeCampaign campaign = campaign_of(request.definition);
   EXPECT_EQ(campaign.name, "mine");
   EXPECT_EQ(campaign.num_runs, 7U);
-  EXPECT_EQ(request.priority, 0);
-  EXPECT_EQ(request.audit_fraction, 0.0);
+  EXPECT_EQ(request.priority, std::nullopt);
+  EXPECT_EQ(request.audit_fraction, std::nullopt);
 }
 
 TEST_F(SubmitRequestOfAFile, HasWhatTheArgumentsReplace) {

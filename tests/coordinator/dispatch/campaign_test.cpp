@@ -54,6 +54,25 @@ TEST_F(CampaignTest, ThatIsDoneIsFinishedAtOnce) {
   (void)outbox.take_events();
 }
 
+// They may crash again, so they are lent last and alone.
+TEST_F(CampaignTest, ThatIsRetriedLendsTheRunsThatWereGivenUpAsSuspects) {
+  StoredCampaign stored = stored_campaign(3);
+  stored.finished = {{{0}, 1}};
+  stored.given_up = {{{1}, 2}};
+  on_campaign(state, one, stored, now, outbox);
+  ASSERT_EQ(campaign(one).phase, Phase::finished);
+  (void)outbox.take_events();
+  on_retry(state, one, now, outbox);
+  EXPECT_EQ(outbox.take_events(), Strings{"given_up_runs_retried runs=2"});
+  EXPECT_EQ(campaign(one).phase, Phase::active);
+  EXPECT_TRUE(campaign(one).given_up.empty());
+  add_worker(first, 4);
+  const auto lease = outbox.take_sent<wire::RunLease>(first);
+  EXPECT_EQ(lease.runs, (RunRange{{1}, 1}));
+  EXPECT_TRUE(lease.is_alone);
+  outbox.forget();
+}
+
 TEST_F(CampaignTest, ThatIsPausedIsNotLentAndAskedBack) {
   add_campaign(one, 10);
   add_worker(first, 2);

@@ -87,6 +87,59 @@ TEST_F(ServiceClients, GiveACampaignThatIsServedAnotherPriorityAndPlan) {
   EXPECT_EQ(store.stop_plan(), expected);
 }
 
+TEST_F(ServiceClients, ExtendACampaignThatKeepsItsPriority) {
+  start_with({});
+  (void)client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3)),
+                                         .priority = 7,
+                                         .audit_fraction = 0.5});
+  (void)client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 5))});
+  EXPECT_EQ(client->status().campaigns[0].num_runs, 5U);
+  EXPECT_EQ(client->status().campaigns[0].priority, 7);
+  end(StopRequest::now);
+  const Store store = Store::open_read_only(directory / "a.db");
+  EXPECT_EQ(store.control().priority, 7);
+  EXPECT_EQ(store.control().audit_fraction, 0.5);
+}
+
+TEST_F(ServiceClients, SetThePriorityOfACampaign) {
+  start_with({test::campaign_of("a", 3), test::campaign_of("b", 3)});
+  EXPECT_EQ(client->done(wire::ControlRequest{ControlAction::set_priority, "b", 1}),
+            "campaign b: active, 3 runs, 0 of them done");
+  EXPECT_EQ(client->status().campaigns[1].priority, 1);
+  const wire::RunLease lease = PlayingWorker(endpoint.address()).borrow();
+  end(StopRequest::now);
+  const Store served = Store::open_read_only(directory / "b.db");
+  EXPECT_EQ(lease.campaign, served.id());
+  EXPECT_EQ(served.control().priority, 1);
+}
+
+TEST_F(ServiceClients, RetryTheRunsThatWereGivenUp) {
+  {
+    ServedCampaign campaign = files.open(test::campaign_of("a", 1), {}, {});
+    const Entry given_up = GivenUpRun{.run = {0}};
+    (void)campaign.store.write({&given_up, 1});
+  }
+  start_with({test::campaign_of("a", 1)});
+  EXPECT_EQ(client->error(wire::ControlRequest{ControlAction::set_priority, "a", 1}),
+            "campaign = a (is finished)");
+  EXPECT_EQ(client->done(wire::ControlRequest{ControlAction::retry, "a"}),
+            "campaign a: active, 1 runs, 0 of them done");
+  EXPECT_EQ(client->error(wire::ControlRequest{ControlAction::retry, "a"}),
+            "campaign = a (has no run that was given up)");
+  EXPECT_EQ(client->status().campaigns[0].num_given_up, 0U);
+  end(StopRequest::now);
+  EXPECT_THAT(Store::open_read_only(directory / "a.db").given_up_runs(), ElementsAre());
+}
+
+TEST_F(ServiceClients, ResumeACancelledCampaignBeforeAnythingElse) {
+  start_with({test::campaign_of("a", 1)});
+  (void)client->done(wire::ControlRequest{ControlAction::cancel, "a"});
+  for (const ControlAction action : {ControlAction::retry, ControlAction::set_priority}) {
+    EXPECT_EQ(client->error(wire::ControlRequest{action, "a", 1}),
+              "campaign = a (is cancelled; resume it first)");
+  }
+}
+
 TEST_F(ServiceClients, AreToldWhyACampaignCannotBeExtended) {
   start_with({test::campaign_of("a", 3)});
   EXPECT_EQ(

@@ -1,6 +1,7 @@
 // A service and the files of its directory: those that cannot be served, and those that need not.
 
 #include <gmock/gmock.h>
+#include <sqlite3.h>
 
 #include <atomic>
 #include <filesystem>
@@ -303,6 +304,37 @@ TEST_F(ServiceWithADirectory, GoesOnWithACancelledCampaignThatItDidNotOpen) {
   EXPECT_EQ(client->status().campaigns.at(0).priority, 4);
   PlayingWorker worker(endpoint.address());
   EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{0});
+}
+
+TEST_F(ServiceWithADirectory, RetriesRunsOfACampaignThatItDidNotOpen) {
+  {
+    ServedCampaign campaign = files.open(test::campaign_of("a", 1), {}, {});
+    const coordinator::Entry given_up = GivenUpRun{.run = {0}};
+    (void)campaign.store.write({&given_up, 1});
+    const coordinator::Entry finished = CampaignControl{.phase = wire::CampaignPhase::finished};
+    (void)campaign.store.write({&finished, 1});
+  }
+  start_service();
+  EXPECT_EQ(folder.num_loads(), 0);
+  EXPECT_EQ(client->done(wire::ControlRequest{wire::ControlAction::retry, "a"}),
+            "campaign a: active, 1 runs, 0 of them done");
+  PlayingWorker worker(endpoint.address());
+  EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{0});
+}
+
+// The names say the opposite.
+TEST_F(ServiceWithADirectory, ListsCampaignsInTheOrderInWhichTheyWereMade) {
+  for (const auto& [name, year] : {std::pair{"c", 2021}, {"a", 2023}, {"b", 2022}}) {
+    { const ServedCampaign campaign = files.open(test::campaign_of(name, 1), {}, {}); }
+    sqlite3* file = nullptr;
+    ASSERT_EQ(sqlite3_open((directory / (name + std::string(".db"))).c_str(), &file), SQLITE_OK);
+    const std::string sql =
+        "UPDATE campaign SET created_utc = '" + std::to_string(year) + "-01-01T00:00:00Z'";
+    EXPECT_EQ(sqlite3_exec(file, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+    sqlite3_close(file);
+  }
+  start_service();
+  EXPECT_THAT(served(), ElementsAre("c", "b", "a"));
 }
 
 TEST_F(ServiceWithADirectory, ServesAFileThatIsPutThere) {

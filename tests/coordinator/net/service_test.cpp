@@ -142,6 +142,27 @@ TEST_F(ServiceWorkers, AreNotWaitedForAfterACoordinatorThatEndedInOrder) {
   EXPECT_EQ(PlayingWorker(endpoint.address(), 1002).borrow().runs.count, 1U);
 }
 
+// The next coordinator waits for those that held runs; they were not told to end.
+TEST_F(ServiceWorkers, AreLeftToTheNextCoordinator) {
+  start({test::campaign_of("a", 2)});
+  PlayingWorker holder(endpoint.address(), 1001);
+  const wire::RunLease lease = holder.borrow(1);
+  end(StopRequest::leave);
+  config.dispatch.reattach_wait = std::chrono::hours(1);
+  start({test::campaign_of("a", 2)});
+  PlayingWorker other(endpoint.address(), 1002);
+  (void)other.register_here();
+  EXPECT_TRUE(other.is_lent_nothing());
+  holder.say_hello();
+  for (wire::Packet packet = holder.next_packet();
+       !std::holds_alternative<wire::Welcome>(packet.message); packet = holder.next_packet()) {
+    EXPECT_FALSE(std::holds_alternative<wire::Stop>(packet.message));
+  }
+  holder.want(1, {PlayingWorker::held(lease)});
+  holder.deliver(lease);
+  EXPECT_EQ(holder.receive<wire::ResultAck>().runs.size(), lease.runs.count);
+}
+
 TEST_F(ServiceWorkers, DeliverWhatTheyHoldWhenDrained) {
   start({test::campaign_of("a", 5)});
   PlayingWorker worker(endpoint.address());

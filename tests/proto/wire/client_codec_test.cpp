@@ -56,15 +56,28 @@ TEST(SubmitRequest, NeedsNeitherRuleNorBudget) {
   EXPECT_EQ(submit.failures_max, std::nullopt);
 }
 
+// A campaign that gets more runs keeps what the request leaves out; 0 is not the same.
+TEST(SubmitRequest, TellsZeroFromNothing) {
+  const SubmitRequest nothing = round_trip_request(SubmitRequest{.definition = some_definition()});
+  EXPECT_EQ(nothing.priority, std::nullopt);
+  EXPECT_EQ(nothing.audit_fraction, std::nullopt);
+  const SubmitRequest zero = round_trip_request(
+      SubmitRequest{.definition = some_definition(), .priority = 0, .audit_fraction = 0.0});
+  EXPECT_EQ(zero.priority, 0);
+  EXPECT_EQ(zero.audit_fraction, 0.0);
+}
+
 TEST(QuestionRequests, AreTold) {
   (void)round_trip_request(StatusRequest{});
   (void)round_trip_request(WorkersRequest{});
 }
 
 TEST(ControlRequest, KeepsActionAndCampaign) {
-  for (const auto action : {ControlAction::pause, ControlAction::resume, ControlAction::cancel}) {
-    const auto control =
-        round_trip_request(ControlRequest{.action = action, .campaign = "hardy2013"});
+  for (const auto action : {ControlAction::pause, ControlAction::resume, ControlAction::cancel,
+                            ControlAction::set_priority, ControlAction::retry}) {
+    const auto control = round_trip_request(
+        ControlRequest{.action = action, .campaign = "hardy2013", .priority = -7});
+    EXPECT_EQ(control.priority, -7);
     EXPECT_EQ(control.action, action);
     EXPECT_EQ(control.campaign, "hardy2013");
   }
@@ -258,6 +271,8 @@ TEST(ClientNames, AreThoseOfTheEnumerators) {
   EXPECT_EQ(name_of(ControlAction::pause), "pause");
   EXPECT_EQ(name_of(ControlAction::resume), "resume");
   EXPECT_EQ(name_of(ControlAction::cancel), "cancel");
+  EXPECT_EQ(name_of(ControlAction::set_priority), "set-priority");
+  EXPECT_EQ(name_of(ControlAction::retry), "retry");
   EXPECT_EQ(name_of(CampaignPhase::active), "active");
   EXPECT_EQ(name_of(CampaignPhase::paused), "paused");
   EXPECT_EQ(name_of(CampaignPhase::finished), "finished");

@@ -261,10 +261,12 @@ TEST(MalformedSubmitRequest, HasADefinition) {
 
 TEST(MalformedControlRequest, HasAnActionAndACampaign) {
   EXPECT_EQ(refusal_of_control([](auto& control) { control.clear_action(); }),
-            "action = 0 (must be in [1, 3])");
+            "action = 0 (must be in [1, 5])");
   EXPECT_EQ(refusal_of_control(
-                [](auto& control) { control.set_action(static_cast<proto::ControlAction>(4)); }),
-            "action = 4 (must be in [1, 3])");
+                [](auto& control) { control.set_action(static_cast<proto::ControlAction>(6)); }),
+            "action = 6 (must be in [1, 5])");
+  EXPECT_EQ(refusal_of_control([](auto& control) { control.set_priority(101); }),
+            "priority = 101 (must be in [-100, 100])");
   EXPECT_EQ(refusal_of_control([](auto& control) { control.set_campaign("a b"); }),
             "campaign = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
 }
