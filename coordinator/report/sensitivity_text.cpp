@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "coordinator/report/text_cells.hpp"
@@ -123,6 +124,16 @@ std::string limit_line(const DrawnRuns& drawn) {
                      drawn.runs.size() > drawn.num_first ? " and this one" : "");
 }
 
+/// Which run is the worst, and how to ask why.
+std::string worst_run_text(const DrawnRuns& drawn, std::size_t quantity) {
+  const auto worst = std::ranges::max_element(drawn.errors[quantity], {},
+                                              [](double error) { return std::abs(error); });
+  const auto position = static_cast<std::size_t>(worst - drawn.errors[quantity].begin());
+  const std::uint64_t run = drawn.runs[position].value;
+  return fmt::format("Largest |error|: run {0}; why: --run {0} --parameter {1}\n", run,
+                     model().results().quantities[quantity].name);
+}
+
 std::span<const Sensitivity> first_of(const std::vector<Sensitivity>& rows, std::size_t num_rows) {
   return std::span(rows).first(std::min(num_rows, rows.size()));
 }
@@ -173,12 +184,12 @@ std::string explanation_rows(const DrawnRuns& drawn, std::span<const Sensitivity
 
 std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity, std::size_t num_rows) {
   const auto both = sensitivities_of(drawn, quantity);
-  return fmt::format("{}: {} runs\n{}{}\n{}\n{}{}\n{}",
+  return fmt::format("{}: {} runs\n{}{}\n{}\n{}{}\n{}\n{}",
                      model().results().quantities[quantity].symbol, drawn.runs.size(),
                      limit_line(drawn), left_out(drawn),
                      sensitivity_rows(drawn, first_of(both[1], num_rows), "|error|"),
                      sensitivity_rows(drawn, first_of(both[0], num_rows), "error"), key_of(both[1]),
-                     term_table(drawn, quantity));
+                     term_table(drawn, quantity), worst_run_text(drawn, quantity));
 }
 
 std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIndex run,
@@ -194,12 +205,34 @@ std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIn
                      explanation_rows(drawn, first_of(both[0], num_rows), position, "error"));
 }
 
-std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run) {
+std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run,
+                              std::span<const double> objectives) {
   const std::size_t position = position_of(drawn, run);
-  const auto worst = std::ranges::min_element(
-      drawn.errors, {},
-      [&](const std::vector<double>& errors) { return rank_of(errors, position); });
-  return static_cast<std::size_t>(worst - drawn.errors.begin());
+  // Where no parameter has an objective, the rank among the runs decides.
+  const auto badness = [&](std::size_t quantity) {
+    const std::vector<double>& errors = drawn.errors[quantity];
+    return std::pair(std::abs(errors[position]) / objectives[quantity],
+                     errors.size() - rank_of(errors, position));
+  };
+  std::size_t worst = 0;
+  for (std::size_t i = 1; i < drawn.errors.size(); ++i) {
+    if (badness(i) > badness(worst)) worst = i;
+  }
+  return worst;
+}
+
+std::string choice_text(const DrawnRuns& drawn, RunIndex run, std::span<const double> objectives) {
+  const std::size_t quantity = worst_quantity_of(drawn, run, objectives);
+  const std::string_view name = model().results().quantities[quantity].name;
+  if (!std::isfinite(objectives[quantity])) {
+    return fmt::format("Of {}, no parameter having an objective: that of the highest rank\n", name);
+  }
+  const double ratio =
+      std::abs(drawn.errors[quantity][position_of(drawn, run)]) / objectives[quantity];
+  return fmt::format(
+      "Of {}, as its error is the largest beside its objective: {:.3g} times that\n"
+      "(another parameter: --parameter NAME)\n",
+      name, ratio);
 }
 
 }  // namespace proofmass::coordinator

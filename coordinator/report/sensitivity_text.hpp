@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 
 #include "coordinator/report/drawn_runs.hpp"
@@ -13,8 +14,8 @@ namespace proofmass::coordinator {
 inline constexpr std::uint64_t sensitivity_runs_max = 100'000;
 
 /// Which drawn quantities drive a parameter's error, and which its magnitude: the first `num_rows`
-/// of sensitivities() of each, and the error as a sum of explanatory_terms(). Lines have at most 80
-/// characters.
+/// of sensitivities() of each, and the error as a sum of explanatory_terms(), and how to ask why
+/// the worst run is so. Lines have at most 80 characters.
 /// @throws InvalidArgument below 16 runs.
 [[nodiscard]] std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
                                            std::size_t num_rows);
@@ -25,8 +26,16 @@ inline constexpr std::uint64_t sensitivity_runs_max = 100'000;
 [[nodiscard]] std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity,
                                            RunIndex run, std::size_t num_rows);
 
-/// The parameter for which the run's |error| has the highest rank.
+/// The parameter whose |error| is the largest in units of its objective; of those without
+/// objectives, the one for which the |error| has the highest rank.
+/// @param objectives  Those of the campaign's scenario, one a parameter.
 /// @throws InvalidArgument if the run is not among those.
-[[nodiscard]] std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run);
+[[nodiscard]] std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run,
+                                            std::span<const double> objectives);
+
+/// Which parameter that is and why, in lines of at most 80 characters.
+/// @throws InvalidArgument if the run is not among those.
+[[nodiscard]] std::string choice_text(const DrawnRuns& drawn, RunIndex run,
+                                      std::span<const double> objectives);
 
 }  // namespace proofmass::coordinator

@@ -156,11 +156,14 @@ void export_text(const fs::path& file) {
 
 void read_drawn(const fs::path& file) {
   const Store store = Store::open_read_only(file);
-  const DrawnRuns drawn = read_drawn_runs(store, *stored_campaign(store), sensitivity_runs_max);
+  const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
+  const DrawnRuns drawn = read_drawn_runs(store, *campaign, sensitivity_runs_max);
   (void)sensitivity_text(drawn, index(Parameter::k2c), 3);
   if (drawn.runs.empty()) return;
-  (void)explanation_text(drawn, worst_quantity_of(drawn, drawn.runs.front()), drawn.runs.front(),
-                         3);
+  const RunIndex run = drawn.runs.front();
+  const std::vector<double> objectives = campaign->objectives();
+  (void)choice_text(drawn, run, objectives);
+  (void)explanation_text(drawn, worst_quantity_of(drawn, run, objectives), run, 3);
 }
 
 void compare(const fs::path& file, const fs::path& pristine) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -42,16 +43,19 @@ int print_sensitivity(const SensitivityOptions& options) {
   const Store store = Store::open_read_only(options.database);
   std::optional<RunIndex> explained;
   if (options.run) explained = RunIndex{*options.run};
-  const DrawnRuns drawn =
-      read_drawn_runs(store, *stored_campaign(store), sensitivity_runs_max, explained);
+  const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
+  const DrawnRuns drawn = read_drawn_runs(store, *campaign, sensitivity_runs_max, explained);
   if (drawn.runs.size() < sensitivity_values_min) {
     throw Error(fmt::format("runs with an estimate = {} (sensitivities need {} at least)",
                             drawn.runs.size(), sensitivity_values_min));
   }
   if (explained) {
-    const std::size_t quantity =
-        quantities.empty() ? worst_quantity_of(drawn, *explained) : quantities.front();
-    print_lines(explanation_text(drawn, quantity, *explained, options.num_rows));
+    if (quantities.empty()) {
+      const std::vector<double> objectives = campaign->objectives();
+      print_lines(choice_text(drawn, *explained, objectives));
+      quantities.push_back(worst_quantity_of(drawn, *explained, objectives));
+    }
+    print_lines(explanation_text(drawn, quantities.front(), *explained, options.num_rows));
     return exit_done;
   }
   if (quantities.empty()) {
@@ -73,7 +77,9 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
       app, chosen, "sensitivity", "Print which drawn quantities drive the errors",
       print_sensitivity);
   command.add_option("DB", options.database, database_text)->required();
-  command.add_option("--parameter", options.parameter, "Of this parameter; all by default");
+  command.add_option("--parameter", options.parameter,
+                     "Of this parameter; all by default, or with --run\n"
+                     "the one that is worst beside its objective");
   command.add_option("--run", options.run, "Why this run is as far off as it is")
       ->check(wire::in_range(std::uint64_t{0}, num_runs_max - 1));
   command.add_option("--rows", options.num_rows, "Quantities to name for each error")
