@@ -15,9 +15,11 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
@@ -92,8 +94,16 @@ std::vector<AttachedFile> attached_files_of(const std::vector<std::string>& text
   return files;
 }
 
+void require_not_swapped(const QueryOptions& options) {
+  std::error_code ignored;
+  if (std::filesystem::exists(options.database, ignored) || !has_campaign_mark(options.sql)) return;
+  throw UsageError(
+      fmt::format("SQL = {} (is a database: the database goes before the question)", options.sql));
+}
+
 // SIGINT and SIGTERM end it in order.
 int query_database(const QueryOptions& options) {
+  require_not_swapped(options);
   const QueryFiles files(options.database, attached_files_of(options.attached));
   // While it waits for input, a signal ends the process at once.
   const std::string sql = options.sql == "-" ? read_standard_input() : options.sql;

@@ -97,5 +97,20 @@ TEST_F(ReportCommand, RefusesARunWithoutAnEstimate) {
   EXPECT_EQ(refused.error, "run = 60 (must have an estimate, as 60 runs up to 59 have)");
 }
 
+TEST_F(ReportCommand, ChoosesTheParameterOfARunByItsObjective) {
+  const std::string output = test::answer_of({"sensitivity", database_, "--run", "9"}).output;
+  EXPECT_TRUE(output.starts_with("Of a_c11_delta_")) << output;
+  const test::Answer of_one =
+      test::answer_of({"sensitivity", database_, "--run", "9", "--parameter", "k2c"});
+  EXPECT_TRUE(of_one.output.starts_with("Run 9: error of K2c/K1c² 1e-05 ")) << of_one.output;
+}
+
+TEST_F(ReportCommand, SaysThatDatabaseAndQuestionAreSwapped) {
+  const test::Answer refused = test::answer_of({"query", "SELECT 1", database_});
+  EXPECT_EQ(refused.exit_code, exit_wrong_usage);
+  EXPECT_EQ(refused.error, "SQL = " + database_.string() +
+                               " (is a database: the database goes before the question)");
+}
+
 }  // namespace
 }  // namespace proofmass::coordinator

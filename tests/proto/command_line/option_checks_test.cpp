@@ -38,11 +38,18 @@ TEST(OneOf, NamesTheWordsThatItTakes) {
 
 /// What a program with `run --runs N` and `report` says of these arguments.
 std::string refusal(const std::string& arguments) {
-  CLI::App app;
+  CLI::App app("", "program");
   app.require_subcommand(1);
   std::uint64_t num_runs = 0;
+  std::string first, second;
   app.add_subcommand("run", "")->add_option("--runs", num_runs, "");
   app.add_subcommand("report", "");
+  CLI::App* const query = app.add_subcommand("query", "");
+  query->add_option("DB", first, "")->required();
+  query->add_option("SQL", second, "")->required();
+  CLI::App* const tag = app.add_subcommand("tag", "");
+  tag->add_option("DB", first, "")->required();
+  tag->add_option("ACTION", second, "");
   try {
     app.parse(arguments);
   } catch (const CLI::ParseError& error) {
@@ -63,7 +70,27 @@ TEST(Refusal, NamesTheNearestCommandAndOption) {
 TEST(Refusal, NamesNoneIfNoneIsNear) {
   EXPECT_EQ(refusal("simulate"), "command = simulate (must be one that --help lists)");
   EXPECT_EQ(refusal("run --database"), "option = --database (must be one that --help lists)");
-  EXPECT_EQ(refusal("report more"), "argument = more (not expected; --help tells what is)");
+  EXPECT_EQ(refusal("report more"),
+            "argument = more (not expected; usage: program report [OPTIONS])");
+}
+
+TEST(Refusal, ShowsWhatWasTakenForWhichArgument) {
+  EXPECT_EQ(refusal("tag 13 add a.db"),
+            "argument = a.db (not expected after DB = 13, ACTION = add; "
+            "usage: program tag [OPTIONS] DB [ACTION])");
+  EXPECT_EQ(refusal("query a b c d"),
+            "arguments = c d (not expected after DB = a, SQL = b; "
+            "usage: program query [OPTIONS] DB SQL)");
+}
+
+TEST(Refusal, NamesAnUnknownOptionBeforeAMissingArgument) {
+  EXPECT_EQ(refusal("query --runs"), "option = --runs (must be one that --help lists)");
+  EXPECT_EQ(refusal("query"), "DB is required; usage: program query [OPTIONS] DB SQL");
+  EXPECT_EQ(refusal("query a"), "SQL is required; usage: program query [OPTIONS] DB SQL");
+}
+
+TEST(Refusal, SaysThatAnOptionLacksItsValue) {
+  EXPECT_EQ(refusal("run --runs"), "option = --runs (needs a value behind it)");
 }
 
 TEST(Choice, SetsTheValueOfItsWord) {
