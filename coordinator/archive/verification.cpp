@@ -272,11 +272,6 @@ constexpr std::size_t name_width = 12;
 constexpr std::size_t verdict_width = 13;
 constexpr std::size_t line_width = 80;
 
-std::string_view word_for(Verdict verdict) {
-  constexpr std::array<std::string_view, 3> words{"ok", "FAILS", "not checked"};
-  return words[static_cast<std::size_t>(verdict)];
-}
-
 // Text broken between words, from the second line on after `indent` spaces.
 std::string wrapped(const std::string& text, std::size_t indent) {
   std::istringstream stream(text);
@@ -326,6 +321,11 @@ Check Check::fails(std::string finding, std::vector<std::string> details) {
 Check Check::not_checked(std::string finding) {
   return {
       .name = {}, .verdict = Verdict::not_checked, .finding = std::move(finding), .details = {}};
+}
+
+std::string_view word_for(Verdict verdict) {
+  constexpr std::array<std::string_view, 3> words{"ok", "FAILS", "not checked"};
+  return words[static_cast<std::size_t>(verdict)];
 }
 
 std::string check_text(const Check& check) {

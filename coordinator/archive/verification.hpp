@@ -58,6 +58,9 @@ struct VerifyOptions {
                           const std::function<void(const Check&)>& report,
                           const IsStopped& is_stopped);
 
+/// `ok`, `FAILS` or `not checked`.
+[[nodiscard]] std::string_view word_for(Verdict verdict);
+
 /// A check as text: a line, then one for each detail; at most 80 characters each unless a detail
 /// has no place to break.
 [[nodiscard]] std::string check_text(const Check& check);

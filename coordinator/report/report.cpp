@@ -27,13 +27,9 @@ void check_given_up(const Store& store, const CampaignStatistics& statistics,
 }
 
 std::string report_of_one_state(const Store& store, const Campaign& campaign) {
-  const ReadResults results = read_results(store, campaign);
+  const auto [results, check, given_up] = read_checked_results(store, campaign);
   const CampaignStatistics& statistics = results.statistics;
-  const DigestCheck check = check_digest(store, statistics.num_runs, results.digests);
-  const std::vector<RunRange> given_up = store.given_up_runs();
   const std::uint64_t num_given_up = num_runs_in(given_up);
-  check_given_up(store, statistics, num_given_up);
-  check_stop_checks(store, campaign.objectives());
   std::string text = summary_text(store.name(), store.seed(), store.num_runs(), statistics,
                                   results.digests.results, check) +
                      given_up_text(given_up) + stop_text(store);
@@ -47,6 +43,19 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign) {
 }
 
 }  // namespace
+
+CheckedResults read_checked_results(const Store& store, const Campaign& campaign) {
+  CheckedResults checked;
+  store.read_one_state([&] {
+    checked.results = read_results(store, campaign);
+    const CampaignStatistics& statistics = checked.results.statistics;
+    checked.check = check_digest(store, statistics.num_runs, checked.results.digests);
+    checked.given_up = store.given_up_runs();
+    check_given_up(store, statistics, num_runs_in(checked.given_up));
+    check_stop_checks(store, campaign.objectives());
+  });
+  return checked;
+}
 
 std::string report_text(const Store& store, const Campaign& campaign) {
   std::string text;

@@ -68,6 +68,17 @@ struct ReadResults {
 /// @throws Error if a number is out of range, see require_in_range().
 [[nodiscard]] ReadResults read_results(const Store& store, const Campaign& campaign);
 
+/// What a report is made of.
+struct CheckedResults {
+  ReadResults results;
+  DigestCheck check = DigestCheck::holds;
+  std::vector<RunRange> given_up;  ///< Ascending.
+};
+
+/// Reads all results, of one state of the file, and holds them against what is stored beside them.
+/// @throws StoreError as report_text() does.
+[[nodiscard]] CheckedResults read_checked_results(const Store& store, const Campaign& campaign);
+
 /// Stores statistics, their digest, and the budgets that follow from them in the file.
 void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results);
 

@@ -1,16 +1,16 @@
 #include "coordinator/report/report.hpp"
 
-#include <fmt/format.h>
-
+#include <algorithm>
 #include <filesystem>
+#include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
+#include "coordinator/report/report_json.hpp"
 #include "coordinator/report/requirement_text.hpp"
 #include "coordinator/store/store.hpp"
 
@@ -20,35 +20,41 @@ namespace {
 struct ReportOptions {
   std::filesystem::path database;
   std::vector<std::string> requirements;  ///< See parse_requirement().
+  OutputFormat format = OutputFormat::text;
 };
 
-std::vector<RequirementAnswer> answers_of(const Store& store,
+std::vector<RequirementAnswer> answers_of(const Store& store, const Campaign& campaign,
                                           const std::vector<std::string>& requirements) {
   try {
-    return check_requirements(store, stored_campaign(store)->objectives(), requirements);
+    return check_requirements(store, campaign.objectives(), requirements);
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }
 }
 
-int print_requirements(const Store& store, const std::vector<std::string>& requirements) {
-  bool are_met = true;
-  std::string_view separator = "";
-  for (const RequirementAnswer& answer : answers_of(store, requirements)) {
-    print_lines(fmt::format("{}{}", separator, requirement_text(answer)));
-    separator = "\n";
-    are_met = are_met && answer.check.verdict == Verdict::met;
+std::string answers_text(const std::vector<RequirementAnswer>& answers) {
+  std::string text;
+  for (const RequirementAnswer& answer : answers) {
+    text += (text.empty() ? "" : "\n") + requirement_text(answer);
   }
-  return are_met ? exit_done : exit_not_met;
+  return text;
 }
 
 /// Prints the tables of a campaign, finished or not; of requirements, if there are any, the answers
-/// instead.
+/// instead. JSON holds both.
 int print_report(const ReportOptions& options) {
   const Store store = Store::open_read_only(options.database);
-  if (!options.requirements.empty()) return print_requirements(store, options.requirements);
-  print_lines(report_text(store, *stored_campaign(store)));
-  return exit_done;
+  const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
+  const std::vector<RequirementAnswer> answers = answers_of(store, *campaign, options.requirements);
+  if (options.format == OutputFormat::json) {
+    print_lines(report_json(store, *campaign, answers));
+  } else {
+    print_lines(answers.empty() ? report_text(store, *campaign) : answers_text(answers));
+  }
+  const bool are_met = std::ranges::all_of(answers, [](const RequirementAnswer& answer) {
+    return answer.check.verdict == Verdict::met;
+  });
+  return are_met ? exit_done : exit_not_met;
 }
 
 }  // namespace
@@ -62,6 +68,7 @@ void add_report(CLI::App& app, Command& chosen) {
                      "Answer instead whether it is met, as in\n"
                      "\"a_c12 < 9e-4 for 99% with 95%\" or\n"
                      "\"all objectives for 95% with 90%\"; may be repeated");
+  add_json_flag(command, options.format);
 }
 
 }  // namespace proofmass::coordinator

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "coordinator/archive/verification.hpp"
@@ -19,20 +20,45 @@ namespace {
 struct VerifyCommandOptions {
   std::filesystem::path database;
   double fraction = 0.01;  ///< Of the runs, simulated again; in [0, 1].
+  OutputFormat format = OutputFormat::text;
 };
+
+using Json = nlohmann::ordered_json;
+
+Json json_of_check(const Check& check) {
+  return {{"name", check.name},
+          {"verdict", word_for(check.verdict)},
+          {"finding", check.finding},
+          {"details", check.details}};
+}
+
+void print_checks(const std::filesystem::path& database, std::size_t num_failing,
+                  const Json& checks) {
+  const Json json{{"file", database.string()}, {"num_failing", num_failing}, {"checks", checks}};
+  constexpr int indent = 2;
+  print_lines(json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n");
+}
 
 int verify_database(const VerifyCommandOptions& options) {
   return run_until_stopped([&](const IsStopped& is_stopped) {
     const VerifyOptions how{.fraction = options.fraction,
                             .num_threads = std::max(1U, std::thread::hardware_concurrency())};
+    const bool is_json = options.format == OutputFormat::json;
     std::size_t num_failing = 0, num_checks = 0;
+    Json checks = Json::array();
     const auto report = [&](const Check& check) {
       ++num_checks;
       if (check.verdict == Verdict::fails) ++num_failing;
+      if (is_json) {
+        checks.push_back(json_of_check(check));
+        return;
+      }
       print_lines(check_text(check));
       flush_standard_output();  // The simulation may take long.
     };
-    if (verify(options.database, how, report, is_stopped)) return exit_done;
+    const bool holds = verify(options.database, how, report, is_stopped);
+    if (is_json) print_checks(options.database, num_failing, checks);
+    if (holds) return exit_done;
     wire::say(fmt::format("proofmass: error: {}: {} of {} checks {}\n", options.database.string(),
                           num_failing, num_checks, num_failing == 1 ? "fails" : "fail"));
     return exit_cannot_be_done;
@@ -49,6 +75,7 @@ void add_verify(CLI::App& app, Command& chosen) {
   command.add_option("--fraction", options.fraction, "Of the runs to simulate again")
       ->check(wire::in_range(0.0, 1.0))
       ->capture_default_str();
+  add_json_flag(command, options.format);
 }
 
 }  // namespace proofmass::coordinator

@@ -1,9 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/exit_code.hpp"
+#include "coordinator/report/digest.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/program.hpp"
@@ -110,6 +114,71 @@ TEST_F(ReportCommand, SaysThatDatabaseAndQuestionAreSwapped) {
   EXPECT_EQ(refused.exit_code, exit_wrong_usage);
   EXPECT_EQ(refused.error, "SQL = " + database_.string() +
                                " (is a database: the database goes before the question)");
+}
+
+// Errors 1, 2, ... 60 times 1e-6: their mean is 30.5e-6, their variance that of 60 numbers in a
+// row, 60·61/12, and 1 − 30/60 of them are above 30e-6.
+TEST_F(ReportCommand, PrintsWhatTheTablesHoldAsJson) {
+  const test::Answer answer = test::answer_of(
+      {"report", database_, "--json", "--requirement", "a_c12 < 30.5e-6 for 95% with 95%"});
+  EXPECT_EQ(answer.exit_code, exit_not_met);
+  const auto json = nlohmann::json::parse(answer.output);
+  EXPECT_EQ(json["num_runs"], 60);
+  EXPECT_EQ(json["num_finished"], 60);
+  EXPECT_EQ(json["num_with_estimate"], 60);
+  EXPECT_EQ(json["num_lost"], 0);
+  EXPECT_EQ(json["digest"], digest_of(Store::open_read_only(database_)));
+  EXPECT_EQ(json["is_digest_checked"], false);  // No statistics are stored.
+  ASSERT_EQ(json["parameters"].size(), num_parameters);
+  const auto& parameter = json["parameters"][index(Parameter::a_c12)];
+  EXPECT_EQ(parameter["parameter"], "a_c12");
+  EXPECT_EQ(parameter["unit"], "rad");
+  EXPECT_EQ(parameter["objective"], hardy2013_campaign().objectives()[index(Parameter::a_c12)]);
+  EXPECT_EQ(parameter["worst"], 1e-6 * 60.0);
+  EXPECT_EQ(parameter["worst_run"], 59);
+  EXPECT_DOUBLE_EQ(parameter["mean"], 30.5e-6);
+  EXPECT_DOUBLE_EQ(parameter["standard_deviation"], 1e-6 * std::sqrt(60.0 * 61.0 / 12.0));
+  EXPECT_DOUBLE_EQ(parameter["bias"], 30.5e-6);
+  EXPECT_LT(parameter["bias_interval"][0], 30.5e-6);
+  EXPECT_GT(parameter["bias_interval"][1], 30.5e-6);
+  EXPECT_EQ(parameter["percentiles"][0]["level"], 0.5);
+  EXPECT_TRUE(parameter["percentiles"][3]["interval"].is_null());  // Needs 368 runs.
+  EXPECT_EQ(json["budget"]["terms"].size(), hardy2013_campaign().error_budget()->infos.size());
+  EXPECT_EQ(json["budget"]["total"]["before_m_s2"],
+            hardy2013_campaign().error_budget()->before.total);
+  const auto& requirement = json["requirements"][0];
+  EXPECT_EQ(requirement["answer"], "not met");
+  EXPECT_EQ(requirement["num_exceedances"], 30);
+  EXPECT_EQ(requirement["limit"], 30.5e-6);
+}
+
+TEST_F(ReportCommand, PrintsNullWhereNoRunHasAnEstimate) {
+  const auto none = directory_ / "none.db";
+  const MicroscopeCampaign campaign = hardy2013_campaign();
+  (void)Store::create(none, campaign, canonical_definition(campaign));
+  const auto json = nlohmann::json::parse(test::answer_of({"report", none, "--json"}).output);
+  EXPECT_TRUE(json["parameters"][0]["mean"].is_null());
+  EXPECT_TRUE(json["parameters"][0]["fraction_beyond_objective"].is_null());
+  EXPECT_TRUE(json["budget"]["total"]["after_mean_m_s2"].is_null());
+  EXPECT_TRUE(json["all_objectives"]["fraction_within_interval"].is_null());
+}
+
+// The results are made up: a simulation yields others.
+TEST_F(ReportCommand, VerifiesWithJsonForPrograms) {
+  const test::Answer answer = test::answer_of({"verify", database_, "--json"});
+  EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
+  const auto json = nlohmann::json::parse(answer.output);
+  EXPECT_EQ(json["file"], database_.string());
+  ASSERT_EQ(json["checks"].size(), 11U);
+  EXPECT_EQ(json["checks"][0]["name"], "file");
+  EXPECT_EQ(json["checks"][0]["verdict"], "ok");
+  const auto& last = json["checks"][10];
+  EXPECT_EQ(last["name"], "simulation");
+  EXPECT_EQ(last["verdict"], "FAILS");
+  EXPECT_FALSE(last["details"].empty());
+  const auto num_failing = std::ranges::count_if(
+      json["checks"], [](const auto& check) { return check["verdict"] == "FAILS"; });
+  EXPECT_EQ(json["num_failing"], num_failing);
 }
 
 }  // namespace

@@ -1,0 +1,172 @@
+#include "coordinator/report/report_json.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "coordinator/report/report.hpp"
+#include "core/campaign/error_budget.hpp"
+#include "core/campaign/model.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <typename Value>
+Json or_null(const std::optional<Value>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json bounds_of(const Interval& interval) { return {interval.lower, interval.upper}; }
+
+Json bounds_of(const std::optional<Interval>& interval) {
+  return interval ? bounds_of(*interval) : Json(nullptr);
+}
+
+Json percentiles_of(const AccuracyStatistic& accuracy) {
+  Json json = Json::array();
+  for (const PercentileStatistic& percentile : accuracy.percentiles) {
+    json.push_back({{"level", percentile.level},
+                    {"value", percentile.value},
+                    {"interval", bounds_of(percentile.interval)}});
+  }
+  return json;
+}
+
+/// What a number of runs cannot tell is null.
+Json statistics_of(const AccuracyStatistic& accuracy, std::uint64_t num_runs) {
+  const ErrorStatistic& error = accuracy.error;
+  Json json{{"worst", accuracy.worst},
+            {"worst_run", accuracy.worst_run.value},
+            {"mean", accuracy.mean},
+            {"mean_interval", bounds_of(accuracy.mean_interval)},
+            {"standard_deviation", accuracy.standard_deviation},
+            {"standard_deviation_interval", bounds_of(accuracy.deviation_interval)},
+            {"percentiles", percentiles_of(accuracy)},
+            {"bias", error.bias},
+            {"bias_interval", bounds_of(error.bias_interval)},
+            {"error_rms", error.rms},
+            {"error_standard_deviation", error.standard_deviation},
+            {"error_standard_deviation_interval", bounds_of(error.deviation_interval)},
+            {"error_skewness", error.skewness},
+            {"num_beyond_objective", accuracy.num_beyond_objective},
+            {"fraction_beyond_objective", nullptr},
+            {"fraction_beyond_objective_interval", bounds_of(accuracy.beyond_objective)}};
+  if (num_runs == 0) {
+    for (const auto& item : json.items()) item.value() = nullptr;
+    return json;
+  }
+  json["fraction_beyond_objective"] =
+      static_cast<double>(accuracy.num_beyond_objective) / static_cast<double>(num_runs);
+  if (num_runs < 2) json["standard_deviation"] = json["error_standard_deviation"] = nullptr;
+  if (num_runs < 3) json["error_skewness"] = nullptr;
+  return json;
+}
+
+Json parameters_of(const Campaign& campaign, const CampaignStatistics& statistics) {
+  const std::vector<double> objectives = campaign.objectives();
+  const std::vector<Quantity>& quantities = model().results().quantities;
+  Json json = Json::array();
+  for (std::size_t i = 0; i < quantities.size(); ++i) {
+    Json parameter{{"parameter", quantities[i].name},
+                   {"symbol", quantities[i].symbol},
+                   {"unit", quantities[i].unit},
+                   {"objective", objectives[i]}};  // Infinity becomes null.
+    parameter.update(statistics_of(statistics.accuracy[i], statistics.num_estimated));
+    json.push_back(std::move(parameter));
+  }
+  return json;
+}
+
+Json budget_of(const Campaign& campaign, const ReadResults& results) {
+  const std::optional<ErrorBudget> budget = campaign.error_budget();
+  if (!budget) return nullptr;
+  const CampaignStatistics& statistics = results.statistics;
+  std::optional<Budget> worst, mean;
+  if (statistics.num_estimated > 0) {
+    worst = budget->after(statistics.worst_errors());
+    mean = budget->after(statistics.mean_errors());
+  }
+  const auto row = [&](std::string_view name, const auto& value_of) -> Json {
+    return {{"term", name},
+            {"before_m_s2", value_of(budget->before)},
+            {"after_worst_m_s2", worst ? Json(value_of(*worst)) : Json(nullptr)},
+            {"after_mean_m_s2", mean ? Json(value_of(*mean)) : Json(nullptr)}};
+  };
+  Json json{{"terms", Json::array()},
+            {"total", row(budget->total_info.name, [](const Budget& of) { return of.total; })},
+            {"single_runs", nullptr}};
+  for (std::size_t i = 0; i < budget->infos.size(); ++i) {
+    json["terms"].push_back(
+        row(budget->infos[i].name, [&](const Budget& of) { return of.entries[i]; }));
+  }
+  if (const std::optional<RunTotals>& totals = results.totals) {
+    json["single_runs"] = {{"median_m_s2", totals->median},
+                           {"percentile_95_m_s2", totals->percentile_95},
+                           {"worst_m_s2", totals->worst},
+                           {"worst_run", totals->worst_run.value}};
+  }
+  return json;
+}
+
+Json json_of(const RequirementAnswer& answer) {
+  const RequirementCheck& check = answer.check;
+  const Requirement& requirement = answer.requirement;
+  Json json{{"requirement", answer.text},
+            {"answer", name_of(check.verdict)},
+            {"parameter", nullptr},
+            {"limit", nullptr},
+            {"coverage", requirement.tolerance.coverage},
+            {"confidence", requirement.tolerance.confidence},
+            {"num_runs", check.num_runs},
+            {"num_exceedances", check.num_exceedances},
+            {"num_without_estimate", check.num_without_estimate},
+            {"num_exceedances_allowed", check.num_allowed},
+            {"exceedance_bounds", bounds_of(check.exceedance)},
+            {"tolerance_bound", check.bound ? Json(check.bound->value) : Json(nullptr)},
+            {"num_runs_at_best", or_null(check.num_runs_at_best)},
+            {"num_runs_at_this_rate", or_null(check.num_runs_at_this_rate)}};
+  if (requirement.subject == Requirement::Subject::parameter) {
+    json["parameter"] = model().results().quantities[requirement.parameter].name;
+    json["limit"] = requirement.limit;
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string report_json(const Store& store, const Campaign& campaign,
+                        std::span<const RequirementAnswer> answers) {
+  const CheckedResults checked = read_checked_results(store, campaign);
+  const CampaignStatistics& statistics = checked.results.statistics;
+  const std::uint64_t num_given_up = num_runs_in(checked.given_up);
+  Json json{{"campaign", store.name()},
+            {"seed", std::to_string(store.seed())},
+            {"digest", checked.results.digests.results},
+            {"is_digest_checked", checked.check == DigestCheck::holds},
+            {"num_runs", store.num_runs()},
+            {"num_finished", statistics.num_runs},
+            {"num_with_estimate", statistics.num_estimated},
+            {"num_not_converged", statistics.num_not_converged},
+            {"num_not_finite", statistics.num_not_finite},
+            {"num_no_draw", statistics.num_no_draw},
+            {"num_lost", statistics.num_lost},
+            {"num_given_up", num_given_up},
+            {"confidence", default_confidence},
+            {"parameters", parameters_of(campaign, statistics)},
+            {"all_objectives",
+             {{"num_within", statistics.num_within_objectives},
+              {"num_runs", statistics.num_runs + num_given_up},
+              {"fraction_within_interval", bounds_of(statistics.within_objectives(num_given_up))}}},
+            {"budget", budget_of(campaign, checked.results)},
+            {"requirements", Json::array()}};
+  for (const RequirementAnswer& answer : answers) json["requirements"].push_back(json_of(answer));
+  constexpr int indent = 2;
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace proofmass::coordinator
