@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <span>
 #include <utility>
 #include <vector>
@@ -124,13 +125,17 @@ std::string limit_line(const DrawnRuns& drawn) {
                      drawn.runs.size() > drawn.num_first ? " and this one" : "");
 }
 
+RunIndex worst_run_of(const DrawnRuns& drawn, std::size_t quantity) {
+  const std::vector<double>& errors = drawn.errors[quantity];
+  const auto worst =
+      std::ranges::max_element(errors, {}, [](double error) { return std::abs(error); });
+  return drawn.runs[static_cast<std::size_t>(worst - errors.begin())];
+}
+
 /// Which run is the worst, and how to ask why.
 std::string worst_run_text(const DrawnRuns& drawn, std::size_t quantity) {
-  const auto worst = std::ranges::max_element(drawn.errors[quantity], {},
-                                              [](double error) { return std::abs(error); });
-  const auto position = static_cast<std::size_t>(worst - drawn.errors[quantity].begin());
-  const std::uint64_t run = drawn.runs[position].value;
-  return fmt::format("Largest |error|: run {0}; why: --run {0} --parameter {1}\n", run,
+  return fmt::format("Largest |error|: run {0}; why: --run {0} --parameter {1}\n",
+                     worst_run_of(drawn, quantity).value,
                      model().results().quantities[quantity].name);
 }
 
@@ -178,6 +183,43 @@ std::string explanation_rows(const DrawnRuns& drawn, std::span<const Sensitivity
             "\n";
   }
   return text;
+}
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
+             std::optional<std::size_t> position) {
+  Json json = Json::array();
+  for (const Sensitivity& row : rows) {
+    const FirstOrderIndex& index = row.first_order;
+    Json entry{{"quantity", drawn.names[row.input]},
+               {"fraction_of_variance", index.index},
+               {"interval", {index.interval.lower, index.interval.upper}},
+               {"rank_correlation", row.rank.coefficient},
+               {"p_value", row.adjusted_p_value},
+               {"run_value", nullptr},
+               {"run_percentile", nullptr}};
+    if (position) {
+      const std::vector<double>& values = drawn.columns[row.input];
+      entry["run_value"] = values[*position];
+      entry["run_percentile"] = percentile_of(values, values[*position]);
+    }
+    json.push_back(std::move(entry));
+  }
+  return json;
+}
+
+Json terms_of(const DrawnRuns& drawn, std::size_t quantity) {
+  Json json = Json::array();
+  for (const ExplanatoryTerm& term : explanatory_terms(inputs_of(drawn), drawn.errors[quantity],
+                                                       num_terms_max, default_confidence)) {
+    json.push_back({{"quantity", drawn.names[term.first]},
+                    {"times", term.second ? Json(drawn.names[*term.second]) : Json(nullptr)},
+                    {"slope", term.slope},
+                    {"fraction_of_variance", term.share},
+                    {"p_value", term.p_value}});
+  }
+  return json;
 }
 
 }  // namespace
@@ -233,6 +275,32 @@ std::string choice_text(const DrawnRuns& drawn, RunIndex run, std::span<const do
       "Of {}, as its error is the largest beside its objective: {:.3g} times that\n"
       "(another parameter: --parameter NAME)\n",
       name, ratio);
+}
+
+std::string sensitivity_json(const DrawnRuns& drawn, std::span<const std::size_t> quantities,
+                             std::optional<RunIndex> run, std::size_t num_rows) {
+  std::optional<std::size_t> position;
+  if (run) position = position_of(drawn, *run);
+  Json json{{"run", run ? Json(run->value) : Json(nullptr)},
+            {"num_runs", drawn.runs.size()},
+            {"num_with_estimate", drawn.num_with_estimate},
+            {"confidence", default_confidence},
+            {"parameters", Json::array()}};
+  for (const std::size_t quantity : quantities) {
+    const std::vector<double>& errors = drawn.errors[quantity];
+    const auto both = sensitivities_of(drawn, quantity);
+    json["parameters"].push_back(
+        {{"parameter", model().results().quantities[quantity].name},
+         {"unit", model().results().quantities[quantity].unit},
+         {"worst_run", worst_run_of(drawn, quantity).value},
+         {"run_error", position ? Json(errors[*position]) : Json(nullptr)},
+         {"run_rank", position ? Json(rank_of(errors, *position)) : Json(nullptr)},
+         {"drives_magnitude", json_of(drawn, first_of(both[1], num_rows), position)},
+         {"drives_error", json_of(drawn, first_of(both[0], num_rows), position)},
+         {"terms", terms_of(drawn, quantity)}});
+  }
+  constexpr int indent = 2;
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace proofmass::coordinator

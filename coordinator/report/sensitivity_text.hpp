@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -25,6 +26,13 @@ inline constexpr std::uint64_t sensitivity_runs_max = 100'000;
 /// @throws InvalidArgument if the run is not among those, or they are below 16.
 [[nodiscard]] std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity,
                                            RunIndex run, std::size_t num_rows);
+
+/// Both for programs, of these parameters, in full precision and SI units; of the run's values only
+/// if there is one. coordinator/cli/README.md lists the keys.
+/// @throws InvalidArgument if the run is not among those, or they are below 16.
+[[nodiscard]] std::string sensitivity_json(const DrawnRuns& drawn,
+                                           std::span<const std::size_t> quantities,
+                                           std::optional<RunIndex> run, std::size_t num_rows);
 
 /// The parameter whose |error| is the largest in units of its objective; of those without
 /// objectives, the one for which the |error| has the highest rank.

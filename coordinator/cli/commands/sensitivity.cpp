@@ -28,6 +28,7 @@ struct SensitivityOptions {
   std::optional<std::string> parameter;  ///< Name; all by default.
   std::optional<std::uint64_t> run;      ///< To be explained.
   std::size_t num_rows = 5;              ///< Drawn quantities that are named for each error.
+  OutputFormat format = OutputFormat::text;
 };
 
 std::size_t quantity_named(std::string_view name) {
@@ -49,17 +50,22 @@ int print_sensitivity(const SensitivityOptions& options) {
     throw Error(fmt::format("runs with an estimate = {} (sensitivities need {} at least)",
                             drawn.runs.size(), sensitivity_values_min));
   }
-  if (explained) {
-    if (quantities.empty()) {
-      const std::vector<double> objectives = campaign->objectives();
-      print_lines(choice_text(drawn, *explained, objectives));
-      quantities.push_back(worst_quantity_of(drawn, *explained, objectives));
-    }
-    print_lines(explanation_text(drawn, quantities.front(), *explained, options.num_rows));
-    return exit_done;
+  const bool is_json = options.format == OutputFormat::json;
+  if (explained && quantities.empty()) {
+    const std::vector<double> objectives = campaign->objectives();
+    if (!is_json) print_lines(choice_text(drawn, *explained, objectives));
+    quantities.push_back(worst_quantity_of(drawn, *explained, objectives));
   }
   if (quantities.empty()) {
     for (std::size_t i = 0; i < drawn.errors.size(); ++i) quantities.push_back(i);
+  }
+  if (is_json) {
+    print_lines(sensitivity_json(drawn, quantities, explained, options.num_rows));
+    return exit_done;
+  }
+  if (explained) {
+    print_lines(explanation_text(drawn, quantities.front(), *explained, options.num_rows));
+    return exit_done;
   }
   std::string_view separator = "";
   for (const std::size_t quantity : quantities) {
@@ -86,6 +92,7 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
       ->check(wire::in_range(std::size_t{1},
                              model().drawn().size() + model().results().quantities.size()))
       ->capture_default_str();
+  add_json_flag(command, options.format);
 }
 
 }  // namespace proofmass::coordinator

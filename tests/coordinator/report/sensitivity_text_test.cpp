@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <span>
 #include <sstream>
@@ -216,6 +217,30 @@ TEST(SensitivityText, TellsHowToAskWhyTheWorstRunIsSo) {
   drawn.errors[index(Parameter::a_c12)][58] = 9.0;
   EXPECT_THAT(sensitivity_text(drawn, index(Parameter::k2c), 1),
               EndsWith("\n\nLargest |error|: run 57; why: --run 57 --parameter k2c\n"));
+}
+
+TEST(SensitivityJson, HoldsWhatTheTablesHold) {
+  DrawnRuns drawn = made_up_runs();
+  drawn.columns[7][42] = 1.5;
+  drawn.errors[index(Parameter::k2c)][42] = 1.5;
+  const std::vector<std::size_t> quantities{index(Parameter::k2c)};
+  const auto json = nlohmann::json::parse(sensitivity_json(drawn, quantities, RunIndex{42}, 2));
+  EXPECT_EQ(json["run"], 42);
+  EXPECT_EQ(json["num_runs"], 1000);
+  ASSERT_EQ(json["parameters"].size(), 1U);
+  const auto& parameter = json["parameters"][0];
+  EXPECT_EQ(parameter["parameter"], "k2c");
+  EXPECT_EQ(parameter["worst_run"], 42);
+  EXPECT_EQ(parameter["run_error"], 1.5);
+  EXPECT_EQ(parameter["run_rank"], 1);
+  ASSERT_EQ(parameter["drives_error"].size(), 2U);
+  const auto& driver = parameter["drives_error"][0];
+  EXPECT_EQ(driver["quantity"], drawn_names()[7]);
+  EXPECT_NEAR(driver["fraction_of_variance"], 1.0, 1e-3);
+  EXPECT_EQ(driver["run_value"], 1.5);
+  EXPECT_EQ(driver["run_percentile"], 99.9);  // 999 of 1000 runs are below.
+  EXPECT_EQ(parameter["terms"][0]["quantity"], drawn_names()[7]);
+  EXPECT_TRUE(parameter["terms"][0]["times"].is_null());
 }
 
 TEST(ExplanationText, RefusesARunBetweenThoseThatAreThere) {
