@@ -22,7 +22,8 @@ constexpr std::size_t name_width = 39;
 constexpr std::size_t share_width = 21;
 constexpr std::size_t rank_width = 9;
 constexpr std::size_t p_width = 11;
-constexpr std::size_t value_width = 9;
+constexpr std::size_t explained_name_width = 38;
+constexpr std::size_t value_width = 10;  // `-0.000477` and a space.
 constexpr std::size_t percentile_width = 11;
 constexpr std::size_t terms_width = 44;
 constexpr std::size_t slope_width = 12;
@@ -169,14 +170,14 @@ double percentile_of(const std::vector<double>& values, double value) {
 std::string explanation_rows(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
                              std::size_t position, std::string_view output) {
   std::string text =
-      left_aligned(fmt::format("drives {}", output), name_width) +
+      left_aligned(fmt::format("drives {}", output), explained_name_width) +
       right_aligned("% of variance (95 %)", share_width) + right_aligned("value", value_width) +
       right_aligned("percentile", percentile_width) + "\n" +
-      horizontal_rule(name_width + share_width + value_width + percentile_width) + "\n";
+      horizontal_rule(explained_name_width + share_width + value_width + percentile_width) + "\n";
   for (const Sensitivity& row : rows) {
     const std::vector<double>& values = drawn.columns[row.input];
     const double value = values[position];
-    text += left_aligned(drawn.names[row.input], name_width) +
+    text += left_aligned(drawn.names[row.input], explained_name_width) +
             right_aligned(share_of(row.first_order), share_width) +
             right_aligned(fmt::format("{:.3g}", value), value_width) +
             right_aligned(fmt::format("{:.1f}", percentile_of(values, value)), percentile_width) +
