@@ -120,7 +120,7 @@ TEST_F(CampaignProcess, ASmallerNumberOfRunsIsRefused) {
   EXPECT_EQ(
       errors_of("smaller"),
       "proofmass: error: campaign.runs = 1 (must be at least 2, which smaller.db was asked for; "
-      "the number comes from --runs, or else from the campaign database)\n");
+      "the number comes from --runs, or else from the campaign file)\n");
 }
 
 TEST_F(CampaignProcess, RefusesTheDatabaseOfAnotherCampaign) {

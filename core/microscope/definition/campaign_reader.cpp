@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 
 #include "core/campaign/model.hpp"
 #include "core/definition/csv.hpp"
@@ -41,6 +42,45 @@ void read_columns(MicroscopeCampaign& campaign, DataFiles& files) {
     const std::string path = fmt::format("dispersion.{}.file", drawn_names()[element]);
     campaign.table_columns.push_back(parse_column(
         files.text_of(dispersion.file, path), files.name_of(dispersion.file), dispersion.column));
+  }
+}
+
+/// Values that a drawn quantity may have in a file: far beyond any instrument, and wide enough for
+/// any experiment with the model. An offcentring of 5 m is a slip of the pen.
+class MagnitudeCheck {
+ public:
+  explicit MagnitudeCheck(std::size_t drawn)
+      : path_(fmt::format("dispersion.{}", drawn_names()[drawn])) {
+    for (const DrawGroup& group : draw_groups()) {
+      if (drawn >= group.first) maximum_ = 1000.0 * group.bound;
+    }
+  }
+
+  void run(std::string_view key, double value) const {
+    if (std::fabs(value) <= maximum_) return;
+    throw ConfigError(
+        fmt::format("{}.{}", path_, key), fmt::format("{}", value),
+        fmt::format("must be in [-{0:.6g}, {0:.6g}], 1000 times the nominal bound", maximum_));
+  }
+
+ private:
+  std::string path_;
+  double maximum_ = 0.0;
+};
+
+void check_magnitudes(const MicroscopeCampaign& campaign) {
+  for (std::size_t i = 0; i < num_drawn; ++i) {
+    const Dispersion& law = campaign.dispersions[i];
+    const MagnitudeCheck check(i);
+    check.run("minimum", law.minimum);
+    check.run("maximum", law.maximum);
+    check.run("mean", law.mean);
+    check.run("standard_deviation", law.standard_deviation);
+    check.run("value", law.value);
+  }
+  for (std::size_t i = 0; const std::size_t drawn : campaign.table_quantities()) {
+    for (const double value : campaign.table_columns[i]) MagnitudeCheck(drawn).run("column", value);
+    ++i;
   }
 }
 
@@ -83,6 +123,7 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
   read_columns(campaign, files);
   try {
     campaign.validate();
+    check_magnitudes(campaign);
   } catch (const ConfigError& error) {
     throw document.located(error);
   }

@@ -223,6 +223,15 @@ TEST(DispersionErrors, NameTheLineOfAnInconsistentLaw) {
             "campaign.toml:2: dispersion.offcentring_m.maximum = -1 (must be > minimum, -2e-05)");
 }
 
+TEST(DispersionErrors, RefuseWhatNoInstrumentHas) {
+  const std::string rule = " (must be in [-0.02, 0.02], 1000 times the nominal bound)";
+  EXPECT_EQ(refusal_of("[dispersion.offcentring_m]\nmaximum = 0.02"), "");
+  EXPECT_EQ(refusal_of("[dispersion.offcentring_m]\nmaximum = 5"),
+            "campaign.toml:2: dispersion.offcentring_m.maximum = 5" + rule);
+  EXPECT_EQ(refusal_of("[dispersion.offcentring_m.z]\nlaw = \"fixed\"\nvalue = -0.03"),
+            "campaign.toml:3: dispersion.offcentring_m.z.value = -0.03" + rule);
+}
+
 // --- data files ---
 
 constexpr std::string_view table_law =
@@ -257,10 +266,14 @@ TEST(DataFileErrors, NameTheLineOfAMalformedFile) {
 
 TEST(DataFileErrors, NameATableWithFewerRowsThanRuns) {
   const test::ScratchFolder folder;
-  folder.write("draws.csv", "a\n1\n2\n");
+  folder.write("draws.csv", "a\n1e-5\n0.03\n");
   EXPECT_EQ(refusal_of(table_law, folder),
             "campaign.toml:5: dispersion.offcentring_m.x.column = \"a\" (has 2 rows, 3 runs need "
             "one each)");
+  EXPECT_EQ(refusal_of(table_law, folder, {.num_runs = 2}),
+            "campaign.toml:5: dispersion.offcentring_m.x.column = 0.03 (must be in [-0.02, 0.02], "
+            "1000 times the nominal bound)");
+  folder.write("draws.csv", "a\n1e-5\n2e-5\n");
   EXPECT_EQ(refusal_of(table_law, folder, {.num_runs = 2}), "");
 }
 

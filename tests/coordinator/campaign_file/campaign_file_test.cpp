@@ -112,7 +112,7 @@ TEST(ReadCampaign, ReadsDataFilesBesideTheCampaignFile) {
                "time_s,linear_x_m_s2,linear_y_m_s2,linear_z_m_s2,"
                "angular_x_rad_s2,angular_y_rad_s2,angular_z_rad_s2\n"
                "0,1,2,3,4,5,6\n6000,1,2,3,4,5,6\n");
-  folder.write("draws.csv", "a,b\n1,10\n2,20\n3,30\n");
+  folder.write("draws.csv", "a,b\n0.01,1\n0.02,2\n0.005,3\n");
   const MicroscopeCampaign campaign =
       test::microscope(*read_campaign(folder.write("campaign.toml", R"(
     campaign = { name = "tables", runs = 3 }
@@ -128,8 +128,9 @@ TEST(ReadCampaign, ReadsDataFilesBesideTheCampaignFile) {
   )")));
   ASSERT_EQ(campaign.environment_table.size(), 2u);
   EXPECT_EQ(campaign.environment_table[1].time_s, 6000.0);
-  EXPECT_THAT(campaign.table_columns, ElementsAre(ElementsAre(10, 20, 30), ElementsAre(1, 2, 3)));
-  EXPECT_THAT(campaign.table_values(RunIndex{2}), ElementsAre(30, 3));
+  EXPECT_THAT(campaign.table_columns,
+              ElementsAre(ElementsAre(1, 2, 3), ElementsAre(0.01, 0.02, 0.005)));
+  EXPECT_THAT(campaign.table_values(RunIndex{2}), ElementsAre(3, 0.005));
 }
 
 TEST(Overrides, WinOverTheFile) {

@@ -86,16 +86,6 @@ TEST(ProgressDisplay, WritesALineEveryTenPercent) {
   EXPECT_NE(text.find("\n30/30 runs  100 %\n"), std::string::npos);
 }
 
-TEST(ProgressDisplay, BeginsAgainWhenThereAreMoreRuns) {
-  const std::string text =
-      output_of<ProgressDisplay>(DisplayMode::lines, [](ProgressDisplay& display) {
-        display.update(progress(128, 128, 0.0));
-        display.update(progress(128, 128, 0.0));
-        display.update(progress(128, 192, 0.0));
-      });
-  EXPECT_EQ(text, "128/128 runs  100 %\n128/192 runs   66 %\n");
-}
-
 TEST(ProgressDisplay, ShowsThatNothingCanBeStored) {
   wire::CampaignStatus failing = progress(42, 100, 0.5);
   failing.storage_failure = "campaign database = a.db (the disk is full)";

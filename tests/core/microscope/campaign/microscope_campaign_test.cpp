@@ -69,19 +69,6 @@ TEST(MicroscopeCampaign, RefusesTooFewOrTooManyRuns) {
             "campaign.runs = 1000000001 (must be in [1, 1000000000])");
 }
 
-TEST(MicroscopeCampaign, RefusesQuantitiesThatNoInstrumentHas) {
-  const std::string rule = " (must be in [-0.02, 0.02], 1000 times the nominal bound)";
-  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.dispersions[24].maximum = 0.02; }), "");
-  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.dispersions[24].maximum = 5.0; }),
-            "dispersion.offcentring_m.x.maximum = 5" + rule);
-  EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) {
-              c.num_runs = 2;
-              c.dispersions[26] = {.law = Law::table, .file = "a.csv", .column = "z"};
-              c.table_columns = {{1e-6, -0.03}};
-            }),
-            "dispersion.offcentring_m.z = -0.03" + rule);
-}
-
 TEST(MicroscopeCampaign, ChecksScenarioAndDispersions) {
   EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.scenario.noise.scale = -1.0; }),
             "noise.scale = -1 (must be >= 0)");

@@ -19,14 +19,13 @@ namespace {
 using detail::number_text;
 using detail::quoted_text;
 
-// The bits of a number that went through a campaign file.
+// The bits of a number that went through a definition.
 std::uint64_t bits_through_file(double value) {
   MicroscopeCampaign campaign = hardy2013_campaign();
   campaign.dispersions[0] = Dispersion{};
   campaign.dispersions[0].law = Law::fixed;
   campaign.dispersions[0].value = value;
-  const MicroscopeCampaign read =
-      parse_campaign("stored definition", canonical_definition(campaign), {}, {});
+  const MicroscopeCampaign read = campaign_of(campaign.definition(TableColumns::included));
   return std::bit_cast<std::uint64_t>(read.dispersions[0].value);
 }
 
