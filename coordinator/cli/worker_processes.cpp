@@ -7,11 +7,8 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -19,6 +16,7 @@
 #include "coordinator/query/child_process.hpp"
 #include "core/error.hpp"
 #include "proto/link/host_name.hpp"
+#include "proto/link/process_end.hpp"
 
 extern char** environ;
 
@@ -27,17 +25,12 @@ namespace {
 
 constexpr int grace_ms = 3000;  // A worker looks at signals between two orbits, some 20 ms apart.
 
-std::uint64_t num_oom_kills() {
-  std::ifstream stream("/proc/vmstat");
-  return oom_kills_in(std::string(std::istreambuf_iterator<char>(stream), {}));
-}
-
-/// Starts a program that can be ended with SIGINT and SIGTERM, also if they are blocked here.
+/// Starts a program that can be ended with these signals, also if they are blocked here.
 /// @return An error number, or 0.
 int spawn(const std::filesystem::path& program, char* const* arguments, pid_t& process_id) {
   sigset_t mask;
   pthread_sigmask(SIG_SETMASK, nullptr, &mask);
-  for (const int signal : {SIGINT, SIGTERM}) sigdelset(&mask, signal);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigdelset(&mask, signal);
   posix_spawnattr_t attributes;
   if (const int error = posix_spawnattr_init(&attributes); error != 0) return error;
   posix_spawnattr_setsigmask(&attributes, &mask);
@@ -68,20 +61,10 @@ std::filesystem::path worker_executable() {
   return worker;
 }
 
-std::uint64_t oom_kills_in(std::string_view vmstat) {
-  constexpr std::string_view label = "\noom_kill ";
-  const std::size_t found = vmstat.find(label);
-  if (found == std::string_view::npos) return 0;
-  const char* const digits = vmstat.data() + found + label.size();
-  std::uint64_t count = 0;
-  std::from_chars(digits, vmstat.data() + vmstat.size(), count);
-  return count;
-}
-
 WorkerProcesses::WorkerProcesses(std::filesystem::path executable, std::string endpoint)
     : executable_(std::move(executable)),
       endpoint_(std::move(endpoint)),
-      num_oom_kills_(num_oom_kills()) {}
+      num_oom_kills_(wire::num_oom_kills()) {}
 
 WorkerProcesses::~WorkerProcesses() {
   wait_until_ended(0);
@@ -123,10 +106,8 @@ std::vector<WorkerProcesses::Exit> WorkerProcesses::take_exits() {
 }
 
 wire::LossReason WorkerProcesses::reason_of(int status) {
-  if (!WIFSIGNALED(status)) return wire::LossReason::failed;
-  if (WTERMSIG(status) != SIGKILL) return wire::LossReason::crashed;
-  const std::uint64_t num_before = std::exchange(num_oom_kills_, num_oom_kills());
-  return num_oom_kills_ > num_before ? wire::LossReason::out_of_memory : wire::LossReason::crashed;
+  const std::uint64_t num_before = std::exchange(num_oom_kills_, wire::num_oom_kills());
+  return wire::reason_of_end(status, num_oom_kills_ > num_before);
 }
 
 void WorkerProcesses::wait_until_ended(int milliseconds_max) {
@@ -168,7 +149,9 @@ void LocalWorkers::check(const WorkerProcesses::Exit& exit, const std::string& r
   num_failures_ = num_done_now > num_done_at_failure_ ? 1 : num_failures_ + 1;
   num_done_at_failure_ = num_done_now;
   // Runs are blamed for a crash, and given up in the end; nothing else accounts for the others.
-  const bool is_accounted_for = exit.reason != LossReason::failed && runs != "none";
+  const bool is_blamed =
+      exit.reason == LossReason::crashed || exit.reason == LossReason::out_of_memory;
+  const bool is_accounted_for = is_blamed && runs != "none";
   const bool is_hopeless = !is_accounted_for && num_failures_ >= failures_in_a_row_max;
   if (!is_hopeless && !service_.is_quarantined(host_)) return;
   throw Error(

@@ -18,10 +18,6 @@ namespace proofmass::coordinator {
 /// @throws Error if it is not there.
 [[nodiscard]] std::filesystem::path worker_executable();
 
-/// How many processes the kernel has ended for want of memory since it started.
-/// @param vmstat  Text of /proc/vmstat; 0 if it does not say.
-[[nodiscard]] std::uint64_t oom_kills_in(std::string_view vmstat);
-
 /// Worker processes of this machine, of one thread each: what kills one costs the runs of that
 /// thread only. They end with this process, however it ends.
 class WorkerProcesses {
@@ -31,8 +27,7 @@ class WorkerProcesses {
     std::string name;
     pid_t process_id = 0;
     std::string text;  ///< `killed by signal 9 (Killed)`, `exit code 1`.
-    /// crashed if a signal ended it; out_of_memory if that was SIGKILL and the kernel has ended
-    /// processes for want of memory since the last call; failed otherwise.
+    /// By reason_of_end(), with the kernel's want of memory since the last call.
     wire::LossReason reason = wire::LossReason::failed;
   };
 

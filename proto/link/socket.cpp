@@ -38,7 +38,7 @@ constexpr int linger_of_dealer = 2000;
 // connections together.
 constexpr int unread_count_max = 0;
 // Messages that wait to be sent to one peer. A worker may be told of many ranges and results at a
-// time; whoever does not take them loses them, and the protocol repeats what matters.
+// time; a peer that does not read them loses them, and the protocol repeats what matters.
 constexpr int unsent_count_max = 1000;
 
 void limit(zmq::socket_t& socket, std::size_t message_size, int linger) {
@@ -90,7 +90,7 @@ zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
 zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& security) {
   zmq::socket_t socket(context, zmq::socket_type::dealer);
   limit(socket, message_size_max, linger_of_dealer);
-  // Without a connection nothing is queued: whoever needs an answer asks again.
+  // Without a connection nothing is queued: a peer that needs an answer asks again.
   socket.set(zmq::sockopt::immediate, true);
   socket.set(zmq::sockopt::reconnect_ivl, reconnect_interval_min);
   socket.set(zmq::sockopt::reconnect_ivl_max, reconnect_interval_max);

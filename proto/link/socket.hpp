@@ -19,8 +19,8 @@ namespace proofmass::wire {
 // messages that wait to be received has no limit: a process that others can reach must watch its
 // memory.
 
-/// A ROUTER, bound. With keys, an Authenticator must be bound in the same context before: whoever
-/// comes earlier is refused.
+/// A ROUTER, bound. With keys, an Authenticator must be bound in the same context before:
+/// peers that come earlier are refused.
 ///
 /// @param option    Name of the option that the endpoint comes from, for the message.
 /// @param endpoint  check_endpoint() holds; the port may be `*`.

@@ -11,28 +11,17 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <random>
 #include <string>
 #include <utility>
 
 #include "core/error.hpp"
+#include "proto/link/process_end.hpp"
 
 namespace proofmass::worker {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-/// Processes that the kernel has ended for want of memory, since it started, in this machine.
-std::uint64_t num_out_of_memory() {
-  std::ifstream file("/proc/vmstat");
-  std::string name;
-  std::uint64_t value = 0;
-  while (file >> name >> value) {
-    if (name == "oom_kill") return value;
-  }
-  return 0;
-}
 
 sigset_t supervised_signals() {
   sigset_t set;
@@ -70,12 +59,12 @@ class Supervisor {
     std::optional<wire::FormerSession> former;
     while (true) {
       const ChildStart start{.session = random_session(), .former = former};
-      const std::uint64_t num_killed_before = num_out_of_memory();
+      const std::uint64_t num_killed_before = wire::num_oom_kills();
       const pid_t child = start_child(start);
       const int status = wait_for(child);
       if (WIFEXITED(status) && WEXITSTATUS(status) != exit_hung) return WEXITSTATUS(status);
       if (num_requests_ > 0) return exit_code_of(status);
-      former = former_session(start.session, status, num_out_of_memory() > num_killed_before);
+      former = former_session(start.session, status, wire::num_oom_kills() > num_killed_before);
       if (!wait_before_restart(status)) return 0;
     }
   }
@@ -123,13 +112,13 @@ class Supervisor {
   /// hears no more of it, or has told it to end.
   static std::optional<wire::FormerSession> former_session(wire::SessionId session, int status,
                                                            bool is_memory_short) {
-    if (!WIFSIGNALED(status)) return std::nullopt;
-    const int signal = WTERMSIG(status);
-    if (signal == SIGKILL && !is_memory_short) return std::nullopt;
-    return wire::FormerSession{
-        .session = session,
-        .reason = signal == SIGKILL ? wire::LossReason::out_of_memory : wire::LossReason::crashed,
-        .signal = static_cast<std::uint32_t>(signal)};
+    const wire::LossReason reason = wire::reason_of_end(status, is_memory_short);
+    if (reason == wire::LossReason::failed || reason == wire::LossReason::preempted) {
+      return std::nullopt;
+    }
+    return wire::FormerSession{.session = session,
+                               .reason = reason,
+                               .signal = static_cast<std::uint32_t>(WTERMSIG(status))};
   }
 
   /// False if it was asked to end meanwhile.

@@ -39,7 +39,7 @@ TEST(WorkerProcesses, SayHowAWorkerEnded) {
   const auto crashed = exit_of("kill -SEGV $$");
   EXPECT_EQ(crashed.text, "killed by signal 11 (Segmentation fault)");
   EXPECT_EQ(crashed.reason, wire::LossReason::crashed);
-  EXPECT_EQ(exit_of("kill -KILL $$").reason, wire::LossReason::crashed);
+  EXPECT_EQ(exit_of("kill -KILL $$").reason, wire::LossReason::preempted);
 }
 
 TEST(WorkerProcesses, GiveAWorkerItsNameItsCoordinatorAndItsParent) {
@@ -62,11 +62,6 @@ TEST(WorkerProcesses, SayThatAProgramCannotBeStarted) {
   } catch (const Error& error) {
     EXPECT_STREQ(error.what(), "worker program = /nowhere/worker (No such file or directory)");
   }
-}
-
-TEST(OomKills, AreReadFromTheKernelsCounters) {
-  EXPECT_EQ(oom_kills_in("nr_free_pages 1\noom_kill 17\nnuma_hit 2\n"), 17U);
-  EXPECT_EQ(oom_kills_in("nr_free_pages 1\n"), 0U);
 }
 
 }  // namespace
