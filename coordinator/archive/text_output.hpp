@@ -21,7 +21,7 @@ class DraftFile {
   /// Where to write to.
   [[nodiscard]] const std::filesystem::path& draft() const { return draft_; }
 
-  /// Makes the draft durable and gives it its name. @pre Whoever wrote it has closed it.
+  /// Makes the draft durable and gives it its name. @pre The draft is closed.
   /// @throws ArchiveError `output = path (cannot be written: why)`.
   void publish();
 

@@ -49,8 +49,8 @@ void on_removed(State& state, CampaignId id, Outbox& outbox);
 ///                  known here.
 void on_ended(State& state, CampaignId id, std::uint64_t num_runs = num_runs_max);
 
-/// The file of a campaign that has ended is not there any more, or holds something else: whoever
-/// has results of it keeps them. @pre It is not served.
+/// The file of a campaign that has ended is not there any more, or holds something else:
+/// workers with results of it keep them. @pre It is not served.
 void on_unlisted(State& state, CampaignId id);
 
 // Workers.

@@ -37,7 +37,7 @@ void send_not_served(const State& state, WorkerId worker, CampaignId campaign, O
 /// Ends the campaign if it is finished.
 void finish_if_done(State& state, CampaignId id, Outbox& outbox);
 
-/// After runs were lost, or given up: ends campaigns and lends to whoever waits.
+/// After runs were lost, or given up: ends campaigns and lends to workers that wait.
 void settle(State& state, TimePoint now, Outbox& outbox);
 
 }  // namespace proofmass::coordinator::detail

@@ -22,8 +22,8 @@ namespace proofmass::coordinator {
 using Respond = std::function<void(wire::ClientReply)>;
 
 /// Between the clients' socket and what carries requests out: puts large requests together from
-/// their parts, reads them in the background, and sends each reply to whoever waits for it. Knows
-/// no socket. Nothing that a client sends makes one of its functions throw.
+/// their parts, reads them in the background, and sends each reply to the connections that
+/// wait for it. Knows no socket. Nothing that a client sends makes one of its functions throw.
 class ClientGateway {
  public:
   /// What it needs from the service.

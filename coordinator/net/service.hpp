@@ -41,8 +41,8 @@ enum class ServiceEnd : std::uint8_t {
 struct ServiceConfig {
   std::string workers_endpoint;                 ///< Where workers connect; the port may be `*`.
   std::optional<std::string> clients_endpoint;  ///< Where clients do, if any.
-  /// With coordinator.key and the lists of authorized keys; without, whoever reaches the addresses
-  /// is served.
+  /// With coordinator.key and the lists of authorized keys; without keys, every peer that reaches
+  /// the addresses is served.
   std::optional<std::filesystem::path> keys;
   bool is_plain_waived = false;  ///< No keys beyond this machine: the user knows it.
   ServiceEnd end = ServiceEnd::never;

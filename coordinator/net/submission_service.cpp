@@ -74,8 +74,8 @@ void SubmissionService::review() {
   }
 }
 
-// Files of nobody's, and all of a coordinator without keys, are not limited: whoever may reach it
-// may fill its disk in other ways.
+// Files without an owner, and all files of a coordinator without keys, are not limited: a client
+// that can reach it can fill its disk in other ways.
 void SubmissionService::check_limits(const std::string& owner, std::uint64_t size,
                                      bool is_new) const {
   if (owner.empty() || !is_new) return;

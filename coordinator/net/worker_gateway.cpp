@@ -95,7 +95,7 @@ void WorkerGateway::close_out(const Address& from, RejectReason reason, const st
     on_gone(state_, *worker, LossReason::protocol, now, outbox);
     peers_.forget(*worker);
   } else {
-    // A session is not known: whoever reads this takes any for its own.
+    // The session is not known; the peer accepts any as its own.
     send_packet(from,
                 {.header = {.session = {1}, .epoch = epoch_, .sequence = 1}, .message = reject});
   }

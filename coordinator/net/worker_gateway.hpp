@@ -25,7 +25,7 @@ struct Incoming {
 /// the right form, calls the function of the event, and addresses what goes out. Knows neither
 /// socket nor clock.
 ///
-/// Whoever breaks the rules is told once and is not listened to any more on that connection.
+/// A peer that violates the protocol gets one error and is then ignored on that connection.
 class WorkerGateway {
  public:
   /// What it needs from the service.

@@ -11,8 +11,8 @@
 
 namespace proofmass::coordinator {
 
-/// SHA-256 over results in run order: two files of one campaign have the same digest, whoever
-/// computed the runs, in whatever order they arrived.
+/// SHA-256 over results in run order: two files of one campaign have the same digest,
+/// whichever workers computed the runs and in whatever order they arrived.
 ///
 /// A result is 184 bytes for the ten quantities of MICROSCOPE, little-endian: run index (64 bits),
 /// status, draws, rounds (32 bits each), 32 bits of zero, then the truth and the estimate of each

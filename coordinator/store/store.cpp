@@ -88,7 +88,7 @@ Store::~Store() {
   try {
     (void)return_to_place();
   } catch (const std::exception&) {
-    // Whoever must know calls rest() before.
+    // A caller that must know calls rest() before.
   }
 }
 

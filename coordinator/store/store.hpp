@@ -33,7 +33,7 @@ class Store {
   /// Makes a new campaign database, complete or not at all, and opens it like open().
   ///
   /// @param campaign    Validated.
-  /// @param definition  The campaign as canonical TOML, for whoever opens the file.
+  /// @param definition  The campaign as canonical TOML, for those who open the file.
   /// @throws StoreError if the file exists.
   static Store create(const std::filesystem::path& path, const Campaign& campaign,
                       std::string_view definition);

@@ -112,6 +112,9 @@ std::string refusal_of(const CLI::App& app, const CLI::ParseError& error) {
     return refusal_of_command(app, app.remaining().front());
   }
   const bool is_missing = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
+  if (is_missing && needs_command && app.get_subcommands().empty()) {
+    return "command = none (must be one that --help lists)";
+  }
   if (is_missing || dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
     const std::vector<std::string> unknown = app.remaining(true);
     const auto option = std::ranges::find_if(unknown, [](const std::string& argument) {

@@ -239,7 +239,7 @@ void Executor::compute(Batch& batch) {
   try {
     finish(batch, simulate(batch));
   } catch (const Abandoned&) {
-    // Whoever dropped the batch has taken it from the list.
+    // The thread that dropped the batch has removed it from the list.
   }
 }
 

@@ -92,7 +92,7 @@ class Conversation {
   void on_slept(Duration duration) { heard_at_ += duration; }
   /// Gives back what has not begun, finishes what can be finished in time, delivers, leaves.
   void on_drain_request(TimePoint now);
-  /// Leaves at once. Whoever asks keeps the results, or they will be computed again.
+  /// Leaves at once. The caller keeps the results, or they will be computed again.
   void on_abandon_request();
 
   /// Present once the conversation is over.

@@ -79,7 +79,7 @@ void Conversation::leave(const std::string& reason) {
   end(Ending::Kind::done, reason);
 }
 
-/// As many as a log can take in at a time; whoever serves the conversation takes them at once.
+/// As many as a log can take in at a time; the caller takes them at once.
 void Conversation::note(wire::Event event) {
   constexpr std::size_t events_max = 100;
   if (events_.size() < events_max) events_.push_back(std::move(event));

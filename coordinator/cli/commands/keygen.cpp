@@ -57,7 +57,7 @@ std::string list_line(const wire::KeyPair& pair, std::string_view name,
                      rights);
 }
 
-/// Whoever sets a coordinator up may control all of its campaigns.
+/// The person who sets a coordinator up may control all of its campaigns.
 std::string_view first_rights(KeyRole role) {
   return role == KeyRole::client ? "observe,submit,control" : "";
 }

@@ -67,6 +67,10 @@ TEST(Refusal, NamesTheNearestCommandAndOption) {
             "option = --rnus=3 (must be one that --help lists; nearest is --runs)");
 }
 
+TEST(Refusal, SaysThatACommandIsMissing) {
+  EXPECT_EQ(refusal(""), "command = none (must be one that --help lists)");
+}
+
 TEST(Refusal, NamesNoneIfNoneIsNear) {
   EXPECT_EQ(refusal("simulate"), "command = simulate (must be one that --help lists)");
   EXPECT_EQ(refusal("run --database"), "option = --database (must be one that --help lists)");
