@@ -165,6 +165,14 @@ TEST(ExplanationText, ShowsTheRunsValuesOfWhatDrivesTheError) {
   EXPECT_THAT(lines[4], HasSubstr("      1.5       99.9"));
 }
 
+// `-1.22e-08` is as wide as a value gets.
+TEST(ExplanationText, KeepsTheWidestValueApartFromItsNeighbour) {
+  DrawnRuns drawn = made_up_runs();
+  drawn.columns[7][42] = -1.22e-8;
+  EXPECT_THAT(explanation_text(drawn, index(Parameter::k2c), {42}, num_drawn),
+              HasSubstr(") -1.22e-08 "));
+}
+
 // An error whose sign is that of one quantity and whose magnitude grows with another.
 TEST(ExplanationText, ShowsWhatDrivesTheMagnitudeBeforeWhatDrivesTheError) {
   DrawnRuns drawn = made_up_runs();
