@@ -35,7 +35,7 @@ std::string figures(const wire::CampaignStatus& status) {
     return fmt::format("{:3} %  nothing can be stored", percent(status));
   }
   if (status.num_done == 0 && status.num_lent > 0) {
-    return fmt::format("{:3} %  the first {} are computed", percent(status), status.num_lent);
+    return fmt::format("{:3} %  computing the first {}", percent(status), status.num_lent);
   }
   return fmt::format("{:3} %{}{}", percent(status), rate_text(status.rate_hz), left_text(status));
 }

@@ -45,7 +45,7 @@ TEST(ProgressBar, SaysThatTheFirstRunsAreComputed) {
   wire::CampaignStatus status = progress(0, 100, 0.0);
   status.num_lent = 32;
   EXPECT_EQ(progress_bar(status, 60),
-            "0/100 runs [..............]   0 %  the first 32 are computed");
+            "0/100 runs [.................]   0 %  computing the first 32");
   status.num_done = 16;
   EXPECT_EQ(progress_line(status), "16/100 runs   16 %");
 }
