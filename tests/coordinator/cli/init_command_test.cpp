@@ -1,4 +1,6 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <stdlib.h>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/exit_code.hpp"
@@ -8,6 +10,9 @@
 
 namespace proofmass::coordinator {
 namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST(Init, WritesACampaignThatCanBeRead) {
   const test::TemporaryDirectory directory;
@@ -32,6 +37,28 @@ TEST(Init, SaysWhyAFileCannotBeWritten) {
   const test::Answer answer = test::answer_of({"init", file});
   EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
   EXPECT_EQ(answer.error, file.string() + ": No such file or directory");
+}
+
+// Only what a command can end with.
+TEST(ExitCodes, AreThoseOfTheCommand) {
+  const auto help_of = [](const std::string& command) {
+    return test::answer_of({command, "--help"}).output;
+  };
+  for (const std::string command : {"init", "status", "release"}) {
+    EXPECT_THAT(help_of(command), HasSubstr("  2    wrong usage"));
+    EXPECT_THAT(help_of(command), Not(HasSubstr("  3    a requirement"))) << command;
+    EXPECT_THAT(help_of(command), Not(HasSubstr("  130  interrupted"))) << command;
+  }
+  EXPECT_THAT(help_of("report"), HasSubstr("  3    a requirement"));
+  EXPECT_THAT(help_of("verify"), HasSubstr("  130  interrupted"));
+}
+
+TEST(ClientOptions, MayComeFromTheEnvironment) {
+  setenv("PROOFMASS_CLIENT_CONNECT", "nowhere", 1);
+  const test::Answer answer = test::answer_of({"status"});
+  unsetenv("PROOFMASS_CLIENT_CONNECT");
+  EXPECT_EQ(answer.exit_code, exit_wrong_usage);
+  EXPECT_EQ(answer.error, "connect = nowhere (must be ipc://PATH or tcp://HOST:PORT)");
 }
 
 }  // namespace
