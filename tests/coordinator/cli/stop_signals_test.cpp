@@ -66,5 +66,27 @@ TEST_F(SignalThreadTest, LeavesSignalsAsTheyWere) {
   EXPECT_TRUE(is_handled_here);
 }
 
+/// Ends this process with the request that a signal leads to, where SIGHUP was handled so before.
+[[noreturn]] void exit_with_request_after(int signal, void (*former_handler)(int)) {
+  (void)std::signal(SIGHUP, former_handler);
+  const std::atomic<StopRequest>& request = catch_stop_signals(OnTerminate::drain);
+  (void)raise(signal);
+  _exit(static_cast<int>(request.load()));
+}
+
+testing::ExitedWithCode ends_with(StopRequest request) {
+  return testing::ExitedWithCode(static_cast<int>(request));
+}
+
+TEST(StopSignalsDeathTest, LeaveTheWorkersOnAHangUp) {
+  EXPECT_EXIT(exit_with_request_after(SIGHUP, SIG_DFL), ends_with(StopRequest::leave), "");
+  EXPECT_EXIT(exit_with_request_after(SIGTERM, SIG_DFL), ends_with(StopRequest::drain), "");
+}
+
+// As `nohup` does.
+TEST(StopSignalsDeathTest, LeaveAHangUpIgnoredThatWasIgnoredBefore) {
+  EXPECT_EXIT(exit_with_request_after(SIGHUP, SIG_IGN), ends_with(StopRequest::none), "");
+}
+
 }  // namespace
 }  // namespace proofmass::coordinator
