@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <span>
 
 #include "core/campaign/model.hpp"
 #include "core/definition/csv.hpp"
@@ -56,31 +57,42 @@ class MagnitudeCheck {
     }
   }
 
-  void run(std::string_view key, double value) const {
-    if (std::fabs(value) <= maximum_) return;
-    throw ConfigError(
-        fmt::format("{}.{}", path_, key), fmt::format("{}", value),
-        fmt::format("must be in [-{0:.6g}, {0:.6g}], 1000 times the nominal bound", maximum_));
+  void run(const Dispersion& law) const {
+    check("minimum", law.minimum);
+    check("maximum", law.maximum);
+    check("mean", law.mean);
+    check("standard_deviation", law.standard_deviation);
+    check("value", law.value);
+  }
+
+  /// @param column  The values of the quantity's table, one a run.
+  void run(const Dispersion& law, std::span<const double> column) const {
+    const auto wrong = std::ranges::find_if(column, [&](double value) { return !is_in(value); });
+    if (wrong == column.end()) return;
+    throw ConfigError(path_ + ".column", fmt::format("\"{}\"", law.column),
+                      fmt::format("run {} has {}, {}", wrong - column.begin(), *wrong, rule()));
   }
 
  private:
+  [[nodiscard]] bool is_in(double value) const { return std::fabs(value) <= maximum_; }
+  [[nodiscard]] std::string rule() const {
+    return fmt::format("must be in [-{0:.6g}, {0:.6g}], 1000 times the nominal bound", maximum_);
+  }
+
+  void check(std::string_view key, double value) const {
+    if (is_in(value)) return;
+    throw ConfigError(fmt::format("{}.{}", path_, key), fmt::format("{}", value), rule());
+  }
+
   std::string path_;
   double maximum_ = 0.0;
 };
 
 void check_magnitudes(const MicroscopeCampaign& campaign) {
-  for (std::size_t i = 0; i < num_drawn; ++i) {
-    const Dispersion& law = campaign.dispersions[i];
-    const MagnitudeCheck check(i);
-    check.run("minimum", law.minimum);
-    check.run("maximum", law.maximum);
-    check.run("mean", law.mean);
-    check.run("standard_deviation", law.standard_deviation);
-    check.run("value", law.value);
-  }
-  for (std::size_t i = 0; const std::size_t drawn : campaign.table_quantities()) {
-    for (const double value : campaign.table_columns[i]) MagnitudeCheck(drawn).run("column", value);
-    ++i;
+  for (std::size_t i = 0; i < num_drawn; ++i) MagnitudeCheck(i).run(campaign.dispersions[i]);
+  const std::vector<std::size_t> drawn = campaign.table_quantities();
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    MagnitudeCheck(drawn[i]).run(campaign.dispersions[drawn[i]], campaign.table_columns[i]);
   }
 }
 

@@ -270,9 +270,10 @@ TEST(DataFileErrors, NameATableWithFewerRowsThanRuns) {
   EXPECT_EQ(refusal_of(table_law, folder),
             "campaign.toml:5: dispersion.offcentring_m.x.column = \"a\" (has 2 rows, 3 runs need "
             "one each)");
-  EXPECT_EQ(refusal_of(table_law, folder, {.num_runs = 2}),
-            "campaign.toml:5: dispersion.offcentring_m.x.column = 0.03 (must be in [-0.02, 0.02], "
-            "1000 times the nominal bound)");
+  EXPECT_EQ(
+      refusal_of(table_law, folder, {.num_runs = 2}),
+      "campaign.toml:5: dispersion.offcentring_m.x.column = \"a\" (run 1 has 0.03, must be in "
+      "[-0.02, 0.02], 1000 times the nominal bound)");
   folder.write("draws.csv", "a\n1e-5\n2e-5\n");
   EXPECT_EQ(refusal_of(table_law, folder, {.num_runs = 2}), "");
 }
