@@ -109,7 +109,7 @@ FileOutcome opened(const CampaignDirectory& directory, const std::filesystem::pa
 /// When the campaign of a file was made; empty if the file cannot be opened.
 std::string created_utc(const FileOutcome& outcome) {
   if (const auto* const prepared = std::get_if<PreparedCampaign>(&outcome)) {
-    return prepared->campaign.store.created_utc();
+    return prepared->created_utc;
   }
   const auto* const ended = std::get_if<EndedCampaign>(&outcome);
   return ended == nullptr ? "" : ended->created_utc;
@@ -154,11 +154,13 @@ PreparedCampaign prepare(ServedCampaign campaign, GivenUpRuns given_up,
   const std::uint64_t num_failures = store.num_without_estimate();
   std::vector<SessionId> sessions = store.attached_sessions();
   std::string owner = store.owner();
+  std::string created_utc = store.created_utc();
   store.begin_coordinator(start);
   return {.campaign = std::move(campaign),
           .stored = std::move(stored),
           .control = control,
           .plan = plan,
+          .created_utc = std::move(created_utc),
           .owner = std::move(owner),
           .num_failures = num_failures,
           .sessions = std::move(sessions)};

@@ -24,6 +24,7 @@ struct PreparedCampaign {
   StoredCampaign stored;  ///< For the dispatch.
   CampaignControl control;
   StopPlan plan;
+  std::string created_utc;          ///< As in `2024-02-29T12:00:10Z`.
   std::string owner;                ///< Name of the key that submitted it; empty if not known.
   std::uint64_t num_failures = 0;   ///< Finished runs without an estimate.
   std::vector<SessionId> sessions;  ///< Workers that may come back.
@@ -46,7 +47,7 @@ struct EndedCampaign {
   CampaignId id;
   std::filesystem::path file;
   wire::CampaignStatus status;
-  std::string created_utc = {};    ///< As in `2024-02-29T12:00:10Z`; of files found at the start.
+  std::string created_utc = {};    ///< Likewise; empty if it was closed by this service.
   std::optional<FileStamp> stamp;  ///< Of the file when it was last looked at; empty until it was.
 };
 
@@ -82,9 +83,9 @@ struct KnownCampaigns {
 [[nodiscard]] PreparedCampaign prepare(ServedCampaign campaign, GivenUpRuns given_up,
                                        const CoordinatorStart& start);
 
-/// Looks at the files of a directory that are not known, in order, and adds their campaigns to
-/// those that are. Opens a file only if something is left to do with it: a campaign that has ended
-/// costs no lock, no descriptor and no write.
+/// Looks at the files of a directory that are not known and adds their campaigns to those that are.
+/// Tells of them in the order in which the campaigns were made. Opens a file only if something is
+/// left to do with it: a campaign that has ended costs no lock, no descriptor and no write.
 /// @throws Error if the directory cannot be read.
 [[nodiscard]] std::vector<FileOutcome> look_at_all(const CampaignDirectory& directory,
                                                    KnownCampaigns& known,
