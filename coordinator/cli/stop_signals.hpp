@@ -12,9 +12,9 @@
 
 namespace proofmass::coordinator {
 
-/// What SIGTERM asks for; SIGINT, and any second one of both, ask to stop now. Where SIGTERM asks
-/// to drain, SIGHUP asks to leave the workers to the next coordinator, unless it was ignored
-/// before.
+/// What the first SIGTERM asks for; SIGINT and a second SIGTERM ask to stop now. With `drain`,
+/// SIGHUP asks to leave the workers to the next coordinator, unless the process was started with
+/// SIGHUP ignored.
 enum class OnTerminate : std::uint8_t { stop_now, drain };
 
 /// From now on these signals end no process: they set the request that is returned, which lives
