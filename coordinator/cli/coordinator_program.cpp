@@ -111,19 +111,20 @@ void log_start(const Service& service, const Log& log) {
 /// @return False if they could not all be written.
 bool finish(std::vector<ServedCampaign> campaigns, const Log& log) {
   bool is_written = true;
-  for (auto& [file, store, definition] : campaigns) {
+  for (ServedCampaign& campaign : campaigns) {
+    const std::string file = campaign.file.string();
     try {
-      update_statistics(store, *definition);
-      if (const std::optional<std::string> reason = store.rest()) {
+      update_statistics(campaign.store, *campaign.definition);
+      if (const std::optional<std::string> reason = campaign.store.rest()) {
         log({.severity = Severity::warning,
              .kind = "write_ahead_log_kept",
-             .fields = {{"file", file.string()}, Field::reason(*reason)}});
+             .fields = {{"file", file}, Field::reason(*reason)}});
       }
     } catch (const std::exception& error) {
       is_written = false;
       log({.severity = Severity::error,
            .kind = "statistics_failed",
-           .fields = {{"file", file.string()}, Field::reason(error.what())}});
+           .fields = {{"file", file}, Field::reason(error.what())}});
     }
   }
   return is_written;

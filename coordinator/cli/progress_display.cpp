@@ -60,6 +60,13 @@ wire::CampaignStatus out_of(wire::CampaignStatus status, std::uint64_t num_runs)
   return status;
 }
 
+wire::CampaignStatus of_part(wire::CampaignStatus status, std::uint64_t num_runs,
+                             std::uint64_t num_done_beside) {
+  status.num_runs = num_runs;
+  status.num_done -= num_done_beside;
+  return status;
+}
+
 std::string progress_bar(const wire::CampaignStatus& status, std::size_t columns_max) {
   const std::string left = fmt::format("{}/{} runs [", status.num_done, status.num_runs);
   const std::string right = fmt::format("] {}", figures(status));

@@ -23,6 +23,12 @@ enum class DisplayMode : std::uint8_t {
 /// @param num_runs  The most; without a stop rule those of the campaign.
 [[nodiscard]] wire::CampaignStatus out_of(wire::CampaignStatus status, std::uint64_t num_runs);
 
+/// The progress of a part of a campaign.
+/// @param num_runs          Of the part.
+/// @param num_done_beside   Runs that were done already and are not of the part.
+[[nodiscard]] wire::CampaignStatus of_part(wire::CampaignStatus status, std::uint64_t num_runs,
+                                           std::uint64_t num_done_beside);
+
 /// A line of at most `columns_max` columns: runs done, percent, rate, time left; or that nothing
 /// can be stored. Before the first run is done, how many the workers have.
 [[nodiscard]] std::string progress_bar(const wire::CampaignStatus& status, std::size_t columns_max);

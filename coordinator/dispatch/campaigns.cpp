@@ -91,6 +91,8 @@ void on_campaign(State& state, CampaignId id, const StoredCampaign& stored, Time
   RunSet open(RunRange{{0}, stored.definition->num_runs});
   open.remove(campaign.committed);
   open.remove(campaign.given_up);
+  campaign.elsewhere = open.overlap(RunSet(stored.elsewhere));
+  open.remove(campaign.elsewhere);
   restore_blame(state, id, stored, open, outbox);
   detail::make_pending(state, id, std::move(open), {1}, outbox);
   restore_audits(campaign, stored);

@@ -30,6 +30,7 @@ void check_places(const CampaignState& campaign) {
   add_disjoint(campaign.lent.runs(), all);
   add_disjoint(keys_of(campaign.delivered), all);
   add_disjoint(campaign.given_up, all);
+  add_disjoint(campaign.elsewhere, all);
   PROOFMASS_EXPECT(all == RunSet(RunRange{{0}, campaign.definition->num_runs}));
 }
 
@@ -157,8 +158,7 @@ void check_invariants(const State& state) {
     check_audits(campaign);
     check_index(campaign, counted[id]);
     PROOFMASS_EXPECT(campaign.phase != Phase::finished ||
-                     campaign.committed.size() + campaign.given_up.size() ==
-                         campaign.definition->num_runs);
+                     num_settled(campaign) == campaign.definition->num_runs);
   }
   check_workers(state);
   check_served(state);

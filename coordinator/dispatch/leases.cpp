@@ -225,7 +225,8 @@ bool close_run(State& state, CampaignId id, RunIndex run, WorkerId by, RunsByWor
       for (const LeaseId copy : copies) take_off_and_tell(state, copy, run, by, holders);
       campaign.copies.erase(run);
     }
-  } else if (!remove_from_pending(campaign, run) && !campaign.given_up.remove(run)) {
+  } else if (!remove_from_pending(campaign, run) && !campaign.given_up.remove(run) &&
+             !campaign.elsewhere.remove(run)) {
     return false;
   }
   campaign.suspects.erase(run);

@@ -111,8 +111,8 @@ RunSet foreign_runs(const CampaignState& campaign, const wire::ResultBatch& batc
 
 /// A run that was given up has come after all: the campaign is finished again once it is stored.
 void reopen_if_unfinished(State& state, CampaignState& campaign) {
-  const std::uint64_t num_ended = campaign.committed.size() + campaign.given_up.size();
-  if (campaign.phase != Phase::finished || num_ended == campaign.definition->num_runs) return;
+  if (campaign.phase != Phase::finished) return;
+  if (num_settled(campaign) == campaign.definition->num_runs) return;
   campaign.phase = Phase::active;
   detail::sort_served(state);
 }

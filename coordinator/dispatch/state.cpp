@@ -20,9 +20,12 @@ State initial_state(const DispatchConfig& config, std::set<SessionId> awaited, T
   return state;
 }
 
+std::uint64_t num_settled(const CampaignState& campaign) {
+  return campaign.committed.size() + campaign.given_up.size() + campaign.elsewhere.size();
+}
+
 bool is_finished(const CampaignState& campaign) {
-  const std::uint64_t num_ended = campaign.committed.size() + campaign.given_up.size();
-  return num_ended == campaign.definition->num_runs && campaign.to_audit.empty() &&
+  return num_settled(campaign) == campaign.definition->num_runs && campaign.to_audit.empty() &&
          campaign.audits.empty() && campaign.num_comparing == 0;
 }
 

@@ -153,8 +153,8 @@ struct AuditKey {
 };
 
 /// One campaign. Each of its runs is in exactly one of `pending`, `pending_suspects`, `lent`,
-/// `delivered`, `committed` and `given_up`. All other fields can be found by walking the leases, or
-/// count.
+/// `delivered`, `committed`, `given_up` and `elsewhere`. All other fields can be found by walking
+/// the leases, or count.
 struct CampaignState {
   std::shared_ptr<const Campaign> definition;  ///< Shared with messages under way.
   Phase phase = Phase::active;
@@ -166,6 +166,7 @@ struct CampaignState {
   std::map<RunIndex, Uncommitted> delivered;     ///< Handed to the store, not committed yet.
   RunSet committed;
   RunSet given_up;
+  RunSet elsewhere;  ///< Not lent here, as another coordinator computes them; taken if they come.
   std::map<RunIndex, Suspicion> suspects;           ///< Open runs that were blamed for a crash.
   std::map<RunIndex, Copies> copies;                ///< Of runs in `lent`, once there was one.
   std::map<AuditKey, RunSet> to_audit;              ///< Committed, and not lent for audit yet.
@@ -191,7 +192,8 @@ struct StoredCampaign {
   double audit_fraction = 0.0;
   std::vector<RunRange> finished;
   std::vector<RunRange> given_up;
-  std::vector<RunRange> compared = {};  ///< Finished runs of which a second result was compared.
+  std::vector<RunRange> elsewhere = {};  ///< Unfinished runs that are not to be lent here.
+  std::vector<RunRange> compared = {};   ///< Finished runs of which a second result was compared.
   /// Open runs that were blamed for crashes, how often, and under how many attempts they were lent.
   struct Blamed {
     RunIndex run;
@@ -239,7 +241,10 @@ struct State {
 [[nodiscard]] State initial_state(const DispatchConfig& config, std::set<SessionId> awaited,
                                   TimePoint now);
 
-/// True if every run is durably stored or given up, and every audit done.
+/// Runs that nothing more is expected of: they are durably stored, given up or computed elsewhere.
+[[nodiscard]] std::uint64_t num_settled(const CampaignState& campaign);
+
+/// True if every run is settled, and every audit done.
 [[nodiscard]] bool is_finished(const CampaignState& campaign);
 
 /// True if no result is expected or on its way to the store any more.

@@ -10,6 +10,7 @@
 #include "coordinator/net/rights.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 
@@ -18,6 +19,7 @@ struct ServedCampaign {
   std::filesystem::path file;
   Store store;
   std::shared_ptr<const Campaign> definition;  ///< Shared with the dispatch and its messages.
+  std::vector<RunRange> elsewhere = {};        ///< Runs that are not to be computed here.
 };
 
 /// The number of runs that a campaign is to have for now. With a stop rule it is the next at which

@@ -16,8 +16,7 @@ namespace {
 
 std::optional<double> remaining_s(const CampaignState& campaign, double rate_hz) {
   if (campaign.phase != Phase::active || rate_hz <= 0.0) return std::nullopt;
-  const std::uint64_t num_ended = campaign.committed.size() + campaign.given_up.size();
-  return static_cast<double>(campaign.definition->num_runs - num_ended) / rate_hz;
+  return static_cast<double>(campaign.definition->num_runs - num_settled(campaign)) / rate_hz;
 }
 
 bool is_over(Phase phase) { return phase == Phase::finished || phase == Phase::cancelled; }
@@ -224,12 +223,17 @@ wire::CampaignStatus CampaignService::status_of_served(CampaignId id) const {
           .owner = served.owner};
 }
 
-Phase CampaignService::phase_of(CampaignId id) const {
-  const Phase phase = state_.campaigns.at(id).phase;
+bool CampaignService::is_undecided(CampaignId id) const {
   const Served& served = served_.at(id);
-  const bool is_undecided = !served.plan.stop_rule.empty() && !served.is_decided;
-  if (phase == Phase::finished && is_undecided) return Phase::active;
-  return phase;
+  return state_.campaigns.at(id).phase == Phase::finished && !served.plan.stop_rule.empty() &&
+         !served.is_decided;
+}
+
+Phase CampaignService::phase_of(CampaignId id) const {
+  const CampaignState& campaign = state_.campaigns.at(id);
+  const bool is_more_to_come = is_undecided(id) || !campaign.elsewhere.empty();
+  if (campaign.phase == Phase::finished && is_more_to_come) return Phase::active;
+  return campaign.phase;
 }
 
 void CampaignService::review() {
@@ -291,10 +295,8 @@ void CampaignService::review_summary(CampaignId id, Served& served) {
     take_summary(id, served);
   }
   if (served.is_held || surroundings_.now() < served.summary_after) return;
-  const bool is_finished = state_.campaigns.at(id).phase == Phase::finished;
-  const bool is_undecided = is_finished && phase_of(id) != Phase::finished;
   const bool is_due = std::exchange(served.is_summary_due, false);
-  if (is_due || is_undecided) begin_summary(id, served);
+  if (is_due || is_undecided(id)) begin_summary(id, served);
 }
 
 void CampaignService::take_summary(CampaignId id, Served& served) {
@@ -458,8 +460,7 @@ void CampaignService::say_not_closed(std::string_view reason) {
 bool CampaignService::is_all_done() const {
   return std::all_of(state_.campaigns.begin(), state_.campaigns.end(), [&](const auto& item) {
     const auto& [id, campaign] = item;
-    const bool is_undecided = campaign.phase == Phase::finished && phase_of(id) != Phase::finished;
-    return campaign.phase == Phase::cancelled || (is_finished(campaign) && !is_undecided);
+    return campaign.phase == Phase::cancelled || (is_finished(campaign) && !is_undecided(id));
   });
 }
 

@@ -153,7 +153,9 @@ class CampaignService {
   };
 
   [[nodiscard]] wire::CampaignStatus status_of_served(CampaignId id) const;
-  /// As shown and stored: a campaign whose stop rule is still to be checked is not finished.
+  /// All runs of now are there, and its stop rule is still to be checked with them.
+  [[nodiscard]] bool is_undecided(CampaignId id) const;
+  /// As shown and stored: a campaign that is undecided, or has runs elsewhere, is not finished.
   [[nodiscard]] Phase phase_of(CampaignId id) const;
   void extend(CampaignId id, std::shared_ptr<const Campaign> definition);
   void resume(CampaignId id);

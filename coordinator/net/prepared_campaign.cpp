@@ -26,6 +26,7 @@ StoredCampaign stored_campaign_of(const ServedCampaign& campaign, GivenUpRuns gi
                         .audit_fraction = control.audit_fraction,
                         .finished = store.finished_runs(),
                         .given_up = {},
+                        .elsewhere = campaign.elsewhere,
                         .compared = store.compared_runs(),
                         .blamed = {}};
   if (given_up == GivenUpRuns::retry) return stored;

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -9,8 +10,11 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_start.hpp"
@@ -21,6 +25,7 @@
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/cli/worker_processes.hpp"
+#include "coordinator/dispatch/run_set.hpp"
 #include "coordinator/net/private_endpoint.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/report/report.hpp"
@@ -43,6 +48,7 @@ struct RunOptions {
   Overrides overrides;
   std::optional<unsigned> num_workers;   ///< By default one for each processor.
   std::optional<double> audit_fraction;  ///< Of the runs that are missing, computed twice; 0 to 1.
+  std::optional<RunRange> part;          ///< Only these runs are computed.
   StopOptions stop;
   bool is_quiet = false;
 };
@@ -51,8 +57,25 @@ std::filesystem::path database_of(const RunOptions& options) {
   return options.database.value_or(options.campaign_file.stem().string() + ".db");
 }
 
-std::uint64_t num_missing(const Store& store) {
-  return store.num_runs() - num_runs_in(store.finished_runs());
+/// The runs that are to be computed of a campaign with so many.
+RunRange part_of(const RunOptions& options, std::uint64_t num_runs) {
+  return options.part.value_or(RunRange{{0}, num_runs});
+}
+
+std::uint64_t num_finished(const Store& store, RunRange part) {
+  return RunSet(store.finished_runs()).overlap(part).size();
+}
+
+std::uint64_t num_missing(const Store& store, const RunOptions& options) {
+  const RunRange part = part_of(options, store.num_runs());
+  return part.count - num_finished(store, part);
+}
+
+/// The runs beside a part.
+std::vector<RunRange> runs_beside(RunRange part, std::uint64_t num_runs) {
+  RunSet runs(RunRange{{0}, num_runs});
+  runs.remove(part);
+  return runs.ranges();
 }
 
 /// No more than there are batches: runs of one batch take no longer than one of them.
@@ -156,17 +179,21 @@ struct Outcome {
 Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOptions& options) {
   const bool is_decided =
       options.stop.rule.empty() || campaign.store.control().phase == wire::CampaignPhase::finished;
-  if (num_missing(campaign.store) == 0 && is_decided) {
+  if (num_missing(campaign.store, options) == 0 && is_decided) {
     return {.store = std::move(campaign.store), .is_done = true};
   }
+  const RunRange part = part_of(options, num_runs);
+  const std::uint64_t num_finished_now = num_finished(campaign.store, part);
+  const std::uint64_t num_finished_beside =
+      num_runs_in(campaign.store.finished_runs()) - num_finished_now;
+  if (options.part) campaign.elsewhere = runs_beside(part, num_runs);
   make_active(campaign.store, options);
   const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   ProgressDisplay display(options.is_quiet ? DisplayMode::quiet : display_mode_for(stderr), stderr);
   const PrivateEndpoint endpoint;
   GrowingFile file;
-  const std::uint64_t num_local =
-      num_workers(options, num_runs - num_runs_in(campaign.store.finished_runs()));
+  const std::uint64_t num_local = num_workers(options, part.count - num_finished_now);
   std::vector<ServedCampaign> campaigns;
   campaigns.push_back(std::move(campaign));
   const ServiceConfig config = service_config(endpoint, num_local, file);
@@ -176,7 +203,8 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
   const auto show = [&] {
     const wire::CampaignStatus status = service.campaigns().front();
     storage.update(status);
-    display.update(out_of(status, num_runs));
+    display.update(options.part ? of_part(status, part.count, num_finished_beside)
+                                : out_of(status, num_runs));
   };
   workers.start(num_local);
   service.run(stop, [&] {
@@ -197,12 +225,12 @@ void require_in_place(const Store& store, const std::filesystem::path& database)
       database.string()));
 }
 
-int say_interrupted(const Store& store, const std::filesystem::path& database) {
-  const std::uint64_t num_runs = store.num_runs();
+int say_interrupted(const Store& store, const RunOptions& options) {
+  const RunRange part = part_of(options, store.num_runs());
   wire::say(
       fmt::format("proofmass: interrupted; {} of {} runs are in {}\n"
                   "proofmass: the same command computes the others\n",
-                  num_runs - num_missing(store), num_runs, database.string()));
+                  num_finished(store, part), part.count, database_of(options).string()));
   return exit_interrupted;
 }
 
@@ -217,7 +245,8 @@ void bring_to_rest(Store& store, const std::filesystem::path& database) {
 }
 
 /// Statistics of a file that cannot be written stay as they are; what is stored is said.
-int end_interrupted(Store& store, const Campaign& campaign, const std::filesystem::path& database) {
+int end_interrupted(Store& store, const Campaign& campaign, const RunOptions& options) {
+  const std::filesystem::path database = database_of(options);
   try {
     update_statistics(store, campaign);
     bring_to_rest(store, database);
@@ -225,7 +254,7 @@ int end_interrupted(Store& store, const Campaign& campaign, const std::filesyste
     wire::say(fmt::format("proofmass: error: {}\n", wire::visible_text(error.what())));
   }
   require_in_place(store, database);
-  return say_interrupted(store, database);
+  return say_interrupted(store, options);
 }
 
 int say_given_up(std::span<const RunRange> given_up, std::uint64_t num_runs) {
@@ -246,17 +275,30 @@ int say_cancelled(const Store& store, std::uint64_t failures_max) {
   return exit_cannot_be_done;
 }
 
+/// A part must be of the campaign. With a stop rule it would not be known which runs there will be.
+void check_part(const RunOptions& options, const Campaign& campaign) {
+  if (!options.part) return;
+  const std::string range =
+      fmt::format("range = {}:{}", options.part->first.value, options.part->end());
+  if (options.part->end() > campaign.num_runs) {
+    throw UsageError(
+        fmt::format("{} (must end at most at campaign.runs = {})", range, campaign.num_runs));
+  }
+  if (!options.stop.rule.empty()) throw UsageError(range + " (must not be with --until)");
+}
+
 /// Runs what is missing of a campaign with local workers and prints its tables. A run that crashes
 /// its workers is given up, and tried again the next time.
 /// @return An ExitCode; exit_not_met if all runs together do not reach the stop rule.
 int run_campaign(const RunOptions& options) {
   const std::unique_ptr<Campaign> campaign =
       read_campaign(options.campaign_file, options.overrides);
+  check_part(options, *campaign);
   const std::filesystem::path database = database_of(options);
   Outcome outcome =
       compute(open_or_create(*campaign, plan_of(options, campaign->num_runs), database),
               campaign->num_runs, options);
-  if (!outcome.is_done) return end_interrupted(outcome.store, *campaign, database);
+  if (!outcome.is_done) return end_interrupted(outcome.store, *campaign, options);
   update_statistics(outcome.store, *campaign);
   require_in_place(outcome.store, database);
   bring_to_rest(outcome.store, database);
@@ -269,6 +311,30 @@ int run_campaign(const RunOptions& options) {
   return is_rule_missed(outcome.store) ? exit_not_met : exit_done;
 }
 
+/// The runs of `50:100`, which are 50 to 99; empty if the text is none such.
+std::optional<RunRange> parsed_range(std::string_view text) {
+  std::uint64_t first = 0, end = 0;
+  const char* const text_end = text.data() + text.size();
+  const auto [colon, first_error] = std::from_chars(text.data(), text_end, first);
+  if (first_error != std::errc() || colon == text_end || *colon != ':') return std::nullopt;
+  const auto [last, end_error] = std::from_chars(colon + 1, text_end, end);
+  if (end_error != std::errc() || last != text_end || first >= end) return std::nullopt;
+  return RunRange{{first}, end - first};
+}
+
+void add_range_option(CLI::App& command, std::optional<RunRange>& part) {
+  const auto check = [](const std::string& text) {
+    if (parsed_range(text)) return std::string();
+    return text + " (must be A:B, whole numbers with A below B)";
+  };
+  command
+      .add_option_function<std::string>(
+          "--range", [&part](const std::string& text) { part = parsed_range(text); },
+          "Compute runs A to B - 1 only; `merge` joins the\ndatabases of several ranges")
+      ->type_name("A:B")
+      ->check(CLI::Validator(check, "", "range"));
+}
+
 }  // namespace
 
 void add_run(CLI::App& app, Command& chosen) {
@@ -278,6 +344,7 @@ void add_run(CLI::App& app, Command& chosen) {
   command.add_option("FILE", options.campaign_file, "Campaign file (TOML)")->required();
   command.add_option("--db", options.database, "Database; FILE's stem with .db, here, by default");
   add_override_options(command, options.overrides);
+  add_range_option(command, options.part);
   add_audit_option(command, options.audit_fraction);
   add_stop_options(command, options.stop);
   command

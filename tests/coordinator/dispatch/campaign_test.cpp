@@ -45,6 +45,38 @@ TEST_F(CampaignTest, OnlyWhatIsNotFinishedIsLent) {
   EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{4}, 1}));
 }
 
+TEST_F(CampaignTest, RunsThatAreComputedElsewhereAreNotLent) {
+  StoredCampaign stored = stored_campaign(10);
+  stored.finished = {{{1}, 2}};
+  stored.elsewhere = {{{0}, 4}, {{6}, 4}};
+  stored.blamed = {{.run = {7}, .num_crashes = 1, .attempt = {1}}};
+  on_campaign(state, one, stored, now, outbox);
+  add_worker(first, 4);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{4}, 1}));
+  complete(first, one, {4, 5});
+  EXPECT_EQ(campaign(one).phase, Phase::finished);
+}
+
+// A worker that comes from another coordinator may hold or have computed them.
+TEST_F(CampaignTest, AResultOfARunThatIsComputedElsewhereIsTaken) {
+  StoredCampaign stored = stored_campaign(4);
+  stored.elsewhere = {{{1}, 3}};
+  on_campaign(state, one, stored, now, outbox);
+  add_worker(first);
+  complete(first, one, {0});
+  ASSERT_EQ(campaign(one).phase, Phase::finished);
+  heartbeat(first, {held(one, {{1}, 2})});
+  outbox.forget();
+  deliver(first, one, {2});
+  EXPECT_FALSE(is_finished(campaign(one)));
+  const Runs stored_runs = outbox.take_stored();
+  EXPECT_EQ(stored_runs, Runs{{2}});
+  on_committed(state, one, stored_runs, now, outbox);
+  EXPECT_TRUE(is_finished(campaign(one)));
+  EXPECT_EQ(campaign(one).committed.ranges(), (Ranges{{{0}, 1}, {{2}, 1}}));
+  outbox.forget();
+}
+
 TEST_F(CampaignTest, ThatIsDoneIsFinishedAtOnce) {
   StoredCampaign stored = stored_campaign(2);
   stored.finished = {{{0}, 1}};
