@@ -193,6 +193,14 @@ struct Summary {
   bool operator==(const Summary&) const = default;
 };
 
+/// What one part gave to the whole when campaign databases were merged.
+struct MergedPart {
+  std::uint64_t num_new = 0;
+  std::uint64_t num_again = 0;  ///< Runs that a part before it has as well, with the same result.
+
+  bool operator==(const MergedPart&) const = default;
+};
+
 /// How a campaign database got back the name that it had lost.
 enum class FileReturn : std::uint8_t {
   restored,       ///< Nothing had the name.

@@ -17,6 +17,7 @@
 #include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/detail/integrity.hpp"
+#include "coordinator/store/detail/merge_rows.hpp"
 #include "coordinator/store/detail/result_rows.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
@@ -68,14 +69,16 @@ std::unique_ptr<detail::StoreLock> lock_if_free(const std::filesystem::path& pat
   }
 }
 
+/// @param fill  Writes what a new campaign does not have.
 void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
-                 std::string_view definition) {
+                 std::string_view definition, const std::function<void(Database&)>& fill) {
   Database database(draft, Access::create);
   detail::configure(database);
   Transaction transaction(database);
   detail::migrate(database);
   detail::insert_campaign(database, campaign, definition);
   detail::replace_budgets(database, campaign.error_budget(), {});
+  fill(database);
   transaction.commit();
 }
 
@@ -95,16 +98,35 @@ Store::~Store() {
 Store::Store(Store&&) noexcept = default;
 Store& Store::operator=(Store&&) noexcept = default;
 
-Store Store::create(const std::filesystem::path& path, const Campaign& campaign,
-                    std::string_view definition) {
+Store Store::create_filled(const std::filesystem::path& path, const Campaign& campaign,
+                           std::string_view definition,
+                           const std::function<void(detail::Database&)>& fill) {
   check_name(path);
   detail::check_directory_of(path);
   auto lock = std::make_unique<detail::StoreLock>(path);
   detail::check_absence(path);
   detail::appear_complete(path, detail::IfThere::keep, [&](const std::filesystem::path& draft) {
-    write_draft(draft, campaign, definition);
+    write_draft(draft, campaign, definition, fill);
   });
   return Store(std::make_unique<Impl>(path, std::move(lock)));
+}
+
+Store Store::create(const std::filesystem::path& path, const Campaign& campaign,
+                    std::string_view definition) {
+  return create_filled(path, campaign, definition, [](Database&) {});
+}
+
+Store Store::merge(const std::filesystem::path& path, const Campaign& campaign,
+                   std::string_view definition, std::span<const std::filesystem::path> parts,
+                   const std::function<void(const MergedPart&)>& on_part) {
+  return create_filled(path, campaign, definition, [&](Database& whole) {
+    detail::MergeRows rows(whole);
+    for (const std::filesystem::path& file : parts) {
+      const Store part = open_read_only(file);
+      part.read_one_state([&] { on_part(rows.add(part.impl_->database)); });
+    }
+    rows.finish();
+  });
 }
 
 Store Store::open(const std::filesystem::path& path) {

@@ -38,6 +38,20 @@ class Store {
   static Store create(const std::filesystem::path& path, const Campaign& campaign,
                       std::string_view definition);
 
+  /// Makes a new campaign database of all that several databases of the campaign hold of its runs,
+  /// complete or not at all, and opens it like open(). Tags, notes and events stay where they are.
+  /// The campaign is finished if every run is, and else active.
+  ///
+  /// @param campaign, definition  As of create().
+  /// @param parts                 Of the campaign, and sound: the caller has checked them
+  /// (verify()).
+  /// @param on_part               Told of each part in turn; if it throws, no file is made.
+  /// @throws StoreError if the file exists, if two parts have different results of a run, and as
+  ///         open_read_only() does.
+  static Store merge(const std::filesystem::path& path, const Campaign& campaign,
+                     std::string_view definition, std::span<const std::filesystem::path> parts,
+                     const std::function<void(const MergedPart&)>& on_part);
+
   /// Opens a campaign database for its coordinator: takes the lock, brings an older file up to
   /// date.
   /// @throws StoreError if the file is missing, foreign, newer than this program or damaged, or if
@@ -232,6 +246,11 @@ class Store {
  private:
   struct Impl;
   explicit Store(std::unique_ptr<Impl> impl);
+
+  /// create(), with what `fill` writes beside the campaign.
+  static Store create_filled(const std::filesystem::path& path, const Campaign& campaign,
+                             std::string_view definition,
+                             const std::function<void(detail::Database&)>& fill);
 
   std::unique_ptr<Impl> impl_;
 };

@@ -1,0 +1,160 @@
+#include "coordinator/store/detail/merge_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "coordinator/store/detail/control_rows.hpp"
+#include "coordinator/store/detail/entry_rows.hpp"
+#include "coordinator/store/store_error.hpp"
+
+namespace proofmass::coordinator::detail {
+namespace {
+
+// A worker that is still there, as far as its part knows, is nobody that the whole waits for.
+constexpr std::string_view insert_worker_sql =
+    "INSERT INTO worker (session, worker, host, process_id, num_slots, first_seen_utc, ended_utc,"
+    " end_reason) VALUES (nullif(?1, ''), ?2, ?3, ?4, ?5, ?6,"
+    " coalesce(nullif(?7, ''), strftime('%Y-%m-%dT%H:%M:%SZ', 'now')),"
+    " coalesce(nullif(?8, ''), 'silent'))";
+
+constexpr std::string_view count_deliveries_sql =
+    "UPDATE worker SET num_results = counted.num_results, compute_s = counted.compute_s,"
+    " last_result_unix_s = counted.last_unix_s FROM"
+    " (SELECT worker_key, count(*) AS num_results, sum(compute_s) AS compute_s,"
+    "  max(received_unix_s) AS last_unix_s FROM delivery GROUP BY worker_key) AS counted"
+    " WHERE worker.worker_key = counted.worker_key";
+
+constexpr std::string_view insert_failure_sql =
+    "INSERT INTO run_failure (run_index, reason, num_attempts, given_up_utc) VALUES (?, ?, ?, ?)"
+    " ON CONFLICT DO NOTHING";
+
+/// The key in the whole of a worker that a row of the part refers to.
+std::int64_t key_of(const std::map<std::int64_t, std::int64_t>& workers, const Statement& row,
+                    int column) {
+  const auto found = workers.find(row.integer(column));
+  if (found != workers.end()) return found->second;
+  row.refuse_as_damaged(fmt::format("worker lacks worker_key = {}", row.integer(column)));
+}
+
+}  // namespace
+
+MergeRows::MergeRows(Database& whole)
+    : whole_(whole),
+      num_runs_(whole.count("SELECT num_runs FROM campaign")),
+      results_(whole),
+      largest_errors_(whole) {}
+
+MergedPart MergeRows::add(const Database& part) {
+  const WorkerKeys workers = add_workers(part);
+  const MergedPart merged = add_results(part, workers);
+  add_losses(part, workers);
+  add_failures(part);
+  add_comparisons(part, workers);
+  return merged;
+}
+
+void MergeRows::finish() {
+  whole_.prepare(count_deliveries_sql).run();
+  whole_.prepare("DELETE FROM run_failure WHERE run_index IN (SELECT run_index FROM run_result)")
+      .run();
+  CampaignControl control = read_control(whole_);
+  const bool is_finished = whole_.count("SELECT count(*) FROM delivery") == num_runs_;
+  control.phase = is_finished ? wire::CampaignPhase::finished : wire::CampaignPhase::active;
+  write_control(whole_, control);
+}
+
+MergeRows::WorkerKeys MergeRows::add_workers(const Database& part) {
+  WorkerKeys keys;
+  Statement select = part.prepare(
+      "SELECT worker_key, ifnull(session, ''), worker, host, process_id, num_slots, first_seen_utc,"
+      " ifnull(ended_utc, ''), ifnull(end_reason, '') FROM worker ORDER BY worker_key");
+  Statement find = whole_.prepare("SELECT worker_key FROM worker WHERE session = ?");
+  Statement insert = whole_.prepare(insert_worker_sql);
+  while (select.step()) {
+    find.bind_all(select.text(1));
+    if (find.step()) {
+      keys.emplace(select.integer(0), find.integer(0));
+      find.finish();
+      continue;
+    }
+    insert.run(select.text(1), select.text(2), select.text(3), select.optional_count(4),
+               select.optional_count(5), select.text(6), select.text(7), select.text(8));
+    keys.emplace(select.integer(0), whole_.last_row());
+  }
+  return keys;
+}
+
+MergedPart MergeRows::add_results(const Database& part, const WorkerKeys& workers) {
+  MergedPart merged;
+  Statement result_row = select_results(part);
+  Statement delivery = part.prepare(
+      "SELECT run_index, worker_key, attempt, compute_s, received_unix_s FROM delivery"
+      " ORDER BY run_index");
+  Statement insert = whole_.prepare("INSERT INTO delivery VALUES (?, ?, ?, ?, ?)");
+  while (result_row.step()) {
+    const RunResult result = read_result(result_row);
+    if (!delivery.step() || delivery.count(0) != result.run.value) {
+      part.refuse_as_damaged(
+          fmt::format("delivery lacks run {}, which has a result", result.run.value));
+    }
+    check_delivery({.result = result, .worker = {}, .attempt = {}, .compute_s = delivery.real(3)},
+                   num_runs_);
+    if (results_.insert(result)) {
+      insert.run(result.run.value, key_of(workers, delivery, 1), delivery.count(2),
+                 delivery.real(3), delivery.integer(4));
+      largest_errors_.add(result);
+      ++merged.num_new;
+      continue;
+    }
+    ++merged.num_again;
+    if (are_equal(result, results_.read(result.run))) continue;
+    part.refuse(
+        fmt::format("has another result of run {} than a part before it; one of them was "
+                    "computed wrongly or changed, and `proofmass verify` with --fraction "
+                    "tells which",
+                    result.run.value));
+  }
+  return merged;
+}
+
+void MergeRows::add_losses(const Database& part, const WorkerKeys& workers) {
+  Statement select = part.prepare(
+      "SELECT first_run, num_runs, attempt, worker_key, reason, is_blamed, lost_unix_s FROM attempt"
+      " ORDER BY attempt_id");
+  Statement insert = whole_.prepare(
+      "INSERT INTO attempt (first_run, num_runs, attempt, worker_key, reason, is_blamed,"
+      " lost_unix_s) VALUES (?, ?, ?, ?, ?, ?, ?)");
+  while (select.step()) {
+    insert.run(select.integer(0), select.integer(1), select.integer(2), key_of(workers, select, 3),
+               select.text(4), select.integer(5), select.integer(6));
+  }
+  whole_
+      .prepare("DELETE FROM attempt WHERE attempt_id <= (SELECT max(attempt_id) FROM attempt) - ?")
+      .run(num_attempts_max);
+}
+
+void MergeRows::add_failures(const Database& part) {
+  Statement select =
+      part.prepare("SELECT run_index, reason, num_attempts, given_up_utc FROM run_failure");
+  Statement insert = whole_.prepare(insert_failure_sql);
+  while (select.step()) {
+    insert.run(select.integer(0), select.text(1), select.integer(2), select.text(3));
+  }
+}
+
+void MergeRows::add_comparisons(const Database& part, const WorkerKeys& workers) {
+  Statement select = part.prepare(
+      "SELECT run_index, worker_key, is_equal, stored_digest, second_digest, compared_unix_s"
+      " FROM audit");
+  Statement insert =
+      whole_.prepare("INSERT INTO audit VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING");
+  while (select.step()) {
+    insert.run(select.integer(0), key_of(workers, select, 1), select.integer(2), select.text(3),
+               select.text(4), select.integer(5));
+  }
+}
+
+}  // namespace proofmass::coordinator::detail
