@@ -55,6 +55,7 @@ void add_verify(CLI::App& app, Command& chosen);
 void add_export(CLI::App& app, Command& chosen);
 void add_backup(CLI::App& app, Command& chosen);
 void add_compare(CLI::App& app, Command& chosen);
+void add_merge(CLI::App& app, Command& chosen);
 void add_list(CLI::App& app, Command& chosen);
 void add_tag(CLI::App& app, Command& chosen);
 void add_note(CLI::App& app, Command& chosen);

@@ -1,0 +1,131 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/archive/verification.hpp"
+#include "coordinator/cli/campaign_start.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/dispatch/run_set.hpp"
+#include "coordinator/report/report.hpp"
+#include "coordinator/store/store.hpp"
+#include "core/runs.hpp"
+#include "proto/command_line/option_checks.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+struct MergeOptions {
+  std::filesystem::path whole;
+  std::vector<std::filesystem::path> parts;
+  double fraction = 0.01;  ///< Of each part's runs, simulated again; in [0, 1].
+};
+
+/// The campaign of the part that has the most runs, which may have been extended since the others.
+struct Merged {
+  std::shared_ptr<const Campaign> campaign;
+  std::filesystem::path part;
+};
+
+Merged largest_campaign(const std::vector<std::filesystem::path>& parts) {
+  Merged largest;
+  for (const std::filesystem::path& part : parts) {
+    std::shared_ptr<const Campaign> campaign = stored_campaign(Store::open_read_only(part));
+    if (largest.campaign != nullptr && campaign->num_runs <= largest.campaign->num_runs) continue;
+    largest = {.campaign = std::move(campaign), .part = part};
+  }
+  return largest;
+}
+
+/// Where a campaign with a stop rule ends depends on the results of all runs before.
+void require_part(const std::filesystem::path& part, const Merged& merged) {
+  const Store store = Store::open_read_only(part);
+  const std::string remedy =
+      fmt::format("asked for by {}; merge databases of one campaign only", merged.part.string());
+  require_same(store, *merged.campaign, part, remedy);
+  const std::string rule = store.stop_plan().stop_rule;
+  if (rule.empty()) return;
+  throw UsageError(
+      fmt::format("{} has until = {} (must not be in a part of a campaign)", part.string(), rule));
+}
+
+/// @throws ArchiveError with what does not hold.
+void require_sound(const std::filesystem::path& part, const MergeOptions& options,
+                   const IsStopped& is_stopped) {
+  const VerifyOptions how{.fraction = options.fraction,
+                          .num_threads = std::max(1U, std::thread::hardware_concurrency())};
+  std::string failing;
+  const auto collect = [&](const Check& check) {
+    if (check.verdict == Verdict::fails) failing += "\n" + check_text(check);
+  };
+  if (verify(part, how, collect, is_stopped)) return;
+  while (failing.ends_with('\n')) failing.pop_back();
+  throw ArchiveError(fmt::format("{} does not hold what it should:{}", part.string(), failing));
+}
+
+std::string count_text(const MergedPart& part) {
+  const std::string num_new = fmt::format("{} run{}", part.num_new, part.num_new == 1 ? "" : "s");
+  if (part.num_again == 0) return num_new;
+  return fmt::format("{}, and {} equal to those of parts before it", num_new, part.num_again);
+}
+
+/// Runs without a result, and how to get them.
+std::string missing_text(const Store& store, const MergeOptions& options) {
+  RunSet missing(RunRange{{0}, store.num_runs()});
+  missing.remove(RunSet(store.finished_runs()));
+  if (missing.empty()) return {};
+  return fmt::format(
+      "{} of {} runs are in no part: {}\n`proofmass run FILE --db {}` computes them\n",
+      missing.size(), store.num_runs(), to_text(missing), options.whole.string());
+}
+
+int merge_databases(const MergeOptions& options) {
+  return run_until_stopped([&](const IsStopped& is_stopped) {
+    const Merged merged = largest_campaign(options.parts);
+    for (const std::filesystem::path& part : options.parts) require_part(part, merged);
+    for (const std::filesystem::path& part : options.parts) {
+      require_sound(part, options, is_stopped);
+    }
+    const std::string definition = merged.campaign->definition(TableColumns::left_out).text;
+    std::string lines;
+    std::size_t next = 0;
+    Store whole = Store::merge(
+        options.whole, *merged.campaign, definition, options.parts, [&](const MergedPart& part) {
+          if (is_stopped()) throw Interrupted();
+          lines += fmt::format("{}: {}\n", options.parts[next++].string(), count_text(part));
+        });
+    update_statistics(whole, *merged.campaign);
+    print_lines(lines + missing_text(whole, options) +
+                fmt::format("Digest {}\n", whole.summary()->digests.results));
+    return exit_done;
+  });
+}
+
+}  // namespace
+
+void add_merge(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<MergeOptions>(
+      app, chosen, "merge", "Join databases of parts of a campaign", merge_databases);
+  command.footer(exit_codes_text({exit_interrupted}));
+  command.add_option("OUT", options.whole, "Database to be made of all parts")->required();
+  command.add_option("PART", options.parts, "Databases of one campaign, as of `run --range`")
+      ->required();
+  command
+      .add_option("--fraction", options.fraction,
+                  "Of each part's runs to simulate again and compare")
+      ->check(wire::in_range(0.0, 1.0))
+      ->capture_default_str();
+}
+
+}  // namespace proofmass::coordinator
