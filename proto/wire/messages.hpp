@@ -23,7 +23,7 @@ inline constexpr std::uint32_t protocol_version = 7;
 
 inline constexpr std::uint32_t runs_per_lease_max = 4096;  ///< Also of a batch of results.
 inline constexpr std::size_t ranges_per_message_max = 4096;
-inline constexpr std::uint32_t slots_max = 1024;
+inline constexpr std::uint32_t slots_max = 4096;
 inline constexpr std::size_t definition_part_size_max = std::size_t{256} << 10;  ///< Bytes.
 
 /// Number of a worker's registration with a coordinator, from 1.

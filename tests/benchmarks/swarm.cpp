@@ -254,7 +254,7 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(0, 100'000));
   app.add_option("--churn", options.num_replaced, "Idle connections to replace each second")
       ->check(CLI::Range(0, 100'000));
-  app.add_option("--slots", options.worker.num_slots, "Of each")->check(CLI::Range(1, 1024));
+  app.add_option("--slots", options.worker.num_slots, "Of each")->check(CLI::Range(1, 4096));
   app.add_option("--runs-held", options.worker.runs_held_max, "Most runs that each has at a time")
       ->check(CLI::Range(1, 4096));
   app.add_option("--elapsed-s", options.worker.elapsed_s, "What they say that a run takes")

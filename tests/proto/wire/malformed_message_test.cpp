@@ -135,9 +135,9 @@ TEST(MalformedHello, SaysOnlyOfACrashHowTheFormerProcessEnded) {
 
 TEST(MalformedHello, HasSlots) {
   EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_num_slots(0); }),
-            "num_slots = 0 (must be in [1, 1024])");
-  EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_num_slots(1025); }),
-            "num_slots = 1025 (must be in [1, 1024])");
+            "num_slots = 0 (must be in [1, 4096])");
+  EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_num_slots(4097); }),
+            "num_slots = 4097 (must be in [1, 4096])");
 }
 
 TEST(MalformedReject, HasAKnownReasonAndABoundedText) {
@@ -256,9 +256,9 @@ TEST(MalformedHeartbeat, HasABoundedNumberOfRanges) {
             }),
             "held = 4097 entries (must be in [0, 4096])");
   EXPECT_EQ(refusal_of_heartbeat([](auto& heartbeat) {
-              for (int i = 0; i < 1024; ++i) *heartbeat.add_computing() = heartbeat.computing(0);
+              for (int i = 0; i < 4096; ++i) *heartbeat.add_computing() = heartbeat.computing(0);
             }),
-            "computing = 1025 entries (must be in [0, 1024])");
+            "computing = 4097 entries (must be in [0, 4096])");
   const auto fill = [](auto& ranges) {
     for (int i = 0; i < 4095; ++i) *ranges.Add() = ranges.Get(0);
   };
