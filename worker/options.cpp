@@ -18,6 +18,9 @@ namespace {
 
 unsigned threads_max() { return wire::slots_max / static_cast<unsigned>(model().batch_size()); }
 
+/// The year 2286; Slurm says 2³² − 1 or so of jobs without an end.
+constexpr std::int64_t end_time_unix_s_max = 9'999'999'999;
+
 constexpr std::uint64_t seconds_max = std::uint64_t{366} * 24 * 3600;
 
 /// Seconds in the unit; nothing if there is no such unit.
@@ -65,6 +68,10 @@ void add_work(CLI::App& app, Options& options) {
   add_duration(app, "max-walltime", options.walltime_max,
                "Time after which the worker must have ended,\ne.g. 3600, 90m, 2h")
       ->envname("PROOFMASS_MAX_WALLTIME");
+  app.add_option("--end-time", options.end_time_unix_s,
+                 "When the worker must have ended, in seconds\nsince 1970 (UTC), as Slurm says it")
+      ->envname("SLURM_JOB_END_TIME")
+      ->check(wire::in_range(std::int64_t{0}, end_time_unix_s_max));
   add_duration(app, "drain-time", options.drain_time,
                "Time to finish and deliver after SIGTERM; 100s\nby default")
       ->envname("PROOFMASS_DRAIN_TIME");

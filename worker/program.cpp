@@ -80,6 +80,29 @@ wire::ClientSecurity security_for(const Options& options, const wire::Log& log) 
   return {};
 }
 
+/// @throws InvalidArgument if it has passed: then the variable is that of a job long ago.
+TimePoint end_of_job(std::int64_t end_time_unix_s, TimePoint program_start) {
+  const auto end = std::chrono::sys_seconds(std::chrono::seconds(end_time_unix_s));
+  const auto time_left = end - std::chrono::system_clock::now();
+  if (time_left <= Duration::zero()) {
+    throw InvalidArgument(
+        fmt::format("end-time = {} (must be in the future; from --end-time or SLURM_JOB_END_TIME)",
+                    end_time_unix_s));
+  }
+  return program_start + std::chrono::duration_cast<Duration>(time_left);
+}
+
+/// The earlier of both ends, if there are any.
+std::optional<TimePoint> walltime_end(const Options& options, TimePoint program_start) {
+  std::optional<TimePoint> end;
+  if (options.walltime_max) end = program_start + *options.walltime_max;
+  if (options.end_time_unix_s) {
+    const TimePoint job_end = end_of_job(*options.end_time_unix_s, program_start);
+    end = std::min(end.value_or(job_end), job_end);
+  }
+  return end;
+}
+
 ServeConfig serve_config(const Options& options, TimePoint program_start, const wire::Log& log) {
   ServeConfig config;
   config.log = log;
@@ -92,7 +115,7 @@ ServeConfig serve_config(const Options& options, TimePoint program_start, const 
   conversation.drain_time = options.drain_time;
   if (options.parent) conversation.give_up_after = give_up_with_parent;
   if (options.give_up_after) conversation.give_up_after = *options.give_up_after;
-  if (options.walltime_max) conversation.walltime_end = program_start + *options.walltime_max;
+  conversation.walltime_end = walltime_end(options, program_start);
   return config;
 }
 
@@ -142,6 +165,7 @@ void leave_out_service_options(Options& options) {
   options.keys.reset();
   options.spool.reset();
   options.walltime_max.reset();
+  options.end_time_unix_s.reset();
 }
 
 int run(Options options, const Program& program) {

@@ -5,6 +5,8 @@
 #include <signal.h>
 
 #include <chrono>
+#include <cstdint>
+#include <ctime>
 #include <string>
 
 #include "tests/system/fault_fixture.hpp"
@@ -34,11 +36,14 @@ class WorkerEnd : public ControlledCampaign {
   }
 };
 
-// It stops early enough to finish and deliver what it computes, whose time it knows.
+// It stops early enough to finish and deliver what it computes, whose time it knows. The earlier of
+// two ends counts.
 TEST_F(WorkerEnd, ComesBeforeTheWalltime) {
   const auto walltime_end = std::chrono::steady_clock::now() + std::chrono::seconds(12);
+  const std::int64_t end_time = std::time(nullptr) + 12;  // Not later, as it cuts off a fraction.
   Process coordinator = this->coordinator("coordinator", {"null.toml", "--exit-when-done"});
-  Process limited = null_worker("limited", {"--max-walltime", "12", "--run-time", "0.1"});
+  Process limited = null_worker("limited", {"--max-walltime", "1h", "--end-time",
+                                            std::to_string(end_time), "--run-time", "0.1"});
   EXPECT_EQ(limited.wait(), 0) << errors_of("limited");
   EXPECT_LT(std::chrono::steady_clock::now(), walltime_end);
   ASSERT_LT(num_done("null"), num_null_runs);

@@ -104,7 +104,10 @@ TEST_F(Usage, IsRefusedWithTheRule) {
 
 TEST_F(Usage, OfTheServicesIsRefusedWithTheRule) {
   EXPECT_EQ(refusal_of("proofmass-worker", {"--connect", "ipc:///tmp/a", "--threads", "-1"}),
-            "proofmass-worker: error: --threads = -1 (must be a whole number in [1, 64])\n");
+            "proofmass-worker: error: --threads = -1 (must be a whole number in [1, 256])\n");
+  EXPECT_EQ(refusal_of("proofmass-worker", {"--connect", "ipc:///tmp/a", "--end-time", "100"}),
+            "proofmass-worker: error: end-time = 100 (must be in the future; from --end-time or "
+            "SLURM_JOB_END_TIME)\n");
   EXPECT_EQ(refusal_of("proofmass-worker", {}), "proofmass-worker: error: --connect is required\n");
   EXPECT_EQ(refusal_of("proofmass-coordinator", {"--drain-time", "-1"}),
             "proofmass-coordinator: error: --drain-time = -1 (must be in [0, 31622400])\n");

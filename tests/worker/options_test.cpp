@@ -75,13 +75,16 @@ TEST(WorkerOptions, ComeFromTheEnvironment) {
   setenv("PROOFMASS_CONNECT", "ipc:///tmp/b", 1);
   setenv("PROOFMASS_MAX_WALLTIME", "1d", 1);
   setenv("PROOFMASS_SPOOL", "/s", 1);
+  setenv("SLURM_JOB_END_TIME", "1800000000", 1);
   const Options options = parsed({});
   unsetenv("PROOFMASS_CONNECT");
   unsetenv("PROOFMASS_MAX_WALLTIME");
   unsetenv("PROOFMASS_SPOOL");
+  unsetenv("SLURM_JOB_END_TIME");
   EXPECT_EQ(options.endpoint, "ipc:///tmp/b");
   EXPECT_EQ(options.walltime_max, 24h);
   EXPECT_EQ(options.spool, "/s");
+  EXPECT_EQ(options.end_time_unix_s, 1'800'000'000);
 }
 
 TEST(WorkerOptions, ComeFromAFileUnlessTheyAreArguments) {
@@ -109,7 +112,9 @@ TEST(WorkerOptions, MustBeOfTheKnownKinds) {
   const auto error_with = [&](const std::string& name, const std::string& value) {
     return error_of({"--connect", "ipc:///tmp/a", name, value});
   };
-  EXPECT_EQ(error_with("--threads", "0"), "--threads = 0 (must be in [1, 64])");
+  EXPECT_EQ(error_with("--threads", "0"), "--threads = 0 (must be in [1, 256])");
+  EXPECT_EQ(error_with("--end-time", "noon"),
+            "--end-time = noon (must be a whole number in [0, 9999999999])");
   EXPECT_EQ(error_with("--log-format", "xml"), "--log-format = xml (must be one of json, text)");
   EXPECT_EQ(error_with("--faults", "drop=2").substr(0, 15), "faults.drop = 2");
   EXPECT_EQ(error_with("--max-walltime", "5x"),

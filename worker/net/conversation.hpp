@@ -153,6 +153,7 @@ class Conversation {
   void send_due_results(TimePoint now);
   void send_results(std::span<const RunKey> runs, TimePoint now);
   void watch_time(TimePoint now);
+  [[nodiscard]] Duration time_to_leave() const;  ///< Before the walltime is over.
   void begin_to_leave(const Leaving& leaving, TimePoint now);
   void give_back_waiting();
   void give_back_late_batches(TimePoint now);

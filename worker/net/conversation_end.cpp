@@ -3,6 +3,7 @@
 #include <array>
 #include <utility>
 
+#include "core/math/hash.hpp"
 #include "core/runs.hpp"
 #include "worker/net/conversation.hpp"
 
@@ -25,10 +26,7 @@ void Conversation::on_abandon_request() {
 void Conversation::watch_time(TimePoint now) {
   const bool has_deadline = leaving_ && leaving_->deadline;
   if (!has_deadline && config_.walltime_end) {
-    // Half again of the usual time: a batch that begins now is finished.
-    const Duration usual = execution_.usual_batch_time().value_or(Duration::zero());
-    const Duration needed = usual + usual / 2 + 2 * config_.delivery_time;
-    if (now + needed >= *config_.walltime_end) {
+    if (now + time_to_leave() >= *config_.walltime_end) {
       begin_to_leave({.reason = wire::LossReason::walltime,
                       .deadline = *config_.walltime_end - config_.delivery_time},
                      now);
@@ -41,6 +39,16 @@ void Conversation::watch_time(TimePoint now) {
     execution_.abandon();
     leave(fmt::format("out of time with {} results not acknowledged", unacknowledged_.size()));
   }
+}
+
+/// Half again of the usual time of a batch, so that one that begins now is finished; and up to
+/// once more, for each worker another part of it: those of one job end at the same time, and shall
+/// not all give back and deliver at once.
+Duration Conversation::time_to_leave() const {
+  const Duration usual = execution_.usual_batch_time().value_or(Duration::zero());
+  const double share = fraction_of(mixed(session_.value));
+  return usual + usual / 2 + std::chrono::duration_cast<Duration>(share * usual) +
+         2 * config_.delivery_time;
 }
 
 void Conversation::begin_to_leave(const Leaving& leaving, TimePoint now) {

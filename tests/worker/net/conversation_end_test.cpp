@@ -1,3 +1,5 @@
+#include <array>
+
 #include "tests/worker/net/conversation_fixture.hpp"
 
 // How a conversation ends.
@@ -208,18 +210,18 @@ TEST_F(ConversationTest, GivesBackByNotNamingRunsIfItIsNotRegistered) {
   (void)take_sent<wire::ResultBatch>();
 }
 
-// Batches take 60 s: with half of that to spare and twice 5 s to deliver and to end, it is time
-// 100 s before the walltime is over.
+// Batches take 60 s: with half of that to spare and twice 5 s to deliver and to end, it is time at
+// least 100 s before the walltime is over, and at most 60 s earlier.
 TEST_F(ConversationTest, DrainsInTimeBeforeItsWalltimeIsOver) {
   register_with_campaign({.walltime_end = now + 1000s});
   execution.batch_time = 60s;
   receive(lease(0, 1));
   execution.begin_batch();
   receive(lease(1, 1));
-  tick_after(899s);
+  tick_after(839s);
   EXPECT_FALSE(conversation->is_leaving());
   sent.clear();
-  tick_after(1s);
+  tick_after(61s);
   EXPECT_EQ(take_sent<wire::Heartbeat>().num_runs_max, 0U);
   const auto given_back = take_sent<wire::GiveBack>();
   EXPECT_EQ(given_back.reason, wire::LossReason::walltime);
@@ -229,6 +231,27 @@ TEST_F(ConversationTest, DrainsInTimeBeforeItsWalltimeIsOver) {
   (void)take_sent<wire::ResultBatch>();
   acknowledge({{0}});
   EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::walltime);
+}
+
+// A quarter of the workers of a job leaves in each quarter of those 60 s, but for chance.
+TEST_F(ConversationTest, LeavesBeforeItsWalltimeAtAnotherTimeThanOtherWorkers) {
+  const TimePoint beginning = now;
+  execution.batch_time = 60s;
+  constexpr int num_workers = 400;
+  std::array<int, 4> num_leaving{};
+  for (int worker = 0; worker < num_workers; ++worker) {
+    session = {static_cast<std::uint64_t>(worker + 1)};
+    now = beginning;
+    register_with_campaign({.walltime_end = now + 1000s});
+    now += 840s;
+    std::size_t quarter = 0;
+    for (; quarter < num_leaving.size() && !conversation->is_leaving(); ++quarter) tick_after(15s);
+    ASSERT_TRUE(conversation->is_leaving());
+    ++num_leaving.at(quarter - 1);
+    sent.clear();
+  }
+  // Five standard deviations of a binomial law.
+  for (const int num : num_leaving) EXPECT_NEAR(num, num_workers / 4, 44);
 }
 
 TEST_F(ConversationTest, EndsBeforeItsWalltimeIsOver) {

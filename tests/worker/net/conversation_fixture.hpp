@@ -138,7 +138,7 @@ class ConversationTest : public testing::Test {
   }
 
   void receive(wire::Message message, wire::Epoch epoch = first_epoch) {
-    conversation->on_packet({{own_session, epoch, ++num_received}, std::move(message)}, now);
+    conversation->on_packet({{session, epoch, ++num_received}, std::move(message)}, now);
   }
   void reject_unregistered(wire::Epoch epoch = first_epoch) {
     receive(wire::Reject{.reason = wire::RejectReason::not_registered, .text = ""}, epoch);
@@ -147,8 +147,8 @@ class ConversationTest : public testing::Test {
 
   void start(const ConversationConfig& config = {}) {
     conversation.emplace(
-        own_session, hello, execution,
-        [this](const wire::Packet& packet) { sent.push_back(packet); }, now, config);
+        session, hello, execution, [this](const wire::Packet& packet) { sent.push_back(packet); },
+        now, config);
   }
   void register_here() {
     (void)take_sent<wire::Hello>();
@@ -188,6 +188,7 @@ class ConversationTest : public testing::Test {
                           .build = "b",
                           .former = {}};
   const wire::Welcome welcome{.worker = {1}, .heartbeat_interval_s = 2.0};
+  wire::SessionId session = own_session;
   TimePoint now = TimePoint{} + std::chrono::hours(1);
   FakeExecution execution;
   std::deque<wire::Packet> sent;

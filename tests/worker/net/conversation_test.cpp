@@ -44,10 +44,10 @@ TEST_F(ConversationTest, SaysHelloEverMoreSeldom) {
 
 TEST_F(ConversationTest, SaysHelloAtOtherTimesThanOtherWorkers) {
   std::set<int> ticks_at_second_hello;
-  for (std::uint64_t session = 1; session <= 20; ++session) {
+  for (std::uint64_t worker = 1; worker <= 20; ++worker) {
     std::size_t num_sent = 0;
     Conversation other(
-        {session}, hello, execution, [&](const wire::Packet&) { ++num_sent; }, now);
+        {worker}, hello, execution, [&](const wire::Packet&) { ++num_sent; }, now);
     int num_ticks = 0;
     while (num_sent < 2) other.on_tick(now + ++num_ticks * 1ms);
     ticks_at_second_hello.insert(num_ticks);
