@@ -1,0 +1,99 @@
+#!/usr/bin/env python3
+"""Makes the tarball of deploy/package.sh twice and runs a campaign with it in a bare root.
+
+That root holds nothing but a static busybox and what the tarball brings, so that every library, the
+loader included, must be in there. With --root, a root directory with another Linux is used instead.
+The digest must be the one that the programs of the build have.
+
+Exit code 0 if all holds, 1 if not; 77 if a root cannot be entered, but 1 if the environment has CI.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+SHORTEN = "s/^orbits = .*/orbits = 2/;s/^sample_period_s = .*/sample_period_s = 1/;s/^runs = .*/runs = 40/"
+# `run` starts workers itself; the services are three programs that find their libraries.
+CAMPAIGN = f"""set -e
+proofmass init paper.toml
+sed -E '{SHORTEN}' paper.toml > short.toml
+proofmass run short.toml --db run.db --quiet > run.txt
+proofmass-coordinator --directory served --bind ipc://$PWD/socket --exit-when-done short.toml 2> coordinator.log &
+proofmass-worker --connect ipc://$PWD/socket 2> worker.log
+wait
+proofmass report run.db | grep Digest
+proofmass report served/hardy2013.db | grep Digest
+"""
+
+
+def check(is_true, what):
+    if not is_true:
+        print(f"FAILED: {what}")
+        sys.exit(1)
+
+
+def make_package(script, build, directory):
+    directory.mkdir()
+    subprocess.run([script, "--build", build, "--output", directory], check=True)
+    (tarball,) = directory.iterdir()
+    return tarball
+
+
+def make_bare_root(root):
+    for name in ("bin", "proc", "dev", "tmp", "opt"):
+        (root / name).mkdir(parents=True)
+    shutil.copy("/bin/busybox", root / "bin/busybox")
+    for applet in subprocess.check_output(["/bin/busybox", "--list"], text=True).split():
+        if applet != "busybox":
+            (root / "bin" / applet).symlink_to("busybox")
+    for name, minor in (("null", 3), ("urandom", 9)):
+        subprocess.run(["mknod", "-m", "666", root / "dev" / name, "c", "1", str(minor)], check=True)
+
+
+def digests(command, programs, directory, **options):
+    lines = f"export PATH={programs}:$PATH\ncd {directory}\n{CAMPAIGN}"
+    process = subprocess.run([*command, "sh", "-c", lines], stdout=subprocess.PIPE, text=True, **options)
+    check(process.returncode == 0, f"exit code = {process.returncode} (must be 0) of {command}")
+    return [line.split()[-1] for line in process.stdout.splitlines() if line.startswith("Digest")]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--build", required=True, type=Path, help="build tree")
+    parser.add_argument("--root", type=Path, help="root directory of another Linux")
+    arguments = parser.parse_args()
+    script = Path(__file__).resolve().parents[2] / "deploy/package.sh"
+    if os.geteuid() != 0 or not Path("/bin/busybox").exists():
+        print("SKIPPED: needs root and /bin/busybox")
+        sys.exit(1 if "CI" in os.environ else 77)
+    with tempfile.TemporaryDirectory() as name:
+        directory = Path(name)
+        tarball = make_package(script, arguments.build, directory / "first")
+        again = make_package(script, arguments.build, directory / "second")
+        check(tarball.read_bytes() == again.read_bytes(), "the same programs make other bytes")
+
+        root = arguments.root or directory / "root"
+        if not arguments.root:
+            make_bare_root(root)
+        place = Path(tempfile.mkdtemp(dir=root / "tmp"))
+        subprocess.run(["tar", "--extract", "--file", tarball, "--directory", place], check=True)
+        inside = Path("/tmp") / place.name
+        (programs,) = place.glob("*/bin")
+        in_root = ["unshare", "--mount", "--pid", "--fork", "--kill-child", "chroot", root, "sh", "-c",
+                   'mount -t proc proc /proc && exec "$@"', "sh"]
+        packaged = digests(in_root, inside / programs.relative_to(place), inside)
+
+        here = directory / "here"
+        here.mkdir()
+        expected = digests([], arguments.build.resolve() / "bin", here)
+        print("\n".join(packaged + expected))
+        check(len(packaged) == 2 and packaged == expected, "the packaged programs have another digest")
+        shutil.rmtree(place)
+
+
+if __name__ == "__main__":
+    main()
