@@ -81,7 +81,7 @@ wire::ClientSecurity security_for(const Options& options, const wire::Log& log) 
 }
 
 /// @throws InvalidArgument if it has passed: then the variable is that of a job long ago.
-TimePoint end_of_job(std::int64_t end_time_unix_s, TimePoint program_start) {
+TimePoint allocation_end(std::int64_t end_time_unix_s, TimePoint program_start) {
   const auto end = std::chrono::sys_seconds(std::chrono::seconds(end_time_unix_s));
   const auto time_left = end - std::chrono::system_clock::now();
   if (time_left <= Duration::zero()) {
@@ -97,8 +97,8 @@ std::optional<TimePoint> walltime_end(const Options& options, TimePoint program_
   std::optional<TimePoint> end;
   if (options.walltime_max) end = program_start + *options.walltime_max;
   if (options.end_time_unix_s) {
-    const TimePoint job_end = end_of_job(*options.end_time_unix_s, program_start);
-    end = std::min(end.value_or(job_end), job_end);
+    const TimePoint end_there = allocation_end(*options.end_time_unix_s, program_start);
+    end = std::min(end.value_or(end_there), end_there);
   }
   return end;
 }
