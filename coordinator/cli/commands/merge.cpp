@@ -33,13 +33,13 @@ struct MergeOptions {
 };
 
 /// The campaign of the part that has the most runs, which may have been extended since the others.
-struct Merged {
+struct LargestPart {
   std::shared_ptr<const Campaign> campaign;
   std::filesystem::path part;
 };
 
-Merged largest_campaign(const std::vector<std::filesystem::path>& parts) {
-  Merged largest;
+LargestPart largest_part(const std::vector<std::filesystem::path>& parts) {
+  LargestPart largest;
   for (const std::filesystem::path& part : parts) {
     std::shared_ptr<const Campaign> campaign = stored_campaign(Store::open_read_only(part));
     if (largest.campaign != nullptr && campaign->num_runs <= largest.campaign->num_runs) continue;
@@ -49,11 +49,11 @@ Merged largest_campaign(const std::vector<std::filesystem::path>& parts) {
 }
 
 /// Where a campaign with a stop rule ends depends on the results of all runs before.
-void require_part(const std::filesystem::path& part, const Merged& merged) {
+void require_part(const std::filesystem::path& part, const LargestPart& largest) {
   const Store store = Store::open_read_only(part);
   const std::string remedy =
-      fmt::format("asked for by {}; merge databases of one campaign only", merged.part.string());
-  require_same(store, *merged.campaign, part, remedy);
+      fmt::format("asked for by {}; merge databases of one campaign only", largest.part.string());
+  require_same(store, *largest.campaign, part, remedy);
   const std::string rule = store.stop_plan().stop_rule;
   if (rule.empty()) return;
   throw UsageError(
@@ -92,20 +92,20 @@ std::string missing_text(const Store& store, const MergeOptions& options) {
 
 int merge_databases(const MergeOptions& options) {
   return run_until_stopped([&](const IsStopped& is_stopped) {
-    const Merged merged = largest_campaign(options.parts);
-    for (const std::filesystem::path& part : options.parts) require_part(part, merged);
+    const LargestPart largest = largest_part(options.parts);
+    for (const std::filesystem::path& part : options.parts) require_part(part, largest);
     for (const std::filesystem::path& part : options.parts) {
       require_sound(part, options, is_stopped);
     }
-    const std::string definition = merged.campaign->definition(TableColumns::left_out).text;
+    const std::string definition = largest.campaign->definition(TableColumns::left_out).text;
     std::string lines;
     std::size_t next = 0;
     Store whole = Store::merge(
-        options.whole, *merged.campaign, definition, options.parts, [&](const MergedPart& part) {
+        options.whole, *largest.campaign, definition, options.parts, [&](const MergedPart& part) {
           if (is_stopped()) throw Interrupted();
           lines += fmt::format("{}: {}\n", options.parts[next++].string(), count_text(part));
         });
-    update_statistics(whole, *merged.campaign);
+    update_statistics(whole, *largest.campaign);
     print_lines(lines + missing_text(whole, options) +
                 fmt::format("Digest {}\n", whole.summary()->digests.results));
     return exit_done;

@@ -86,6 +86,13 @@ TEST_F(MergeCommand, NamesTheRunsThatAreInNoPart) {
   EXPECT_EQ(Store::open_read_only(path("whole.db")).control().phase, wire::CampaignPhase::active);
 }
 
+TEST_F(MergeCommand, TakesAPartWithoutResults) {
+  (void)part("a.db", 0, 0);
+  const Answer answer = merge({"a.db"});
+  EXPECT_EQ(answer.exit_code, exit_done) << answer.error;
+  EXPECT_THAT(answer.output, HasSubstr("24 of 24 runs are in no part: 0..23\n"));
+}
+
 TEST_F(MergeCommand, RefusesAnotherCampaignAndNamesTheDifferences) {
   (void)part("a.db", 0, 10);
   MicroscopeCampaign other = test::quick_campaign(num_runs);
