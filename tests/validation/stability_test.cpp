@@ -167,14 +167,13 @@ TEST_F(Stability, OfTheAttitudeIntegralIsKeptOrReported) {
 
 // With its integral kept, the loop is unstable below the gain at which 2ζω is ω_I: at 0.0033 Hz.
 TEST_F(Stability, OfLowAttitudeGainIsKeptOrReported) {
-  expect_explained_sweep(
-      "attitude bandwidth",
-      {0.02, 0.01, 0.007, 0.005, 0.004, 0.0036, 0.0034, 0.0032, 0.003, 0.0025},
-      [](MicroscopeCampaign& campaign, double bandwidth_hz) {
-        campaign.scenario.attitude.bandwidth_hz = bandwidth_hz;
-        campaign.scenario.attitude.damping = 0.3;
-        campaign.scenario.attitude.integral_hz = 0.002;
-      });
+  expect_explained_sweep("attitude bandwidth",
+                         {0.02, 0.01, 0.007, 0.005, 0.004, 0.0036, 0.0034, 0.0032, 0.003, 0.0025},
+                         [](MicroscopeCampaign& campaign, double bandwidth_hz) {
+                           campaign.scenario.attitude.bandwidth_hz = bandwidth_hz;
+                           campaign.scenario.attitude.damping = 0.3;
+                           campaign.scenario.attitude.integral_hz = 0.002;
+                         });
 }
 
 // The loop takes the thrusters' noise out of the lines, but K2 turns its square into noise there.

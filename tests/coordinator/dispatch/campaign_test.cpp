@@ -52,7 +52,7 @@ TEST_F(CampaignTest, RunsThatAreComputedElsewhereAreNotLent) {
   stored.blamed = {{.run = {7}, .num_crashes = 1, .attempt = {1}}};
   on_campaign(state, one, stored, now, outbox);
   add_worker(first, 4);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{4}, 1}));
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{4}, 2}));
   complete(first, one, {4, 5});
   EXPECT_EQ(campaign(one).phase, Phase::finished);
 }
