@@ -50,8 +50,6 @@ def make_bare_root(root):
     for applet in subprocess.check_output(["/bin/busybox", "--list"], text=True).split():
         if applet != "busybox":
             (root / "bin" / applet).symlink_to("busybox")
-    for name, minor in (("null", 3), ("urandom", 9)):
-        subprocess.run(["mknod", "-m", "666", root / "dev" / name, "c", "1", str(minor)], check=True)
 
 
 def digests(command, programs, directory, **options):
@@ -83,8 +81,8 @@ def main():
         subprocess.run(["tar", "--extract", "--file", tarball, "--directory", place], check=True)
         inside = Path("/tmp") / place.name
         (programs,) = place.glob("*/bin")
-        in_root = ["unshare", "--mount", "--pid", "--fork", "--kill-child", "chroot", root, "sh", "-c",
-                   'mount -t proc proc /proc && exec "$@"', "sh"]
+        enter = 'mount --bind /dev "$0/dev" && mount -t proc proc "$0/proc" && exec chroot "$0" "$@"'
+        in_root = ["unshare", "--mount", "--pid", "--fork", "--kill-child", "sh", "-c", enter, root]
         packaged = digests(in_root, inside / programs.relative_to(place), inside)
 
         here = directory / "here"
