@@ -1,7 +1,7 @@
 #!/bin/bash
-# Makes a tarball of the programs with the loader and all libraries that they need: it runs on any
-# Linux for x86-64, from any directory and without root, also where the system's C library is older
-# than that of Debian 12. Equal programs give equal bytes.
+# Makes a tarball of the programs with the loader and all libraries that they need: it runs on other
+# Linux systems (x86-64), from any directory and without root, also where the system's C library is
+# older than that of Debian 12. The same build at the same commit gives the same bytes.
 #
 #   package.sh [--build DIR] [--output DIR]
 #

@@ -18,7 +18,7 @@ namespace {
 
 unsigned threads_max() { return wire::slots_max / static_cast<unsigned>(model().batch_size()); }
 
-/// The year 2286; Slurm says 2³² − 1 or so of jobs without an end.
+/// The year 2286: ten digits, so that a time in milliseconds is refused.
 constexpr std::int64_t end_time_unix_s_max = 9'999'999'999;
 
 constexpr std::uint64_t seconds_max = std::uint64_t{366} * 24 * 3600;

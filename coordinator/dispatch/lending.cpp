@@ -259,8 +259,9 @@ void finish_if_done(State& state, CampaignId id, Outbox& outbox) {
   if (!is_finished(campaign)) return;
   campaign.phase = Phase::finished;
   sort_served(state);
-  outbox.log({.kind = "campaign_finished",
-              .fields = {{"runs", campaign.definition->num_runs},
+  const std::uint64_t num_elsewhere = campaign.elsewhere.size();
+  outbox.log({.kind = num_elsewhere == 0 ? "campaign_finished" : "part_finished",
+              .fields = {{"runs", campaign.definition->num_runs - num_elsewhere},
                          {"given_up", campaign.given_up.size()},
                          {"duplicates", campaign.num_duplicates},
                          {"compared", campaign.num_audited},

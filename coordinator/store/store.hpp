@@ -43,8 +43,7 @@ class Store {
   /// The campaign is finished if every run is, and else active.
   ///
   /// @param campaign, definition  As of create().
-  /// @param parts                 Of the campaign, and sound: the caller has checked them
-  /// (verify()).
+  /// @param parts                 Of the campaign; the caller has checked them with verify().
   /// @param on_part               Told of each part in turn; if it throws, no file is made.
   /// @throws StoreError if the file exists, if two parts have different results of a run, and as
   ///         open_read_only() does.

@@ -152,6 +152,24 @@ TEST_F(ArchiveProcess, EndsInOrderWhenItIsInterrupted) {
   EXPECT_EQ(errors_of("verify"), "proofmass: interrupted\n");
 }
 
+TEST_F(ArchiveProcess, AMergeThatIsInterruptedWritesNoDatabase) {
+  // Its sessions are so long that their simulation is not over before the signal comes.
+  ASSERT_EQ(proofmass("part", {"run", "paper.toml", "--db", "part.db", "--runs", "16"}).wait(), 0);
+  Process merge = proofmass("merge", {"merge", "whole.db", "part.db", "--fraction", "1"});
+  const std::string status = "/proc/" + std::to_string(merge.id()) + "/status";
+  // Bit 1 of the mask is that of SIGINT.
+  const auto catches_interrupts = [&] {
+    const std::string text = read_file(status);
+    const std::size_t mask = text.find("SigCgt:\t");
+    return mask != std::string::npos && (std::stoull(text.substr(mask + 8), nullptr, 16) & 2) != 0;
+  };
+  wait_until("a handler", catches_interrupts);
+  merge.signal(SIGINT);
+  EXPECT_EQ(merge.wait(), 130);
+  EXPECT_EQ(errors_of("merge"), "proofmass: interrupted\n");
+  EXPECT_FALSE(std::filesystem::exists(path("whole.db")));
+}
+
 TEST_F(ArchiveProcess, ComparesAndListsCampaigns) {
   EXPECT_EQ(start("other", {"--seed", "2", "--runs", "16"}).wait(), 0);
   EXPECT_EQ(proofmass("compare", {"compare", "done.db", "other.db"}).wait(), 0);

@@ -5,7 +5,8 @@ That root holds nothing but a static busybox and what the tarball brings, so tha
 loader included, must be in there. With --root, a root directory with another Linux is used instead.
 The digest must be the one that the programs of the build have.
 
-Exit code 0 if all holds, 1 if not; 77 if a root cannot be entered, but 1 if the environment has CI.
+Needs root and /bin/busybox. Exit code 0 if all holds, 1 if not; 77 without root or busybox, but 1 if
+the environment has CI.
 """
 
 import argparse
@@ -16,13 +17,18 @@ import sys
 import tempfile
 from pathlib import Path
 
-SHORTEN = "s/^orbits = .*/orbits = 2/;s/^sample_period_s = .*/sample_period_s = 1/;s/^runs = .*/runs = 40/"
-# `run` starts workers itself; the services are three programs that find their libraries.
+SHORTEN = ";".join(
+    f"s/^{key} = .*/{key} = {value}/"
+    for key, value in (("orbits", 2), ("sample_period_s", 1), ("runs", 40))
+)
+# Shell that writes the digests of a campaign by `run`, which starts the worker itself, and of the
+# same campaign by a coordinator and a worker.
 CAMPAIGN = f"""set -e
 proofmass init paper.toml
 sed -E '{SHORTEN}' paper.toml > short.toml
 proofmass run short.toml --db run.db --quiet > run.txt
-proofmass-coordinator --directory served --bind ipc://$PWD/socket --exit-when-done short.toml 2> coordinator.log &
+proofmass-coordinator --directory served --bind ipc://$PWD/socket \\
+  --exit-when-done short.toml 2> coordinator.log &
 proofmass-worker --connect ipc://$PWD/socket 2> worker.log
 wait
 proofmass report run.db | grep Digest
@@ -52,15 +58,17 @@ def make_bare_root(root):
             (root / "bin" / applet).symlink_to("busybox")
 
 
-def digests(command, programs, directory, **options):
+def digests(command, programs, directory):
     lines = f"export PATH={programs}:$PATH\ncd {directory}\n{CAMPAIGN}"
-    process = subprocess.run([*command, "sh", "-c", lines], stdout=subprocess.PIPE, text=True, **options)
+    process = subprocess.run([*command, "sh", "-c", lines], stdout=subprocess.PIPE, text=True)
     check(process.returncode == 0, f"exit code = {process.returncode} (must be 0) of {command}")
     return [line.split()[-1] for line in process.stdout.splitlines() if line.startswith("Digest")]
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     parser.add_argument("--build", required=True, type=Path, help="build tree")
     parser.add_argument("--root", type=Path, help="root directory of another Linux")
     arguments = parser.parse_args()

@@ -27,6 +27,15 @@ constexpr std::string_view count_deliveries_sql =
     "  max(received_unix_s) AS last_unix_s FROM delivery GROUP BY worker_key) AS counted"
     " WHERE worker.worker_key = counted.worker_key";
 
+// A database that is merged may hold what another one of the parts holds as well.
+constexpr std::string_view delete_repeated_losses_sql =
+    "DELETE FROM attempt WHERE attempt_id NOT IN (SELECT min(attempt_id) FROM attempt GROUP BY"
+    " first_run, num_runs, attempt, worker_key, reason, is_blamed, lost_unix_s)";
+
+constexpr std::string_view delete_old_losses_sql =
+    "DELETE FROM attempt WHERE attempt_id NOT IN"
+    " (SELECT attempt_id FROM attempt ORDER BY attempt_id DESC LIMIT ?)";
+
 constexpr std::string_view insert_failure_sql =
     "INSERT INTO run_failure (run_index, reason, num_attempts, given_up_utc) VALUES (?, ?, ?, ?)"
     " ON CONFLICT DO NOTHING";
@@ -60,6 +69,8 @@ void MergeRows::finish() {
   whole_.prepare(count_deliveries_sql).run();
   whole_.prepare("DELETE FROM run_failure WHERE run_index IN (SELECT run_index FROM run_result)")
       .run();
+  whole_.prepare(delete_repeated_losses_sql).run();
+  whole_.prepare(delete_old_losses_sql).run(num_attempts_max);
   CampaignControl control = read_control(whole_);
   const bool is_finished = whole_.count("SELECT count(*) FROM delivery") == num_runs_;
   control.phase = is_finished ? wire::CampaignPhase::finished : wire::CampaignPhase::active;
@@ -131,9 +142,6 @@ void MergeRows::add_losses(const Database& part, const WorkerKeys& workers) {
     insert.run(select.integer(0), select.integer(1), select.integer(2), key_of(workers, select, 3),
                select.text(4), select.integer(5), select.integer(6));
   }
-  whole_
-      .prepare("DELETE FROM attempt WHERE attempt_id <= (SELECT max(attempt_id) FROM attempt) - ?")
-      .run(num_attempts_max);
 }
 
 void MergeRows::add_failures(const Database& part) {

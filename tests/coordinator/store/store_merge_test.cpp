@@ -142,6 +142,15 @@ TEST_F(StoreMerge, KeepsLossesAndPrefersAResultToAFailure) {
             "5 worker-2 crashed, 4 worker-1 crashed, 5 worker-1 crashed");
 }
 
+// A copy of a part, or a merged database and a part of it.
+TEST_F(StoreMerge, KeepsEachLossOnce) {
+  const auto a =
+      part("a.db", {test::worker_1(), crashed(4, test::session_1), crashed(5, test::session_1)});
+  std::filesystem::copy_file(a, directory() / "copy.db");
+  (void)merge({a, directory() / "copy.db"});
+  EXPECT_EQ(text("SELECT group_concat(first_run, ', ') FROM attempt"), "4, 5");
+}
+
 TEST_F(StoreMerge, KeepsComparisonsAndTheLargestErrors) {
   const auto a = part("a.db", {test::worker_1(), delivery_of(0), worker_2(),
                                SecondDelivery{second_delivery_of(0)}, delivery_of(1)});
