@@ -15,6 +15,7 @@ packages=(
   libgtest-dev libgmock-dev libbenchmark-dev qemu-user clang-format
   iproute2 iptables faketime python3-scipy python3-mpmath python3-h5py
   sshfs openssh-sftp-server busybox-static
+  slurmctld slurmd slurm-client slurm-wlm-basic-plugins munge
 )
 # The fuzzer, and the systems that the dispatch is measured beside.
 more_packages=(clang libclang-rt-14-dev parallel python3-distributed python3-ipyparallel)
