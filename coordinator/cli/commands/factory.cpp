@@ -1,0 +1,296 @@
+#include "coordinator/factory/factory.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "coordinator/cli/client.hpp"
+#include "coordinator/cli/client_tables.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/factory/batch_system.hpp"
+#include "core/error.hpp"
+#include "proto/command_line/option_checks.hpp"
+#include "proto/link/log.hpp"
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::uint64_t workers_max_max = 10'000;
+constexpr std::uint64_t walltime_min_min = 10;
+constexpr std::uint64_t walltime_min_max = 366 * 24 * 60;
+constexpr std::uint64_t interval_s_max = 3600;
+
+/// The worker leaves this long before its allocation ends: what comes before it starts takes time.
+constexpr std::chrono::seconds start_margin{60};
+
+struct FactoryOptions {
+  ClientOptions client;
+  BatchSystem system;
+  FactoryConfig factory;
+  std::string worker_endpoint;
+  std::string worker_keys;
+  std::string start_command;
+  std::string wrap_command;
+  std::optional<unsigned> num_processors;
+  std::vector<std::string> submit_options;
+  std::uint64_t walltime_min = 480;
+  std::uint64_t idle_timeout_s = 300;
+  std::uint64_t interval_s = 30;
+  bool ends_when_done = false;
+  bool is_dry_run = false;
+};
+
+std::string checked_line(std::string_view option, const std::string& text) {
+  if (text.find('\n') == std::string::npos) return text;
+  throw UsageError(fmt::format("--{} (must be one line)", option));
+}
+
+std::string worker_command(const FactoryOptions& options) {
+  std::string command;
+  if (!options.start_command.empty()) {
+    command += checked_line("worker-start-cmd", options.start_command) + " && ";
+  }
+  command += "exec ";
+  if (!options.wrap_command.empty()) {
+    command += checked_line("worker-wrap-cmd", options.wrap_command) + " ";
+  }
+  const auto walltime = std::chrono::minutes(options.walltime_min) - start_margin;
+  command += fmt::format("proofmass-worker --connect {} --name {}-\"$1\" --max-walltime {}s",
+                         quoted_for_shell(checked_line("worker-connect", options.worker_endpoint)),
+                         options.factory.name, walltime.count());
+  command += fmt::format(" --idle-timeout {}s", options.idle_timeout_s);
+  if (!options.worker_keys.empty()) {
+    command += " --keys " + quoted_for_shell(checked_line("worker-keys", options.worker_keys));
+  }
+  if (options.num_processors) command += fmt::format(" --threads {}", *options.num_processors);
+  return command;
+}
+
+AllocationConfig allocation_config(const FactoryOptions& options) {
+  AllocationConfig config{.name = options.factory.name,
+                          .worker_command = worker_command(options),
+                          .walltime = std::chrono::minutes(options.walltime_min),
+                          .num_processors = options.num_processors,
+                          .options = {}};
+  for (const std::string& option : options.submit_options) {
+    config.options.push_back(checked_line("submit-option", option));
+  }
+  return config;
+}
+
+FactoryConfig checked(const FactoryOptions& options) {
+  FactoryConfig config = options.factory;
+  config.walltime = std::chrono::minutes(options.walltime_min);
+  // A worker's name is this one with an identifier of 64 characters at most.
+  constexpr std::size_t name_size_max = 60;
+  if (!wire::is_name(config.name) || config.name.size() > name_size_max) {
+    throw UsageError(fmt::format("--name = \"{}\" (must be 1 to {} of [A-Za-z0-9._-])", config.name,
+                                 name_size_max));
+  }
+  if (config.workers_min > config.workers_max) {
+    throw UsageError(fmt::format("--workers-min = {} (must be at most --workers-max, {})",
+                                 config.workers_min, config.workers_max));
+  }
+  return config;
+}
+
+int show_submission(const BatchSystem& system, const AllocationConfig& config) {
+  const BatchCommand command = system.submission(config);
+  std::string text;
+  for (const std::string& argument : command.arguments) text += quoted_for_shell(argument) + " ";
+  text.back() = '\n';
+  print_lines(text + command.input);
+  return exit_done;
+}
+
+/// A campaign that is over, or paused by a person, is not worked for.
+FactoryView view_of(const wire::StatusReply& status, const wire::WorkersReply& workers) {
+  FactoryView view;
+  for (const wire::CampaignStatus& campaign : status.campaigns) {
+    view.rate_hz += campaign.rate_hz;
+    if (campaign.phase != wire::CampaignPhase::active) continue;
+    view.num_open_runs += campaign.num_runs - campaign.num_done - campaign.num_given_up;
+  }
+  for (const wire::WorkerStatus& worker : workers.workers) view.workers.insert(worker.name);
+  return view;
+}
+
+/// Keeps workers for a coordinator; one object lives as long as the command.
+class FactoryLoop {
+ public:
+  FactoryLoop(const FactoryOptions& options, const wire::Log& log)
+      : options_(options),
+        config_(checked(options)),
+        allocation_(allocation_config(options)),
+        log_(log) {}
+
+  /// One look at coordinator and queue, and what follows from it. What fails is tried again at the
+  /// next look.
+  /// @return Whether all campaigns are over.
+  bool advance() {
+    try {
+      ClientConnection connection(options_.client.connection);
+      const Ask ask = [&](const wire::ClientRequest& request) { return connection.ask(request); };
+      const wire::StatusReply status = whole_status(ask);
+      FactoryView view = view_of(status, all_workers(ask));
+      view.allocations = options_.system.allocations_of(
+          allocation_, output_of(options_.system.listing(allocation_)));
+      carry_out(on_view(state_, config_, view, std::chrono::steady_clock::now(), log_));
+      return !status.campaigns.empty() && std::ranges::all_of(status.campaigns, is_over);
+    } catch (const InvalidArgument&) {
+      throw;  // The address is wrong.
+    } catch (const Error& error) {
+      log_({.severity = wire::Severity::warning,
+            .kind = "factory_waits",
+            .fields = {wire::Field::reason(error.what())}});
+      return false;
+    }
+  }
+
+  [[nodiscard]] std::optional<std::string> reason_to_end() const {
+    return coordinator::reason_to_end(state_);
+  }
+
+ private:
+  void carry_out(const FactoryActions& actions) {
+    for (const std::string& id : actions.cancelled) {
+      (void)output_of(options_.system.cancellation(id));
+      log_({.kind = "allocation_cancelled", .fields = {{"allocation", id}}});
+    }
+    for (std::uint64_t i = 0; i < actions.num_submissions; ++i) {
+      if (!submit()) return;
+    }
+  }
+
+  bool submit() {
+    const auto now = std::chrono::steady_clock::now();
+    try {
+      const std::string id =
+          options_.system.id_of(output_of(options_.system.submission(allocation_)));
+      on_submitted(state_, id, now);
+      log_({.kind = "worker_requested", .fields = {{"allocation", id}}});
+      return true;
+    } catch (const Error& error) {
+      on_submission_failed(state_, error.what(), now, log_);
+      return false;
+    }
+  }
+
+  const FactoryOptions& options_;
+  FactoryConfig config_;
+  AllocationConfig allocation_;
+  const wire::Log& log_;
+  FactoryState state_;
+};
+
+int keep_workers(const FactoryOptions& options) {
+  (void)checked(options);
+  if (options.is_dry_run) return show_submission(options.system, allocation_config(options));
+  const wire::Log log =
+      wire::make_log("proofmass-factory", wire::LogFormat::text, wire::LogLevel::info);
+  const SignalThread signals;
+  const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
+  warn_if_plain(options.client);
+  FactoryLoop loop(options, log);
+  while (stop == StopRequest::none) {
+    const bool are_all_over = loop.advance();
+    if (const auto reason = loop.reason_to_end()) throw Error("factory: " + *reason);
+    if (are_all_over && options.ends_when_done) return exit_done;
+    const auto next = std::chrono::steady_clock::now() + std::chrono::seconds(options.interval_s);
+    while (stop == StopRequest::none && std::chrono::steady_clock::now() < next) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+  }
+  return exit_interrupted;
+}
+
+void add_sizing(CLI::App& command, FactoryOptions& options) {
+  FactoryConfig& factory = options.factory;
+  command.add_option("--workers-max", factory.workers_max, "Workers of this factory, at most")
+      ->check(wire::in_range(std::uint64_t{1}, workers_max_max))
+      ->capture_default_str();
+  command
+      .add_option("--workers-min", factory.workers_min, "Workers, at least, while any run is open")
+      ->check(wire::in_range(std::uint64_t{0}, workers_max_max))
+      ->capture_default_str();
+  command
+      .add_option("--backlog", factory.backlog,
+                  "Workers in the queue that have not registered,\nat most")
+      ->check(wire::in_range(std::uint64_t{1}, workers_max_max))
+      ->capture_default_str();
+  command
+      .add_option("--utilisation-min", factory.utilisation_min,
+                  "A worker is asked for if there is work for this\nshare of its walltime")
+      ->check(wire::in_range(0.001, 1.0))
+      ->capture_default_str();
+  command.add_option("--interval", options.interval_s, "Seconds between two looks")
+      ->check(wire::in_range(std::uint64_t{1}, interval_s_max))
+      ->capture_default_str();
+  command.add_flag("--exit-when-done", options.ends_when_done,
+                   "End when every campaign is finished");
+}
+
+void add_workers_of(CLI::App& command, FactoryOptions& options) {
+  command
+      .add_option("--worker-connect", options.worker_endpoint,
+                  "The coordinator's address for workers")
+      ->required();
+  command.add_option("--worker-keys", options.worker_keys,
+                     "Directory of the worker's keys, on its node");
+  command.add_option("--walltime", options.walltime_min, "Minutes that a worker has")
+      ->check(wire::in_range(walltime_min_min, walltime_min_max))
+      ->capture_default_str();
+  command
+      .add_option("--idle-timeout", options.idle_timeout_s,
+                  "Seconds without work after which a worker ends")
+      ->check(wire::in_range(std::uint64_t{1}, std::uint64_t{24 * 3600}))
+      ->capture_default_str();
+  command
+      .add_option("--processors", options.num_processors,
+                  "Processors of a worker; by default it has a\nnode of its own")
+      ->check(wire::in_range(1U, 256U));
+  command.add_option("--worker-start-cmd", options.start_command,
+                     "Line of bash before the worker starts, e.g.\n'module load proofmass'");
+  command.add_option("--worker-wrap-cmd", options.wrap_command,
+                     "Words before proofmass-worker, e.g.\n'apptainer exec proofmass.sif'");
+  command
+      .add_option("--submit-option", options.submit_options,
+                  "Further option of sbatch or qsub, or line of a\nsubmit description; repeatable")
+      ->allow_extra_args(false);
+}
+
+}  // namespace
+
+void add_factory(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<FactoryOptions>(
+      app, chosen, "factory", "Keep workers in the queue of a batch system", keep_workers);
+  static const std::map<std::string, BatchSystem> systems = [] {
+    std::map<std::string, BatchSystem> by_name;
+    for (const BatchSystem& system : batch_systems()) by_name.emplace(system.name, system);
+    return by_name;
+  }();
+  wire::add_choice(command, "--batch-system", options.system, systems,
+                   "Where workers are queued; local starts them\nhere")
+      ->required();
+  command.add_option("--name", options.factory.name, "Of the factory and its allocations")
+      ->capture_default_str();
+  command.add_flag("--dry-run", options.is_dry_run, "Print how a worker would be queued, and end");
+  add_workers_of(command, options);
+  add_sizing(command, options);
+  add_client_options(command, options.client);
+  command.footer(exit_codes_text({exit_interrupted}));
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,347 @@
+#include "coordinator/factory/batch_system.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <sstream>
+#include <system_error>
+#include <thread>
+
+#include "core/error.hpp"
+
+extern char** environ;
+
+namespace proofmass::coordinator {
+namespace {
+
+// Text.
+
+std::vector<std::string> lines_of(std::string_view text) {
+  std::vector<std::string> lines;
+  std::istringstream stream{std::string(text)};
+  for (std::string line; std::getline(stream, line);) {
+    if (!line.empty()) lines.push_back(line);
+  }
+  return lines;
+}
+
+std::vector<std::string> words_of(const std::string& line) {
+  std::istringstream stream(line);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  return words;
+}
+
+/// `2:05:00`, as Slurm and PBS read it.
+std::string clock_text(std::chrono::seconds duration) {
+  const auto count = duration.count();
+  return fmt::format("{}:{:02}:{:02}", count / 3600, count / 60 % 60, count % 60);
+}
+
+/// @throws Error unless it can be part of a worker's name.
+std::string checked_id(std::string_view program, std::string id) {
+  const auto is_allowed = [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' ||
+           c == '-' || c == '_';
+  };
+  constexpr std::size_t size_max = 64;
+  if (!id.empty() && id.size() <= size_max && std::ranges::all_of(id, is_allowed)) return id;
+  throw Error(fmt::format("{}: identifier = \"{}\" (must be 1 to {} of [A-Za-z0-9._-])", program,
+                          id, size_max));
+}
+
+std::string first_word(std::string_view program, std::string_view output) {
+  const std::vector<std::string> words = words_of(std::string(output));
+  return checked_id(program, words.empty() ? "" : words.front());
+}
+
+/// A list of lines `ID STATE`.
+std::vector<Allocation> with_states(std::string_view program, std::string_view output,
+                                    std::string_view running) {
+  std::vector<Allocation> allocations;
+  for (const std::string& line : lines_of(output)) {
+    const std::vector<std::string> words = words_of(line);
+    if (words.size() != 2) {
+      throw Error(
+          fmt::format("{}: line = \"{}\" (must be an identifier and a state)", program, line));
+    }
+    allocations.push_back({checked_id(program, words[0]), words[1] == running});
+  }
+  return allocations;
+}
+
+/// The script of an allocation whose identifier the batch system has in a variable.
+std::string script(const AllocationConfig& config, std::string_view variable) {
+  return fmt::format("#!/bin/bash\nset -- \"${}\"\n{}\n", variable, config.worker_command);
+}
+
+void append(std::vector<std::string>& arguments, const std::vector<std::string>& further) {
+  arguments.insert(arguments.end(), further.begin(), further.end());
+}
+
+// Slurm.
+
+BatchCommand slurm_submission(const AllocationConfig& config) {
+  BatchCommand command{{"sbatch", "--parsable", "--job-name=" + config.name, "--nodes=1",
+                        "--ntasks=1", "--time=" + clock_text(config.walltime)},
+                       script(config, "SLURM_JOB_ID")};
+  command.arguments.push_back(config.num_processors
+                                  ? fmt::format("--cpus-per-task={}", *config.num_processors)
+                                  : std::string("--exclusive"));
+  append(command.arguments, config.options);
+  return command;
+}
+
+// `4711`, or `4711;cluster` where there are several.
+std::string slurm_id(std::string_view output) {
+  return first_word("sbatch", output.substr(0, output.find(';')));
+}
+
+BatchCommand slurm_listing(const AllocationConfig& config) {
+  return {{"squeue", "--me", "--noheader", "--name=" + config.name,
+           "--states=PENDING,CONFIGURING,RUNNING,SUSPENDED", "--sort=i", "--format=%i %T"}};
+}
+
+std::vector<Allocation> slurm_allocations(const AllocationConfig&, std::string_view output) {
+  return with_states("squeue", output, "RUNNING");
+}
+
+BatchCommand slurm_cancellation(const std::string& id) { return {{"scancel", id}}; }
+
+// PBS: OpenPBS and PBS Pro.
+
+BatchCommand pbs_submission(const AllocationConfig& config) {
+  BatchCommand command{{"qsub", "-N", config.name, "-l", "walltime=" + clock_text(config.walltime)},
+                       script(config, "PBS_JOBID")};
+  append(command.arguments,
+         config.num_processors ? std::vector<std::string>{"-l", fmt::format("select=1:ncpus={}",
+                                                                            *config.num_processors)}
+                               : std::vector<std::string>{"-l", "select=1", "-l", "place=excl"});
+  append(command.arguments, config.options);
+  return command;
+}
+
+std::string pbs_id(std::string_view output) { return first_word("qsub", output); }
+
+// qselect finds by name and state, and qstat cuts both; so it is asked twice.
+BatchCommand pbs_listing(const AllocationConfig& config) {
+  return {{"sh", "-c",
+           "running=$(qselect -u \"$(id -un)\" -N \"$1\" -s R) || exit\n"
+           "others=$(qselect -u \"$(id -un)\" -N \"$1\" -s HQTW) || exit\n"
+           "for id in $others; do echo \"$id Q\"; done\n"
+           "for id in $running; do echo \"$id R\"; done\n",
+           "sh", config.name}};
+}
+
+std::vector<Allocation> pbs_allocations(const AllocationConfig&, std::string_view output) {
+  return with_states("qselect", output, "R");
+}
+
+BatchCommand pbs_cancellation(const std::string& id) { return {{"qdel", id}}; }
+
+// HTCondor.
+
+/// A word of `arguments` in a submit description: in single quotes, which stand twice where they
+/// are meant, as double quotes do within the whole.
+std::string quoted_for_condor(std::string_view text) {
+  std::string quoted = "'";
+  for (const char c : text) {
+    quoted += c;
+    if (c == '\'' || c == '"') quoted += c;
+  }
+  return quoted + "'";
+}
+
+BatchCommand condor_submission(const AllocationConfig& config) {
+  std::string description = fmt::format(
+      "universe = vanilla\n"
+      "executable = /bin/bash\n"
+      "transfer_executable = false\n"
+      "arguments = \"-c {} bash $(ClusterId).$(ProcId)\"\n"
+      "batch_name = {}\n"
+      "getenv = true\n",
+      quoted_for_condor(config.worker_command), config.name);
+  if (config.num_processors) {
+    description += fmt::format("request_cpus = {}\n", *config.num_processors);
+  }
+  for (const std::string& option : config.options) description += option + "\n";
+  return {{"condor_submit", "-terse", "-"}, description + "queue\n"};
+}
+
+// `12.0 - 12.0`: the first and the last.
+std::string condor_id(std::string_view output) { return first_word("condor_submit", output); }
+
+BatchCommand condor_listing(const AllocationConfig& config) {
+  return {{"condor_q", "-constraint",
+           fmt::format("JobBatchName == \"{}\" && JobStatus <= 2", config.name), "-format", "%d.",
+           "ClusterId", "-format", "%d ", "ProcId", "-format", "%d\n", "JobStatus"}};
+}
+
+std::vector<Allocation> condor_allocations(const AllocationConfig&, std::string_view output) {
+  return with_states("condor_q", output, "2");
+}
+
+BatchCommand condor_cancellation(const std::string& id) { return {{"condor_rm", id}}; }
+
+// This machine: workers are processes, and their numbers identify them.
+
+BatchCommand local_submission(const AllocationConfig& config) {
+  return {{"sh", "-c",
+           "setsid sh -c 'set -- \"$$\"; eval \"$0\"' \"$1\" >/dev/null 2>&1 </dev/null & echo $!",
+           "sh", config.worker_command}};
+}
+
+std::string local_id(std::string_view output) { return first_word("sh", output); }
+
+BatchCommand local_listing(const AllocationConfig&) { return {{"ps", "-e", "-o", "pid=,args="}}; }
+
+std::vector<Allocation> local_allocations(const AllocationConfig& config, std::string_view output) {
+  std::vector<Allocation> allocations;
+  for (const std::string& line : lines_of(output)) {
+    const std::vector<std::string> words = words_of(line);
+    const std::string name = words.empty() ? "" : config.name + "-" + words.front();
+    const auto option = std::ranges::find(words, "--name");
+    if (option == words.end() || option + 1 == words.end() || *(option + 1) != name) continue;
+    allocations.push_back({words.front(), true});
+  }
+  return allocations;
+}
+
+BatchCommand local_cancellation(const std::string& id) { return {{"kill", id}}; }
+
+// Commands.
+
+constexpr std::chrono::seconds command_wait{60};
+constexpr std::size_t output_size_max = 1 << 20;
+
+/// A file in memory, closed at the end.
+class MemoryFile {
+ public:
+  explicit MemoryFile(const char* name) : descriptor_(memfd_create(name, MFD_CLOEXEC)) {
+    if (descriptor_ < 0) fail("memory of a command");
+  }
+  ~MemoryFile() { close(descriptor_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+
+  void write_from_start(std::string_view text) const {
+    if (pwrite(descriptor_, text.data(), text.size(), 0) != static_cast<ssize_t>(text.size())) {
+      fail("input of a command");
+    }
+  }
+
+  [[nodiscard]] std::string text() const {
+    std::string text(output_size_max, '\0');
+    const ssize_t size = pread(descriptor_, text.data(), text.size(), 0);
+    text.resize(size < 0 ? 0 : static_cast<std::size_t>(size));
+    return text;
+  }
+
+ private:
+  [[noreturn]] static void fail(std::string_view what) {
+    throw Error(fmt::format("{}: {}", what, std::generic_category().message(errno)));
+  }
+
+  int descriptor_;
+};
+
+/// @return What waitpid() says of the end; nothing if it does not end in time and is killed.
+std::optional<int> status_at_end(pid_t process_id) {
+  const auto deadline = std::chrono::steady_clock::now() + command_wait;
+  int status = 0;
+  while (waitpid(process_id, &status, WNOHANG) != process_id) {
+    if (std::chrono::steady_clock::now() > deadline) {
+      kill(process_id, SIGKILL);
+      waitpid(process_id, &status, 0);
+      return std::nullopt;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return status;
+}
+
+/// @return An error number, or 0.
+int spawn(const BatchCommand& command, const std::array<int, 3>& descriptors, pid_t& process_id) {
+  std::vector<char*> arguments;
+  for (const std::string& argument : command.arguments) {
+    arguments.push_back(const_cast<char*>(argument.c_str()));  // It is not written to.
+  }
+  arguments.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  if (const int error = posix_spawn_file_actions_init(&actions); error != 0) return error;
+  for (int i = 0; i < 3; ++i) {
+    posix_spawn_file_actions_adddup2(&actions, descriptors[static_cast<std::size_t>(i)], i);
+  }
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none;
+  sigemptyset(&none);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+  const int error = posix_spawnp(&process_id, arguments.front(), &actions, &attributes,
+                                 arguments.data(), environ);
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  return error;
+}
+
+}  // namespace
+
+const std::vector<BatchSystem>& batch_systems() {
+  static const std::vector<BatchSystem> systems{
+      {"slurm", slurm_submission, slurm_id, slurm_listing, slurm_allocations, slurm_cancellation},
+      {"pbs", pbs_submission, pbs_id, pbs_listing, pbs_allocations, pbs_cancellation},
+      {"condor", condor_submission, condor_id, condor_listing, condor_allocations,
+       condor_cancellation},
+      {"local", local_submission, local_id, local_listing, local_allocations, local_cancellation}};
+  return systems;
+}
+
+std::string quoted_for_shell(std::string_view text) {
+  std::string quoted = "'";
+  for (const char c : text) {
+    if (c == '\'') {
+      quoted += "'\\''";
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + "'";
+}
+
+std::string output_of(const BatchCommand& command) {
+  const std::string& program = command.arguments.front();
+  const MemoryFile input("input");
+  const MemoryFile output("output");
+  const MemoryFile errors("errors");
+  input.write_from_start(command.input);
+  pid_t process_id = 0;
+  const int error =
+      spawn(command, {input.descriptor(), output.descriptor(), errors.descriptor()}, process_id);
+  if (error != 0) {
+    throw Error(
+        fmt::format("{}: cannot be started: {}", program, std::generic_category().message(error)));
+  }
+  const std::optional<int> status = status_at_end(process_id);
+  if (!status) throw Error(fmt::format("{}: did not end within a minute", program));
+  if (*status == 0) return output.text();
+  const std::vector<std::string> words = lines_of(errors.text());
+  throw Error(fmt::format("{}: {}{}", program,
+                          WIFEXITED(*status)
+                              ? fmt::format("exit code {}", WEXITSTATUS(*status))
+                              : fmt::format("killed by signal {}", WTERMSIG(*status)),
+                          words.empty() ? "" : ": " + words.back()));
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,167 @@
+#include "coordinator/factory/batch_system.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "core/error.hpp"
+#include "tests/message_of.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using testing::AllOf;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::StartsWith;
+
+const BatchSystem& system_of(std::string_view name) {
+  return *std::ranges::find(batch_systems(), name, &BatchSystem::name);
+}
+
+AllocationConfig example() {
+  return {.name = "fleet",
+          .worker_command = "echo \"it's $1\"",
+          .walltime = std::chrono::seconds(2 * 3600 + 5 * 60 + 7),
+          .num_processors = {},
+          .options = {}};
+}
+
+/// What the shell makes of the text again.
+std::string read_by_shell(const std::string& word) {
+  return output_of({{"sh", "-c", "printf %s " + word}});
+}
+
+std::vector<std::string> ids_and_states(const std::vector<Allocation>& allocations) {
+  std::vector<std::string> texts;
+  for (const Allocation& allocation : allocations) {
+    texts.push_back(allocation.id + (allocation.is_running ? " runs" : " waits"));
+  }
+  return texts;
+}
+
+TEST(BatchSystem, QuotesForTheShell) {
+  for (const std::string text : {"", "a b", "it's", "$HOME `id` \"x\" \\", "'"}) {
+    EXPECT_EQ(read_by_shell(quoted_for_shell(text)), text);
+  }
+}
+
+// The script of Slurm and PBS, with the variable that they set.
+TEST(BatchSystem, HandsTheIdentifierToTheWorkersCommand) {
+  for (const auto& [name, variable] : {std::pair("slurm", "SLURM_JOB_ID"), {"pbs", "PBS_JOBID"}}) {
+    const BatchCommand command = system_of(name).submission(example());
+    EXPECT_THAT(command.input, StartsWith("#!/bin/bash\n"));
+    EXPECT_EQ(output_of({{"env", std::string(variable) + "=17.host", "bash"}, command.input}),
+              "it's 17.host\n");
+  }
+}
+
+TEST(BatchSystem, AsksSlurmForANodeOrForProcessors) {
+  AllocationConfig config = example();
+  config.options = {"--partition=long"};
+  EXPECT_THAT(system_of("slurm").submission(config).arguments,
+              ElementsAre("sbatch", "--parsable", "--job-name=fleet", "--nodes=1", "--ntasks=1",
+                          "--time=2:05:07", "--exclusive", "--partition=long"));
+  config.num_processors = 12;
+  EXPECT_THAT(system_of("slurm").submission(config).arguments,
+              AllOf(Contains("--cpus-per-task=12"), Not(Contains("--exclusive"))));
+}
+
+TEST(BatchSystem, ReadsWhatSlurmAnswers) {
+  const BatchSystem& slurm = system_of("slurm");
+  EXPECT_EQ(slurm.id_of("4711\n"), "4711");
+  EXPECT_EQ(slurm.id_of("4711;cluster\n"), "4711");
+  EXPECT_THAT(ids_and_states(slurm.allocations_of(
+                  example(), "17 PENDING\n18 RUNNING\n19 CONFIGURING\n20 SUSPENDED\n")),
+              ElementsAre("17 waits", "18 runs", "19 waits", "20 waits"));
+  EXPECT_THAT(slurm.allocations_of(example(), ""), IsEmpty());
+  EXPECT_THAT(slurm.cancellation("17").arguments, ElementsAre("scancel", "17"));
+}
+
+TEST(BatchSystem, AsksPbsForANodeOrForProcessors) {
+  AllocationConfig config = example();
+  EXPECT_THAT(system_of("pbs").submission(config).arguments,
+              ElementsAre("qsub", "-N", "fleet", "-l", "walltime=2:05:07", "-l", "select=1", "-l",
+                          "place=excl"));
+  config.num_processors = 12;
+  EXPECT_THAT(system_of("pbs").submission(config).arguments,
+              AllOf(Contains("select=1:ncpus=12"), Not(Contains("place=excl"))));
+}
+
+TEST(BatchSystem, ReadsWhatPbsAnswers) {
+  const BatchSystem& pbs = system_of("pbs");
+  EXPECT_EQ(pbs.id_of("17.head\n"), "17.head");
+  EXPECT_THAT(ids_and_states(pbs.allocations_of(example(), "18.head Q\n17.head R\n")),
+              ElementsAre("18.head waits", "17.head runs"));
+}
+
+// What HTCondor does with `arguments` in its new syntax: the outer double quotes go, two double
+// quotes are one, single quotes keep a word together, and two of them within are one.
+TEST(BatchSystem, QuotesForCondor) {
+  const BatchCommand command = system_of("condor").submission(example());
+  EXPECT_THAT(
+      command.input,
+      HasSubstr("arguments = \"-c 'echo \"\"it''s $1\"\"' bash $(ClusterId).$(ProcId)\"\n"));
+  EXPECT_THAT(command.input, EndsWith("queue\n"));
+}
+
+TEST(BatchSystem, ReadsWhatCondorAnswers) {
+  const BatchSystem& condor = system_of("condor");
+  EXPECT_EQ(condor.id_of("12.0 - 12.0\n"), "12.0");
+  EXPECT_THAT(ids_and_states(condor.allocations_of(example(), "12.0 1\n13.0 2\n")),
+              ElementsAre("12.0 waits", "13.0 runs"));
+}
+
+TEST(BatchSystem, FindsLocalWorkersByNameAndProcess) {
+  EXPECT_THAT(ids_and_states(system_of("local").allocations_of(
+                  example(),
+                  " 17 proofmass-worker --name fleet-17 --threads 2\n"
+                  " 18 proofmass-worker --name fleet-17 --threads 2\n"  // Its second process.
+                  " 19 proofmass-worker --name other-19\n"
+                  " 20 grep --name\n")),
+              ElementsAre("17 runs"));
+}
+
+TEST(BatchSystem, StartsLocalWorkersWithTheirProcessAsIdentifier) {
+  AllocationConfig config = example();
+  const std::string file = testing::TempDir() + "/started-by-factory";
+  config.worker_command = "echo \"$1\" $$ > " + quoted_for_shell(file + ".new") + " && mv " +
+                          quoted_for_shell(file + ".new") + " " + quoted_for_shell(file);
+  const BatchSystem& local = system_of("local");
+  const std::string id = local.id_of(output_of(local.submission(config)));
+  const std::string seen = output_of(
+      {{"sh", "-c", "until [ -e \"$0\" ]; do sleep 0.01; done; cat \"$0\"; rm \"$0\"", file}});
+  EXPECT_EQ(seen, id + " " + id + "\n");
+}
+
+TEST(BatchSystem, RefusesAnswersThatItDoesNotUnderstand) {
+  const BatchSystem& slurm = system_of("slurm");
+  EXPECT_EQ(test::message_of<Error>([&] { (void)slurm.id_of(""); }),
+            "sbatch: identifier = \"\" (must be 1 to 64 of [A-Za-z0-9._-])");
+  EXPECT_EQ(test::message_of<Error>([&] { (void)slurm.id_of("$(rm)"); }),
+            "sbatch: identifier = \"$(rm)\" (must be 1 to 64 of [A-Za-z0-9._-])");
+  EXPECT_EQ(test::message_of<Error>([&] { (void)slurm.allocations_of(example(), "17\n"); }),
+            "squeue: line = \"17\" (must be an identifier and a state)");
+}
+
+TEST(BatchSystem, SaysWhyACommandFailed) {
+  EXPECT_EQ(test::message_of<Error>([] {
+              (void)output_of({{"sh", "-c", "echo first >&2; echo no such partition >&2; exit 3"}});
+            }),
+            "sh: exit code 3: no such partition");
+  EXPECT_EQ(test::message_of<Error>([] {
+              (void)output_of({{"sh", "-c", "kill -9 $$"}});
+            }),
+            "sh: killed by signal 9");
+  EXPECT_EQ(test::message_of<Error>([] { (void)output_of({{"no-such-program"}}); }),
+            "no-such-program: cannot be started: No such file or directory");
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
