@@ -85,18 +85,18 @@ ParameterArray allowance_for_biases(const MicroscopeCampaign& campaign) {
   const Sensor& inner = instrument.sensors[0];
   const Sensor& outer = instrument.sensors[1];
   const Eigen::Vector3d tilt = make_star_tracker(campaign.scenario.noise, 0.25)
-                                   .fused_bias(instrument.star_tracker_bias_rad)
+                                   .fused_bias_S(instrument.star_tracker_bias_S_rad)
                                    .cwiseAbs();
-  const Eigen::Vector3d b1d = -0.5 * (inner.parasitic_m_s2 - outer.parasitic_m_s2);
+  const Eigen::Vector3d b1d = -0.5 * (inner.parasitic_K_m_s2 - outer.parasitic_K_m_s2);
   const double k2d = 0.5 * (inner.quadratic_s2_m.x() - outer.quadratic_s2_m.x());
   const double kappa = std::abs(2.0 * k2d * b1d.x());
-  const Eigen::Matrix3d common = 0.5 * (inner.sensitivity() + outer.sensitivity());
-  const Eigen::Matrix3d difference = 0.5 * (inner.sensitivity() - outer.sensitivity());
+  const Eigen::Matrix3d common = 0.5 * (inner.sensitivity_KS() + outer.sensitivity_KS());
+  const Eigen::Matrix3d difference = 0.5 * (inner.sensitivity_KS() - outer.sensitivity_KS());
   const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
-  const Eigen::Vector3d turned = 0.5 * ((inner.alignment() - one) * inner.parasitic_m_s2 +
-                                        (outer.alignment() - one) * outer.parasitic_m_s2);
+  const Eigen::Vector3d turned = 0.5 * ((inner.alignment_KS() - one) * inner.parasitic_K_m_s2 +
+                                        (outer.alignment_KS() - one) * outer.parasitic_K_m_s2);
   const Eigen::Vector3d left = common.inverse() * (difference * b1d + turned);
-  const Eigen::Vector3d delta = instrument.offcentring_m.cwiseAbs();
+  const Eigen::Vector3d delta = instrument.offcentring_S_m.cwiseAbs();
   const ParameterArray truth = true_parameters(instrument, 0.0);
 
   ParameterArray allowance{};
@@ -311,10 +311,10 @@ TEST_P(RecoveryOfADraw, IsWithinOneFiftiethInAFrameThatSpins) {
 TEST(RecoveryInAFrameThatSpins, FindsTheCentrifugalAccelerationInADPrime) {
   constexpr double k2c = 14000.0;
   constexpr double delta_x = 20e-6;
-  const auto error_with = [&](double offcentring_m) {
+  const auto error_with = [&](double offcentring_S_m) {
     MicroscopeCampaign campaign = silent_campaign();
     excite(campaign, Parameter::k2c);
-    set(campaign, "offcentring_m.x", offcentring_m);
+    set(campaign, "offcentring_m.x", offcentring_S_m);
     spin_sessions(campaign);
     return RunPlan(campaign).simulate(RunIndex{0}, {}).error(index(Parameter::a_d11_prime));
   };

@@ -37,42 +37,44 @@ struct AttitudeGains {
 /// which the third state takes up. In continuous time LP = (3ω_h s² + 3ω_h² s + ω_h³)/(s + ω_h)³.
 template <typename T>
 struct AttitudeEstimator {
-  Vector3<T> angle;  ///< θ̂, error against the reference attitude, rad.
-  Vector3<T> rate;   ///< Rate against the reference, rad/s.
-  Vector3<T> bias;   ///< Of the angular accelerometer, rad/s².
+  Vector3<T> angle_RS_S;  ///< θ̂, error against the reference attitude, rad.
+  Vector3<T> omega_RS_S;  ///< Rate against the reference, rad/s.
+  Vector3<T> bias_S;      ///< Of the angular accelerometer, rad/s².
 
   /// Takes up the star tracker's angles of this sample.
-  PROOFMASS_INLINE void correct(const AttitudeGains& gains, const Vector3<T>& star_tracker) {
-    const Vector3<T> innovation = star_tracker - angle;
-    angle += T(gains.blend_angle) * innovation;
-    rate += T(gains.blend_rate_per_s) * innovation;
-    bias += T(-gains.blend_bias_per_s2) * innovation;
+  PROOFMASS_INLINE void correct(const AttitudeGains& gains, const Vector3<T>& star_tracker_S) {
+    const Vector3<T> innovation_S = star_tracker_S - angle_RS_S;
+    angle_RS_S += T(gains.blend_angle) * innovation_S;
+    omega_RS_S += T(gains.blend_rate_per_s) * innovation_S;
+    bias_S += T(-gains.blend_bias_per_s2) * innovation_S;
   }
 
   /// Carries the estimate to the next sample with the measured acceleration of this one, which acts
   /// until then.
-  /// @param reference_rate  Ω of the rotating reference, in S.
-  PROOFMASS_INLINE void predict(const AttitudeGains& gains, const Vector3<T>& acceleration,
-                                const Vector3<T>& reference_rate) {
+  /// @param omega_IR_S  Ω of the rotating reference, in S.
+  PROOFMASS_INLINE void predict(const AttitudeGains& gains, const Vector3<T>& omega_dot_IS_S,
+                                const Vector3<T>& omega_IR_S) {
     const T period = T(gains.sample_period_s);
-    const Vector3<T> corrected = acceleration - bias;
-    const Vector3<T> rotation = rate - cross(reference_rate, angle) + (T(0.5) * period) * corrected;
-    angle += period * rotation;
-    rate += period * corrected;
+    const Vector3<T> corrected_S = omega_dot_IS_S - bias_S;
+    const Vector3<T> mean_rate_S =
+        omega_RS_S - cross(omega_IR_S, angle_RS_S) + (T(0.5) * period) * corrected_S;
+    angle_RS_S += period * mean_rate_S;
+    omega_RS_S += period * corrected_S;
   }
 };
 
 /// Proportional-derivative control of the estimated angle with a slow integral.
 template <typename T>
 struct AttitudeController {
-  Vector3<T> integral;  ///< ∫θ̂ dt, rad·s.
+  Vector3<T> angle_integral_S;  ///< ∫θ̂ dt, rad·s.
 
   /// @returns Angular acceleration to be applied from the next sample on, rad/s².
   PROOFMASS_INLINE Vector3<T> advance(const AttitudeGains& gains,
                                       const AttitudeEstimator<T>& estimate) {
-    integral += T(gains.sample_period_s) * estimate.angle;
-    return -(T(gains.stiffness_per_s2) * estimate.angle + T(gains.damping_per_s) * estimate.rate +
-             T(gains.integral_per_s3) * integral);
+    angle_integral_S += T(gains.sample_period_s) * estimate.angle_RS_S;
+    return -(T(gains.stiffness_per_s2) * estimate.angle_RS_S +
+             T(gains.damping_per_s) * estimate.omega_RS_S +
+             T(gains.integral_per_s3) * angle_integral_S);
   }
 };
 

@@ -32,15 +32,15 @@ struct DragFreeGains {
 /// where z⁻¹ is the sample that passes until the command acts.
 template <typename T>
 struct DragFreeController {
-  Vector3<T> first;   ///< Output of the first integrator, m/s².
-  Vector3<T> second;  ///< Output of the second.
+  Vector3<T> first_integral_S;   ///< Output of the first integrator, m/s².
+  Vector3<T> second_integral_S;  ///< Output of the second.
 
   /// @param input  Γ_mes less the known bias, plus C_cal, m/s².
   /// @returns Γ_DF, the acceleration to be cancelled from the next sample on.
-  PROOFMASS_INLINE Vector3<T> advance(const DragFreeGains& gains, const Vector3<T>& input) {
-    first += T(gains.proportional) * input;
-    second += T(gains.integral) * first;
-    return first + second;
+  PROOFMASS_INLINE Vector3<T> advance(const DragFreeGains& gains, const Vector3<T>& input_S) {
+    first_integral_S += T(gains.proportional) * input_S;
+    second_integral_S += T(gains.integral) * first_integral_S;
+    return first_integral_S + second_integral_S;
   }
 };
 

@@ -50,8 +50,8 @@ Eigen::Matrix3d Sensor::symmetric_part() const {
   return m;
 }
 
-Eigen::Matrix3d Sensor::alignment() const {
-  const Eigen::Vector3d& theta = misalignment_rad;
+Eigen::Matrix3d Sensor::alignment_KS() const {
+  const Eigen::Vector3d& theta = misalignment_SK_rad;
   Eigen::Matrix3d m;
   m << 1.0, theta.z(), -theta.y(),  //
       -theta.z(), 1.0, theta.x(),   //
@@ -59,8 +59,8 @@ Eigen::Matrix3d Sensor::alignment() const {
   return m;
 }
 
-Eigen::Matrix3d Sensor::sensitivity() const {
-  return symmetric_part() + alignment() - Eigen::Matrix3d::Identity();
+Eigen::Matrix3d Sensor::sensitivity_KS() const {
+  return symmetric_part() + alignment_KS() - Eigen::Matrix3d::Identity();
 }
 
 Instrument make_instrument(const DrawnValues& values) {
@@ -75,16 +75,16 @@ Instrument make_instrument(const DrawnValues& values) {
   for (std::size_t k = 0; k < 2; ++k) {
     Sensor& sensor = instrument.sensors[k];
     sensor.scale_factor = Eigen::Vector3d::Ones() + scale_factor_error.vector();
-    sensor.misalignment_rad = misalignment.vector();
+    sensor.misalignment_SK_rad = misalignment.vector();
     sensor.coupling_rad = coupling.vector();
     sensor.quadratic_s2_m = quadratic.vector();
-    sensor.read_out_bias_m_s2 = read_out_bias.vector();
-    sensor.parasitic_m_s2 = parasitic.vector();
-    instrument.star_tracker_bias_rad[k] = star_tracker_bias.vector();
+    sensor.read_out_bias_K_m_s2 = read_out_bias.vector();
+    sensor.parasitic_K_m_s2 = parasitic.vector();
+    instrument.star_tracker_bias_S_rad[k] = star_tracker_bias.vector();
   }
-  instrument.offcentring_m = GroupReader(values, "offcentring_m").vector();
-  instrument.centre_offset_m = GroupReader(values, "centre_of_mass_offset_m").vector();
-  instrument.angular_bias_rad_s2 = GroupReader(values, "angular_bias_rad_s2").vector();
+  instrument.offcentring_S_m = GroupReader(values, "offcentring_m").vector();
+  instrument.centre_offset_S_m = GroupReader(values, "centre_of_mass_offset_m").vector();
+  instrument.angular_bias_S_rad_s2 = GroupReader(values, "angular_bias_rad_s2").vector();
 
   const Eigen::Vector3d thrust = GroupReader(values, "thruster_scale_error").vector();
   GroupReader thrust_coupling(values, "thruster_coupling_rad");  // xy xz yx yz zx zy
@@ -98,8 +98,8 @@ Instrument make_instrument(const DrawnValues& values) {
 }
 
 SensitivityMatrices sensitivity_matrices(const Instrument& instrument) {
-  const Eigen::Matrix3d m1 = instrument.sensors[0].sensitivity();
-  const Eigen::Matrix3d m2 = instrument.sensors[1].sensitivity();
+  const Eigen::Matrix3d m1 = instrument.sensors[0].sensitivity_KS();
+  const Eigen::Matrix3d m2 = instrument.sensors[1].sensitivity_KS();
   const Eigen::Matrix3d common = 0.5 * (m1 + m2);
   const Eigen::Matrix3d difference = 0.5 * (m1 - m2);
   const Eigen::Matrix3d ratio = difference * common.inverse();
@@ -113,13 +113,13 @@ ParameterArray true_parameters(const Instrument& instrument, double bias_error_x
   const double k1c = 0.5 * (inner.scale_factor.x() + outer.scale_factor.x());
   const double k2c = 0.5 * (inner.quadratic_s2_m.x() + outer.quadratic_s2_m.x());
   const double k2d = 0.5 * (inner.quadratic_s2_m.x() - outer.quadratic_s2_m.x());
-  const double b1d = -0.5 * (inner.parasitic_m_s2.x() - outer.parasitic_m_s2.x());
+  const double b1d = -0.5 * (inner.parasitic_K_m_s2.x() - outer.parasitic_K_m_s2.x());
 
   ParameterArray truth{};
   const auto at = [&truth](Parameter parameter) -> double& { return truth[index(parameter)]; };
-  at(Parameter::a_c11_delta_x) = a_c(0, 0) * instrument.offcentring_m.x();
-  at(Parameter::a_c11_delta_z) = a_c(0, 0) * instrument.offcentring_m.z();
-  at(Parameter::a_c11_delta_y) = a_c(0, 0) * instrument.offcentring_m.y();
+  at(Parameter::a_c11_delta_x) = a_c(0, 0) * instrument.offcentring_S_m.x();
+  at(Parameter::a_c11_delta_z) = a_c(0, 0) * instrument.offcentring_S_m.z();
+  at(Parameter::a_c11_delta_y) = a_c(0, 0) * instrument.offcentring_S_m.y();
   at(Parameter::a_c12) = a_c(0, 1);
   at(Parameter::a_c13) = a_c(0, 2);
   at(Parameter::a_d11_prime) =

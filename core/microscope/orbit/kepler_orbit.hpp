@@ -19,8 +19,8 @@ struct OrbitConfig {
 /// of a turn on).
 template <typename T>
 struct OrbitPointOf {
-  T direction_x;  ///< û_I = (cos ν, 0, sin ν), from the Earth to the satellite.
-  T direction_z;
+  T radial_I_x;  ///< û_I = (cos ν, 0, sin ν), from the Earth to the satellite.
+  T radial_I_z;
   T gradient_s2;                 ///< μ/r³.
   SineCosineOf<T> mean_anomaly;  ///< Of n·t.
 };
@@ -92,8 +92,8 @@ class KeplerOrbit {
     const T e = T(eccentricity_);
     const T radius_ratio = T(1.0) - e * cosine;  // r/a
     const T inverse = T(1.0) / radius_ratio;
-    return {.direction_x = (cosine - e) * inverse,
-            .direction_z = T(minor_ratio_) * sine * inverse,
+    return {.radial_I_x = (cosine - e) * inverse,
+            .radial_I_z = T(minor_ratio_) * sine * inverse,
             .gradient_s2 = T(mean_motion_rad_s_ * mean_motion_rad_s_) * inverse * inverse * inverse,
             .mean_anomaly = newton.mean};
   }

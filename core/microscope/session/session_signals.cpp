@@ -49,7 +49,7 @@ SessionSignals::Reference SessionSignals::reference_at_start() const {
 
 SessionSignals::Reference SessionSignals::reference_from(const SineCosine& phase) const {
   return {.attitude_IR = {phase.cosine, {0.0, phase.sine, 0.0}},
-          .rate = {0.0, spin_rate_rad_s_, 0.0}};
+          .omega_IR_R = {0.0, spin_rate_rad_s_, 0.0}};
 }
 
 SharedSample SessionSignals::next() {
@@ -69,17 +69,17 @@ void SessionSignals::advance(const SamplePhases& phases, SharedSample& sample) {
   const OrbitPoint& point = phases.orbit;
   const Reference reference = reference_from(phases.reference);
   sample.gradient_s2 = point.gradient_s2;
-  sample.earth_direction_I = {point.direction_x, 0.0, point.direction_z};
-  sample.reference_IR = reference.attitude_IR;
-  sample.reference_rate = reference.rate;
-  sample.earth_direction_R = to_target(reference.attitude_IR, sample.earth_direction_I);
-  sample.external = environment_.at(time_s(0), point);
+  sample.radial_I = {point.radial_I_x, 0.0, point.radial_I_z};
+  sample.attitude_IR = reference.attitude_IR;
+  sample.omega_IR_R = reference.omega_IR_R;
+  sample.radial_R = to_target(reference.attitude_IR, sample.radial_I);
+  sample.external_S = environment_.at(time_s(0), point);
   if (turns_environment_) [[unlikely]]
-    turn(reference.attitude_IR, sample.external);
+    turn(reference.attitude_IR, sample.external_S);
   if (num_excitations_ > 0) excite(phases, sample);
-  commanded_.correct(gains_, sample.attitude_command_rad);
+  commanded_.correct(gains_, sample.attitude_command_S_rad);
   sample.commanded = commanded_;
-  commanded_.predict(gains_, {}, sample.reference_rate);
+  commanded_.predict(gains_, {}, sample.omega_IR_R);
   ++next_;
 }
 
@@ -98,10 +98,10 @@ void SessionSignals::excite(const SamplePhases& phases, SharedSample& sample) co
     const double value = excitation.amplitude * phase.sine;
     switch (excitation.kind) {
       case ExcitationKind::attitude:
-        put(sample.attitude_command_rad[axis], is_turned[axis], value);
+        put(sample.attitude_command_S_rad[axis], is_turned[axis], value);
         break;
       case ExcitationKind::drag_free:
-        put(sample.drag_free_command_m_s2[axis], is_pushed[axis], value);
+        put(sample.drag_free_command_S_m_s2[axis], is_pushed[axis], value);
         break;
       case ExcitationKind::test_mass: {
         const double omega = 2.0 * std::numbers::pi * excitation.frequency_hz;

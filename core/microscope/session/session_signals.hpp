@@ -21,16 +21,16 @@ namespace proofmass {
 
 /// What every run of a campaign sees alike at one sample of a session.
 struct SharedSample {
-  double gradient_s2 = 0.0;           ///< μ/r³.
-  Vector3<double> earth_direction_I;  ///< û.
-  Vector3<double> earth_direction_R;  ///< The same in the frame that the attitude loop holds.
-  Quaternion<double> reference_IR;    ///< Attitude of that frame.
-  Vector3<double> reference_rate;     ///< Its Ω, rad/s.
-  ExternalAcceleration external;
-  Vector3<double> drag_free_command_m_s2;  ///< C_cal.
-  Vector3<double> attitude_command_rad;    ///< Added to the star tracker's output.
-  AttitudeEstimator<double> commanded;     ///< What that command alone makes of the estimate.
-  MassMotionPhase mass_motion;             ///< Of the moving test masses.
+  double gradient_s2 = 0.0;         ///< μ/r³.
+  Vector3<double> radial_I;         ///< û.
+  Vector3<double> radial_R;         ///< The same in the frame that the attitude loop holds.
+  Quaternion<double> attitude_IR;  ///< Attitude of that frame.
+  Vector3<double> omega_IR_R;       ///< Its Ω, rad/s.
+  ExternalAcceleration external_S;
+  Vector3<double> drag_free_command_S_m_s2;  ///< C_cal.
+  Vector3<double> attitude_command_S_rad;    ///< Added to the star tracker's output.
+  AttitudeEstimator<double> commanded;       ///< What that command alone makes of the estimate.
+  MassMotionPhase mass_motion;               ///< Of the moving test masses.
 };
 
 /// What a sample takes from sines and cosines: functions of its time alone.
@@ -58,7 +58,7 @@ class SessionSignals {
   /// Attitude and rate of the reference at the first sample.
   struct Reference {
     Quaternion<double> attitude_IR;
-    Vector3<double> rate;
+    Vector3<double> omega_IR_R;
   };
   [[nodiscard]] Reference reference_at_start() const;
 

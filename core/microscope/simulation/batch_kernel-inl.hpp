@@ -48,11 +48,11 @@ HWY_INLINE SensorModel<Batch> gather_sensor(ConstantsOfLanes constants, std::siz
   const auto sensor = [&](std::size_t lane) -> const SensorModel<double>& {
     return constants[lane].sensors[k];
   };
-  return {gather_vector([&](std::size_t lane) { return sensor(lane).rest_position_m; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).motion_direction; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).parasitic_m_s2; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).offset_m_s2; }),
-          gather_matrix([&](std::size_t lane) { return sensor(lane).sensitivity; }),
+  return {gather_vector([&](std::size_t lane) { return sensor(lane).rest_position_S_m; }),
+          gather_vector([&](std::size_t lane) { return sensor(lane).motion_direction_S; }),
+          gather_vector([&](std::size_t lane) { return sensor(lane).parasitic_K_m_s2; }),
+          gather_vector([&](std::size_t lane) { return sensor(lane).offset_K_m_s2; }),
+          gather_matrix([&](std::size_t lane) { return sensor(lane).sensitivity_KS; }),
           gather_vector([&](std::size_t lane) { return sensor(lane).quadratic_s2_m; })};
 }
 
@@ -60,10 +60,10 @@ HWY_INLINE LoopConstants<Batch> gather_constants(ConstantsOfLanes of) {
   return {{gather_sensor(of, 0), gather_sensor(of, 1)},
           {gather([&](std::size_t lane) { return of[lane].drag_free_weight[0]; }),
            gather([&](std::size_t lane) { return of[lane].drag_free_weight[1]; })},
-          gather_vector([&](std::size_t lane) { return of[lane].subtracted_bias_m_s2; }),
+          gather_vector([&](std::size_t lane) { return of[lane].subtracted_bias_S_m_s2; }),
           gather_matrix([&](std::size_t lane) { return of[lane].thrust_matrix; }),
-          gather_vector([&](std::size_t lane) { return of[lane].angular_bias_rad_s2; }),
-          gather_vector([&](std::size_t lane) { return of[lane].star_tracker_bias_rad; }),
+          gather_vector([&](std::size_t lane) { return of[lane].angular_bias_S_rad_s2; }),
+          gather_vector([&](std::size_t lane) { return of[lane].star_tracker_bias_S_rad; }),
           of[0].sensor_range_m_s2};
 }
 
@@ -192,8 +192,8 @@ double PROOFMASS_NAME(make_noise_, PROOFMASS_KERNEL_SET)(const BatchSession& ses
         continue;
       }
       const SampleNoise<Batch> sample = noise.next();
-      const Vector3<Batch> total = sample.sensor[0] + sample.sensor[1] + sample.angular +
-                                   sample.star_tracker + sample.thrust + sample.torque;
+      const Vector3<Batch> total = sample.sensor_K[0] + sample.sensor_K[1] + sample.angular_S +
+                                   sample.star_tracker_S + sample.thrust_S + sample.torque_S;
       sum = sum + total.x + total.y + total.z;
     }
   }

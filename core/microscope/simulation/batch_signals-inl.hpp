@@ -71,7 +71,7 @@ class BatchSignals {
   }
 
   HWY_INLINE void scatter(const SamplePhasesOf<Batch>& phases) {
-    const Lanes x(phases.orbit.direction_x), z(phases.orbit.direction_z),
+    const Lanes x(phases.orbit.radial_I_x), z(phases.orbit.radial_I_z),
         gradient(phases.orbit.gradient_s2), mean_sine(phases.orbit.mean_anomaly.sine),
         mean_cosine(phases.orbit.mean_anomaly.cosine), reference_sine(phases.reference.sine),
         reference_cosine(phases.reference.cosine);

@@ -26,16 +26,17 @@ std::array<double, 2> motion_factors(const Session& session) {
   return {0.0, 0.0};
 }
 
-SensorModel<double> make_sensor_model(const Sensor& sensor, const Eigen::Vector3d& rest_position_m,
-                                      const Eigen::Vector3d& motion_direction) {
+SensorModel<double> make_sensor_model(const Sensor& sensor,
+                                      const Eigen::Vector3d& rest_position_S_m,
+                                      const Eigen::Vector3d& motion_direction_S) {
   // measured_acceleration() applies [M] to Γ_App + p, so only the last two terms with p are
   // constant.
-  const Eigen::Vector3d& p = sensor.parasitic_m_s2;
-  return {.rest_position_m = vector(rest_position_m),
-          .motion_direction = vector(motion_direction),
-          .parasitic_m_s2 = vector(p),
-          .offset_m_s2 = vector(sensor.read_out_bias_m_s2 - sensor.symmetric_part() * p),
-          .sensitivity = matrix(sensor.sensitivity()),
+  const Eigen::Vector3d& p = sensor.parasitic_K_m_s2;
+  return {.rest_position_S_m = vector(rest_position_S_m),
+          .motion_direction_S = vector(motion_direction_S),
+          .parasitic_K_m_s2 = vector(p),
+          .offset_K_m_s2 = vector(sensor.read_out_bias_K_m_s2 - sensor.symmetric_part() * p),
+          .sensitivity_KS = matrix(sensor.sensitivity_KS()),
           .quadratic_s2_m = vector(sensor.quadratic_s2_m)};
 }
 
@@ -69,21 +70,21 @@ LoopConstants<double> make_loop_constants(const Instrument& instrument, const Sc
     Eigen::Vector3d direction = Eigen::Vector3d::Zero();
     if (factors[k] != 0.0) {
       const auto axis = static_cast<Eigen::Index>(index(mass_excitation(session)->axis));
-      direction = factors[k] * sensor.alignment().transpose().col(axis);
+      direction = factors[k] * sensor.alignment_KS().transpose().col(axis);
     }
     constants.sensors[k] = make_sensor_model(
-        sensor, instrument.centre_offset_m + side * instrument.offcentring_m, direction);
-    subtracted_bias += weights[k] * sensor.read_out_bias_m_s2;
+        sensor, instrument.centre_offset_S_m + side * instrument.offcentring_S_m, direction);
+    subtracted_bias += weights[k] * sensor.read_out_bias_K_m_s2;
   }
   constants.sensor_range_m_s2 = scenario.sensor.range_m_s2;
   constants.drag_free_weight = weights;
-  constants.subtracted_bias_m_s2 = vector(subtracted_bias);
+  constants.subtracted_bias_S_m_s2 = vector(subtracted_bias);
   constants.thrust_matrix = matrix(instrument.thrust_matrix);
-  constants.angular_bias_rad_s2 = vector(instrument.angular_bias_rad_s2);
+  constants.angular_bias_S_rad_s2 = vector(instrument.angular_bias_S_rad_s2);
   const StarTracker star_tracker =
       make_star_tracker(scenario.noise, scenario.simulation.sample_period_s);
-  constants.star_tracker_bias_rad =
-      vector(star_tracker.fused_bias(instrument.star_tracker_bias_rad));
+  constants.star_tracker_bias_S_rad =
+      vector(star_tracker.fused_bias_S(instrument.star_tracker_bias_S_rad));
   return constants;
 }
 

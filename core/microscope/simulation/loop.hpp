@@ -19,20 +19,20 @@ template <typename T>
 struct LoopConstants {
   std::array<SensorModel<T>, 2> sensors;
   std::array<T, 2> drag_free_weight;  ///< Of each sensor's measurement in the loop's input.
-  Vector3<T> subtracted_bias_m_s2;    ///< Known read-out bias of that input.
+  Vector3<T> subtracted_bias_S_m_s2;  ///< Known read-out bias of that input.
   Matrix3<T> thrust_matrix;           ///< [M_DF].
-  Vector3<T> angular_bias_rad_s2;
-  Vector3<T> star_tracker_bias_rad;
+  Vector3<T> angular_bias_S_rad_s2;
+  Vector3<T> star_tracker_bias_S_rad;
   double sensor_range_m_s2 = 0.0;  ///< The same for every lane.
 };
 
 /// What the instrument and the on-board estimator report at one sample.
 template <typename T>
 struct Observation {
-  std::array<Vector3<T>, 2> measured;  ///< Γ_mes,k, m/s².
-  std::array<T, 2> kinematic_x;        ///< Γ_App,k + p_k along X, m/s².
-  Vector3<T> measured_angular;         ///< rad/s².
-  AttitudeEstimator<T> attitude;       ///< With the commanded motion still in its angles.
+  std::array<Vector3<T>, 2> measured_K;  ///< Γ_mes,k, m/s².
+  std::array<T, 2> kinematic_S_x;        ///< Γ_App,k + p_k along X, m/s².
+  Vector3<T> measured_omega_dot_IS_S;    ///< rad/s².
+  AttitudeEstimator<T> attitude;         ///< With the commanded motion still in its angles.
 };
 
 /// Whether the largest acceleration and angle are looked at in a sample: in every fourth it costs
@@ -50,9 +50,9 @@ enum class Watch : std::uint8_t { no, yes };
 template <typename T>
 struct Loop {
   Quaternion<T> attitude_IS;
-  Vector3<T> rate;            ///< Ω in S, rad/s.
-  Vector3<T> thrust_command;  ///< Γ_DF of the sample before, m/s².
-  Vector3<T> torque_command;  ///< rad/s².
+  Vector3<T> omega_IS_S;        ///< Ω in S, rad/s.
+  Vector3<T> thrust_command_S;  ///< Γ_DF of the sample before, m/s².
+  Vector3<T> torque_command_S;  ///< rad/s².
   DragFreeController<T> drag_free;
   AttitudeEstimator<T> estimator;
   AttitudeController<T> controller;
@@ -63,7 +63,7 @@ struct Loop {
   /// Puts the satellite at rest in its reference attitude.
   void begin(const SessionSignals::Reference& reference) {
     attitude_IS = {T(reference.attitude_IR.scalar), broadcast<T>(reference.attitude_IR.vector)};
-    rate = broadcast<T>(reference.rate);
+    omega_IS_S = broadcast<T>(reference.omega_IR_R);
   }
 
   /// Forgets what the loops did while they settled.
@@ -78,64 +78,64 @@ struct Loop {
                                           const SharedSample& shared, const SampleNoise<T>& noise,
                                           Watch watch = Watch::yes) {
     // Γ_sat = Γ_propu + Γ_ext, Γ_propu = −[M_DF] Γ_DF + Γ_n,DF
-    const Vector3<T> thrust = noise.thrust - constants.thrust_matrix * thrust_command;
-    const Vector3<T> angular_acceleration =
-        torque_command + noise.torque + broadcast<T>(shared.external.angular_rad_s2);
+    const Vector3<T> thrust_S = noise.thrust_S - constants.thrust_matrix * thrust_command_S;
+    const Vector3<T> omega_dot_IS_S =
+        torque_command_S + noise.torque_S + broadcast<T>(shared.external_S.angular_rad_s2);
     const SatelliteMotion<T> satellite{
-        .acceleration = thrust + broadcast<T>(shared.external.linear_m_s2),
+        .acceleration_S = thrust_S + broadcast<T>(shared.external_S.linear_m_s2),
         .gradient_s2 = shared.gradient_s2,
-        .earth_direction = to_target(attitude_IS, broadcast<T>(shared.earth_direction_I)),
-        .rate = rate,
-        .angular_acceleration = angular_acceleration};
+        .radial_S = to_target(attitude_IS, broadcast<T>(shared.radial_I)),
+        .omega_IS_S = omega_IS_S,
+        .omega_dot_IS_S = omega_dot_IS_S};
 
     Observation<T> observation;
     for (std::size_t k = 0; k < 2; ++k) {
       const SensorModel<T>& sensor = constants.sensors[k];
-      const Vector3<T> kinematic = kinematic_acceleration(sensor, satellite, shared.mass_motion);
-      observation.kinematic_x[k] = kinematic.x;
-      observation.measured[k] = measured_acceleration(sensor, kinematic) + noise.sensor[k];
+      const Vector3<T> kinematic_S = kinematic_acceleration(sensor, satellite, shared.mass_motion);
+      observation.kinematic_S_x[k] = kinematic_S.x;
+      observation.measured_K[k] = measured_acceleration(sensor, kinematic_S) + noise.sensor_K[k];
     }
     if (watch == Watch::yes) {
-      for (const Vector3<T>& measured : observation.measured) {
+      for (const Vector3<T>& measured : observation.measured_K) {
         largest_acceleration = largest_magnitude(measured, largest_acceleration);
       }
       is_any_saturated = is_any_above(largest_acceleration, constants.sensor_range_m_s2);
     }
     if (is_any_saturated) [[unlikely]] {
       const T limit = limit_where_above(largest_acceleration, constants.sensor_range_m_s2);
-      for (Vector3<T>& measured : observation.measured) measured = clamped(measured, limit);
+      for (Vector3<T>& measured : observation.measured_K) measured = clamped(measured, limit);
     }
-    observation.measured_angular =
-        angular_acceleration + constants.angular_bias_rad_s2 + noise.angular;
+    observation.measured_omega_dot_IS_S =
+        omega_dot_IS_S + constants.angular_bias_S_rad_s2 + noise.angular_S;
 
-    const Quaternion<T> reference{T(shared.reference_IR.scalar),
-                                  broadcast<T>(shared.reference_IR.vector)};
-    estimator.correct(attitude_gains, error_angles(conjugate(reference) * attitude_IS) +
-                                          constants.star_tracker_bias_rad + noise.star_tracker +
-                                          broadcast<T>(shared.attitude_command_rad));
+    const Quaternion<T> reference_IR{T(shared.attitude_IR.scalar),
+                                     broadcast<T>(shared.attitude_IR.vector)};
+    estimator.correct(attitude_gains, error_angles(conjugate(reference_IR) * attitude_IS) +
+                                          constants.star_tracker_bias_S_rad + noise.star_tracker_S +
+                                          broadcast<T>(shared.attitude_command_S_rad));
     observation.attitude = estimator;
-    if (watch == Watch::yes) largest_angle = largest_magnitude(estimator.angle, largest_angle);
-    torque_command = controller.advance(attitude_gains, estimator);
-    estimator.predict(attitude_gains, observation.measured_angular,
-                      broadcast<T>(shared.reference_rate));
+    if (watch == Watch::yes) largest_angle = largest_magnitude(estimator.angle_RS_S, largest_angle);
+    torque_command_S = controller.advance(attitude_gains, estimator);
+    estimator.predict(attitude_gains, observation.measured_omega_dot_IS_S,
+                      broadcast<T>(shared.omega_IR_R));
 
-    thrust_command = drag_free.advance(drag_free_gains,
-                                       constants.drag_free_weight[0] * observation.measured[0] +
-                                           constants.drag_free_weight[1] * observation.measured[1] -
-                                           constants.subtracted_bias_m_s2 +
-                                           broadcast<T>(shared.drag_free_command_m_s2));
-    rotate(angular_acceleration, attitude_gains.sample_period_s);
+    thrust_command_S = drag_free.advance(
+        drag_free_gains, constants.drag_free_weight[0] * observation.measured_K[0] +
+                             constants.drag_free_weight[1] * observation.measured_K[1] -
+                             constants.subtracted_bias_S_m_s2 +
+                             broadcast<T>(shared.drag_free_command_S_m_s2));
+    rotate(omega_dot_IS_S, attitude_gains.sample_period_s);
     return observation;
   }
 
   /// One sample of rotation under a constant angular acceleration in S. The last term is the first
   /// of the rotation vector's series in the non-commuting rates [Bortz1971].
-  PROOFMASS_INLINE void rotate(const Vector3<T>& angular_acceleration, double period_s) {
+  PROOFMASS_INLINE void rotate(const Vector3<T>& omega_dot_IS_S, double period_s) {
     const Vector3<T> rotation =
-        T(period_s) * rate + T(0.5 * period_s * period_s) * angular_acceleration +
-        T(period_s * period_s * period_s / 12.0) * cross(rate, angular_acceleration);
+        T(period_s) * omega_IS_S + T(0.5 * period_s * period_s) * omega_dot_IS_S +
+        T(period_s * period_s * period_s / 12.0) * cross(omega_IS_S, omega_dot_IS_S);
     attitude_IS = normalised(attitude_IS * rotation_by(rotation));
-    rate += T(period_s) * angular_acceleration;
+    omega_IS_S += T(period_s) * omega_dot_IS_S;
   }
 };
 

@@ -41,13 +41,13 @@ struct LoopMonitor {
   PROOFMASS_INLINE void add(const std::array<SensorModel<T>, 2>& sensors,
                             const Observation<T>& observation, const double* weights) {
     const T half = T(0.5);
-    const Vector3<T>& m1 = observation.measured[0];
-    const Vector3<T>& m2 = observation.measured[1];
+    const Vector3<T>& m1 = observation.measured_K[0];
+    const Vector3<T>& m2 = observation.measured_K[1];
     const Vector3<T> common = half * (m1 + m2);
     const auto square = [](const T& x) { return x * x; };
     const auto term = [&](std::size_t k) {
       return sensors[k].quadratic_s2_m.x *
-             square(observation.kinematic_x[k] - sensors[k].parasitic_m_s2.x);
+             square(observation.kinematic_S_x[k] - sensors[k].parasitic_K_m_s2.x);
     };
     quadratic.add(half * (term(0) - term(1)));
     common_square.add(square(common.x));

@@ -22,7 +22,7 @@ NoiseShape scaled_shape(const SensorNoise& noise, double scale, double sample_pe
 
 NoiseModel make_noise_model(const NoiseConfig& config, double sample_period_s) {
   const double per_sample = config.scale / std::sqrt(2.0 * sample_period_s);
-  const Eigen::Matrix3d star = make_star_tracker(config, sample_period_s).noise_factor;
+  const Eigen::Matrix3d star = make_star_tracker(config, sample_period_s).noise_factor_S_rad;
   return {.linear_x = scaled_shape(config.linear_x, config.scale, sample_period_s),
           .linear_yz = scaled_shape(config.linear_yz, config.scale, sample_period_s),
           .angular = scaled_shape(config.angular, config.scale, sample_period_s),

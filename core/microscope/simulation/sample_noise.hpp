@@ -16,11 +16,11 @@ namespace proofmass {
 /// All noise of one sample, SI.
 template <typename T>
 struct SampleNoise {
-  std::array<Vector3<T>, 2> sensor;  ///< Γ_n,k, m/s².
-  Vector3<T> angular;                ///< Of the measured angular acceleration, rad/s².
-  Vector3<T> star_tracker;           ///< Of the fused angles, rad.
-  Vector3<T> thrust;                 ///< Γ_n,DF, m/s².
-  Vector3<T> torque;                 ///< Angular actuation, rad/s².
+  std::array<Vector3<T>, 2> sensor_K;  ///< Γ_n,k, m/s².
+  Vector3<T> angular_S;                ///< Of the measured angular acceleration, rad/s².
+  Vector3<T> star_tracker_S;           ///< Of the fused angles, rad.
+  Vector3<T> thrust_S;                 ///< Γ_n,DF, m/s².
+  Vector3<T> torque_S;                 ///< Angular actuation, rad/s².
 };
 
 /// Colours and levels, the same for every run.
@@ -78,19 +78,19 @@ PROOFMASS_INLINE SampleNoise<T> shape_sample(const NoiseModel& model, NoiseState
   };
   SampleNoise<T> noise;
   for (std::size_t k = 0; k < 2; ++k) {
-    noise.sensor[k] = {states[3 * k].advance(model.linear_x, white(3 * k)),
-                       states[3 * k + 1].advance(model.linear_yz, white(3 * k + 1)),
-                       states[3 * k + 2].advance(model.linear_yz, white(3 * k + 2))};
+    noise.sensor_K[k] = {states[3 * k].advance(model.linear_x, white(3 * k)),
+                         states[3 * k + 1].advance(model.linear_yz, white(3 * k + 1)),
+                         states[3 * k + 2].advance(model.linear_yz, white(3 * k + 2))};
   }
-  noise.angular = {states[6].advance(model.angular, white(6)),
-                   states[7].advance(model.angular, white(7)),
-                   states[8].advance(model.angular, white(8))};
+  noise.angular_S = {states[6].advance(model.angular, white(6)),
+                     states[7].advance(model.angular, white(7)),
+                     states[8].advance(model.angular, white(8))};
   const Vector3<T> star = triple(9);
   const std::array<double, 6>& factor = model.star_tracker_factor;
-  noise.star_tracker = {T(factor[0]) * star.x, T(factor[1]) * star.x + T(factor[2]) * star.y,
-                        T(factor[3]) * star.x + T(factor[4]) * star.y + T(factor[5]) * star.z};
-  noise.thrust = T(model.thrust_deviation) * triple(12);
-  noise.torque = T(model.torque_deviation) * triple(15);
+  noise.star_tracker_S = {T(factor[0]) * star.x, T(factor[1]) * star.x + T(factor[2]) * star.y,
+                          T(factor[3]) * star.x + T(factor[4]) * star.y + T(factor[5]) * star.z};
+  noise.thrust_S = T(model.thrust_deviation) * triple(12);
+  noise.torque_S = T(model.torque_deviation) * triple(15);
   return noise;
 }
 

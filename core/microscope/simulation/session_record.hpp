@@ -23,21 +23,23 @@ template <typename T>
 PROOFMASS_INLINE std::array<T, num_signals> ground_signals(const Observation<T>& observation,
                                                            const SharedSample& shared,
                                                            Product kind) {
-  const Vector3<T>& m1 = observation.measured[0];
-  const Vector3<T>& m2 = observation.measured[1];
+  const Vector3<T>& m1 = observation.measured_K[0];
+  const Vector3<T>& m2 = observation.measured_K[1];
   const T half = T(0.5);
   const T differential_x = half * (m1.x - m2.x);
   const Vector3<T> common = half * (m1 + m2);
 
   // The ground knows what was commanded and takes it out of the on-board estimate, which followed
   // the star tracker with the command in it.
-  const Vector3<T> angle = observation.attitude.angle - broadcast<T>(shared.commanded.angle);
-  const Vector3<T> rate = observation.attitude.rate - broadcast<T>(shared.commanded.rate) +
-                          broadcast<T>(shared.reference_rate);
-  const Vector3<T> direction =
-      to_target(from_error_angles(angle), broadcast<T>(shared.earth_direction_R));
-  const auto [g] =
-      gradient_matrix(shared.gradient_s2, direction, rate, observation.measured_angular);
+  const Vector3<T> angle_RS_S =
+      observation.attitude.angle_RS_S - broadcast<T>(shared.commanded.angle_RS_S);
+  const Vector3<T> omega_IS_S = observation.attitude.omega_RS_S -
+                                broadcast<T>(shared.commanded.omega_RS_S) +
+                                broadcast<T>(shared.omega_IR_R);
+  const Vector3<T> radial_S =
+      to_target(from_error_angles(angle_RS_S), broadcast<T>(shared.radial_R));
+  const auto [g] = gradient_matrix(shared.gradient_s2, radial_S, omega_IS_S,
+                                   observation.measured_omega_dot_IS_S);
 
   T product = T(0.0);
   const T motion = T(0.5 * shared.mass_motion.position_m);

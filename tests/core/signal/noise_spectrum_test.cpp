@@ -27,9 +27,9 @@ using Samples = std::array<double, num_noise_channels>;
 
 Samples flat(const SampleNoise<double>& noise) {
   Samples samples{};
-  const std::array<const Vector3<double>*, 6> vectors{&noise.sensor[0], &noise.sensor[1],
-                                                      &noise.angular,   &noise.star_tracker,
-                                                      &noise.thrust,    &noise.torque};
+  const std::array<const Vector3<double>*, 6> vectors{&noise.sensor_K[0], &noise.sensor_K[1],
+                                                      &noise.angular_S,   &noise.star_tracker_S,
+                                                      &noise.thrust_S,    &noise.torque_S};
   for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = (*vectors[i / 3])[i % 3];
   return samples;
 }
@@ -192,7 +192,7 @@ double mean_square_of_means(std::size_t first, std::uint64_t num_draws) {
     SessionNoise noise(model, seed, RunIndex{run}, "start");
     for (std::size_t k = 0; k < first; ++k) static_cast<void>(noise.next());
     Vector3<double> mean;
-    for (std::size_t k = 0; k < mean_length; ++k) mean += noise.next().angular;
+    for (std::size_t k = 0; k < mean_length; ++k) mean += noise.next().angular_S;
     mean = (1.0 / static_cast<double>(mean_length)) * mean;
     sum += dot(mean, mean);
   }

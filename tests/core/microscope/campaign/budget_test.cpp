@@ -160,8 +160,8 @@ double amplitude_at_test_frequency(double turns, const std::function<double(doub
     const double revolutions = 2.0 * k / num_samples;
     const OrbitPoint point = orbit.at(revolutions * orbit.period_s());
     const double angle = 2.0 * std::numbers::pi * turns * revolutions;
-    const double x = std::cos(angle) * point.direction_x - std::sin(angle) * point.direction_z;
-    const double z = std::sin(angle) * point.direction_x + std::cos(angle) * point.direction_z;
+    const double x = std::cos(angle) * point.radial_I_x - std::sin(angle) * point.radial_I_z;
+    const double z = std::sin(angle) * point.radial_I_x + std::cos(angle) * point.radial_I_z;
     const double phase = 2.0 * std::numbers::pi * (1.0 + turns) * revolutions;
     sum += point.gradient_s2 * of(x, z) * std::polar(2.0 / num_samples, phase);
   }

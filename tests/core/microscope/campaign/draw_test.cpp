@@ -219,8 +219,8 @@ TEST(DrawInstrument, KeepsTheBounds) {
   for (std::uint64_t run = 0; run < 5000; ++run) {
     const AcceptedDraw draw = draw_instrument(campaign, RunIndex{run}, {});
     ASSERT_TRUE(draw.instrument.has_value());
-    ASSERT_TRUE(accepts(draw.instrument->sensors[0].sensitivity(),
-                        draw.instrument->sensors[1].sensitivity()));
+    ASSERT_TRUE(accepts(draw.instrument->sensors[0].sensitivity_KS(),
+                        draw.instrument->sensors[1].sensitivity_KS()));
   }
 }
 
@@ -237,7 +237,7 @@ TEST(DrawInstrument, TakesTheFirstDrawThatIsAccepted) {
       const bool is_last = i + 1 == draw.num_draws;
       ASSERT_EQ(is_accepted(instrument, campaign.scenario.acceptance), is_last);
       if (!is_last) continue;
-      EXPECT_EQ(instrument.offcentring_m, draw.instrument->offcentring_m);
+      EXPECT_EQ(instrument.offcentring_S_m, draw.instrument->offcentring_S_m);
     }
     if (draw.num_draws > 1) ++num_redrawn;
   }
@@ -261,8 +261,8 @@ TEST(IsAccepted, ComparesEachEntryWithItsBound) {
   const MicroscopeCampaign campaign;
   const Instrument instrument =
       make_instrument(draw_values(campaign.dispersions, campaign.seed, RunIndex{0}, 0, {}));
-  const Eigen::Matrix3d m1 = instrument.sensors[0].sensitivity();
-  const Eigen::Matrix3d m2 = instrument.sensors[1].sensitivity();
+  const Eigen::Matrix3d m1 = instrument.sensors[0].sensitivity_KS();
+  const Eigen::Matrix3d m2 = instrument.sensors[1].sensitivity_KS();
   const Eigen::Matrix3d a_d = (m1 - m2) * (m1 + m2).inverse();
   const Eigen::Matrix3d a_c = 0.5 * (m1 + m2) - 0.5 * a_d * (m1 - m2);
   const double differential = std::fmax(std::abs(a_d(0, 1)), std::abs(a_d(0, 2)));

@@ -43,7 +43,7 @@ std::vector<double> blended(const Trajectory& trajectory, double star_factor,
   std::vector<double> estimates;
   for (std::size_t k = 0; k < trajectory.angle.size(); ++k) {
     estimator.correct(gains, {star_factor * trajectory.angle[k], 0.0, 0.0});
-    estimates.push_back(estimator.angle.x);
+    estimates.push_back(estimator.angle_RS_S.x);
     estimator.predict(gains, {acceleration_factor * trajectory.acceleration[k], 0.0, 0.0}, zero);
   }
   return estimates;
@@ -72,11 +72,11 @@ TEST(AttitudeEstimator, ForgetsWithATriplePole) {
   const AttitudeGains gains = attitude_gains(config, period_s);
   const double r = std::exp(-2.0 * std::numbers::pi * config.blending_hz * period_s);
   AttitudeEstimator<double> estimator{
-      .angle = {1.0, 0.0, 0.0}, .rate = {0.1, 0.0, 0.0}, .bias = {-0.02, 0.0, 0.0}};
+      .angle_RS_S = {1.0, 0.0, 0.0}, .omega_RS_S = {0.1, 0.0, 0.0}, .bias_S = {-0.02, 0.0, 0.0}};
   std::vector<double> y;
   for (int k = 0; k < 200; ++k) {
     estimator.correct(gains, zero);
-    y.push_back(estimator.angle.x);
+    y.push_back(estimator.angle_RS_S.x);
     estimator.predict(gains, zero, zero);
   }
   for (std::size_t k = 0; k + 3 < y.size(); ++k) {
@@ -93,9 +93,9 @@ TEST(AttitudeEstimator, RemovesAConstantBiasOfTheAccelerometer) {
     estimator.correct(gains, zero);
     estimator.predict(gains, {bias, -bias, 0.0}, zero);
   }
-  EXPECT_NEAR(estimator.angle.x, 0.0, 1e-9 * bias / (gains.blend_bias_per_s2));
-  EXPECT_NEAR(estimator.bias.x, bias, 1e-9 * bias);
-  EXPECT_NEAR(estimator.bias.y, -bias, 1e-9 * bias);
+  EXPECT_NEAR(estimator.angle_RS_S.x, 0.0, 1e-9 * bias / (gains.blend_bias_per_s2));
+  EXPECT_NEAR(estimator.bias_S.x, bias, 1e-9 * bias);
+  EXPECT_NEAR(estimator.bias_S.y, -bias, 1e-9 * bias);
 }
 
 // In continuous time LP = (3ω s² + 3ω² s + ω³)/(s + ω)³; sampling changes it by a part fT or so.
@@ -115,7 +115,7 @@ TEST(AttitudeEstimator, PassesTheStarTrackerBelowTheCrossover) {
     const int num_settling = 8000;
     for (int k = 0; k < num_settling + samples_per_period; ++k) {
       estimator.correct(gains, {std::cos(step * k), 0.0, 0.0});
-      if (k >= num_settling) sum += estimator.angle.x * std::polar(1.0, -step * k);
+      if (k >= num_settling) sum += estimator.angle_RS_S.x * std::polar(1.0, -step * k);
       estimator.predict(gains, zero, zero);
     }
     const std::complex<double> measured = sum * (2.0 / samples_per_period);
@@ -127,11 +127,12 @@ TEST(AttitudeEstimator, PassesTheStarTrackerBelowTheCrossover) {
 // prediction follows it: an angle along X with Ω about Y turns into Z at −Ω∧θ.
 TEST(AttitudeEstimator, PredictsInARotatingReference) {
   const AttitudeGains gains = attitude_gains({}, period_s);
-  AttitudeEstimator<double> estimator{.angle = {1e-4, 0.0, 0.0}, .rate = zero, .bias = zero};
+  AttitudeEstimator<double> estimator{
+      .angle_RS_S = {1e-4, 0.0, 0.0}, .omega_RS_S = zero, .bias_S = zero};
   const double spin = 0.01;
   estimator.predict(gains, zero, {0.0, spin, 0.0});
-  EXPECT_DOUBLE_EQ(estimator.angle.x, 1e-4);
-  EXPECT_DOUBLE_EQ(estimator.angle.z, 1e-4 * spin * period_s);  // −(Ω ŷ ∧ θ x̂) = +Ωθ ẑ
+  EXPECT_DOUBLE_EQ(estimator.angle_RS_S.x, 1e-4);
+  EXPECT_DOUBLE_EQ(estimator.angle_RS_S.z, 1e-4 * spin * period_s);  // −(Ω ŷ ∧ θ x̂) = +Ωθ ẑ
 }
 
 // At rest in angle and rate only the proportional part acts at first; the integral adds ω²ω_I∫θ dt.
@@ -141,7 +142,7 @@ TEST(AttitudeController, IsProportionalDerivativeWithASlowIntegral) {
   const double omega = 2.0 * std::numbers::pi * config.bandwidth_hz;
   AttitudeController<double> controller;
   const AttitudeEstimator<double> estimate{
-      .angle = {1e-5, 0.0, 0.0}, .rate = {0.0, 2e-7, 0.0}, .bias = zero};
+      .angle_RS_S = {1e-5, 0.0, 0.0}, .omega_RS_S = {0.0, 2e-7, 0.0}, .bias_S = zero};
   Vector3<double> command{};
   const int num_samples = 40;
   for (int k = 0; k < num_samples; ++k) command = controller.advance(gains, estimate);

@@ -21,7 +21,8 @@ TEST(StarTracker, FusesTwoHeadsByInverseCovariance) {
   Eigen::Matrix3d expected = Eigen::Matrix3d::Zero();
   expected(0, 0) = across / 2.0;
   expected(1, 1) = expected(2, 2) = 1.0 / (1.0 / across + 1.0 / about);
-  const Eigen::Matrix3d covariance = tracker.noise_factor * tracker.noise_factor.transpose();
+  const Eigen::Matrix3d covariance =
+      tracker.noise_factor_S_rad * tracker.noise_factor_S_rad.transpose();
   EXPECT_LT((covariance - expected).norm(), 1e-14 * across);
   EXPECT_LT((tracker.weight[0] + tracker.weight[1] - Eigen::Matrix3d::Identity()).norm(), 1e-14);
 }
@@ -30,18 +31,18 @@ TEST(StarTracker, WeighsEachHeadsBiasWhereItSeesBest) {
   const StarTracker tracker = make_star_tracker({}, 0.25);
   // A bias of head 1 about its own boresight hardly counts: σ²/(σ² + σ_b²) = 1/26.
   const Eigen::Vector3d boresight = Eigen::Vector3d(0.0, 1.0, 1.0).normalized();
-  const Eigen::Vector3d fused = tracker.fused_bias({1e-5 * boresight, Eigen::Vector3d::Zero()});
+  const Eigen::Vector3d fused = tracker.fused_bias_S({1e-5 * boresight, Eigen::Vector3d::Zero()});
   EXPECT_LT((fused - 1e-5 / 26.0 * boresight).norm(), 1e-18);
   // About X both count alike.
   const Eigen::Vector3d x =
-      tracker.fused_bias({Eigen::Vector3d(2e-5, 0, 0), Eigen::Vector3d::Zero()});
+      tracker.fused_bias_S({Eigen::Vector3d(2e-5, 0, 0), Eigen::Vector3d::Zero()});
   EXPECT_NEAR(x.x(), 1e-5, 1e-19);
 }
 
 TEST(StarTracker, IsSilentWithoutNoise) {
   NoiseConfig noise;
   noise.scale = 0.0;
-  EXPECT_EQ(make_star_tracker(noise, 0.25).noise_factor.norm(), 0.0);
+  EXPECT_EQ(make_star_tracker(noise, 0.25).noise_factor_S_rad.norm(), 0.0);
 }
 
 }  // namespace

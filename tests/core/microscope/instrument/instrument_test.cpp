@@ -19,41 +19,41 @@ DrawnValues distinct_values() {
 
 Sensor perfect_sensor() {
   return {.scale_factor = Eigen::Vector3d::Ones(),
-          .misalignment_rad = Eigen::Vector3d::Zero(),
+          .misalignment_SK_rad = Eigen::Vector3d::Zero(),
           .coupling_rad = Eigen::Vector3d::Zero(),
           .quadratic_s2_m = Eigen::Vector3d::Zero(),
-          .read_out_bias_m_s2 = Eigen::Vector3d::Zero(),
-          .parasitic_m_s2 = Eigen::Vector3d::Zero()};
+          .read_out_bias_K_m_s2 = Eigen::Vector3d::Zero(),
+          .parasitic_K_m_s2 = Eigen::Vector3d::Zero()};
 }
 
 Instrument perfect_instrument() {
   return {.sensors = {perfect_sensor(), perfect_sensor()},
-          .offcentring_m = Eigen::Vector3d::Zero(),
-          .centre_offset_m = Eigen::Vector3d::Zero(),
-          .angular_bias_rad_s2 = Eigen::Vector3d::Zero(),
+          .offcentring_S_m = Eigen::Vector3d::Zero(),
+          .centre_offset_S_m = Eigen::Vector3d::Zero(),
+          .angular_bias_S_rad_s2 = Eigen::Vector3d::Zero(),
           .thrust_matrix = Eigen::Matrix3d::Identity(),
-          .star_tracker_bias_rad = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()}};
+          .star_tracker_bias_S_rad = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()}};
 }
 
 TEST(Sensor, SensitivityMatrixIsThePrintedOne) {
   Sensor sensor = perfect_sensor();
   sensor.scale_factor = {2.0, 3.0, 5.0};
-  sensor.coupling_rad = {0.25, 0.5, 0.125};         // η_x, η_y, η_z
-  sensor.misalignment_rad = {0.0625, 0.75, 0.375};  // θ_x, θ_y, θ_z
+  sensor.coupling_rad = {0.25, 0.5, 0.125};            // η_x, η_y, η_z
+  sensor.misalignment_SK_rad = {0.0625, 0.75, 0.375};  // θ_x, θ_y, θ_z
   Eigen::Matrix3d printed;
   printed << 2.0, 0.125 + 0.375, 0.5 - 0.75,  //
       0.125 - 0.375, 3.0, 0.25 + 0.0625,      //
       0.5 + 0.75, 0.25 - 0.0625, 5.0;
-  EXPECT_EQ(sensor.sensitivity(), printed);
+  EXPECT_EQ(sensor.sensitivity_KS(), printed);
 }
 
 TEST(Sensor, AlignmentIsTheRotationAtFirstOrder) {
   Sensor sensor = perfect_sensor();
-  sensor.misalignment_rad = {1e-3, -2e-3, 3e-3};
+  sensor.misalignment_SK_rad = {1e-3, -2e-3, 3e-3};
   // A rotation of the frame by θ turns components by v − θ∧v.
   const Eigen::Vector3d v(0.3, -0.7, 0.2);
-  const Eigen::Vector3d expected = v - sensor.misalignment_rad.cross(v);
-  EXPECT_LT((sensor.alignment() * v - expected).norm(), 4 * epsilon);
+  const Eigen::Vector3d expected = v - sensor.misalignment_SK_rad.cross(v);
+  EXPECT_LT((sensor.alignment_KS() * v - expected).norm(), 4 * epsilon);
 }
 
 TEST(Instrument, TakesEveryDrawnValueOnce) {
@@ -69,20 +69,20 @@ TEST(Instrument, TakesEveryDrawnValueOnce) {
     ADD_FAILURE() << "no drawn quantity " << name;
     return 0.0;
   };
-  EXPECT_EQ(instrument.sensors[1].misalignment_rad.y(), value_of("misalignment_rad.sensor_2_y"));
+  EXPECT_EQ(instrument.sensors[1].misalignment_SK_rad.y(), value_of("misalignment_rad.sensor_2_y"));
   EXPECT_EQ(instrument.sensors[0].coupling_rad.z(), value_of("coupling_rad.sensor_1_z"));
   EXPECT_EQ(instrument.sensors[1].quadratic_s2_m.x(), value_of("quadratic_factor_s2_m.sensor_2_x"));
-  EXPECT_EQ(instrument.sensors[0].read_out_bias_m_s2.y(),
+  EXPECT_EQ(instrument.sensors[0].read_out_bias_K_m_s2.y(),
             value_of("read_out_bias_m_s2.sensor_1_y"));
-  EXPECT_EQ(instrument.sensors[1].parasitic_m_s2.z(),
+  EXPECT_EQ(instrument.sensors[1].parasitic_K_m_s2.z(),
             value_of("parasitic_acceleration_m_s2.sensor_2_z"));
-  EXPECT_EQ(instrument.offcentring_m.z(), value_of("offcentring_m.z"));
-  EXPECT_EQ(instrument.centre_offset_m.x(), value_of("centre_of_mass_offset_m.x"));
-  EXPECT_EQ(instrument.angular_bias_rad_s2.y(), value_of("angular_bias_rad_s2.y"));
+  EXPECT_EQ(instrument.offcentring_S_m.z(), value_of("offcentring_m.z"));
+  EXPECT_EQ(instrument.centre_offset_S_m.x(), value_of("centre_of_mass_offset_m.x"));
+  EXPECT_EQ(instrument.angular_bias_S_rad_s2.y(), value_of("angular_bias_rad_s2.y"));
   EXPECT_EQ(instrument.thrust_matrix(1, 1), 1.0 + value_of("thruster_scale_error.y"));
   EXPECT_EQ(instrument.thrust_matrix(0, 2), value_of("thruster_coupling_rad.xz"));
   EXPECT_EQ(instrument.thrust_matrix(2, 0), value_of("thruster_coupling_rad.zx"));
-  EXPECT_EQ(instrument.star_tracker_bias_rad[1].x(), value_of("star_tracker_bias_rad.head_2_x"));
+  EXPECT_EQ(instrument.star_tracker_bias_S_rad[1].x(), value_of("star_tracker_bias_rad.head_2_x"));
 }
 
 // By hand: with M_c = 1 + 0.5 E_12 and M_d = 0.25 E_11 + 0.125 E_13,
@@ -95,13 +95,13 @@ TEST(SensitivityMatrices, EqualTheHandComputedOnes) {
   instrument.sensors[1].scale_factor.x() = 0.75;
   for (Sensor& sensor : instrument.sensors) {
     sensor.coupling_rad.z() = 0.25;
-    sensor.misalignment_rad.z() = 0.25;
+    sensor.misalignment_SK_rad.z() = 0.25;
   }
   // Entry 13 is η_y − θ_y with 31 = η_y + θ_y = 0.
   instrument.sensors[0].coupling_rad.y() = 0.0625;
-  instrument.sensors[0].misalignment_rad.y() = -0.0625;
+  instrument.sensors[0].misalignment_SK_rad.y() = -0.0625;
   instrument.sensors[1].coupling_rad.y() = -0.0625;
-  instrument.sensors[1].misalignment_rad.y() = 0.0625;
+  instrument.sensors[1].misalignment_SK_rad.y() = 0.0625;
 
   Eigen::Matrix3d a_d = Eigen::Matrix3d::Zero();
   a_d.row(0) << 0.25, -0.125, 0.125;
@@ -119,8 +119,8 @@ TEST(SensitivityMatrices, ExpressTheDifferenceThroughTheCommonMeasurement) {
   const auto [a_c, a_d] = sensitivity_matrices(instrument);
   const Eigen::Vector3d common(1.0, -2.0, 0.5);
   const Eigen::Vector3d difference(0.3, 0.2, -0.9);
-  const Eigen::Vector3d m1 = instrument.sensors[0].sensitivity() * (common + difference);
-  const Eigen::Vector3d m2 = instrument.sensors[1].sensitivity() * (common - difference);
+  const Eigen::Vector3d m1 = instrument.sensors[0].sensitivity_KS() * (common + difference);
+  const Eigen::Vector3d m2 = instrument.sensors[1].sensitivity_KS() * (common - difference);
   const Eigen::Vector3d residual = 0.5 * (m1 - m2) - a_d * 0.5 * (m1 + m2) - a_c * difference;
   EXPECT_LT(residual.norm(), 20 * epsilon);
 }
@@ -131,9 +131,9 @@ TEST(TrueParameters, FollowTheirDefinitions) {
   instrument.sensors[1].scale_factor.x() = 0.5;  // K1c = 1, K1d = ½: a_d11 = ½, a_c11 = ¾.
   instrument.sensors[0].quadratic_s2_m.x() = 12.0;
   instrument.sensors[1].quadratic_s2_m.x() = 4.0;  // K2c = 8, K2d = 4.
-  instrument.sensors[0].parasitic_m_s2.x() = 0.25;
-  instrument.sensors[1].parasitic_m_s2.x() = 0.75;  // b_1d = ¼.
-  instrument.offcentring_m = {1.0, 2.0, 4.0};
+  instrument.sensors[0].parasitic_K_m_s2.x() = 0.25;
+  instrument.sensors[1].parasitic_K_m_s2.x() = 0.75;  // b_1d = ¼.
+  instrument.offcentring_S_m = {1.0, 2.0, 4.0};
   const ParameterArray truth = true_parameters(instrument, /*bias_error_x_m_s2=*/0.125);
   const auto at = [&truth](Parameter parameter) { return truth[index(parameter)]; };
   EXPECT_DOUBLE_EQ(at(Parameter::a_c11_delta_x), 0.75);

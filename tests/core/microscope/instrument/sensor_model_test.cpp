@@ -11,21 +11,21 @@ constexpr Vector3<double> zero{};
 const Matrix3<double> identity{{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}};
 
 SensorModel<double> perfect_sensor() {
-  return {.rest_position_m = zero,
-          .motion_direction = zero,
-          .parasitic_m_s2 = zero,
-          .offset_m_s2 = zero,
-          .sensitivity = identity,
+  return {.rest_position_S_m = zero,
+          .motion_direction_S = zero,
+          .parasitic_K_m_s2 = zero,
+          .offset_K_m_s2 = zero,
+          .sensitivity_KS = identity,
           .quadratic_s2_m = zero};
 }
 
 /// At rest above the Earth in the direction +X of S.
 SatelliteMotion<double> at_rest() {
-  return {.acceleration = zero,
+  return {.acceleration_S = zero,
           .gradient_s2 = 1e-6,
-          .earth_direction = {1.0, 0.0, 0.0},
-          .rate = zero,
-          .angular_acceleration = zero};
+          .radial_S = {1.0, 0.0, 0.0},
+          .omega_IS_S = zero,
+          .omega_dot_IS_S = zero};
 }
 
 // A mass held above the centre of mass of a satellite that does not rotate falls slower than it:
@@ -33,7 +33,7 @@ SatelliteMotion<double> at_rest() {
 // (μ/r³)·distance.
 TEST(KinematicAcceleration, HoldsAMassAgainstTheGravityGradient) {
   SensorModel<double> sensor = perfect_sensor();
-  sensor.rest_position_m = {3.0, 5.0, 0.0};
+  sensor.rest_position_S_m = {3.0, 5.0, 0.0};
   const Vector3<double> a = kinematic_acceleration(sensor, at_rest(), {});
   EXPECT_DOUBLE_EQ(a.x, -2e-6 * 3.0);
   EXPECT_DOUBLE_EQ(a.y, 1e-6 * 5.0);
@@ -42,11 +42,11 @@ TEST(KinematicAcceleration, HoldsAMassAgainstTheGravityGradient) {
 
 TEST(KinematicAcceleration, HoldsAMassOnACircleAgainstItsInertia) {
   SensorModel<double> sensor = perfect_sensor();
-  sensor.rest_position_m = {2.0, 0.0, 0.0};
+  sensor.rest_position_S_m = {2.0, 0.0, 0.0};
   SatelliteMotion<double> satellite = at_rest();
   satellite.gradient_s2 = 0.0;
-  satellite.rate = {0.0, 0.5, 0.0};
-  satellite.angular_acceleration = {0.0, 0.0, 0.25};
+  satellite.omega_IS_S = {0.0, 0.5, 0.0};
+  satellite.omega_dot_IS_S = {0.0, 0.0, 0.25};
   const Vector3<double> a = kinematic_acceleration(sensor, satellite, {});
   EXPECT_DOUBLE_EQ(a.x, -0.5 * 0.5 * 2.0);  // Towards the centre.
   EXPECT_DOUBLE_EQ(a.y, 0.25 * 2.0);        // Along the growing speed.
@@ -55,10 +55,10 @@ TEST(KinematicAcceleration, HoldsAMassOnACircleAgainstItsInertia) {
 
 TEST(KinematicAcceleration, IncludesTheMotionOfTheMassAndItsCoriolisTerm) {
   SensorModel<double> sensor = perfect_sensor();
-  sensor.motion_direction = {1.0, 0.0, 0.0};
+  sensor.motion_direction_S = {1.0, 0.0, 0.0};
   SatelliteMotion<double> satellite = at_rest();
   satellite.gradient_s2 = 0.0;
-  satellite.rate = {0.0, 0.0, 0.5};
+  satellite.omega_IS_S = {0.0, 0.0, 0.5};
   const MassMotionPhase motion{.position_m = 0.0, .velocity_m_s = 4.0, .acceleration_m_s2 = 8.0};
   const Vector3<double> a = kinematic_acceleration(sensor, satellite, motion);
   EXPECT_DOUBLE_EQ(a.x, 8.0);
@@ -68,7 +68,7 @@ TEST(KinematicAcceleration, IncludesTheMotionOfTheMassAndItsCoriolisTerm) {
 
 TEST(KinematicAcceleration, FollowsTheSatelliteAsAWhole) {
   SatelliteMotion<double> satellite = at_rest();
-  satellite.acceleration = {1.0, 2.0, 3.0};
+  satellite.acceleration_S = {1.0, 2.0, 3.0};
   const Vector3<double> a = kinematic_acceleration(perfect_sensor(), satellite, {});
   EXPECT_EQ(a.x, 1.0);
   EXPECT_EQ(a.y, 2.0);
@@ -79,9 +79,9 @@ TEST(KinematicAcceleration, FollowsTheSatelliteAsAWhole) {
 // Γ_App = −p, and eq:measurement gives b0 + M(0) − (K1 + η) p + K2 p².
 TEST(MeasuredAcceleration, ShowsParasiticForcesThroughTheSymmetricPartAlone) {
   SensorModel<double> sensor = perfect_sensor();
-  sensor.parasitic_m_s2 = {0.5, 0.0, 0.0};
-  sensor.offset_m_s2 = {3.0 - 2.0 * 0.5, 0.0, 0.0};  // b0 = 3, K1 = 2.
-  sensor.sensitivity.row[0] = {2.0, 7.0, 7.0};
+  sensor.parasitic_K_m_s2 = {0.5, 0.0, 0.0};
+  sensor.offset_K_m_s2 = {3.0 - 2.0 * 0.5, 0.0, 0.0};  // b0 = 3, K1 = 2.
+  sensor.sensitivity_KS.row[0] = {2.0, 7.0, 7.0};
   sensor.quadratic_s2_m = {16.0, 0.0, 0.0};
   const Vector3<double> measured = measured_acceleration(sensor, zero);
   EXPECT_DOUBLE_EQ(measured.x, 3.0 - 2.0 * 0.5 + 16.0 * 0.25);

@@ -27,8 +27,8 @@ struct Anomalies {
 
 Anomalies anomalies(const OrbitPoint& point, double eccentricity) {
   const long double e = eccentricity;
-  const long double x = point.direction_x;
-  const long double z = point.direction_z;
+  const long double x = point.radial_I_x;
+  const long double z = point.radial_I_z;
   const long double eccentric = std::atan2(std::sqrt(1.0L - e * e) * z, e + x);
   return {eccentric, (1.0L - e * e) / (1.0L + e * x)};
 }
@@ -59,8 +59,8 @@ TEST(KeplerOrbit, TakesBatchesOfTimesUpToAnEccentricityOf0p008) {
       const OrbitPoint alone = orbit.at(0.25 * k);
       const std::optional<OrbitPoint> lane = orbit.at_lanes(0.25 * k);
       ASSERT_TRUE(lane.has_value()) << e << ", " << k;
-      ASSERT_EQ(std::bit_cast<std::uint64_t>(lane->direction_x),
-                std::bit_cast<std::uint64_t>(alone.direction_x));
+      ASSERT_EQ(std::bit_cast<std::uint64_t>(lane->radial_I_x),
+                std::bit_cast<std::uint64_t>(alone.radial_I_x));
       ASSERT_EQ(std::bit_cast<std::uint64_t>(lane->gradient_s2),
                 std::bit_cast<std::uint64_t>(alone.gradient_s2));
     }
@@ -74,7 +74,7 @@ TEST(KeplerOrbit, DirectionIsAUnitVector) {
     const KeplerOrbit orbit({.period_s = 5950.0, .eccentricity = e});
     for (int k = 0; k < 1000; ++k) {
       const OrbitPoint p = orbit.at(5.951 * k);
-      ASSERT_NEAR(p.direction_x * p.direction_x + p.direction_z * p.direction_z, 1.0,
+      ASSERT_NEAR(p.radial_I_x * p.radial_I_x + p.radial_I_z * p.radial_I_z, 1.0,
                   2e-15 / (1.0 - e));
     }
   }
@@ -83,12 +83,12 @@ TEST(KeplerOrbit, DirectionIsAUnitVector) {
 TEST(KeplerOrbit, StartsAtPerigeeAndMovesTowardsZ) {
   const KeplerOrbit orbit({.period_s = 5950.0, .eccentricity = 0.1});
   const OrbitPoint start = orbit.at(0.0);
-  EXPECT_EQ(start.direction_x, 1.0);
-  EXPECT_EQ(start.direction_z, 0.0);
+  EXPECT_EQ(start.radial_I_x, 1.0);
+  EXPECT_EQ(start.radial_I_z, 0.0);
   const double n = two_pi / 5950.0;
   EXPECT_NEAR(start.gradient_s2 / (n * n / (0.9 * 0.9 * 0.9)), 1.0, 1e-15);
-  EXPECT_GT(orbit.at(1.0).direction_z, 0.0);
-  EXPECT_NEAR(orbit.at(2975.0).direction_x, -1.0, 1e-15);  // Apogee.
+  EXPECT_GT(orbit.at(1.0).radial_I_z, 0.0);
+  EXPECT_NEAR(orbit.at(2975.0).radial_I_x, -1.0, 1e-15);  // Apogee.
 }
 
 // From t to −t the orbit mirrors; a period on it repeats, within the rounding of t/period.
@@ -97,12 +97,12 @@ TEST(KeplerOrbit, IsSymmetricAboutPerigeeAndPeriodic) {
   for (const double t : {0.25, 100.0, 1234.5, 4000.0}) {
     const OrbitPoint after = orbit.at(t);
     const OrbitPoint before = orbit.at(-t);
-    EXPECT_NEAR(before.direction_x, after.direction_x, 1e-15);
-    EXPECT_NEAR(before.direction_z, -after.direction_z, 1e-15);
+    EXPECT_NEAR(before.radial_I_x, after.radial_I_x, 1e-15);
+    EXPECT_NEAR(before.radial_I_z, -after.radial_I_z, 1e-15);
     EXPECT_NEAR(before.gradient_s2 / after.gradient_s2, 1.0, 1e-15);
     const OrbitPoint later = orbit.at(t + 40 * 5950.0);
-    EXPECT_NEAR(later.direction_x, after.direction_x, 1e-13);
-    EXPECT_NEAR(later.direction_z, after.direction_z, 1e-13);
+    EXPECT_NEAR(later.radial_I_x, after.radial_I_x, 1e-13);
+    EXPECT_NEAR(later.radial_I_z, after.radial_I_z, 1e-13);
   }
 }
 
@@ -125,7 +125,7 @@ TEST(KeplerOrbit, SweepsEqualAreasInEqualTimes) {
     const auto rate = [&](double t, double half_step) {
       const OrbitPoint a = orbit.at(t - half_step);
       const OrbitPoint b = orbit.at(t + half_step);
-      const double sine = a.direction_x * b.direction_z - a.direction_z * b.direction_x;
+      const double sine = a.radial_I_x * b.radial_I_z - a.radial_I_z * b.radial_I_x;
       return std::asin(sine) / (2.0 * half_step);
     };
     for (int k = 0; k < 200; ++k) {
@@ -146,8 +146,8 @@ struct Gradient {
 Gradient gradient_at(const KeplerOrbit& orbit, double t) {
   const OrbitPoint p = orbit.at(t);
   const double g = p.gradient_s2;
-  return {g * (3.0 * p.direction_x * p.direction_x - 1.0), g * 3.0 * p.direction_x * p.direction_z,
-          -g, g * (3.0 * p.direction_z * p.direction_z - 1.0)};
+  return {g * (3.0 * p.radial_I_x * p.radial_I_x - 1.0), g * 3.0 * p.radial_I_x * p.radial_I_z, -g,
+          g * (3.0 * p.radial_I_z * p.radial_I_z - 1.0)};
 }
 
 /// Amplitude of a component at a multiple of f_orb, over n². The trapezoidal rule on a periodic

@@ -77,10 +77,10 @@ TEST(SessionSignals, StartTheRecordAtPerigee) {
   const std::vector<TimedSample> samples = all_samples(fixture);
   const SharedSample& first = samples[16000].sample;
   EXPECT_EQ(samples[16000].time_s, 0.0);
-  EXPECT_NEAR(first.earth_direction_I.x, 1.0, 2.3e-16);
-  EXPECT_EQ(first.earth_direction_I.z, 0.0);
-  EXPECT_LT(samples[15999].sample.earth_direction_I.z, 0.0);
-  EXPECT_GT(samples[16001].sample.earth_direction_I.z, 0.0);
+  EXPECT_NEAR(first.radial_I.x, 1.0, 2.3e-16);
+  EXPECT_EQ(first.radial_I.z, 0.0);
+  EXPECT_LT(samples[15999].sample.radial_I.z, 0.0);
+  EXPECT_GT(samples[16001].sample.radial_I.z, 0.0);
 }
 
 TEST(SessionSignals, CarryOrbitAndEnvironmentOfTheirTime) {
@@ -88,23 +88,23 @@ TEST(SessionSignals, CarryOrbitAndEnvironmentOfTheirTime) {
   for (const auto& [time_s, sample] : all_samples(fixture)) {
     const OrbitPoint point = fixture.orbit.at(time_s);
     ASSERT_EQ(sample.gradient_s2, point.gradient_s2);
-    ASSERT_EQ(sample.earth_direction_I.x, point.direction_x);
-    ASSERT_EQ(sample.earth_direction_I.z, point.direction_z);
+    ASSERT_EQ(sample.radial_I.x, point.radial_I_x);
+    ASSERT_EQ(sample.radial_I.z, point.radial_I_z);
     const ExternalAcceleration external = fixture.environment.at(time_s, point);
-    ASSERT_EQ(sample.external.linear_m_s2.x, external.linear_m_s2.x);
-    ASSERT_EQ(sample.external.angular_rad_s2.z, external.angular_rad_s2.z);
+    ASSERT_EQ(sample.external_S.linear_m_s2.x, external.linear_m_s2.x);
+    ASSERT_EQ(sample.external_S.angular_rad_s2.z, external.angular_rad_s2.z);
   }
 }
 
 TEST(SessionSignals, AreStillWithoutExcitation) {
   const Fixture fixture;
   for (const auto& [time_s, sample] : all_samples(fixture)) {
-    ASSERT_EQ(length(sample.attitude_command_rad), 0.0);
-    ASSERT_EQ(length(sample.drag_free_command_m_s2), 0.0);
+    ASSERT_EQ(length(sample.attitude_command_S_rad), 0.0);
+    ASSERT_EQ(length(sample.drag_free_command_S_m_s2), 0.0);
     ASSERT_EQ(sample.mass_motion.acceleration_m_s2, 0.0);
-    ASSERT_EQ(length(sample.commanded.angle), 0.0);
-    ASSERT_EQ(length(sample.reference_rate), 0.0);
-    ASSERT_EQ(sample.earth_direction_R.x, sample.earth_direction_I.x);
+    ASSERT_EQ(length(sample.commanded.angle_RS_S), 0.0);
+    ASSERT_EQ(length(sample.omega_IR_R), 0.0);
+    ASSERT_EQ(sample.radial_R.x, sample.radial_I.x);
   }
 }
 
@@ -115,10 +115,10 @@ TEST(SessionSignals, ExciteTheDragFreeLoopInPhaseWithTheRecord) {
   fixture.session.excitations = {{ExcitationKind::drag_free, Axis::y, 2e-8, 1.22847554e-3}};
   for (const auto& [time_s, sample] : all_samples(fixture)) {
     const double expected = 2e-8 * std::sin(two_pi * 1.22847554e-3 * time_s);
-    ASSERT_NEAR(sample.drag_free_command_m_s2.y, expected, 2e-8 * 1e-13);
-    ASSERT_EQ(sample.drag_free_command_m_s2.x, 0.0);
-    ASSERT_EQ(sample.drag_free_command_m_s2.z, 0.0);
-    ASSERT_EQ(length(sample.attitude_command_rad), 0.0);
+    ASSERT_NEAR(sample.drag_free_command_S_m_s2.y, expected, 2e-8 * 1e-13);
+    ASSERT_EQ(sample.drag_free_command_S_m_s2.x, 0.0);
+    ASSERT_EQ(sample.drag_free_command_S_m_s2.z, 0.0);
+    ASSERT_EQ(length(sample.attitude_command_S_rad), 0.0);
     ASSERT_EQ(sample.mass_motion.position_m, 0.0);
   }
 }
@@ -136,10 +136,10 @@ TEST(SessionSignals, ExciteAllThatTheSessionShakes) {
     return amplitude * std::sin(two_pi * frequency_hz * time_s);
   };
   for (const auto& [time_s, sample] : all_samples(fixture)) {
-    ASSERT_NEAR(sample.drag_free_command_m_s2.y,
+    ASSERT_NEAR(sample.drag_free_command_S_m_s2.y,
                 sine(2e-8, 1.2e-3, time_s) + sine(1e-8, 3.1e-3, time_s), 3e-8 * 1e-12);
-    ASSERT_EQ(sample.drag_free_command_m_s2.x, 0.0);
-    ASSERT_NEAR(sample.attitude_command_rad.z, sine(3.5e-3, 1e-3, time_s), 3.5e-3 * 1e-12);
+    ASSERT_EQ(sample.drag_free_command_S_m_s2.x, 0.0);
+    ASSERT_NEAR(sample.attitude_command_S_rad.z, sine(3.5e-3, 1e-3, time_s), 3.5e-3 * 1e-12);
     ASSERT_NEAR(sample.mass_motion.position_m, sine(1e-5, 9.88e-3, time_s), 1e-5 * 1e-12);
   }
 }
@@ -149,9 +149,9 @@ TEST(SessionSignals, CommandTheAttitudeInPhaseWithTheRecord) {
   fixture.session.excitations = {{ExcitationKind::attitude, Axis::z, 3.5e-3, 1e-3}};
   for (const auto& [time_s, sample] : all_samples(fixture)) {
     const double expected = 3.5e-3 * std::sin(two_pi * 1e-3 * time_s);
-    ASSERT_NEAR(sample.attitude_command_rad.z, expected, 3.5e-3 * 1e-13);
-    ASSERT_EQ(sample.attitude_command_rad.x, 0.0);
-    ASSERT_EQ(length(sample.drag_free_command_m_s2), 0.0);
+    ASSERT_NEAR(sample.attitude_command_S_rad.z, expected, 3.5e-3 * 1e-13);
+    ASSERT_EQ(sample.attitude_command_S_rad.x, 0.0);
+    ASSERT_EQ(length(sample.drag_free_command_S_m_s2), 0.0);
   }
 }
 
@@ -201,7 +201,7 @@ TEST(SessionSignals, FilterTheCommandLikeTheEstimator) {
     fixture.session.excitations = {{ExcitationKind::attitude, Axis::z, 3.5e-3, frequency_hz}};
     const std::vector<TimedSample> samples = all_samples(fixture);
     const auto measured = phasor(samples, 16000, 20000, frequency_hz,
-                                 [](const SharedSample& s) { return s.commanded.angle.z; });
+                                 [](const SharedSample& s) { return s.commanded.angle_RS_S.z; });
     const std::complex<double> command(0.0, -3.5e-3);
 
     const std::complex<double> z = std::polar(1.0, two_pi * frequency_hz * period_s);
@@ -221,8 +221,8 @@ TEST(SessionSignals, CommandedAngleStaysOnItsAxis) {
   Fixture fixture;
   fixture.session.excitations = {{ExcitationKind::attitude, Axis::y, 3.5e-3, 1e-3}};
   for (const auto& [time_s, sample] : all_samples(fixture)) {
-    ASSERT_EQ(sample.commanded.angle.x, 0.0);
-    ASSERT_EQ(sample.commanded.angle.z, 0.0);
+    ASSERT_EQ(sample.commanded.angle_RS_S.x, 0.0);
+    ASSERT_EQ(sample.commanded.angle_RS_S.z, 0.0);
   }
 }
 
@@ -233,16 +233,16 @@ TEST(SessionSignals, SpinTheReferenceAboutY) {
   const double rate = 4.2e-3;
   fixture.session.spin_rate_rad_s = rate;
   for (const auto& [time_s, sample] : all_samples(fixture)) {
-    ASSERT_EQ(sample.reference_rate.y, rate);
-    ASSERT_NEAR(sample.reference_IR.scalar, std::cos(0.5 * rate * time_s), 1e-13);
-    ASSERT_NEAR(sample.reference_IR.vector.y, std::sin(0.5 * rate * time_s), 1e-13);
+    ASSERT_EQ(sample.omega_IR_R.y, rate);
+    ASSERT_NEAR(sample.attitude_IR.scalar, std::cos(0.5 * rate * time_s), 1e-13);
+    ASSERT_NEAR(sample.attitude_IR.vector.y, std::sin(0.5 * rate * time_s), 1e-13);
     // R = rotation by Ωt about Y: x_R = x cos − z sin, z_R = x sin + z cos.
     const double c = std::cos(rate * time_s);
     const double s = std::sin(rate * time_s);
-    const Vector3<double>& u = sample.earth_direction_I;
-    ASSERT_NEAR(sample.earth_direction_R.x, c * u.x - s * u.z, 1e-13);
-    ASSERT_NEAR(sample.earth_direction_R.y, 0.0, 1e-15);
-    ASSERT_NEAR(sample.earth_direction_R.z, s * u.x + c * u.z, 1e-13);
+    const Vector3<double>& u = sample.radial_I;
+    ASSERT_NEAR(sample.radial_R.x, c * u.x - s * u.z, 1e-13);
+    ASSERT_NEAR(sample.radial_R.y, 0.0, 1e-15);
+    ASSERT_NEAR(sample.radial_R.z, s * u.x + c * u.z, 1e-13);
   }
 }
 
@@ -261,9 +261,10 @@ TEST(SessionSignals, TurnTheHarmonicEnvironmentIntoTheFrameThatSpins) {
       ASSERT_NEAR(a_R.y, a_I.y, 1e-20);
       ASSERT_NEAR(a_R.z, s * a_I.x + c * a_I.z, 1e-20);
     };
-    expect_turned(inertial[i].sample.external.linear_m_s2, spinning[i].sample.external.linear_m_s2);
-    expect_turned(inertial[i].sample.external.angular_rad_s2,
-                  spinning[i].sample.external.angular_rad_s2);
+    expect_turned(inertial[i].sample.external_S.linear_m_s2,
+                  spinning[i].sample.external_S.linear_m_s2);
+    expect_turned(inertial[i].sample.external_S.angular_rad_s2,
+                  spinning[i].sample.external_S.angular_rad_s2);
   }
 }
 
@@ -273,8 +274,8 @@ TEST(SessionSignals, ReferenceThatFollowsTheOrbitSeesTheEarthAtRest) {
   fixture.orbit = KeplerOrbit(fixture.scenario.orbit);
   fixture.session.spin_rate_rad_s = -fixture.orbit.mean_motion_rad_s();
   for (const auto& [time_s, sample] : all_samples(fixture)) {
-    ASSERT_NEAR(sample.earth_direction_R.x, 1.0, 1e-14);
-    ASSERT_NEAR(sample.earth_direction_R.z, 0.0, 1e-13);
+    ASSERT_NEAR(sample.radial_R.x, 1.0, 1e-14);
+    ASSERT_NEAR(sample.radial_R.z, 0.0, 1e-13);
   }
 }
 
@@ -312,7 +313,7 @@ std::vector<double> tabulated(int num_rows, const std::vector<double>& times_s) 
   std::vector<double> values;
   for (const double time_s : times_s) {
     const auto position = static_cast<std::size_t>((time_s + 4000.0) / period_s);
-    values.push_back(samples[position].sample.external.linear_m_s2.x);
+    values.push_back(samples[position].sample.external_S.linear_m_s2.x);
   }
   return values;
 }

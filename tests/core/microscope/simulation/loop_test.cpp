@@ -17,17 +17,17 @@ constexpr Vector3<double> zero{};
 
 Instrument perfect_instrument() {
   const Sensor sensor{.scale_factor = Eigen::Vector3d::Ones(),
-                      .misalignment_rad = Eigen::Vector3d::Zero(),
+                      .misalignment_SK_rad = Eigen::Vector3d::Zero(),
                       .coupling_rad = Eigen::Vector3d::Zero(),
                       .quadratic_s2_m = Eigen::Vector3d::Zero(),
-                      .read_out_bias_m_s2 = Eigen::Vector3d::Zero(),
-                      .parasitic_m_s2 = Eigen::Vector3d::Zero()};
+                      .read_out_bias_K_m_s2 = Eigen::Vector3d::Zero(),
+                      .parasitic_K_m_s2 = Eigen::Vector3d::Zero()};
   return {.sensors = {sensor, sensor},
-          .offcentring_m = Eigen::Vector3d::Zero(),
-          .centre_offset_m = Eigen::Vector3d::Zero(),
-          .angular_bias_rad_s2 = Eigen::Vector3d::Zero(),
+          .offcentring_S_m = Eigen::Vector3d::Zero(),
+          .centre_offset_S_m = Eigen::Vector3d::Zero(),
+          .angular_bias_S_rad_s2 = Eigen::Vector3d::Zero(),
           .thrust_matrix = Eigen::Matrix3d::Identity(),
-          .star_tracker_bias_rad = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()}};
+          .star_tracker_bias_S_rad = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()}};
 }
 
 Scenario silent_scenario() {
@@ -53,12 +53,12 @@ TEST(LoopRotation, ConservesATorqueFreeMotion) {
   Loop<double> loop;
   const Vector3<double> rate{0.006, -0.008, 0.0005};
   const double speed = std::sqrt(dot(rate, rate));
-  loop.rate = rate;
+  loop.omega_IS_S = rate;
   constexpr int num_steps = 100000;
   for (int k = 0; k < num_steps; ++k) loop.rotate(zero, period_s);
   const double half = 0.5 * speed * period_s * num_steps;
   const double tolerance = 1e-11;
-  EXPECT_EQ(loop.rate.x, rate.x);
+  EXPECT_EQ(loop.omega_IS_S.x, rate.x);
   EXPECT_NEAR(loop.attitude_IS.scalar, std::cos(half), tolerance);
   EXPECT_NEAR(loop.attitude_IS.vector.y, std::sin(half) * rate.y / speed, tolerance);
   const double norm = loop.attitude_IS.scalar * loop.attitude_IS.scalar +
@@ -74,7 +74,7 @@ TEST(LoopRotation, IntegratesAConstantAccelerationExactly) {
   for (int k = 0; k < num_steps; ++k) loop.rotate({0.0, 0.0, acceleration}, period_s);
   const double t = num_steps * period_s;
   EXPECT_NEAR(2.0 * std::asin(loop.attitude_IS.vector.z), 0.5 * acceleration * t * t, 1e-13);
-  EXPECT_NEAR(loop.rate.z, acceleration * t, 1e-15);
+  EXPECT_NEAR(loop.omega_IS_S.z, acceleration * t, 1e-15);
 }
 
 // With a changing axis one step of T agrees with many of T/n much better than the commutator term
@@ -83,10 +83,10 @@ TEST(LoopRotation, FollowsATurningAxis) {
   const Vector3<double> rate{0.02, 0.0, 0.0};
   const Vector3<double> acceleration{0.0, 4e-3, 0.0};
   Loop<double> coarse;
-  coarse.rate = rate;
+  coarse.omega_IS_S = rate;
   coarse.rotate(acceleration, period_s);
   Loop<double> fine;
-  fine.rate = rate;
+  fine.omega_IS_S = rate;
   constexpr int num_parts = 1000;
   for (int k = 0; k < num_parts; ++k) fine.rotate(acceleration, period_s / num_parts);
   const Vector3<double> difference = coarse.attitude_IS.vector - fine.attitude_IS.vector;
@@ -109,10 +109,10 @@ double measured_rejection(double frequency_hz) {
   std::complex<double> sum = 0.0;
   const int num_settling = 16000;
   for (int k = 0; k < num_settling + samples; ++k) {
-    shared.external.linear_m_s2.x = 1e-8 * std::cos(step * k);
+    shared.external_S.linear_m_s2.x = 1e-8 * std::cos(step * k);
     const Observation<double> observation =
         loop.advance(constants, drag_free, attitude, shared, SampleNoise<double>{});
-    const double common = 0.5 * (observation.measured[0].x + observation.measured[1].x);
+    const double common = 0.5 * (observation.measured_K[0].x + observation.measured_K[1].x);
     if (k >= num_settling) sum += common * std::polar(1.0, -step * k);
   }
   return std::abs(sum) * 2.0 / samples / 1e-8;
@@ -145,12 +145,12 @@ TEST(Loop, FollowsTheSessionsCommand) {
   const AttitudeGains attitude = attitude_gains(scenario.attitude, period_s);
   Loop<double> loop;
   SharedSample shared;
-  shared.drag_free_command_m_s2 = {2e-8, 0.0, 0.0};
+  shared.drag_free_command_S_m_s2 = {2e-8, 0.0, 0.0};
   Observation<double> observation;
   for (int k = 0; k < 8000; ++k) {
     observation = loop.advance(constants, drag_free, attitude, shared, SampleNoise<double>{});
   }
-  EXPECT_NEAR(observation.measured[0].x, -2e-8, 1e-14);
+  EXPECT_NEAR(observation.measured_K[0].x, -2e-8, 1e-14);
 }
 
 // Spinning about Y at Ω with perfect sensors, X points to ν + Ωt from the Earth, so on a circular
@@ -162,7 +162,7 @@ TEST(Loop, SpinsAsTheClosedFormSays) {
   Session session = quiet_session();
   session.spin_rate_rad_s = 4.7552e-3;  // 4.5 turns an orbit.
   Instrument instrument = perfect_instrument();
-  instrument.offcentring_m = {20e-6, 0.0, 0.0};
+  instrument.offcentring_S_m = {20e-6, 0.0, 0.0};
   const LoopConstants<double> constants = make_loop_constants(instrument, scenario, session);
   const KeplerOrbit orbit(scenario.orbit);
   const EnvironmentTable no_table;
@@ -183,7 +183,7 @@ TEST(Loop, SpinsAsTheClosedFormSays) {
     const double t_xx = n2 * (3.0 * std::cos(phase) * std::cos(phase) - 1.0);
     const double spin2 = session.spin_rate_rad_s * session.spin_rate_rad_s;
     const double expected = 0.5 * (t_xx + spin2) * 20e-6;
-    const double measured = 0.5 * (observation.measured[0].x - observation.measured[1].x);
+    const double measured = 0.5 * (observation.measured_K[0].x - observation.measured_K[1].x);
     // Attitude errors of the settled loop are rounding; 1e-9 of the largest gradient.
     ASSERT_NEAR(measured, expected, 1e-9 * 0.5 * (2.0 * n2 + spin2) * 20e-6) << t;
     // The ground's gradient comes from the estimated attitude and is the true one here.
@@ -214,11 +214,12 @@ TEST(GroundSignals, SeeTheTrueAttitudeUnderACommandedSwing) {
   double largest = 0.0;
   for (std::int64_t i = -signals.num_settling(); i < signals.num_record(); ++i) {
     const SharedSample shared = signals.next();
-    const Vector3<double> u = to_target(loop.attitude_IS, shared.earth_direction_I);
+    const Vector3<double> u = to_target(loop.attitude_IS, shared.radial_I);
     const Observation<double> observation =
         loop.advance(constants, drag_free, attitude, shared, SampleNoise<double>{});
     if (i < 0) continue;
-    const double expected = 3.0 * shared.gradient_s2 * u.x * u.y + observation.measured_angular.z;
+    const double expected =
+        3.0 * shared.gradient_s2 * u.x * u.y + observation.measured_omega_dot_IS_S.z;
     const auto values = ground_signals(observation, shared, Product::none);
     largest = std::max(largest, std::abs(expected));
     // Rates of the swing, 2e-5 rad/s, would enter squared; settling leaves e^(−4000 s/53 s).
