@@ -21,7 +21,7 @@ StarTracker make_star_tracker(const NoiseConfig& noise, double sample_period_s) 
   }
   const Eigen::Matrix3d covariance = (information[0] + information[1]).inverse();
   const Eigen::LLT<Eigen::Matrix3d> cholesky(covariance);
-  return {.noise_factor_S_rad = noise.scale * Eigen::Matrix3d(cholesky.matrixL()),
+  return {.noise_factor_S_rad = cholesky.matrixL(),
           .weight = {covariance * information[0], covariance * information[1]}};
 }
 

@@ -20,14 +20,19 @@ NoiseShape scaled_shape(const SensorNoise& noise, double scale, double sample_pe
 
 }  // namespace
 
+// The one place where noise.scale acts on what is simulated. The outputs of the filters are scaled
+// and not the levels that they are made from: shape_noise() needs a white level above 0, which a
+// scale of 0 would not leave.
 NoiseModel make_noise_model(const NoiseConfig& config, double sample_period_s) {
-  const double per_sample = config.scale / std::sqrt(2.0 * sample_period_s);
+  const double scale = config.scale;
   const Eigen::Matrix3d star = make_star_tracker(config, sample_period_s).noise_factor_S_rad;
-  return {.linear_x = scaled_shape(config.linear_x, config.scale, sample_period_s),
-          .linear_yz = scaled_shape(config.linear_yz, config.scale, sample_period_s),
-          .angular = scaled_shape(config.angular, config.scale, sample_period_s),
-          .star_tracker_factor = {star(0, 0), star(1, 0), star(1, 1), star(2, 0), star(2, 1),
-                                  star(2, 2)},
+  // A one-sided density A² is the variance A²/(2T) of each sample.
+  const double per_sample = scale / std::sqrt(2.0 * sample_period_s);
+  return {.linear_x = scaled_shape(config.linear_x, scale, sample_period_s),
+          .linear_yz = scaled_shape(config.linear_yz, scale, sample_period_s),
+          .angular = scaled_shape(config.angular, scale, sample_period_s),
+          .star_tracker_factor = {scale * star(0, 0), scale * star(1, 0), scale * star(1, 1),
+                                  scale * star(2, 0), scale * star(2, 1), scale * star(2, 2)},
           .thrust_deviation = config.thrust_asd_m_s2 * per_sample,
           .torque_deviation = config.torque_asd_rad_s2 * per_sample};
 }

@@ -39,11 +39,5 @@ TEST(StarTracker, WeighsEachHeadsBiasWhereItSeesBest) {
   EXPECT_NEAR(x.x(), 1e-5, 1e-19);
 }
 
-TEST(StarTracker, IsSilentWithoutNoise) {
-  NoiseConfig noise;
-  noise.scale = 0.0;
-  EXPECT_EQ(make_star_tracker(noise, 0.25).noise_factor_S_rad.norm(), 0.0);
-}
-
 }  // namespace
 }  // namespace proofmass

@@ -1,0 +1,60 @@
+#include "core/microscope/simulation/sample_noise.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace proofmass {
+namespace {
+
+constexpr double period_s = 0.25;
+constexpr std::size_t num_samples = 100;
+
+/// The 18 channels of a sample.
+std::array<double, num_noise_channels> channels(const SampleNoise<double>& noise) {
+  std::array<double, num_noise_channels> values{};
+  std::size_t next = 0;
+  for (const Vector3<double>& v : {noise.sensor_K[0], noise.sensor_K[1], noise.angular_S,
+                                   noise.star_tracker_S, noise.thrust_S, noise.torque_S}) {
+    for (const double value : {v.x, v.y, v.z}) values[next++] = value;
+  }
+  return values;
+}
+
+std::vector<std::array<double, num_noise_channels>> samples_at(double scale) {
+  NoiseConfig config;
+  config.scale = scale;
+  const NoiseModel model = make_noise_model(config, period_s);
+  SessionNoise noise(model, /*seed=*/1, RunIndex{0}, "a_c12");
+  std::vector<std::array<double, num_noise_channels>> samples;
+  for (std::size_t i = 0; i < num_samples; ++i) samples.push_back(channels(noise.next()));
+  return samples;
+}
+
+// Every channel is a weighted sum of the same deviates. The scale is a factor of each weight, and a
+// sum has at most 14 terms, each rounded twice; terms cancel to a hundredth at worst in so few
+// samples.
+TEST(NoiseScale, MultipliesEveryChannel) {
+  const auto once = samples_at(1.0);
+  const auto thrice = samples_at(3.0);
+  for (std::size_t i = 0; i < num_samples; ++i) {
+    for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
+      const double expected = 3.0 * once[i][channel];
+      ASSERT_NEAR(thrice[i][channel], expected, 1e-12 * std::abs(expected))
+          << noise_channel_names()[channel];
+    }
+  }
+}
+
+TEST(NoiseScale, OfZeroSilencesEveryChannel) {
+  for (const auto& sample : samples_at(0.0)) {
+    for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
+      ASSERT_EQ(sample[channel], 0.0) << noise_channel_names()[channel];
+    }
+  }
+}
+
+}  // namespace
+}  // namespace proofmass
