@@ -9,7 +9,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/simulation/batch_kernel.hpp"
 #include "core/microscope/simulation/session_record.hpp"
 #include "core/random/normal.hpp"

@@ -5,7 +5,6 @@
 #include "core/campaign/model.hpp"
 #include "core/error.hpp"
 #include "core/microscope/campaign/budget.hpp"
-#include "core/microscope/campaign/draw.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/instrument/instrument.hpp"

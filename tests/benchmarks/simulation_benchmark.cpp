@@ -4,7 +4,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/microscope/simulation/session_record.hpp"
 #include "core/random/normal.hpp"

@@ -5,9 +5,8 @@
 
 #include "core/campaign/model_rules.hpp"
 #include "core/campaign/run_result.hpp"
-#include "core/microscope/campaign/loop_health.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
-#include "core/microscope/campaign/parameter.hpp"
+#include "core/microscope/campaign/results.hpp"
 
 namespace proofmass::test {
 

@@ -55,7 +55,7 @@ TEST(CheckLayers, AllowsWhatTheLayersAreFor) {
 }
 
 TEST(CheckLayers, KeepTheEngineFromKnowingOneModel) {
-  const std::string model = "\"core/microscope/campaign/parameter.hpp\"";
+  const std::string model = "\"core/microscope/campaign/results.hpp\"";
   for (const std::string path :
        {"proto/wire/a.cpp", "proto/wire/a.hpp", "coordinator/report/a.hpp", "coordinator/cli/a.cpp",
         "coordinator/query/extension.cpp", "worker/program.cpp", "worker/net/main.cpp",

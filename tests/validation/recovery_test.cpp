@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/control/star_tracker.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/random/stream.hpp"

@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "core/campaign/error_budget.hpp"
-#include "core/microscope/campaign/parameter.hpp"
+#include "core/microscope/campaign/results.hpp"
 
 namespace proofmass {
 

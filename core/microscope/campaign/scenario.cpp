@@ -7,7 +7,7 @@
 
 #include "core/error.hpp"
 #include "core/microscope/estimation/methods.hpp"
-#include "core/microscope/session/session_names.hpp"
+#include "core/microscope/session/session.hpp"
 
 namespace proofmass {
 

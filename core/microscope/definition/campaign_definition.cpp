@@ -3,12 +3,148 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <span>
 #include <utility>
 
+#include "core/campaign/model.hpp"
+#include "core/definition/csv.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
 
 namespace proofmass {
+namespace {
+
+constexpr std::array<std::string_view, 7> environment_headings{
+    "time_s",           "linear_x_m_s2",    "linear_y_m_s2",   "linear_z_m_s2",
+    "angular_x_rad_s2", "angular_y_rad_s2", "angular_z_rad_s2"};
+
+// Row i of an environment table stands in line i + 1, below the headings.
+DefinitionError located_in_table(const ConfigError& error, const std::string& name) {
+  constexpr std::string_view row_prefix = "environment.file row ";
+  std::size_t row = 0;
+  if (error.field().starts_with(row_prefix)) {
+    const char* const digits = error.field().data() + row_prefix.size();
+    std::from_chars(digits, error.field().data() + error.field().size(), row);
+  }
+  return DefinitionError(fmt::format("{}:{}: {}", name, row + 1, error.what()));
+}
+
+void read_environment(MicroscopeCampaign& campaign, DataFiles& files) {
+  if (campaign.scenario.environment.kind != EnvironmentKind::file) return;
+  if (campaign.environment_file.empty()) return;  // validate() says what is missing.
+  const std::string& text = files.text_of(campaign.environment_file, "environment.file");
+  campaign.environment_table = parse_environment(text, files.name_of(campaign.environment_file),
+                                                 campaign.scenario.orbit.period_s);
+}
+
+void read_columns(MicroscopeCampaign& campaign, DataFiles& files) {
+  for (const std::size_t element : campaign.table_quantities()) {
+    const Dispersion& dispersion = campaign.dispersions[element];
+    const std::string path = fmt::format("dispersion.{}.file", drawn_names()[element]);
+    campaign.table_columns.push_back(parse_column(
+        files.text_of(dispersion.file, path), files.name_of(dispersion.file), dispersion.column));
+  }
+}
+
+/// Values that a drawn quantity may have in a file: far beyond any instrument, and wide enough for
+/// any experiment with the model. An offcentring of 5 m is a slip of the pen.
+class MagnitudeCheck {
+ public:
+  explicit MagnitudeCheck(std::size_t drawn)
+      : path_(fmt::format("dispersion.{}", drawn_names()[drawn])) {
+    for (const DrawGroup& group : draw_groups()) {
+      if (drawn >= group.first) maximum_ = 1000.0 * group.bound;
+    }
+  }
+
+  void run(const Dispersion& law) const {
+    check("minimum", law.minimum);
+    check("maximum", law.maximum);
+    check("mean", law.mean);
+    check("standard_deviation", law.standard_deviation);
+    check("value", law.value);
+  }
+
+  /// @param column  The values of the quantity's table, one a run.
+  void run(const Dispersion& law, std::span<const double> column) const {
+    const auto wrong = std::ranges::find_if(column, [&](double value) { return !is_in(value); });
+    if (wrong == column.end()) return;
+    throw ConfigError(path_ + ".column", fmt::format("\"{}\"", law.column),
+                      fmt::format("run {} has {}, {}", wrong - column.begin(), *wrong, rule()));
+  }
+
+ private:
+  [[nodiscard]] bool is_in(double value) const { return std::fabs(value) <= maximum_; }
+  [[nodiscard]] std::string rule() const {
+    return fmt::format("must be in [-{0:.6g}, {0:.6g}], 1000 times the nominal bound", maximum_);
+  }
+
+  void check(std::string_view key, double value) const {
+    if (is_in(value)) return;
+    throw ConfigError(fmt::format("{}.{}", path_, key), fmt::format("{}", value), rule());
+  }
+
+  std::string path_;
+  double maximum_ = 0.0;
+};
+
+void check_magnitudes(const MicroscopeCampaign& campaign) {
+  for (std::size_t i = 0; i < num_drawn; ++i) MagnitudeCheck(i).run(campaign.dispersions[i]);
+  const std::vector<std::size_t> drawn = campaign.table_quantities();
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    MagnitudeCheck(drawn[i]).run(campaign.dispersions[drawn[i]], campaign.table_columns[i]);
+  }
+}
+
+}  // namespace
+
+EnvironmentTable parse_environment(std::string_view text, const std::string& name,
+                                   double orbit_period_s) {
+  CsvReader reader(text, name);
+  if (!reader.next_row() || !std::ranges::equal(reader.cells(), environment_headings)) {
+    reader.refuse(fmt::format("the first line must be {}", fmt::join(environment_headings, ",")));
+  }
+  EnvironmentTable table;
+  while (reader.next_row()) {
+    if (table.size() == environment_rows_max) {
+      reader.refuse(fmt::format("more than {} rows", environment_rows_max));
+    }
+    reader.expect_cells(environment_headings.size());
+    const auto number = [&](std::size_t i) { return reader.number(i, environment_headings[i]); };
+    table.push_back({.time_s = number(0),
+                     .linear_m_s2 = {number(1), number(2), number(3)},
+                     .angular_rad_s2 = {number(4), number(5), number(6)}});
+  }
+  try {
+    validate_environment_table(table, orbit_period_s);
+  } catch (const ConfigError& error) {
+    throw located_in_table(error, name);
+  }
+  return table;
+}
+
+MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
+  MicroscopeCampaign campaign = read_definition(document);
+  document.check();
+  // A file that is empty by mistake would be the nominal campaign.
+  if (document.find("campaign.name") == nullptr) {
+    document.refuse_absence("campaign.name", "every campaign needs one");
+    document.check();
+  }
+  read_environment(campaign, files);
+  read_columns(campaign, files);
+  try {
+    campaign.validate();
+    check_magnitudes(campaign);
+  } catch (const ConfigError& error) {
+    throw document.located(error);
+  }
+  return campaign;
+}
+
 namespace {
 
 void validate(const MicroscopeCampaign& campaign, TableColumns columns, const Document& document) {

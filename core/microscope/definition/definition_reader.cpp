@@ -11,8 +11,8 @@
 
 #include "core/definition/document.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
-#include "core/microscope/definition/dispersion_keys.hpp"
-#include "core/microscope/session/session_names.hpp"
+#include "core/microscope/definition/definition_entries.hpp"
+#include "core/microscope/session/session.hpp"
 
 namespace proofmass {
 namespace {

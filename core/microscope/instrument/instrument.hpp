@@ -4,48 +4,55 @@
 #include <array>
 
 #include "core/microscope/campaign/drawn_quantities.hpp"
-#include "core/microscope/campaign/parameter.hpp"
+#include "core/microscope/campaign/results.hpp"
 
 namespace proofmass {
 
-/// One electrostatic sensor with its test mass. Vectors are x, y, z.
+/// One electrostatic sensor with its test mass, as drawn for a run. K is the sensor's frame. The
+/// triples K1, η and K2 belong to its axes; they are no vectors and have no frame in their names.
 struct Sensor {
-  Eigen::Vector3d scale_factor;          ///< K1.
-  Eigen::Vector3d misalignment_SK_rad;   ///< θ: small rotation from S to the sensor frame.
-  Eigen::Vector3d coupling_rad;          ///< η: defect of orthogonality.
-  Eigen::Vector3d quadratic_s2_m;        ///< K2.
+  Eigen::Vector3d scale_factor;          ///< K1 of each axis, near 1.
+  Eigen::Vector3d misalignment_SK_rad;   ///< θ: rotation vector from S to K, small.
+  Eigen::Vector3d coupling_rad;          ///< η: defect of orthogonality, of the planes yz, xz, xy.
+  Eigen::Vector3d quadratic_s2_m;        ///< K2 of each axis.
   Eigen::Vector3d read_out_bias_K_m_s2;  ///< b0.
-  Eigen::Vector3d parasitic_K_m_s2;      ///< p = F_Pa/m.
+  Eigen::Vector3d parasitic_K_m_s2;      ///< p = F_Pa/m, the paper's b1.
 
-  /// [K1] + [η].
+  /// [K1] + [η], symmetric: what the electrostatic measurement makes of a force in K.
   [[nodiscard]] Eigen::Matrix3d symmetric_part() const;
-  /// [θ] = 1 + [dθ], the rotation from S to the sensor frame at first order.
+  /// [θ] = 1 + [dθ], at first order the rotation v_K = [θ] v_S.
   [[nodiscard]] Eigen::Matrix3d alignment_KS() const;
-  /// [M], exactly as printed after [Hardy2013] eq:measurement.
+  /// [M], exactly as printed after [Hardy2013] eq:measurement: first order in the angles.
   [[nodiscard]] Eigen::Matrix3d sensitivity_KS() const;
 };
 
 /// One drawn satellite and instrument: everything that differs between two runs except noise.
 struct Instrument {
-  std::array<Sensor, 2> sensors;      ///< Inner mass (1), outer mass (2).
-  Eigen::Vector3d offcentring_S_m;    ///< Δ = O₁O₂.
-  Eigen::Vector3d centre_offset_S_m;  ///< r_c: from the satellite's centre of mass to the middle.
+  std::array<Sensor, 2> sensors;          ///< Inner mass (1), outer mass (2).
+  Eigen::Vector3d offcentring_S_m;        ///< Δ = O₁O₂, from mass 1 to mass 2.
+  Eigen::Vector3d centre_offset_S_m;      ///< r_c: from O_sat to the middle of O₁ and O₂.
   Eigen::Vector3d angular_bias_S_rad_s2;  ///< Of the measured angular acceleration.
-  Eigen::Matrix3d thrust_matrix;          ///< [M_DF].
-  std::array<Eigen::Vector3d, 2> star_tracker_bias_S_rad;  ///< Of each head, in S.
+  Eigen::Matrix3d thrust_matrix;          ///< [M_DF]: acceleration in S for a command in S.
+  std::array<Eigen::Vector3d, 2> star_tracker_bias_S_rad;  ///< Of each head, a rotation vector.
 };
 
+/// The instrument of a draw, whether or not it lies inside the acceptance bounds.
 [[nodiscard]] Instrument make_instrument(const DrawnValues& values);
 
-/// [A_c] = [M_c] − [M_d][M_c]⁻¹[M_d] and [A_d] = [M_d][M_c]⁻¹ ([Hardy2013] after eq:Gamma-mesdx).
+/// Common and differential sensitivity ([Hardy2013] after eq:Gamma-mesdx), with
+/// M_c = ½(M_1 + M_2) and M_d = ½(M_1 − M_2):
+///
+///     A_c = M_c − M_d M_c⁻¹ M_d        A_d = M_d M_c⁻¹
+///
+/// They satisfy Γ_mes,d = A_d Γ_mes,c + A_c Γ_App,d for linear sensors.
 struct SensitivityMatrices {
-  Eigen::Matrix3d common;        ///< A_c.
-  Eigen::Matrix3d differential;  ///< A_d.
+  Eigen::Matrix3d common;        ///< A_c, near 1; multiplies components in S.
+  Eigen::Matrix3d differential;  ///< A_d, 1e-2 at most; multiplies measured components.
 };
 
 [[nodiscard]] SensitivityMatrices sensitivity_matrices(const Instrument& instrument);
 
-/// True values of the ten parameters, from exact matrices.
+/// True values of the ten parameters, SI, from exact matrices.
 ///
 /// a_d11' = a_d11 + 2(K2c/K1c) b_1d + 2(K2d/K1c)(C_0x − b_0c,x) ([Hardy2013] section 4.2), with
 /// b_1d = −½(p_1 − p_2) along X.

@@ -9,42 +9,47 @@
 
 namespace proofmass {
 
-/// What is the same for all sensors.
+// One sensor with its mass in the sample loop, over the number type of the kernel. k is the sensor,
+// 1 or 2, K its frame.
+
+/// Settings that are the same for all sensors: `[sensor]` of a campaign file.
 struct SensorConfig {
   /// Largest acceleration that a sensor reports on an axis, m/s²; a larger one reads as this.
   double range_m_s2 = 1e-5;
 };
 
-/// Satellite motion that both test masses feel, in S.
+/// Satellite motion that both test masses feel at one sample.
 template <typename T>
 struct SatelliteMotion {
   Vector3<T> acceleration_S;  ///< Γ_sat: non-gravitational acceleration of O_sat, m/s².
-  double gradient_s2 = 0.0;   ///< μ/r³.
-  Vector3<T> radial_S;        ///< û_S: from the Earth to the satellite.
+  double gradient_s2 = 0.0;   ///< μ/r³; the same for every lane.
+  Vector3<T> radial_S;        ///< û: unit vector from the Earth's centre to the satellite.
   Vector3<T> omega_IS_S;      ///< Ω, rad/s.
   Vector3<T> omega_dot_IS_S;  ///< Ω̇, rad/s².
 };
 
-/// Factors of the motion q(t) = direction·(position, velocity, acceleration) of a test mass.
+/// Factors of the motion q_S(t) = motion_direction_S·(position, velocity, acceleration) that a
+/// session commands of a test mass. All are 0 where no mass moves.
 struct MassMotionPhase {
-  double position_m = 0.0;
-  double velocity_m_s = 0.0;
-  double acceleration_m_s2 = 0.0;
+  double position_m = 0.0;         ///< Δ_TM sin(2π f t).
+  double velocity_m_s = 0.0;       ///< Its first derivative.
+  double acceleration_m_s2 = 0.0;  ///< Its second.
 };
 
-/// Constants of a sensor and its mass, in S unless said otherwise.
+/// Constants of a sensor and its mass during a session.
 template <typename T>
 struct SensorModel {
-  Vector3<T> rest_position_S_m;   ///< r_k without excitation: from O_sat to O_k.
-  Vector3<T> motion_direction_S;  ///< [θ_k]ᵀ e_a s_k.
+  Vector3<T> rest_position_S_m;  ///< r_k without excitation: from O_sat to O_k.
+  Vector3<T> motion_direction_S;  ///< [θ_k]ᵀ e_a s_k: an axis of K in S; 0 if the mass is at rest.
   Vector3<T> parasitic_K_m_s2;    ///< p_k.
-  Vector3<T> offset_K_m_s2;       ///< b0_k − ([K1_k] + [η_k]) p_k.
+  Vector3<T> offset_K_m_s2;       ///< b0_k − ([K1_k] + [η_k]) p_k: all that is constant.
   Matrix3<T> sensitivity_KS;      ///< [M_k].
-  Vector3<T> quadratic_s2_m;      ///< [K2_k].
+  Vector3<T> quadratic_s2_m;      ///< K2 of each axis of K.
 };
 
-/// Γ_App,k + p_k, the applied acceleration without the parasitic one ([Hardy2013]
-/// eq:instrument-dynamics with O_kO_sat = −r_k): Γ_sat − ([T] − [In]) r + [Cor] ṙ + r̈.
+/// Γ_App,k + p_k in S, m/s²: the applied acceleration without the parasitic one ([Hardy2013]
+/// eq:instrument-dynamics with O_kO_sat = −r_k): Γ_sat − ([T] − [In]) r + [Cor] ṙ + r̈. The mass
+/// follows the session's command exactly, as the sensor's own loop is far faster.
 template <typename T>
 PROOFMASS_INLINE Vector3<T> kinematic_acceleration(const SensorModel<T>& sensor,
                                                    const SatelliteMotion<T>& satellite,
@@ -59,8 +64,13 @@ PROOFMASS_INLINE Vector3<T> kinematic_acceleration(const SensorModel<T>& sensor,
          T(2.0) * cross(satellite.omega_IS_S, velocity_S) + acceleration_S;
 }
 
-/// Γ_mes,k without noise ([Hardy2013] eq:measurement):
+/// Γ_mes,k in K without noise, m/s² ([Hardy2013] eq:measurement):
 /// b0 + [M](Γ_App + p) − ([K1] + [η]) p + [K2] Γ_App².
+///
+/// Γ_App is computed as the difference of a vector in S and one in K. It enters through K2 alone, a
+/// small term of which turning p by θ would change a part in 400.
+///
+/// @param kinematic_S  kinematic_acceleration().
 template <typename T>
 PROOFMASS_INLINE Vector3<T> measured_acceleration(const SensorModel<T>& sensor,
                                                   const Vector3<T>& kinematic_S) {

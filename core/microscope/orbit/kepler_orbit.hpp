@@ -9,17 +9,17 @@
 
 namespace proofmass {
 
-/// The orbit of the satellite about the Earth.
+/// The orbit of the satellite about the Earth: `[orbit]` of a campaign file.
 struct OrbitConfig {
   double period_s = 5950.0;
-  double eccentricity = 5e-3;
+  double eccentricity = 5e-3;  ///< In [0, 0.5].
 };
 
-/// Where the satellite is on its orbit, in the orbital plane of I (X towards perigee, Z a quarter
-/// of a turn on).
+/// Where the satellite is on its orbit. The orbital plane is that of X and Z of the inertial frame
+/// I: X points towards perigee, Z a quarter of a turn on.
 template <typename T>
 struct OrbitPointOf {
-  T radial_I_x;  ///< û_I = (cos ν, 0, sin ν), from the Earth to the satellite.
+  T radial_I_x;  ///< û = (cos ν, 0, sin ν): unit vector from the Earth's centre to the satellite.
   T radial_I_z;
   T gradient_s2;                 ///< μ/r³.
   SineCosineOf<T> mean_anomaly;  ///< Of n·t.
@@ -29,12 +29,12 @@ using OrbitPoint = OrbitPointOf<double>;
 /// Whether a step of Newton's method is the last one.
 PROOFMASS_INLINE bool is_small(double move) { return std::abs(move) < 1e-8; }
 
-/// Keplerian motion with perigee on +X at t = 0.
+/// Keplerian motion with perigee on +X at t = 0. README.md has the equations and their range.
 class KeplerOrbit {
  public:
   explicit KeplerOrbit(const OrbitConfig& config);
 
-  /// A pure function of time; `time_s` may be negative.
+  /// A pure function of time, by Newton's method to rounding; `time_s` may be negative.
   [[nodiscard]] OrbitPoint at(double time_s) const;
 
   /// The same for a batch of times, one a lane; nothing if one of them needs more than the first

@@ -6,12 +6,92 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "core/error.hpp"
-#include "core/microscope/session/session_names.hpp"
 
 namespace proofmass {
+namespace {
+
+using enum SessionTarget;
+using enum ExcitationKind;
+using enum MassMotion;
+
+constexpr auto no_product = Product::none;
+constexpr auto common_drag_free = DragFreeSource::common;
+constexpr std::optional<DragFreeSource> any_drag_free;
+
+constexpr auto quiet = ExcitationRule::none;
+constexpr auto shaken = ExcitationRule::stimulus;
+
+constexpr Stimulus no_stimulus{};
+constexpr Stimulus turned_about_z{attitude, Axis::z};
+constexpr Stimulus moved_along(Axis axis) { return {test_mass, axis}; }
+constexpr Stimulus pushed_along(Axis axis) { return {drag_free, axis}; }
+
+// The calibration equations of [Hardy2013] section 4.2, a row for each target. In the order of the
+// rows, Γ_mes,dx is at the session's lines
+//
+//     ½ [T − In]_xj a_c11 Δ_j                              j = x, z, y
+//     a_c1j ½([T]_jj − [T]_xx) Δ_TM sin(2π f_TM t)         j = 2, 3 (y, z)
+//     a_d1j Γ_mes,cj                                       j = 1, 2, 3 (x, y, z)
+//     K2d/K1c² Γ_mes,cx²
+//     ±½ K2k/K1k² Γ_mes,kx²                                of the mass k that moves
+//
+// a_c1j multiplies [T]_jj less [T]_xx because the masses move along axes of their sensors, which
+// are turned against the satellite's by θ, the larger part of a_c1j.
+constexpr std::array<TargetInfo, num_session_targets> targets{{
+    {a_c11_delta_x, "a_c11_delta_x", quiet, no_stimulus, common_drag_free, Signal::gradient_xx,
+     no_product, 2.0, SignalSet::all},
+    {a_c11_delta_z, "a_c11_delta_z", quiet, no_stimulus, common_drag_free, Signal::gradient_xz,
+     no_product, 2.0, SignalSet::all},
+    {a_c11_delta_y, "a_c11_delta_y", shaken, turned_about_z, common_drag_free, Signal::gradient_xy,
+     no_product, 2.0, SignalSet::all},
+    {a_c12, "a_c12", shaken, moved_along(Axis::y), common_drag_free, Signal::product,
+     Product::modulated_yy, 1.0, SignalSet::common},
+    {a_c13, "a_c13", shaken, moved_along(Axis::z), common_drag_free, Signal::product,
+     Product::modulated_zz, 1.0, SignalSet::common},
+    {a_d11_prime, "a_d11_prime", shaken, pushed_along(Axis::x), common_drag_free, Signal::common_x,
+     no_product, 1.0, SignalSet::common},
+    {a_d12, "a_d12", shaken, pushed_along(Axis::y), common_drag_free, Signal::common_y, no_product,
+     1.0, SignalSet::common},
+    {a_d13, "a_d13", shaken, pushed_along(Axis::z), common_drag_free, Signal::common_z, no_product,
+     1.0, SignalSet::common},
+    {k2d, "k2d", shaken, pushed_along(Axis::x), common_drag_free, Signal::product,
+     Product::common_squared, 1.0, SignalSet::common},
+    {k2_sensor_1, "k2_sensor_1", shaken, Stimulus{test_mass, Axis::x, mass_1},
+     DragFreeSource::sensor_2, Signal::product, Product::sensor_1_squared, 2.0, SignalSet::common},
+    {k2_sensor_2, "k2_sensor_2", shaken, Stimulus{test_mass, Axis::x, mass_2},
+     DragFreeSource::sensor_1, Signal::product, Product::sensor_2_squared, -2.0, SignalSet::common},
+    {no_target, "no_target", ExcitationRule::any, no_stimulus, any_drag_free, Signal::product,
+     no_product, 0.0, SignalSet::common},
+}};
+
+constexpr bool are_in_order() {
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    if (index(targets[i].target) != i) return false;
+  }
+  return true;
+}
+static_assert(are_in_order());
+
+constexpr std::array<std::string_view, num_session_targets> target_names = [] {
+  std::array<std::string_view, num_session_targets> names{};
+  for (std::size_t i = 0; i < targets.size(); ++i) names[i] = targets[i].name;
+  return names;
+}();
+
+}  // namespace
+
+const TargetInfo& target_info(SessionTarget target) {
+  PROOFMASS_EXPECT(index(target) < targets.size());
+  return targets[index(target)];
+}
+
+std::span<const std::string_view> names_of(SessionTarget) { return target_names; }
+
+const char* name_of(SessionTarget target) { return target_info(target).name.data(); }
 
 std::span<const std::string_view> names_of(Axis) {
   static constexpr std::array<std::string_view, 3> names{"x", "y", "z"};
@@ -86,15 +166,14 @@ using Lines = std::vector<LineMultiple>;
 
 // Calibration signals of model and mission: [Hardy2013] section 4.2 gives their kinds, the
 // frequencies are those flown, the amplitudes reach the paper's accuracies.
-constexpr Excitation attitude_z{ExcitationKind::attitude, Axis::z, 3.5e-3, 1.0e-3,
-                                MassMotion::opposition};
+constexpr Excitation swing_about_z{attitude, Axis::z, 3.5e-3, 1.0e-3, opposition};
 
-constexpr Excitation drag_free(Axis axis) {
-  return {ExcitationKind::drag_free, axis, 2e-8, 1.22847554e-3, MassMotion::opposition};
+constexpr Excitation push_along(Axis axis) {
+  return {drag_free, axis, 2e-8, 1.22847554e-3, opposition};
 }
 
-constexpr Excitation test_mass(Axis axis, MassMotion motion) {
-  return {ExcitationKind::test_mass, axis, 10e-6, 9.88e-3, motion};
+constexpr Excitation move_along(Axis axis, MassMotion motion) {
+  return {test_mass, axis, 10e-6, 9.88e-3, motion};
 }
 
 Session session_of(SessionTarget target, Lines fit_lines, Lines known_lines) {
@@ -124,8 +203,6 @@ Session lasting(Session session, int num_orbits) {
 }  // namespace
 
 std::vector<Session> hardy2013_sessions() {
-  using enum SessionTarget;
-  using enum MassMotion;
   const Lines gradient{{2, 0}};
   const Lines orbital{{1, 0}, {3, 0}, {4, 0}};
   const Lines sidebands{{2, 1}, {-2, 1}};
@@ -139,16 +216,16 @@ std::vector<Session> hardy2013_sessions() {
   return {
       session_of(a_c11_delta_x, gradient, orbital),
       session_of(a_c11_delta_z, gradient, orbital),
-      excited(session_of(a_c11_delta_y, {{0, 1}}, all_sidebands), attitude_z),
-      lasting(excited(session_of(a_c12, sidebands, carrier), test_mass(Axis::y, opposition)), 40),
-      excited(session_of(a_c13, sidebands, carrier), test_mass(Axis::z, opposition)),
-      excited(session_of(a_d11_prime, {{0, 1}}, with_harmonic), drag_free(Axis::x)),
-      excited(session_of(a_d12, {{0, 1}}, with_harmonic), drag_free(Axis::y)),
-      excited(session_of(a_d13, {{0, 1}}, with_harmonic), drag_free(Axis::z)),
-      excited(session_of(k2d, {{0, 2}}, with_carrier), drag_free(Axis::x)),
-      locked_on(excited(session_of(k2_sensor_1, {{0, 2}}, quadratic), test_mass(Axis::x, mass_1)),
+      excited(session_of(a_c11_delta_y, {{0, 1}}, all_sidebands), swing_about_z),
+      lasting(excited(session_of(a_c12, sidebands, carrier), move_along(Axis::y, opposition)), 40),
+      excited(session_of(a_c13, sidebands, carrier), move_along(Axis::z, opposition)),
+      excited(session_of(a_d11_prime, {{0, 1}}, with_harmonic), push_along(Axis::x)),
+      excited(session_of(a_d12, {{0, 1}}, with_harmonic), push_along(Axis::y)),
+      excited(session_of(a_d13, {{0, 1}}, with_harmonic), push_along(Axis::z)),
+      excited(session_of(k2d, {{0, 2}}, with_carrier), push_along(Axis::x)),
+      locked_on(excited(session_of(k2_sensor_1, {{0, 2}}, quadratic), move_along(Axis::x, mass_1)),
                 DragFreeSource::sensor_2),
-      locked_on(excited(session_of(k2_sensor_2, {{0, 2}}, quadratic), test_mass(Axis::x, mass_2)),
+      locked_on(excited(session_of(k2_sensor_2, {{0, 2}}, quadratic), move_along(Axis::x, mass_2)),
                 DragFreeSource::sensor_1),
   };
 }

@@ -9,7 +9,6 @@
 #include "core/campaign/field.hpp"
 #include "core/error.hpp"
 #include "core/microscope/session/session.hpp"
-#include "core/microscope/session/session_names.hpp"
 
 namespace proofmass {
 namespace {

@@ -12,25 +12,29 @@
 #include "core/math/quaternion.hpp"
 #include "core/math/vector3.hpp"
 #include "core/microscope/campaign/scenario.hpp"
-#include "core/microscope/control/attitude_loop.hpp"
+#include "core/microscope/control/control_loops.hpp"
 #include "core/microscope/environment/environment.hpp"
 #include "core/microscope/instrument/sensor_model.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
 
 namespace proofmass {
 
-/// What every run of a campaign sees alike at one sample of a session.
+/// What every run of a campaign sees alike at one sample of a session. R is the reference frame
+/// that the attitude loop holds: I turned about Y at the session's spin rate.
 struct SharedSample {
-  double gradient_s2 = 0.0;         ///< μ/r³.
-  Vector3<double> radial_I;         ///< û.
-  Vector3<double> radial_R;         ///< The same in the frame that the attitude loop holds.
-  Quaternion<double> attitude_IR;  ///< Attitude of that frame.
-  Vector3<double> omega_IR_R;       ///< Its Ω, rad/s.
+  double gradient_s2 = 0.0;        ///< μ/r³.
+  Vector3<double> radial_I;        ///< û: unit vector from the Earth's centre to the satellite.
+  Vector3<double> radial_R;        ///< The same vector.
+  Quaternion<double> attitude_IR;  ///< Of the reference.
+  Vector3<double> omega_IR_R;      ///< Of the reference, rad/s; constant.
+  /// Of a harmonic environment the components in R: what tilts S against R leaves them unchanged.
   ExternalAcceleration external_S;
-  Vector3<double> drag_free_command_S_m_s2;  ///< C_cal.
+  Vector3<double> drag_free_command_S_m_s2;  ///< C_cal, added to the drag-free loop's input.
   Vector3<double> attitude_command_S_rad;    ///< Added to the star tracker's output.
-  AttitudeEstimator<double> commanded;       ///< What that command alone makes of the estimate.
-  MassMotionPhase mass_motion;               ///< Of the moving test masses.
+  /// What the attitude command alone makes of the on-board estimate, which is linear: the ground
+  /// takes it out again.
+  AttitudeEstimator<double> commanded;
+  MassMotionPhase mass_motion;  ///< Of the moving test masses.
 };
 
 /// What a sample takes from sines and cosines: functions of its time alone.
@@ -43,7 +47,8 @@ struct SamplePhasesOf {
 };
 using SamplePhases = SamplePhasesOf<double>;
 
-/// Generates the samples of a session in order, from the start of settling on.
+/// Generates the samples of a session in order, from the start of settling on. The excitations run
+/// while the loops settle, too.
 class SessionSignals {
  public:
   SessionSignals(const Scenario& scenario, const Session& session, const KeplerOrbit& orbit,
@@ -55,11 +60,12 @@ class SessionSignals {
   [[nodiscard]] std::int64_t num_settling() const { return num_settling_; }
   [[nodiscard]] std::int64_t num_record() const { return num_record_; }
 
-  /// Attitude and rate of the reference at the first sample.
+  /// Attitude and rate (rad/s) of the reference.
   struct Reference {
     Quaternion<double> attitude_IR;
     Vector3<double> omega_IR_R;
   };
+  /// Those at the first sample of settling.
   [[nodiscard]] Reference reference_at_start() const;
 
   /// The next sample; the first call yields t = −num_settling()·T.

@@ -6,30 +6,32 @@
 #include "core/math/inline.hpp"
 #include "core/math/quaternion.hpp"
 #include "core/math/vector3.hpp"
-#include "core/microscope/control/attitude_loop.hpp"
-#include "core/microscope/control/drag_free_loop.hpp"
+#include "core/microscope/control/control_loops.hpp"
 #include "core/microscope/instrument/sensor_model.hpp"
 #include "core/microscope/session/session_signals.hpp"
 #include "core/microscope/simulation/sample_noise.hpp"
 
 namespace proofmass {
 
+// The closed loop of one satellite: what it measures, what its controllers command, how it moves.
+// The letters of the frames are those of core/microscope/README.md; T is the number type.
+
 /// Constants of one drawn satellite during one session.
 template <typename T>
 struct LoopConstants {
   std::array<SensorModel<T>, 2> sensors;
-  std::array<T, 2> drag_free_weight;  ///< Of each sensor's measurement in the loop's input.
-  Vector3<T> subtracted_bias_S_m_s2;  ///< Known read-out bias of that input.
-  Matrix3<T> thrust_matrix;           ///< [M_DF].
-  Vector3<T> angular_bias_S_rad_s2;
-  Vector3<T> star_tracker_bias_S_rad;
-  double sensor_range_m_s2 = 0.0;  ///< The same for every lane.
+  std::array<T, 2> drag_free_weight;   ///< Of each sensor's measurement in the loop's input.
+  Vector3<T> subtracted_bias_S_m_s2;   ///< Known read-out bias of that input.
+  Matrix3<T> thrust_matrix;            ///< [M_DF]: acceleration in S for a command in S.
+  Vector3<T> angular_bias_S_rad_s2;    ///< Of the measured angular acceleration.
+  Vector3<T> star_tracker_bias_S_rad;  ///< Of the fused angles.
+  double sensor_range_m_s2 = 0.0;      ///< The same for every lane.
 };
 
 /// What the instrument and the on-board estimator report at one sample.
 template <typename T>
 struct Observation {
-  std::array<Vector3<T>, 2> measured_K;  ///< Γ_mes,k, m/s².
+  std::array<Vector3<T>, 2> measured_K;  ///< Γ_mes,k, each in its sensor's frame, m/s².
   std::array<T, 2> kinematic_S_x;        ///< Γ_App,k + p_k along X, m/s².
   Vector3<T> measured_omega_dot_IS_S;    ///< rad/s².
   AttitudeEstimator<T> attitude;         ///< With the commanded motion still in its angles.
@@ -50,9 +52,9 @@ enum class Watch : std::uint8_t { no, yes };
 template <typename T>
 struct Loop {
   Quaternion<T> attitude_IS;
-  Vector3<T> omega_IS_S;        ///< Ω in S, rad/s.
+  Vector3<T> omega_IS_S;        ///< Ω, rad/s.
   Vector3<T> thrust_command_S;  ///< Γ_DF of the sample before, m/s².
-  Vector3<T> torque_command_S;  ///< rad/s².
+  Vector3<T> torque_command_S;  ///< Angular acceleration of the sample before, rad/s².
   DragFreeController<T> drag_free;
   AttitudeEstimator<T> estimator;
   AttitudeController<T> controller;
@@ -72,6 +74,11 @@ struct Loop {
     is_any_saturated = false;
   }
 
+  /// Advances by one sample.
+  ///
+  /// @param shared  Of this sample; what all runs have in common.
+  /// @param noise   Of this sample; its scale is in it already.
+  /// @returns What instrument and estimator report at this sample.
   PROOFMASS_INLINE Observation<T> advance(const LoopConstants<T>& constants,
                                           const DragFreeGains& drag_free_gains,
                                           const AttitudeGains& attitude_gains,
@@ -128,8 +135,8 @@ struct Loop {
     return observation;
   }
 
-  /// One sample of rotation under a constant angular acceleration in S. The last term is the first
-  /// of the rotation vector's series in the non-commuting rates [Bortz1971].
+  /// One sample of rotation under a constant angular acceleration, rad/s². The last term is the
+  /// first of the rotation vector's series in the non-commuting rates [Bortz1971].
   PROOFMASS_INLINE void rotate(const Vector3<T>& omega_dot_IS_S, double period_s) {
     const Vector3<T> rotation =
         T(period_s) * omega_IS_S + T(0.5 * period_s * period_s) * omega_dot_IS_S +

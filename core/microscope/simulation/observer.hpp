@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <functional>
 
+#include "core/microscope/session/session.hpp"
 #include "core/microscope/session/session_signals.hpp"
-#include "core/microscope/session/signals.hpp"
 #include "core/microscope/simulation/loop.hpp"
 
 namespace proofmass {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/simulation/batch_kernel.hpp"
 #include "core/microscope/simulation/run_health.hpp"

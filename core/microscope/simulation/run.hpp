@@ -11,7 +11,7 @@
 #include "core/campaign/run_result.hpp"
 #include "core/math/instruction_set.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
-#include "core/microscope/estimation/method.hpp"
+#include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/simulation/observer.hpp"
 #include "core/microscope/simulation/run_health.hpp"
 

@@ -1,15 +1,87 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <span>
 #include <vector>
 
-#include "core/microscope/campaign/loop_health.hpp"
+#include "core/math/inline.hpp"
+#include "core/math/vector3.hpp"
+#include "core/microscope/campaign/results.hpp"
 #include "core/microscope/campaign/scenario.hpp"
-#include "core/microscope/estimation/method.hpp"
+#include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/session/session.hpp"
-#include "core/microscope/simulation/loop_monitor.hpp"
+#include "core/microscope/simulation/loop.hpp"
 #include "core/signal/line_weights.hpp"
 
 namespace proofmass {
+
+/// Sums of block after block of a signal, of which only the squared steps from one block to the
+/// next are kept: they are twice the variance of a block's sum, and slow changes do not count.
+template <typename T>
+struct BlockSteps {
+  T sum{};
+  T before{};
+  T squares{};
+
+  PROOFMASS_INLINE void add(const T& value) { sum = sum + value; }
+  PROOFMASS_INLINE void end_block(bool is_first) {
+    const T step = sum - before;
+    if (!is_first) squares = squares + step * step;
+    before = sum;
+    sum = T(0.0);
+  }
+};
+
+/// What a session without excitation tells of the loops, sample after sample.
+template <typename T>
+struct LoopMonitor {
+  BlockSteps<T> quadratic;      ///< ½(K2_1 Γ_App,1x² − K2_2 Γ_App,2x²), m/s².
+  BlockSteps<T> common_square;  ///< Γ_mes,cx².
+  std::array<BlockSteps<T>, 2> sensor_square{};  ///< Γ_mes,kx².
+  std::array<std::array<T, 2>, 3> residual{};    ///< Γ_mes,c at f_EP: [axis][cosine, sine].
+
+  /// @param weights  Cosine's and sine's weight of this sample for the line at f_EP.
+  PROOFMASS_INLINE void add(const std::array<SensorModel<T>, 2>& sensors,
+                            const Observation<T>& observation, const double* weights) {
+    const T half = T(0.5);
+    const Vector3<T>& m1 = observation.measured_K[0];
+    const Vector3<T>& m2 = observation.measured_K[1];
+    const Vector3<T> common = half * (m1 + m2);
+    const auto square = [](const T& x) { return x * x; };
+    const auto term = [&](std::size_t k) {
+      return sensors[k].quadratic_s2_m.x *
+             square(observation.kinematic_S_x[k] - sensors[k].parasitic_K_m_s2.x);
+    };
+    quadratic.add(half * (term(0) - term(1)));
+    common_square.add(square(common.x));
+    sensor_square[0].add(square(m1.x));
+    sensor_square[1].add(square(m2.x));
+    for (std::size_t i = 0; i < 2; ++i) {
+      residual[0][i] = residual[0][i] + T(weights[i]) * common.x;
+      residual[1][i] = residual[1][i] + T(weights[i]) * common.y;
+      residual[2][i] = residual[2][i] + T(weights[i]) * common.z;
+    }
+  }
+
+  PROOFMASS_INLINE void end_block(bool is_first) {
+    quadratic.end_block(is_first);
+    common_square.end_block(is_first);
+    for (BlockSteps<T>& steps : sensor_square) steps.end_block(is_first);
+  }
+};
+
+/// What is kept of one session of a run: sums as LoopMonitor makes them.
+struct SessionHealth {
+  double acceleration_m_s2 = 0.0;  ///< Largest |Γ_mes,k| of a sensor on an axis.
+  double attitude_rad = 0.0;       ///< Largest |θ̂| about an axis.
+  // The rest of sessions without excitation only.
+  bool is_quiet = false;
+  double quadratic_squares = 0.0;
+  double common_squares = 0.0;
+  std::array<double, 2> sensor_squares{};
+  std::array<std::array<double, 2>, 3> residual{};
+};
 
 /// What is kept of the sessions of a run, in the scenario's order.
 using HealthRecord = std::vector<SessionHealth>;

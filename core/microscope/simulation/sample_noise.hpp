@@ -13,28 +13,34 @@
 
 namespace proofmass {
 
-/// All noise of one sample, SI.
+// The noise of a run, sample after sample. Which densities it has follows from a NoiseConfig alone:
+// make_noise_model() turns them, with noise.scale, into filters and deviations that all runs share.
+
+/// All noise of one sample.
 template <typename T>
 struct SampleNoise {
-  std::array<Vector3<T>, 2> sensor_K;  ///< Γ_n,k, m/s².
+  std::array<Vector3<T>, 2> sensor_K;  ///< Γ_n,k, in the frame of sensor k, m/s².
   Vector3<T> angular_S;                ///< Of the measured angular acceleration, rad/s².
   Vector3<T> star_tracker_S;           ///< Of the fused angles, rad.
   Vector3<T> thrust_S;                 ///< Γ_n,DF, m/s².
   Vector3<T> torque_S;                 ///< Angular actuation, rad/s².
 };
 
-/// Colours and levels, the same for every run.
+/// Colours and levels, the same for every run; noise.scale is in all of them.
 struct NoiseModel {
-  NoiseShape linear_x, linear_yz, angular;
+  NoiseShape linear_x, linear_yz, angular;  ///< m/s², m/s², rad/s².
   /// Lower triangular factor of the star tracker's covariance: xx, yx, yy, zx, zy, zz, rad.
   std::array<double, 6> star_tracker_factor{};
-  double thrust_deviation = 0.0;
-  double torque_deviation = 0.0;
+  double thrust_deviation = 0.0;  ///< Of a sample, each axis, m/s².
+  double torque_deviation = 0.0;  ///< Of a sample, each axis, rad/s².
 };
 
+/// The model of a configuration. The only function that applies NoiseConfig::scale to noise: each
+/// output of the model is that of scale 1 times the scale, and exactly 0 with scale 0.
 [[nodiscard]] NoiseModel make_noise_model(const NoiseConfig& config, double sample_period_s);
 
-/// Memory of a NoiseShape.
+/// Memory of a NoiseShape. It is driven by a white sequence of unit variance and does not depend on
+/// noise.scale.
 template <typename T>
 struct NoiseState {
   std::array<T, NoiseShape::num_poles_max> real{};

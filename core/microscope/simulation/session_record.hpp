@@ -5,11 +5,11 @@
 #include <span>
 
 #include "core/math/inline.hpp"
+#include "core/microscope/session/session.hpp"
 #include "core/microscope/session/session_signals.hpp"
-#include "core/microscope/session/signals.hpp"
 #include "core/microscope/simulation/loop.hpp"
-#include "core/microscope/simulation/loop_monitor.hpp"
 #include "core/microscope/simulation/observer.hpp"
+#include "core/microscope/simulation/run_health.hpp"
 #include "core/signal/line_weights.hpp"
 
 namespace proofmass {
@@ -18,7 +18,11 @@ namespace proofmass {
 template <typename T>
 using SignalSums = std::array<std::array<T, 2 * num_fit_lines_max>, num_signals>;
 
-/// The signals of one sample, in the order of `Signal`.
+/// The signals of one sample, in the order of `Signal`. They are what the ground can compute: from
+/// measurements, the estimated attitude, the orbit and the session's commands, not from the truth.
+///
+/// Γ_mes,c and Γ_mes,d are half sum and half difference of components in the two sensors' frames
+/// ([Hardy2013] eq:common-diff). [T̂] − [În] is in the estimated frame S.
 template <typename T>
 PROOFMASS_INLINE std::array<T, num_signals> ground_signals(const Observation<T>& observation,
                                                            const SharedSample& shared,

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "coordinator/archive/export.hpp"
-#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "coordinator/dispatch/dispatch.hpp"
-#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "tests/coordinator/dispatch/recording_outbox.hpp"
 #include "tests/support/microscope_results.hpp"

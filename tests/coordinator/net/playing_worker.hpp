@@ -13,7 +13,7 @@
 
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
-#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/wire/codec.hpp"

@@ -8,7 +8,7 @@
 #include <map>
 #include <string>
 
-#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 
 namespace proofmass::test {

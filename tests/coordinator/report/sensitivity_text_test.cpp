@@ -14,7 +14,7 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "core/error.hpp"
-#include "core/microscope/campaign/draw.hpp"
+#include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 

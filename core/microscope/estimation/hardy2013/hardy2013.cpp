@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "core/error.hpp"
-#include "core/microscope/session/session_names.hpp"
+#include "core/microscope/session/session.hpp"
 
 namespace proofmass {
 namespace {

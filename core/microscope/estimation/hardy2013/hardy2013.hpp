@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "core/microscope/estimation/method.hpp"
+#include "core/microscope/estimation/methods.hpp"
 
 namespace proofmass {
 

@@ -1,5 +1,3 @@
-#include "core/microscope/campaign/draw.hpp"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "core/microscope/session/session_names.hpp"
 
 namespace proofmass {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "core/microscope/session/signals.hpp"
+#include "core/microscope/session/session.hpp"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass {

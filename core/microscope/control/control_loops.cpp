@@ -1,11 +1,10 @@
+#include "core/microscope/control/control_loops.hpp"
+
 #include <numbers>
 
 #include "core/math/elementary.hpp"
-#include "core/microscope/control/attitude_loop.hpp"
-#include "core/microscope/control/drag_free_loop.hpp"
 
 namespace proofmass {
-
 namespace {
 constexpr double two_pi = 2.0 * std::numbers::pi;
 }  // namespace

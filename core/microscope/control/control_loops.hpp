@@ -1,0 +1,131 @@
+#pragma once
+
+#include "core/math/inline.hpp"
+#include "core/math/vector3.hpp"
+
+namespace proofmass {
+
+// The two control loops of the satellite, sampled. What a controller returns at sample k acts from
+// sample k + 1 on. README.md has the transfer functions.
+
+/// Settings of the drag-free loop L(s) = (ω_c/s)(1 + ω_i/s): `[drag_free]` of a campaign file.
+struct DragFreeConfig {
+  double bandwidth_hz = 0.05;  ///< f_c = ω_c/2π, at which |L| is about 1.
+  double integral_hz = 0.005;  ///< f_i = ω_i/2π, below which L grows with 1/f²; < bandwidth_hz.
+  /// Error of the read-out bias that the loop subtracts, on each axis of S: C_0 − b_0c of
+  /// [Hardy2013] section 4.2.
+  double bias_compensation_error_x_m_s2 = 0.0;
+  double bias_compensation_error_y_m_s2 = 0.0;
+  double bias_compensation_error_z_m_s2 = 0.0;
+};
+
+/// Gains of the drag-free loop at the sample rate, without unit.
+struct DragFreeGains {
+  double proportional = 0.0;  ///< ω_c T.
+  double integral = 0.0;      ///< ω_i T.
+};
+
+[[nodiscard]] DragFreeGains drag_free_gains(const DragFreeConfig& config, double sample_period_s);
+
+/// Controller of the drag-free loop, each axis by itself: (ω_c/s)(1 + ω_i/s) with s replaced by
+/// (1 − z⁻¹)/T. Thrust is proportional to acceleration, so the controller supplies all the
+/// dynamics:
+///
+///     L(z) = z⁻¹ · ω_cT/(1 − z⁻¹) · (1 + ω_iT/(1 − z⁻¹))
+///
+/// where z⁻¹ is the sample that passes until the command acts.
+template <typename T>
+struct DragFreeController {
+  Vector3<T> first_integral_S;   ///< Output of the first integrator, m/s².
+  Vector3<T> second_integral_S;  ///< Output of the second, m/s².
+
+  /// @param input_S  Γ_mes less the known bias, plus C_cal, m/s². The measurement's components, in
+  ///                 the sensors' frames, are taken for those in S: a misalignment of 2.5 mrad is
+  ///                 a coupling between the axes of the loop.
+  /// @returns Γ_DF, m/s²: the acceleration to be cancelled from the next sample on.
+  PROOFMASS_INLINE Vector3<T> advance(const DragFreeGains& gains, const Vector3<T>& input_S) {
+    first_integral_S += T(gains.proportional) * input_S;
+    second_integral_S += T(gains.integral) * first_integral_S;
+    return first_integral_S + second_integral_S;
+  }
+};
+
+/// Settings of the attitude loop, proportional and derivative with a slow integral: `[attitude]` of
+/// a campaign file.
+struct AttitudeConfig {
+  double bandwidth_hz = 0.02;  ///< Natural frequency ω/2π.
+  double damping = 0.8;        ///< Damping ratio ζ.
+  double integral_hz = 1e-3;   ///< Corner below which the integral acts; < bandwidth_hz.
+  double blending_hz = 3e-3;   ///< Crossover ω_h/2π from star tracker to angular accelerometer.
+};
+
+/// Gains of the attitude estimator and controller at the sample rate.
+struct AttitudeGains {
+  double sample_period_s = 0.0;    ///< T.
+  double blend_angle = 0.0;        ///< 1 − r³, with r = e^(−ω_h T).
+  double blend_rate_per_s = 0.0;   ///< (3/2)(1 − r)²(1 + r)/T.
+  double blend_bias_per_s2 = 0.0;  ///< (1 − r)³/T².
+  double stiffness_per_s2 = 0.0;   ///< ω².
+  double damping_per_s = 0.0;      ///< 2ζω.
+  double integral_per_s3 = 0.0;    ///< ω²·ω_I.
+};
+
+[[nodiscard]] AttitudeGains attitude_gains(const AttitudeConfig& config, double sample_period_s);
+
+/// Estimates the attitude against the reference R from star tracker and angular accelerometer (the
+/// paper's hybridisation, [Hardy2013] section 5.1).
+///
+/// The double integral of the measured acceleration is corrected by its distance from the star
+/// tracker, which makes two complementary filters with a triple pole at r:
+///
+///     θ̂ = LP(z) θ_st + HP(z) α_mes/s²,    LP + HP = 1
+///
+/// LP has unit gain at rest; HP has three zeros at rest, so it removes the accelerometer's bias,
+/// which the third state takes up. In continuous time LP = (3ω_h s² + 3ω_h² s + ω_h³)/(s + ω_h)³.
+/// The angles are small: R and S are told apart in first order only.
+template <typename T>
+struct AttitudeEstimator {
+  Vector3<T> angle_RS_S;  ///< θ̂: rotation vector from the reference to the satellite, rad.
+  Vector3<T> omega_RS_S;  ///< Its rate: Ω less that of the reference, rad/s.
+  Vector3<T> bias_S;      ///< Estimated bias of the angular accelerometer, rad/s².
+
+  /// Takes up the star tracker's angles of this sample, rad.
+  PROOFMASS_INLINE void correct(const AttitudeGains& gains, const Vector3<T>& star_tracker_RS_S) {
+    const Vector3<T> innovation_S = star_tracker_RS_S - angle_RS_S;
+    angle_RS_S += T(gains.blend_angle) * innovation_S;
+    omega_RS_S += T(gains.blend_rate_per_s) * innovation_S;
+    bias_S += T(-gains.blend_bias_per_s2) * innovation_S;
+  }
+
+  /// Carries the estimate to the next sample with the acceleration that was measured at this one
+  /// and acts until then. The reference turns at a constant rate, so that Ω̇_RS = Ω̇_IS.
+  ///
+  /// @param omega_dot_IS_S  Measured Ω̇, rad/s².
+  /// @param omega_IR_S      Ω of the reference, rad/s. Its components in R will do.
+  PROOFMASS_INLINE void predict(const AttitudeGains& gains, const Vector3<T>& omega_dot_IS_S,
+                                const Vector3<T>& omega_IR_S) {
+    const T period = T(gains.sample_period_s);
+    const Vector3<T> omega_dot_RS_S = omega_dot_IS_S - bias_S;
+    const Vector3<T> mean_rate_S =
+        omega_RS_S - cross(omega_IR_S, angle_RS_S) + (T(0.5) * period) * omega_dot_RS_S;
+    angle_RS_S += period * mean_rate_S;
+    omega_RS_S += period * omega_dot_RS_S;
+  }
+};
+
+/// Proportional-derivative control of the estimated angle with a slow integral.
+template <typename T>
+struct AttitudeController {
+  Vector3<T> angle_integral_S;  ///< ∫θ̂ dt, rad·s.
+
+  /// @returns Angular acceleration in S to be applied from the next sample on, rad/s².
+  PROOFMASS_INLINE Vector3<T> advance(const AttitudeGains& gains,
+                                      const AttitudeEstimator<T>& estimate) {
+    angle_integral_S += T(gains.sample_period_s) * estimate.angle_RS_S;
+    return -(T(gains.stiffness_per_s2) * estimate.angle_RS_S +
+             T(gains.damping_per_s) * estimate.omega_RS_S +
+             T(gains.integral_per_s3) * angle_integral_S);
+  }
+};
+
+}  // namespace proofmass
