@@ -17,7 +17,6 @@
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/error_change.hpp"
 #include "core/statistics/moments.hpp"
-#include "core/statistics/sum.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -13,7 +13,6 @@
 #include "core/statistics/correlation.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
-#include "core/statistics/regression.hpp"
 #include "core/statistics/tolerance.hpp"
 
 namespace proofmass::coordinator {

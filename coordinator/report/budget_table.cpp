@@ -5,7 +5,7 @@
 
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/campaign/error_budget.hpp"
+#include "core/campaign/campaign.hpp"
 
 namespace proofmass::coordinator {
 namespace {

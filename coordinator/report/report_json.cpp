@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "coordinator/report/report.hpp"
-#include "core/campaign/error_budget.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/campaign/error_budget.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/statistics/value_passes.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/definition.hpp"
-#include "core/campaign/result_schema.hpp"
+#include "core/campaign/run_result.hpp"
 #include "core/math/instruction_set.hpp"
 
 namespace proofmass {

@@ -11,7 +11,6 @@
 #include "core/runs.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
-#include "core/statistics/sum.hpp"
 #include "core/statistics/value_passes.hpp"
 
 namespace proofmass {

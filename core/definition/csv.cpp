@@ -9,7 +9,7 @@
 #include <set>
 
 #include "core/campaign/definition.hpp"
-#include "core/definition/nearest_name.hpp"
+#include "core/definition/definition_text.hpp"
 
 namespace proofmass {
 namespace {

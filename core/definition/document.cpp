@@ -7,8 +7,6 @@
 #include <utility>
 
 #include "core/definition/definition_text.hpp"
-#include "core/definition/nearest_name.hpp"
-#include "core/definition/nesting.hpp"
 #include "core/error.hpp"
 
 namespace proofmass {

@@ -4,8 +4,6 @@
 #include <cstdint>
 #include <numbers>
 
-#include "core/math/sincos_series.hpp"
-
 namespace proofmass {
 namespace {
 

@@ -10,7 +10,6 @@
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
-#include "core/statistics/sum.hpp"
 
 namespace proofmass {
 namespace {

@@ -6,7 +6,6 @@
 #include "core/error.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/detail/phrase.hpp"
-#include "core/statistics/detail/requirement_phrase.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/sequential.hpp"
 

@@ -9,8 +9,8 @@
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/detail/special.hpp"
 #include "core/statistics/distribution.hpp"
+#include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
-#include "core/statistics/sum.hpp"
 
 namespace proofmass {
 namespace {

@@ -9,7 +9,6 @@
 #include "core/error.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/detail/phrase.hpp"
-#include "core/statistics/detail/requirement_phrase.hpp"
 
 namespace proofmass {
 namespace {

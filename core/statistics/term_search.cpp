@@ -8,8 +8,8 @@
 
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/distribution.hpp"
+#include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
-#include "core/statistics/sum.hpp"
 
 namespace proofmass {
 namespace {

@@ -8,7 +8,7 @@
 #include <set>
 #include <string_view>
 
-#include "core/definition/nearest_name.hpp"
+#include "core/definition/definition_text.hpp"
 
 namespace proofmass::wire {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/records.hpp"
-#include "core/campaign/error_budget.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"
 

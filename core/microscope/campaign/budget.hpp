@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-#include "core/campaign/error_budget.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/microscope/campaign/results.hpp"
 
 namespace proofmass {

@@ -18,7 +18,9 @@
 
 namespace proofmass {
 
-/// Everything that defines the runs of a campaign apart from seed, number and dispersions.
+/// Everything that defines the runs of a campaign apart from seed, number and dispersions. Each
+/// member is the table of that name of a campaign file; its structure stands in the header of its
+/// module and holds the nominal values.
 struct Scenario {
   OrbitConfig orbit;
   SimulationConfig simulation;
@@ -29,13 +31,16 @@ struct Scenario {
   SensorConfig sensor;
   HealthConfig health;
   EstimationConfig estimation;
-  AcceptanceConfig acceptance;
-  BudgetConfig budget;
-  ParameterArray objectives;  ///< SI; [Hardy2013] tab:perfo-numerical by default.
-  std::vector<Session> sessions;
+  AcceptanceConfig acceptance;    ///< Bounds outside which an instrument is drawn again.
+  BudgetConfig budget;            ///< Levels behind the error budget; the simulation uses none.
+  ParameterArray objectives;      ///< SI, > 0; [Hardy2013] tab:perfo-numerical by default.
+  std::vector<Session> sessions;  ///< In the order in which they are simulated and recorded.
 
   Scenario();  ///< The nominal scenario.
 
+  /// Checks each number against its range, and what has to hold between several: the loops against
+  /// the sample rate, the sessions' lines against the Nyquist frequency, the sessions against the
+  /// estimation method.
   /// @throws ConfigError naming the field, its value and the rule.
   void validate() const;
 };

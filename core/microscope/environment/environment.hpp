@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/campaign/definition.hpp"
-#include "core/campaign/result_schema.hpp"
+#include "core/campaign/run_result.hpp"
 #include "core/math/vector3.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
 

@@ -26,7 +26,8 @@ struct OrbitPointOf {
 };
 using OrbitPoint = OrbitPointOf<double>;
 
-/// Whether a step of Newton's method is the last one.
+/// True if a step of Newton's method, rad, is the last one: what it leaves is of the order of its
+/// square, 1e-16.
 PROOFMASS_INLINE bool is_small(double move) { return std::abs(move) < 1e-8; }
 
 /// Keplerian motion with perigee on +X at t = 0. README.md has the equations and their range.

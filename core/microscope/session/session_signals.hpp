@@ -9,7 +9,6 @@
 
 #include "core/math/elementary.hpp"
 #include "core/math/inline.hpp"
-#include "core/math/quaternion.hpp"
 #include "core/math/vector3.hpp"
 #include "core/microscope/campaign/scenario.hpp"
 #include "core/microscope/control/control_loops.hpp"
@@ -37,7 +36,8 @@ struct SharedSample {
   MassMotionPhase mass_motion;  ///< Of the moving test masses.
 };
 
-/// What a sample takes from sines and cosines: functions of its time alone.
+/// The sines and cosines of a sample: functions of its time alone, which a batch computes for many
+/// samples at once.
 template <typename T>
 struct SamplePhasesOf {
   OrbitPointOf<T> orbit;
@@ -58,6 +58,7 @@ class SessionSignals {
 
   /// Samples before the record: the first record sample has t = 0.
   [[nodiscard]] std::int64_t num_settling() const { return num_settling_; }
+  /// Samples of the record, see num_record_samples().
   [[nodiscard]] std::int64_t num_record() const { return num_record_; }
 
   /// Attitude and rate (rad/s) of the reference.
@@ -122,7 +123,8 @@ class SessionSignals {
   AttitudeEstimator<double> commanded_;
 };
 
-/// Samples of a session's record: a whole number, the last orbit cut at the last full sample.
+/// Samples of a session's record. Where the orbits are no whole number of samples, the record ends
+/// with the last full one.
 [[nodiscard]] std::int64_t num_record_samples(const Scenario& scenario, const Session& session);
 
 }  // namespace proofmass

@@ -11,18 +11,20 @@
 
 namespace proofmass {
 
-/// What one session of a batch of runs is computed from. Lanes that no run fills repeat another's.
+/// What one session of a batch of runs is computed from. A lane is a run; lanes that no run fills
+/// repeat another's. Pointers are borrowed for the call and not null.
 struct BatchSession {
-  SessionSignals* signals = nullptr;
-  SessionSetup setup;
-  const NoiseModel* noise = nullptr;
-  const NoiseStreams* streams = nullptr;
-  std::uint64_t seed = 0;
-  std::size_t num_runs = batch_lanes;  ///< At least 1; in the first lanes.
+  SessionSignals* signals = nullptr;      ///< Not yet asked for any sample.
+  SessionSetup setup;                     ///< What the runs share.
+  const NoiseModel* noise = nullptr;      ///< The same for all runs.
+  const NoiseStreams* streams = nullptr;  ///< Of the session.
+  std::uint64_t seed = 0;                 ///< Of the campaign.
+  std::size_t num_runs = batch_lanes;     ///< At least 1; in the first lanes.
   std::array<RunIndex, batch_lanes> runs{};
   std::array<LoopConstants<double>, batch_lanes> constants{};
   std::array<NoiseStates<double>, batch_lanes> noise_states{};
   std::span<double> weights_buffer;  ///< Room for a block of weights.
+  /// Called after each block with the number of record samples done.
   void (*progress)(const void* context, std::size_t num_samples) = nullptr;
   const void* progress_context = nullptr;
 };

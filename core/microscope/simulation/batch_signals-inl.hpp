@@ -6,7 +6,7 @@
 #include <array>
 #include <cstddef>
 
-#include "core/math/sincos_series.hpp"
+#include "core/math/elementary.hpp"
 #include "core/microscope/session/session_signals.hpp"
 #include "core/microscope/simulation/batch-inl.hpp"
 

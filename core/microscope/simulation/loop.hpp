@@ -4,7 +4,6 @@
 #include <cstdint>
 
 #include "core/math/inline.hpp"
-#include "core/math/quaternion.hpp"
 #include "core/math/vector3.hpp"
 #include "core/microscope/control/control_loops.hpp"
 #include "core/microscope/instrument/sensor_model.hpp"
@@ -16,7 +15,7 @@ namespace proofmass {
 // The closed loop of one satellite: what it measures, what its controllers command, how it moves.
 // The letters of the frames are those of core/microscope/README.md; T is the number type.
 
-/// Constants of one drawn satellite during one session.
+/// Constants of one drawn satellite during one session; make_loop_constants() makes them.
 template <typename T>
 struct LoopConstants {
   std::array<SensorModel<T>, 2> sensors;
@@ -51,16 +50,16 @@ enum class Watch : std::uint8_t { no, yes };
 /// constant until then.
 template <typename T>
 struct Loop {
-  Quaternion<T> attitude_IS;
+  Quaternion<T> attitude_IS;    ///< True attitude.
   Vector3<T> omega_IS_S;        ///< Ω, rad/s.
   Vector3<T> thrust_command_S;  ///< Γ_DF of the sample before, m/s².
   Vector3<T> torque_command_S;  ///< Angular acceleration of the sample before, rad/s².
   DragFreeController<T> drag_free;
-  AttitudeEstimator<T> estimator;
+  AttitudeEstimator<T> estimator;  ///< With the commanded motion in its angles.
   AttitudeController<T> controller;
-  T largest_acceleration{};  ///< |Γ_mes,k| on any axis before the range cuts it off, m/s².
-  T largest_angle{};         ///< |θ̂| about any axis, rad.
-  bool is_any_saturated = false;
+  T largest_acceleration{};       ///< |Γ_mes,k| on any axis before the range cuts it off, m/s².
+  T largest_angle{};              ///< |θ̂| about any axis, rad.
+  bool is_any_saturated = false;  ///< True once a sensor of any lane was beyond its range.
 
   /// Puts the satellite at rest in its reference attitude.
   void begin(const SessionSignals::Reference& reference) {

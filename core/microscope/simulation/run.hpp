@@ -28,11 +28,11 @@ inline constexpr std::size_t batch_lanes = 16;
 /// the scenario's sessions, in their order.
 struct RunRecord {
   RunIndex run;
-  std::uint32_t num_draws = 0;
-  bool has_draw = false;  ///< False if no draw was accepted; then the rest means nothing.
-  ParameterArray truth{};
-  RunPhasors phasors{};
-  HealthRecord health{};
+  std::uint32_t num_draws = 0;  ///< Draws taken until one was accepted.
+  bool has_draw = false;        ///< False if none was; then the rest means nothing.
+  ParameterArray truth{};       ///< true_parameters() of the draw, SI.
+  RunPhasors phasors{};         ///< With the lines and signals that the method needs.
+  HealthRecord health{};        ///< For judge_health().
 };
 
 /// Everything that the runs of a campaign share: filters, weights, orbit, environment. Made once,

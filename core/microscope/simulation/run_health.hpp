@@ -16,13 +16,17 @@
 
 namespace proofmass {
 
+// How well the loops held a run. LoopMonitor is filled in the sample loop, SessionHealth is what a
+// session keeps of it, and judge_health() compares that with the limits. README.md gives the
+// reasons for each number and its limit.
+
 /// Sums of block after block of a signal, of which only the squared steps from one block to the
 /// next are kept: they are twice the variance of a block's sum, and slow changes do not count.
 template <typename T>
 struct BlockSteps {
-  T sum{};
-  T before{};
-  T squares{};
+  T sum{};      ///< Of the samples of this block, in the signal's unit.
+  T before{};   ///< Of the block before.
+  T squares{};  ///< Of the steps, in the signal's unit squared.
 
   PROOFMASS_INLINE void add(const T& value) { sum = sum + value; }
   PROOFMASS_INLINE void end_block(bool is_first) {
@@ -33,13 +37,14 @@ struct BlockSteps {
   }
 };
 
-/// What a session without excitation tells of the loops, sample after sample.
+/// What a session without excitation tells of the loops, sample after sample. With an excitation
+/// the signals would be those of its lines.
 template <typename T>
 struct LoopMonitor {
   BlockSteps<T> quadratic;      ///< ½(K2_1 Γ_App,1x² − K2_2 Γ_App,2x²), m/s².
-  BlockSteps<T> common_square;  ///< Γ_mes,cx².
-  std::array<BlockSteps<T>, 2> sensor_square{};  ///< Γ_mes,kx².
-  std::array<std::array<T, 2>, 3> residual{};    ///< Γ_mes,c at f_EP: [axis][cosine, sine].
+  BlockSteps<T> common_square;  ///< Γ_mes,cx², m²/s⁴.
+  std::array<BlockSteps<T>, 2> sensor_square{};  ///< Γ_mes,kx², m²/s⁴.
+  std::array<std::array<T, 2>, 3> residual{};    ///< Γ_mes,c at f_EP, m/s²: [axis][cosine, sine].
 
   /// @param weights  Cosine's and sine's weight of this sample for the line at f_EP.
   PROOFMASS_INLINE void add(const std::array<SensorModel<T>, 2>& sensors,
@@ -71,16 +76,15 @@ struct LoopMonitor {
   }
 };
 
-/// What is kept of one session of a run: sums as LoopMonitor makes them.
+/// What is kept of one session of a run.
 struct SessionHealth {
   double acceleration_m_s2 = 0.0;  ///< Largest |Γ_mes,k| of a sensor on an axis.
   double attitude_rad = 0.0;       ///< Largest |θ̂| about an axis.
-  // The rest of sessions without excitation only.
-  bool is_quiet = false;
-  double quadratic_squares = 0.0;
-  double common_squares = 0.0;
-  std::array<double, 2> sensor_squares{};
-  std::array<std::array<double, 2>, 3> residual{};
+  bool is_quiet = false;           ///< True if the session was monitored; the rest is 0 if not.
+  double quadratic_squares = 0.0;  ///< BlockSteps::squares of LoopMonitor::quadratic.
+  double common_squares = 0.0;     ///< Of common_square.
+  std::array<double, 2> sensor_squares{};           ///< Of sensor_square.
+  std::array<std::array<double, 2>, 3> residual{};  ///< As in LoopMonitor.
 };
 
 /// What is kept of the sessions of a run, in the scenario's order.
@@ -90,13 +94,16 @@ using HealthRecord = std::vector<SessionHealth>;
 /// the frame turns with the Earth's direction, so that f_EP is 0, the line is f_orb.
 [[nodiscard]] LineFit residual_fit(const Scenario& scenario, const Session& session);
 
+/// The health of a run and, if it is lost, why.
 struct HealthFinding {
   LoopHealth health;
   LoopLoss loss;  ///< In the first session, in the scenario's order, that left a limit.
 };
 
-/// Compares what the sessions left with the limits of scenario.sensor and scenario.health.
+/// Compares what the sessions left with the limits of scenario.sensor and scenario.health. The
+/// noise of quadratic terms is compared with that of the sensors, which noise.scale multiplies.
 ///
+/// @param record   Of scenario.sessions, in their order; as many.
 /// @param phasors  Of the same run: the squared signals that the quadratic factors are found from.
 [[nodiscard]] HealthFinding judge_health(const Scenario& scenario, const HealthRecord& record,
                                          const RunPhasors& phasors);

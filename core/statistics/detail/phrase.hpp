@@ -4,6 +4,8 @@
 #include <span>
 #include <string_view>
 
+#include "core/statistics/requirement.hpp"
+
 namespace proofmass::detail {
 
 /// Reads a phrase that a user typed, such as `a_c12 < 9e-4 for 99% with 95%`, from left to right.
@@ -44,5 +46,9 @@ class Phrase {
   std::span<const std::string_view> parameters_;
   std::string_view rest_;  ///< What is not yet read, without blanks in front.
 };
+
+/// Reads a requirement from the front of a phrase; see parse_requirement(), whose source defines
+/// it.
+[[nodiscard]] Requirement read_requirement(Phrase& phrase);
 
 }  // namespace proofmass::detail

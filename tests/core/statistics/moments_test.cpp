@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "core/statistics/sum.hpp"
 #include "tests/core/statistics/columns.hpp"
 #include "tests/message_of.hpp"
 

@@ -1,12 +1,10 @@
-#include "core/math/quaternion.hpp"
+#include "core/math/vector3.hpp"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <cmath>
 #include <random>
-
-#include "core/math/vector3.hpp"
 
 namespace proofmass {
 namespace {
