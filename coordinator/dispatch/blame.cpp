@@ -11,8 +11,8 @@ namespace {
 /// Whether more than one run may be the cause.
 enum class Certainty : std::uint8_t { ambiguous, certain };
 
-/// What the worker computed as it last said, as far as it is still on its leases; if it did not
-/// say, what it begins with.
+/// The runs that the worker computed by its last heartbeat, as far as they are still on its leases.
+/// If no heartbeat named any, the runs that it begins with.
 RunsByCampaign computed_runs(const State& state, const Worker& worker) {
   const RunsByCampaign leased = leased_runs(state, worker);
   RunsByCampaign computed;
@@ -36,7 +36,7 @@ RunsByCampaign computed_runs(const State& state, const Worker& worker) {
   return computed;
 }
 
-/// Blame from this host means nothing.
+/// Takes back what crashes on this host count against runs: the host is the cause.
 void withdraw(State& state, CampaignId id, const HostId& host) {
   CampaignState& campaign = state.campaigns.at(id);
   for (auto next = campaign.suspects.begin(); next != campaign.suspects.end();) {
@@ -64,7 +64,7 @@ void quarantine(State& state, const HostId& host, std::uint32_t num_crashes, Out
       {.severity = Severity::error, .kind = "host_quarantined", .fields = std::move(fields)});
 }
 
-/// A run that is stored is beyond suspicion; its audit is given up instead, like a run.
+/// A run that is stored cannot become a suspect. Its audit is given up instead.
 void count_audit_crash(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
   const std::uint32_t num_crashes = ++campaign.audit_crashes[run];
@@ -77,7 +77,8 @@ void count_audit_crash(State& state, CampaignId id, RunIndex run, Outbox& outbox
              id);
 }
 
-/// A run that is suspected already will be tried alone; only then does a crash tell more.
+/// If several runs may be the cause, runs that are suspects already are left out: they will be
+/// tried alone, and only then does a crash tell more about them.
 RunSet blame_runs(CampaignState& campaign, const RunSet& accused, Certainty certainty,
                   const HostId& host) {
   RunSet blamed;
@@ -110,7 +111,7 @@ RunsByCampaign split_audits(const State& state, RunsByCampaign& accused) {
 RunsByCampaign blame(State& state, WorkerId id, RunsByCampaign accused, Certainty certainty,
                      Outbox& outbox) {
   const HostId host = state.workers.at(id).host;
-  // A process that was lent nothing says nothing: anybody can start and end some.
+  // The end of a process that was lent nothing proves nothing: anybody can start and end one.
   if (state.quarantined.contains(host) || state.workers.at(id).num_lent == 0) return {};
   const std::uint32_t num_crashes = ++state.hosts.at(host).num_crashes;
   if (num_crashes >= state.config.crashes_per_host_max) {
@@ -171,7 +172,7 @@ bool is_guilty(const State& state, const Suspicion& suspicion) {
 void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
   const Suspicion suspicion = campaign.suspects.at(run);
-  // The run is the cause: hosts that have shown that they can compute are not.
+  // The run is the cause, and not the hosts that have shown that they can compute.
   for (const auto& [name, on_host] : suspicion.hosts) {
     const auto host = state.hosts.find(name);
     if (host == state.hosts.end() || host->second.num_results == 0) continue;

@@ -1,13 +1,14 @@
+#include "coordinator/dispatch/campaigns.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <utility>
 
 #include "coordinator/dispatch/blame.hpp"
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/heartbeat.hpp"
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
-#include "coordinator/dispatch/workers.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {

@@ -13,7 +13,7 @@
 namespace proofmass::coordinator::detail {
 namespace {
 
-/// The lease of a copy becomes the first one of the run.
+/// A copy becomes the first lease of its run.
 void promote_copy(State& state, CampaignId id, RunIndex run, LeaseId copy) {
   const Lease& old = state.leases.at(copy);
   Lease lease{.campaign = id,
@@ -28,7 +28,8 @@ void promote_copy(State& state, CampaignId id, RunIndex run, LeaseId copy) {
   (void)open_lease(state, std::move(lease));
 }
 
-/// The workers may go on with it, but not as if it were like any other run.
+/// Takes a suspect off its copies and asks for it back: it must be tried alone. Their workers may
+/// be computing it already.
 void drop_copies(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
   const std::vector<LeaseId> leases = state.campaigns.at(id).copies.at(run).leases;
   for (const LeaseId lease : leases) {
@@ -39,9 +40,10 @@ void drop_copies(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
   }
 }
 
-/// Runs that were taken off their first lease. One with a copy goes on there, unless it is
-/// suspected: then it must be tried alone.
-void reopen(State& state, CampaignId id, RunSet runs, Attempt attempt, Outbox& outbox) {
+/// For runs that were taken off their first lease: those with a copy go on there, unless they are
+/// suspects, which must be tried alone.
+/// @return The runs that have no place now.
+RunSet promote_copies(State& state, CampaignId id, RunSet runs, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
   for (const RunRange& range : runs.ranges()) {
     auto next = campaign.copies.lower_bound(range.first);
@@ -59,7 +61,7 @@ void reopen(State& state, CampaignId id, RunSet runs, Attempt attempt, Outbox& o
       }
     }
   }
-  make_pending(state, id, std::move(runs), after(attempt), outbox);
+  return runs;
 }
 
 void record_losses(const Lease& lease, const RunSet& runs, LossReason reason, bool is_blamed,
@@ -184,7 +186,10 @@ void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const
   log_loss(lease, runs, reason, guilty, outbox);
   for (const RunRange& range : runs.ranges()) take_off(state, id, range);
   state.hungry.insert(lease.worker);  // It has room for others now.
-  if (lease.kind == LeaseKind::first) reopen(state, lease.campaign, runs, lease.attempt, outbox);
+  if (lease.kind == LeaseKind::first) {
+    RunSet open = promote_copies(state, lease.campaign, runs, outbox);
+    make_pending(state, lease.campaign, std::move(open), after(lease.attempt), outbox);
+  }
   if (lease.kind == LeaseKind::audit) {
     add_to_audit(state.campaigns.at(lease.campaign),
                  {.first_worker = lease.audited, .attempt = after(lease.attempt)}, runs);

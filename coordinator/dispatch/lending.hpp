@@ -5,17 +5,18 @@
 
 namespace proofmass::coordinator::detail {
 
-/// Lends the worker what brings it to its share, if it has run low.
+/// Lends the worker as many runs as its share allows, if it has few left.
 void lend(State& state, WorkerId worker, TimePoint now, Outbox& outbox);
 
-/// The same for all workers that would take more, while there is something to lend.
+/// As lend(), for all workers that would take more, while there are runs to lend.
 void lend_to_hungry(State& state, TimePoint now, Outbox& outbox);
 
-/// True if nothing is lent to the worker: it may be gone, or its host crashes what it computes, or
-/// it tries a suspect.
+/// True if nothing is lent to the worker: it is silent, its host is under quarantine, or it tries a
+/// suspect.
 [[nodiscard]] bool is_passed_over(const State& state, const Worker& worker, TimePoint now);
 
-/// True if workers that were attached before may still say what they hold: nothing is lent.
+/// True if the coordinator still waits for workers that were registered before its restart to say
+/// what they hold. Nothing is lent meanwhile.
 [[nodiscard]] bool is_reattaching(const State& state, TimePoint now);
 
 /// True if runs of the campaign are lent.
@@ -27,17 +28,18 @@ void lend_to_hungry(State& state, TimePoint now, Outbox& outbox);
 /// Tells the worker of a new lease.
 void send_lease(const State& state, LeaseId lease, Outbox& outbox);
 
-/// To be called after all that changes the phase or the priority of a campaign.
+/// To be called whenever the phase or the priority of a campaign has changed.
 void sort_served(State& state);
 
-/// Tells a worker that names a campaign whose runs are not lent (any more) what to do with them:
-/// to forget them if the campaign is finished or cancelled, or else to keep their results.
+/// For a worker that names a campaign whose runs are not lent, or not any more: tells it to forget
+/// them if the campaign is finished or cancelled, and otherwise to keep their results.
 void send_not_served(const State& state, WorkerId worker, CampaignId campaign, Outbox& outbox);
 
 /// Ends the campaign if it is finished.
 void finish_if_done(State& state, CampaignId id, Outbox& outbox);
 
-/// After runs were lost, or given up: ends campaigns and lends to workers that wait.
+/// To be called after runs were lost or given up: ends campaigns that are finished now, and lends
+/// runs to workers that would take more.
 void settle(State& state, TimePoint now, Outbox& outbox);
 
 }  // namespace proofmass::coordinator::detail

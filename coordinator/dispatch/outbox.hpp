@@ -26,14 +26,14 @@ struct Loss {
   bool is_blamed = false;  ///< It counts against these runs.
 };
 
-/// What the dispatch does to the world. The service carries it out; a test writes it down.
+/// What the dispatch wants done. The service carries it out; tests record it.
 class Outbox {
  public:
   virtual ~Outbox() = default;
 
-  /// May be lost, like anything that is sent; the dispatch copes.
+  /// The message may be lost: the dispatch is made for that.
   virtual void send(wire::WorkerId worker, wire::Message message) = 0;
-  /// Sends the part of the campaign's definition that the worker asked for. May be lost likewise.
+  /// Sends the part of the campaign's definition that the worker asked for. It may be lost as well.
   /// @param definition  Shared with the dispatch, because it may have millions of numbers.
   virtual void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
                                const std::shared_ptr<const Campaign>& definition) = 0;
@@ -43,9 +43,9 @@ class Outbox {
   /// Must lead to on_compared() with the run once the result has been compared with the stored one.
   /// Called for runs that were handed to store() before, or committed.
   virtual void compare(wire::WorkerId worker, wire::LeasedResult result) = 0;
-  /// To be kept for the history of attempts; need not be durable at once.
+  /// Keeps a loss for the history of attempts. It need not be durable at once.
   virtual void record(const Loss& loss) = 0;
-  /// The run crashed too many workers: to be kept as given up, so that the campaign can end.
+  /// The run crashed too many workers: keeps it as given up, so that the campaign can end.
   virtual void give_up(wire::CampaignId campaign, RunIndex run) = 0;
   virtual void log(Event event, wire::CampaignId campaign) = 0;
   /// An event that concerns all campaigns.

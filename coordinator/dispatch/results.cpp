@@ -1,3 +1,5 @@
+#include "coordinator/dispatch/results.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/dispatch/dispatch.hpp"
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
 #include "coordinator/dispatch/workers.hpp"
@@ -17,12 +18,6 @@ namespace proofmass::coordinator {
 namespace {
 
 using RunsToAcknowledge = std::map<WorkerId, std::vector<RunIndex>>;
-
-void add_run_time(double elapsed_s, double& mean_s) {
-  constexpr double weight = 0.2;          // Of the newest run: the mean spans about the last ten.
-  elapsed_s = std::max(elapsed_s, 1e-9);  // 0 means that nothing is known.
-  mean_s = mean_s > 0.0 ? mean_s + weight * (elapsed_s - mean_s) : elapsed_s;
-}
 
 void send_acks(const State& state, CampaignId id, const RunsToAcknowledge& runs_by_worker,
                Outbox& outbox) {
@@ -146,8 +141,9 @@ void count_results(State& state, Worker& worker, CampaignId id, const wire::Resu
   const auto unleased = worker.unleased.find(id);
   for (const wire::ComputedRun& computed : batch.results) {
     if (is_foreign(campaign, computed)) continue;
-    add_run_time(computed.elapsed_s, own_s);
-    add_run_time(computed.elapsed_s, campaign.run_time_s);
+    const double elapsed_s = std::max(computed.elapsed_s, 1e-9);  // 0 means that none is known.
+    own_s = running_mean(own_s, elapsed_s);
+    campaign.run_time_s = running_mean(campaign.run_time_s, elapsed_s);
     if (unleased != worker.unleased.end()) unleased->second.remove(computed.result.run);
   }
   if (unleased != worker.unleased.end() && unleased->second.empty()) {

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -55,5 +57,35 @@ class RunSet {
 
 /// For logs: `0..9,12,20..31`; the first few ranges only, then `...`. `none` if empty.
 [[nodiscard]] std::string to_text(const RunSet& runs);
+
+/// Number of a lease, unique for a coordinator's lifetime, from 1. Known to the dispatch alone.
+struct LeaseId {
+  std::uint64_t value = 0;
+  auto operator<=>(const LeaseId&) const = default;
+};
+
+/// Which lease each of a campaign's lent runs is on. Kept as ranges, like RunSet.
+class LeaseIndex {
+ public:
+  /// @pre None of the runs is in the index.
+  void add(RunRange runs, LeaseId lease);
+  /// @pre All runs of the range are in the index.
+  void remove(RunRange runs);
+
+  [[nodiscard]] std::optional<LeaseId> find(RunIndex run) const;
+  /// The runs of the range that are in the index.
+  [[nodiscard]] RunSet overlap(RunRange runs) const;
+  [[nodiscard]] bool empty() const { return entries_.empty(); }
+  [[nodiscard]] std::uint64_t size() const { return size_; }  ///< Number of runs.
+  [[nodiscard]] RunSet runs() const;
+
+ private:
+  struct Entry {
+    std::uint64_t end = 0;  ///< One past the last run.
+    LeaseId lease;
+  };
+  std::map<std::uint64_t, Entry> entries_;  ///< By their first run.
+  std::uint64_t size_ = 0;
+};
 
 }  // namespace proofmass::coordinator

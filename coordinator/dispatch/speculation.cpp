@@ -1,3 +1,5 @@
+#include "coordinator/dispatch/speculation.hpp"
+
 #include <algorithm>
 #include <chrono>
 #include <map>
@@ -7,10 +9,6 @@
 
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
-#include "coordinator/dispatch/workers.hpp"
-
-// The end of a campaign: nothing is pending, and some workers have nothing to do while others still
-// compute. First the idle ones get what only waits at others, then copies of what takes too long.
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -87,7 +85,7 @@ bool is_overdue(const State& state, const Lease& lease, TimePoint now) {
   const double run_time_s = state.campaigns.at(lease.campaign).run_time_s;
   if (run_time_s <= 0.0) return false;
   const double usual_s = std::max(run_time_s, state.config.lease_work_s);
-  return std::chrono::duration<double>(now - lease.lent_at).count() > 2.0 * usual_s;
+  return seconds(now - lease.lent_at) > 2.0 * usual_s;
 }
 
 /// Copies for one idle worker.

@@ -92,6 +92,11 @@ std::string_view name_of(LossReason reason) {
   PROOFMASS_EXPECT(false);
 }
 
+double running_mean(double mean, double value) {
+  constexpr double weight = 0.2;  // Of the newest value.
+  return mean > 0.0 ? mean + weight * (value - mean) : value;
+}
+
 bool is_audited(std::uint64_t campaign_seed, RunIndex run, double fraction) {
   return fraction_of(mixed(mixed(campaign_seed) + run.value)) < fraction;
 }

@@ -10,8 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "coordinator/dispatch/identifiers.hpp"
-#include "coordinator/dispatch/lease_index.hpp"
 #include "coordinator/dispatch/run_set.hpp"
 #include "core/campaign/campaign.hpp"
 #include "proto/wire/client_messages.hpp"
@@ -19,16 +17,26 @@
 
 namespace proofmass::coordinator {
 
+using wire::Attempt;
+using wire::CampaignId;
+using wire::LossReason;
+using wire::SessionId;
+using wire::WorkerId;
+
 /// A monotonic time, handed in by the caller: nothing in the dispatch reads a clock.
 using TimePoint = std::chrono::steady_clock::time_point;
 using Duration = std::chrono::steady_clock::duration;
 
-/// A computer as the workers with one key present it. What they say about it, and what happens to
-/// them there, counts for this key alone: a key cannot put the hosts of another one under
-/// suspicion.
+[[nodiscard]] inline double seconds(Duration duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
+/// A computer, as the workers with one key name it. What these workers say about it, and their
+/// crashes there, count for this key alone, so that one key cannot put the hosts of another one
+/// under quarantine.
 struct HostId {
   std::string key;   ///< Public key of the workers; empty without keys.
-  std::string name;  ///< As the workers have it.
+  std::string name;  ///< As the workers give it.
   auto operator<=>(const HostId&) const = default;
 };
 
@@ -211,7 +219,8 @@ struct Host {
   TimePoint left_at;  ///< Its last worker was heard then, if it has none.
 };
 
-/// All that the dispatch knows. Only the functions of dispatch.hpp change it.
+/// All that the dispatch knows. Only the events change it: the functions
+/// on_...() of campaigns.hpp, results.hpp and workers.hpp.
 struct State {
   DispatchConfig config;
   std::map<CampaignId, CampaignState> campaigns;
@@ -262,11 +271,12 @@ struct State {
 /// `out_of_memory`, for logs and the database.
 [[nodiscard]] std::string_view name_of(LossReason reason);
 
+/// The mean of about the last ten values, with one more.
+/// @param mean  Before it; 0 if there was no value yet.
+[[nodiscard]] double running_mean(double mean, double value);
+
 /// True if the run is one of the fraction that is audited: a pure function, the same after a
 /// restart.
 [[nodiscard]] bool is_audited(std::uint64_t campaign_seed, RunIndex run, double fraction);
-
-/// Aborts if the state contradicts itself. Walks all of it: for tests.
-void check_invariants(const State& state);
 
 }  // namespace proofmass::coordinator

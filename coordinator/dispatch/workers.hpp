@@ -1,36 +1,71 @@
 #pragma once
 
+#include <cstdint>
+#include <string>
+
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::coordinator {
 
-/// The worker of a message, marked as heard; null, and told so, if it is not registered.
+// Events of workers, of time and of the end of the service.
+//
+// Any message between a worker and the coordinator may be lost, repeated or overtaken by another.
+// A worker repeats what has not been answered, and its heartbeats list all runs that it holds, so
+// that both sides agree again after any loss. In the worst case a run is computed twice; it is
+// stored once.
+//
+// A worker that is not registered, or no longer, is answered with Reject{not_registered}. It then
+// registers again and lists what it holds; its results are accepted. The caller has compared the
+// epoch in the header with its own: a message with another epoch is not handed in, but answered by
+// reject_unregistered().
+
+/// Answers a message of a worker that is not registered, or of another epoch.
+void reject_unregistered(WorkerId id, Outbox& outbox);
+/// Calls the event of the message: one of those below, or on_results().
+/// @param key  Public key of the connection; empty without keys.
+/// @pre The message is one of a worker.
+void on_packet(State& state, WorkerId id, const std::string& key, wire::Packet packet,
+               TimePoint now, Outbox& outbox);
+/// Registers a worker, or answers again if it is registered already.
+/// @param key  Public key of the connection; empty without keys. What is said about a host counts
+///             for workers with this key only.
+void on_hello(State& state, WorkerId id, SessionId session, const std::string& key,
+              const wire::Hello& hello, TimePoint now, Outbox& outbox);
+/// Workers of a quarantined host are taken again, whatever their keys.
+/// @return False if it is not quarantined.
+bool on_release_host(State& state, const std::string& host, TimePoint now, Outbox& outbox);
+/// Answers with a part of the definition.
+void on_campaign_request(State& state, WorkerId id, const wire::CampaignRequest& request,
+                         TimePoint now, Outbox& outbox);
+/// Makes both sides agree about what the worker holds, and lends runs up to its share.
+/// @param sequence  Of the header; a heartbeat older than the newest one is ignored.
+void on_heartbeat(State& state, WorkerId id, const wire::Heartbeat& heartbeat,
+                  std::uint64_t sequence, TimePoint now, Outbox& outbox);
+/// The worker will not compute these runs: lends them to others.
+void on_give_back(State& state, WorkerId id, const wire::GiveBack& give_back, TimePoint now,
+                  Outbox& outbox);
+/// The worker leaves: lends to others what it holds. No run is blamed.
+void on_bye(State& state, WorkerId id, const wire::Bye& bye, TimePoint now, Outbox& outbox);
+/// The worker's process has ended, or is taken for ended. Lends to others what it holds, and blames
+/// runs if the reason says that one of them may be the cause.
+void on_gone(State& state, WorkerId id, LossReason reason, TimePoint now, Outbox& outbox);
+
+// Time and the end.
+
+/// To be called several times a second: parts with workers that are silent or hang, lends their
+/// runs to others, and copies runs to idle workers at the end of a campaign.
+void on_tick(State& state, TimePoint now, Outbox& outbox);
+/// Lends nothing more. Workers deliver what they hold and leave.
+void on_drain(State& state, Outbox& outbox);
+/// Lends nothing more. Workers drop what they hold and end.
+void on_stop(State& state, Outbox& outbox);
+
+namespace detail {
+
+/// The worker that sent a message, with the time noted at which it was heard. If it is not
+/// registered, it is told so, and the result is null.
 Worker* heard(State& state, WorkerId id, TimePoint now, Outbox& outbox);
 
-/// Its process ended, or must end: logs it and forgets the worker, blaming what has to be. The
-/// caller settles.
-void part_with(State& state, WorkerId id, LossReason reason, Outbox& outbox);
-
-/// A batch of the worker hangs: tells it to end, and parts with it.
-void part_with_hung(State& state, WorkerId id, const wire::ComputedBatch& batch, Outbox& outbox);
-
-/// Makes both sides agree about what the worker holds.
-void reconcile(State& state, WorkerId id, const wire::Heartbeat& heartbeat, TimePoint now,
-               Outbox& outbox);
-
-/// A campaign is served, or has more runs than before: what workers computed of it without being
-/// able to deliver it is lent to them.
-void adopt_set_aside(State& state, CampaignId campaign, TimePoint now);
-
-/// Notes how far the worker's batches are.
-void note_progress(State& state, Worker& worker, const wire::Heartbeat& heartbeat, TimePoint now);
-
-/// The first of the worker's batches that comes no further; null if all do.
-[[nodiscard]] const wire::ComputedBatch* hung_batch(const State& state, const Worker& worker,
-                                                    TimePoint now);
-
-/// Nothing waits to be lent: gives idle workers a part of what others are too slow with.
-void speculate(State& state, TimePoint now, Outbox& outbox);
-
-}  // namespace proofmass::coordinator::detail
+}  // namespace detail
+}  // namespace proofmass::coordinator

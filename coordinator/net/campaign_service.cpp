@@ -7,7 +7,7 @@
 #include <exception>
 #include <utility>
 
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/campaigns.hpp"
 #include "core/error.hpp"
 #include "proto/wire/client_codec.hpp"
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/workers.hpp"
 #include "core/campaign/model.hpp"
 #include "core/error.hpp"
 #include "proto/wire/client_codec.hpp"

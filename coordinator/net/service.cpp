@@ -7,7 +7,8 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/results.hpp"
+#include "coordinator/dispatch/workers.hpp"
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"

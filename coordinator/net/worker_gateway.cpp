@@ -5,7 +5,7 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/workers.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/wire/codec.hpp"
 

@@ -6,12 +6,15 @@
 #include <utility>
 #include <variant>
 
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/campaigns.hpp"
+#include "coordinator/dispatch/results.hpp"
+#include "coordinator/dispatch/workers.hpp"
 #include "coordinator/net/worker_gateway.hpp"
 #include "core/error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/codec.hpp"
+#include "tests/coordinator/dispatch/invariants.hpp"
 #include "tests/fuzz/fuzz_input.hpp"
 
 namespace proofmass::test {

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/coordinator/dispatch/invariants.hpp"
 
 namespace proofmass::test {
 namespace {

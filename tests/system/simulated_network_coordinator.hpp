@@ -11,7 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/campaigns.hpp"
+#include "coordinator/dispatch/results.hpp"
+#include "coordinator/dispatch/workers.hpp"
 #include "proto/wire/definition_codec.hpp"
 #include "tests/system/simulated_network_execution.hpp"
 #include "tests/system/simulated_network_time.hpp"

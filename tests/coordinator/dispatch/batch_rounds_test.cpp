@@ -6,8 +6,11 @@
 #include <map>
 #include <vector>
 
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/campaigns.hpp"
+#include "coordinator/dispatch/results.hpp"
+#include "coordinator/dispatch/workers.hpp"
 #include "core/microscope/simulation/run.hpp"
+#include "tests/coordinator/dispatch/invariants.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -8,9 +8,12 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/campaigns.hpp"
+#include "coordinator/dispatch/results.hpp"
+#include "coordinator/dispatch/workers.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/simulation/run.hpp"
+#include "tests/coordinator/dispatch/invariants.hpp"
 #include "tests/coordinator/dispatch/recording_outbox.hpp"
 #include "tests/support/microscope_results.hpp"
 

@@ -11,7 +11,8 @@
 #include <variant>
 #include <vector>
 
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/outbox.hpp"
+#include "coordinator/dispatch/state.hpp"
 
 namespace proofmass::test {
 

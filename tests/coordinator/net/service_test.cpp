@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/state.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 

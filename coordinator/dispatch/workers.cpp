@@ -1,4 +1,4 @@
-#include "coordinator/dispatch/dispatch.hpp"
+#include "coordinator/dispatch/workers.hpp"
 
 #include <fmt/format.h>
 
@@ -8,16 +8,16 @@
 #include <vector>
 
 #include "coordinator/dispatch/blame.hpp"
+#include "coordinator/dispatch/heartbeat.hpp"
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
-#include "coordinator/dispatch/workers.hpp"
+#include "coordinator/dispatch/results.hpp"
+#include "coordinator/dispatch/speculation.hpp"
 #include "core/campaign/model.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-double seconds(Duration duration) { return std::chrono::duration<double>(duration).count(); }
 
 /// Why a worker that says Hello cannot be taken; nothing if it can.
 std::optional<wire::Reject> refusal(const State& state, const HostId& host,
@@ -96,6 +96,36 @@ bool take_hello_allowance(State& state, TimePoint now) {
   return true;
 }
 
+/// The worker's process ended, or must end: logs it and forgets the worker. Blames runs if the
+/// reason says that one of them may be the cause. The caller settles.
+void part_with(State& state, WorkerId id, LossReason reason, Outbox& outbox) {
+  const Worker& worker = state.workers.at(id);
+  outbox.log({.severity = Severity::warning,
+              .kind = "worker_gone",
+              .fields = {{"worker", id.value},
+                         {"name", worker.name},
+                         {"reason", name_of(reason)},
+                         {"orbits", worker.num_orbits_done}}});
+  const detail::RunsByCampaign blamed =
+      is_blamed(reason) ? detail::blame_crash(state, id, outbox) : detail::RunsByCampaign();
+  detail::remove_worker(state, id, reason, blamed, outbox);
+}
+
+/// A batch of the worker hangs: tells the worker to end, and parts with it.
+void part_with_hung(State& state, WorkerId id, const wire::ComputedBatch& batch, Outbox& outbox) {
+  outbox.log({.severity = Severity::warning,
+              .kind = "worker_gone",
+              .fields = {{"worker", id.value},
+                         {"name", state.workers.at(id).name},
+                         {"reason", "hung"},
+                         {"runs", to_text(RunSet(batch.ranges))},
+                         {"orbits", batch.num_orbits_done}}},
+             batch.campaign);
+  outbox.send(id, wire::Stop{});
+  const detail::RunsByCampaign blamed = detail::blame_batch(state, id, batch, outbox);
+  detail::remove_worker(state, id, LossReason::hung, blamed, outbox);
+}
+
 /// The process before this one crashed: that is sooner known than that it is silent. Nobody but the
 /// same key on the same host may say so.
 void note_former(State& state, const HostId& host, const wire::FormerSession& former,
@@ -105,7 +135,7 @@ void note_former(State& state, const HostId& host, const wire::FormerSession& fo
       std::find_if(state.workers.begin(), state.workers.end(),
                    [&](const auto& item) { return item.second.session == former.session; });
   if (found != state.workers.end() && found->second.host == host) {
-    detail::part_with(state, found->first, former.reason, outbox);
+    part_with(state, found->first, former.reason, outbox);
   }
 }
 
@@ -117,7 +147,7 @@ void make_room(State& state, TimePoint now, Outbox& outbox) {
       [](const auto& a, const auto& b) { return a.second.heard_at < b.second.heard_at; });
   if (silent == state.workers.end()) return;
   if (now - silent->second.heard_at < state.config.suspect_after) return;
-  detail::part_with(state, silent->first, LossReason::silent, outbox);
+  part_with(state, silent->first, LossReason::silent, outbox);
 }
 
 /// Registered workers are answered again: the answer before may have been lost.
@@ -170,33 +200,6 @@ Worker* heard(State& state, WorkerId id, TimePoint now, Outbox& outbox) {
   }
   found->second.heard_at = now;
   return &found->second;
-}
-
-void part_with(State& state, WorkerId id, LossReason reason, Outbox& outbox) {
-  const Worker& worker = state.workers.at(id);
-  outbox.log({.severity = Severity::warning,
-              .kind = "worker_gone",
-              .fields = {{"worker", id.value},
-                         {"name", worker.name},
-                         {"reason", name_of(reason)},
-                         {"orbits", worker.num_orbits_done}}});
-  const RunsByCampaign blamed =
-      is_blamed(reason) ? blame_crash(state, id, outbox) : RunsByCampaign();
-  remove_worker(state, id, reason, blamed, outbox);
-}
-
-void part_with_hung(State& state, WorkerId id, const wire::ComputedBatch& batch, Outbox& outbox) {
-  outbox.log({.severity = Severity::warning,
-              .kind = "worker_gone",
-              .fields = {{"worker", id.value},
-                         {"name", state.workers.at(id).name},
-                         {"reason", "hung"},
-                         {"runs", to_text(RunSet(batch.ranges))},
-                         {"orbits", batch.num_orbits_done}}},
-             batch.campaign);
-  outbox.send(id, wire::Stop{});
-  const RunsByCampaign blamed = blame_batch(state, id, batch, outbox);
-  remove_worker(state, id, LossReason::hung, blamed, outbox);
 }
 
 }  // namespace detail
@@ -315,7 +318,7 @@ void on_bye(State& state, WorkerId id, const wire::Bye& bye, TimePoint now, Outb
 
 void on_gone(State& state, WorkerId id, LossReason reason, TimePoint now, Outbox& outbox) {
   if (!state.workers.contains(id)) return;
-  detail::part_with(state, id, reason, outbox);
+  part_with(state, id, reason, outbox);
   detail::settle(state, now, outbox);
 }
 
@@ -331,8 +334,8 @@ void on_tick(State& state, TimePoint now, Outbox& outbox) {
     }
   }
   // All of them go before anything is lent again, or one would be lent what another lost.
-  for (const WorkerId id : silent) detail::part_with(state, id, LossReason::silent, outbox);
-  for (const auto& [id, batch] : hung) detail::part_with_hung(state, id, batch, outbox);
+  for (const WorkerId id : silent) part_with(state, id, LossReason::silent, outbox);
+  for (const auto& [id, batch] : hung) part_with_hung(state, id, batch, outbox);
   detail::settle(state, now, outbox);
   detail::speculate(state, now, outbox);
 }

@@ -1,6 +1,7 @@
+#include "tests/coordinator/dispatch/invariants.hpp"
+
 #include <algorithm>
 
-#include "coordinator/dispatch/state.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {

@@ -1,4 +1,7 @@
+#include "coordinator/dispatch/heartbeat.hpp"
+
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -7,10 +10,6 @@
 
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
-#include "coordinator/dispatch/workers.hpp"
-
-// What a heartbeat says against what the coordinator believes. Either may be right: messages are
-// lost on both ways, workers outlive coordinators, and a silent worker's runs are lent again.
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -207,6 +206,35 @@ void settle_set_aside(State& state, WorkerId id, CampaignId campaign_id, TimePoi
   }
 }
 
+bool is_same(const wire::ComputedBatch& a, const wire::ComputedBatch& b) {
+  return a.campaign == b.campaign && a.ranges == b.ranges;
+}
+
+void add_orbit_time(State& state, const Progress& before, const wire::ComputedBatch& batch,
+                    TimePoint now) {
+  const auto campaign = state.campaigns.find(batch.campaign);
+  if (campaign == state.campaigns.end()) return;
+  const double time_s = seconds(now - before.advanced_at) /
+                        static_cast<double>(batch.num_orbits_done - before.batch.num_orbits_done);
+  campaign->second.orbit_time_s = running_mean(campaign->second.orbit_time_s, time_s);
+}
+
+/// How long a batch may take for an orbit. Before anything is known, as if an orbit usually took a
+/// tenth of what is waited at least; a run takes longer than any of its orbits.
+Duration patience(const State& state, CampaignId id) {
+  const DispatchConfig& config = state.config;
+  double orbit_time_s = 0.1 * seconds(config.hung_after_min);
+  const auto campaign = state.campaigns.find(id);
+  if (campaign != state.campaigns.end()) {
+    if (campaign->second.run_time_s > 0.0) orbit_time_s = campaign->second.run_time_s;
+    if (campaign->second.orbit_time_s > 0.0) orbit_time_s = campaign->second.orbit_time_s;
+  }
+  constexpr double patience_s_max = 1e6;  // A worker may claim any time.
+  const double patience_s = std::min(patience_s_max, config.hung_after_orbits * orbit_time_s);
+  return std::max(config.hung_after_min,
+                  std::chrono::duration_cast<Duration>(std::chrono::duration<double>(patience_s)));
+}
+
 }  // namespace
 
 void reconcile(State& state, WorkerId id, const wire::Heartbeat& heartbeat, TimePoint now,
@@ -242,6 +270,41 @@ void adopt_set_aside(State& state, CampaignId campaign, TimePoint now) {
     const Adoption adoption{state, id, campaign, now};
     for (const auto& [attempt, runs] : found->second) adoption.adopt(attempt, runs);
   }
+}
+
+void note_progress(State& state, Worker& worker, const wire::Heartbeat& heartbeat, TimePoint now) {
+  // After a silence the process, or the machine, may have slept: nothing is held against it.
+  const bool was_silent = now - worker.heartbeat_at >= state.config.suspect_after;
+  worker.heartbeat_at = now;
+  worker.num_orbits_done = heartbeat.num_orbits_done;
+  std::vector<Progress> computing;
+  computing.reserve(heartbeat.computing.size());
+  for (const wire::ComputedBatch& batch : heartbeat.computing) {
+    TimePoint advanced_at = now;
+    const auto before =
+        std::find_if(worker.computing.begin(), worker.computing.end(),
+                     [&](const Progress& progress) { return is_same(progress.batch, batch); });
+    if (before != worker.computing.end() && !was_silent) {
+      if (batch.num_orbits_done > before->batch.num_orbits_done) {
+        add_orbit_time(state, *before, batch, now);
+      } else {
+        advanced_at = before->advanced_at;
+      }
+    }
+    computing.push_back({.batch = batch, .advanced_at = advanced_at});
+  }
+  worker.computing = std::move(computing);
+}
+
+const wire::ComputedBatch* hung_batch(const State& state, const Worker& worker, TimePoint now) {
+  // Of a worker that is not heard, nothing is known.
+  if (now - worker.heard_at >= state.config.suspect_after) return nullptr;
+  for (const Progress& progress : worker.computing) {
+    if (now - progress.advanced_at >= patience(state, progress.batch.campaign)) {
+      return &progress.batch;
+    }
+  }
+  return nullptr;
 }
 
 }  // namespace proofmass::coordinator::detail

@@ -8,7 +8,7 @@ namespace {
 using namespace std::chrono_literals;
 using Ranges = std::vector<RunRange>;
 
-class ReconcileTest : public DispatchFixture {
+class HeartbeatTest : public DispatchFixture {
  protected:
   /// The first worker has been lent run 0 of three.
   void lend_one() {
@@ -19,7 +19,7 @@ class ReconcileTest : public DispatchFixture {
   }
 };
 
-TEST_F(ReconcileTest, ALeaseThatNeverArrivedIsLentAgain) {
+TEST_F(HeartbeatTest, ALeaseThatNeverArrivedIsLentAgain) {
   lend_one();
   now += 11s;
   heartbeat(first);  // The lease may be under way.
@@ -35,14 +35,14 @@ TEST_F(ReconcileTest, ALeaseThatNeverArrivedIsLentAgain) {
   EXPECT_EQ(again.attempt, Attempt{2});
 }
 
-TEST_F(ReconcileTest, ALeaseThatIsHeldStays) {
+TEST_F(HeartbeatTest, ALeaseThatIsHeldStays) {
   lend_one();
   now += 1h;
   heartbeat(first, {held(one, {{0}, 1})});
   EXPECT_EQ(state.leases.size(), 1U);
 }
 
-TEST_F(ReconcileTest, AnOpenRunThatAWorkerHoldsIsLentToIt) {
+TEST_F(HeartbeatTest, AnOpenRunThatAWorkerHoldsIsLentToIt) {
   lend_one();
   heartbeat(first, {held(one, {{0}, 3}, 4)});
   outbox.expect_nothing_more();  // It has them: no message is needed.
@@ -53,7 +53,7 @@ TEST_F(ReconcileTest, AnOpenRunThatAWorkerHoldsIsLentToIt) {
 }
 
 // The attempt only grows, but the worker will name the runs by the one that it knows.
-TEST_F(ReconcileTest, AnAdoptedRunIsGivenBackUnderTheAttemptThatTheWorkerKnows) {
+TEST_F(HeartbeatTest, AnAdoptedRunIsGivenBackUnderTheAttemptThatTheWorkerKnows) {
   lend_one();
   now += 60s;
   on_tick(state, now, outbox);  // Run 0 is pending for its second attempt.
@@ -73,7 +73,7 @@ TEST_F(ReconcileTest, AnAdoptedRunIsGivenBackUnderTheAttemptThatTheWorkerKnows) 
   outbox.forget();
 }
 
-TEST_F(ReconcileTest, NobodyIsLentMoreThanAWorkerCanHoldBecauseItSaysSo) {
+TEST_F(HeartbeatTest, NobodyIsLentMoreThanAWorkerCanHoldBecauseItSaysSo) {
   begin();
   add_campaign(one, 1'000'000);
   add_worker(first);
@@ -83,7 +83,7 @@ TEST_F(ReconcileTest, NobodyIsLentMoreThanAWorkerCanHoldBecauseItSaysSo) {
   EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{1}, 999'999}}));
 }
 
-TEST_F(ReconcileTest, ARunThatIsLentToAnotherWorkerIsAskedBack) {
+TEST_F(HeartbeatTest, ARunThatIsLentToAnotherWorkerIsAskedBack) {
   lend_one();
   add_worker(second);
   outbox.forget();
@@ -94,14 +94,14 @@ TEST_F(ReconcileTest, ARunThatIsLentToAnotherWorkerIsAskedBack) {
   EXPECT_TRUE(state.workers.at(second).unleased.empty());
 }
 
-TEST_F(ReconcileTest, AStoredRunThatStillWaitsIsAskedBack) {
+TEST_F(HeartbeatTest, AStoredRunThatStillWaitsIsAskedBack) {
   lend_one();
   complete(first, one, {0});
   heartbeat(first, {held(one, {{0}, 3})});
   EXPECT_EQ(outbox.take_sent<wire::Retract>(first).ranges, (Ranges{{{0}, 1}}));
 }
 
-TEST_F(ReconcileTest, ADeliveredRunNeedsNothing) {
+TEST_F(HeartbeatTest, ADeliveredRunNeedsNothing) {
   lend_one();
   deliver(first, one, {0});
   outbox.forget();
@@ -109,7 +109,7 @@ TEST_F(ReconcileTest, ADeliveredRunNeedsNothing) {
 }
 
 // It may be served later, when its file can be opened: its results must not be thrown away.
-TEST_F(ReconcileTest, ACampaignThatIsNotServedIsKept) {
+TEST_F(HeartbeatTest, ACampaignThatIsNotServedIsKept) {
   lend_one();
   heartbeat(first, {held(one, {{0}, 1}), held(two, {{0}, 5})});
   const auto not_served = outbox.take_sent<wire::NotServed>(first);
@@ -117,7 +117,7 @@ TEST_F(ReconcileTest, ACampaignThatIsNotServedIsKept) {
   EXPECT_TRUE(not_served.ranges.empty());
 }
 
-TEST_F(ReconcileTest, ACampaignThatHasEndedIsForgotten) {
+TEST_F(HeartbeatTest, ACampaignThatHasEndedIsForgotten) {
   lend_one();
   on_ended(state, two, 5);
   heartbeat(first, {held(one, {{0}, 1}), held(two, {{0}, 5})});
@@ -126,7 +126,7 @@ TEST_F(ReconcileTest, ACampaignThatHasEndedIsForgotten) {
   EXPECT_EQ(forget.num_runs, 5U);
 }
 
-TEST_F(ReconcileTest, RunsThatAreGivenBackAreLentAgain) {
+TEST_F(HeartbeatTest, RunsThatAreGivenBackAreLentAgain) {
   lend_one();
   on_give_back(state, first, {.reason = LossReason::preempted, .runs = {held(one, {{0}, 1})}}, now,
                outbox);
@@ -136,7 +136,7 @@ TEST_F(ReconcileTest, RunsThatAreGivenBackAreLentAgain) {
 }
 
 // A message that was long under way must not take back what has been lent anew since.
-TEST_F(ReconcileTest, AGiveBackOfAnOlderAttemptIsIgnored) {
+TEST_F(HeartbeatTest, AGiveBackOfAnOlderAttemptIsIgnored) {
   lend_one();
   on_give_back(state, first, {.runs = {held(one, {{0}, 1})}}, now, outbox);
   outbox.forget();
@@ -144,7 +144,7 @@ TEST_F(ReconcileTest, AGiveBackOfAnOlderAttemptIsIgnored) {
   EXPECT_TRUE(campaign(one).lent.find({0}).has_value());
 }
 
-TEST_F(ReconcileTest, AfterARestartNothingIsLentUntilAllHaveSaidWhatTheyHold) {
+TEST_F(HeartbeatTest, AfterARestartNothingIsLentUntilAllHaveSaidWhatTheyHold) {
   begin({session_of(first), session_of(second)});
   add_campaign(one, 3);
   add_worker(first);
@@ -158,7 +158,7 @@ TEST_F(ReconcileTest, AfterARestartNothingIsLentUntilAllHaveSaidWhatTheyHold) {
   EXPECT_EQ(outbox.take_sent<wire::RunLease>(third).runs, (RunRange{{2}, 1}));
 }
 
-TEST_F(ReconcileTest, AfterARestartNothingIsLentBeforeTheWaitIsOver) {
+TEST_F(HeartbeatTest, AfterARestartNothingIsLentBeforeTheWaitIsOver) {
   begin({session_of(second)});
   add_campaign(one, 3);
   add_worker(first);
@@ -170,7 +170,7 @@ TEST_F(ReconcileTest, AfterARestartNothingIsLentBeforeTheWaitIsOver) {
   (void)outbox.take_sent<wire::RunLease>(first);
 }
 
-TEST_F(ReconcileTest, AfterARestartOneThatCrashedMeanwhileIsNotAwaited) {
+TEST_F(HeartbeatTest, AfterARestartOneThatCrashedMeanwhileIsNotAwaited) {
   begin({session_of(second)});
   add_campaign(one, 3);
   wire::Hello successor = hello();
@@ -182,7 +182,7 @@ TEST_F(ReconcileTest, AfterARestartOneThatCrashedMeanwhileIsNotAwaited) {
 }
 
 // What was finished before the restart is not computed again.
-TEST_F(ReconcileTest, AfterARestartAResultIsTakenAtOnce) {
+TEST_F(HeartbeatTest, AfterARestartAResultIsTakenAtOnce) {
   begin({session_of(first)});
   add_campaign(one, 1);
   on_hello(state, first, session_of(first), "", hello(), now, outbox);
