@@ -6,8 +6,8 @@
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/campaign_files.hpp"
-#include "coordinator/net/rights.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 

@@ -18,7 +18,7 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/stop_signals.hpp"
-#include "coordinator/net/rights.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/report/report.hpp"
 #include "core/campaign/model.hpp"

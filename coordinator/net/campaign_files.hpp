@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "coordinator/net/rights.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/runs.hpp"

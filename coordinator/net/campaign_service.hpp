@@ -13,11 +13,11 @@
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
 #include "coordinator/net/rate_meter.hpp"
-#include "coordinator/net/rights.hpp"
 #include "coordinator/store/store_writer.hpp"
 #include "proto/wire/client_messages.hpp"
 

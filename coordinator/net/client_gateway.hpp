@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
+#include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/request.hpp"
-#include "coordinator/net/rights.hpp"
 #include "coordinator/net/worker_gateway.hpp"
 #include "proto/wire/client_codec.hpp"
 

@@ -5,10 +5,10 @@
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
 #include "coordinator/net/directory_service.hpp"
-#include "coordinator/net/rights.hpp"
 #include "coordinator/net/submission_service.hpp"
 #include "proto/wire/client_messages.hpp"
 

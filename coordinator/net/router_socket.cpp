@@ -11,7 +11,7 @@
 #include <vector>
 #include <zmq.hpp>
 
-#include "coordinator/net/refusal_log.hpp"
+#include "coordinator/net/authentication/refusal_log.hpp"
 #include "core/error.hpp"
 #include "proto/link/socket.hpp"
 

@@ -13,8 +13,8 @@
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/campaign_files.hpp"
-#include "coordinator/net/rights.hpp"
 #include "coordinator/store/store_writer.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/wire/client_messages.hpp"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "coordinator/net/authenticator.hpp"
+#include "coordinator/net/authentication/authenticator.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/net/worker_gateway.hpp"
 

@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
 #include "coordinator/net/request.hpp"
-#include "coordinator/net/rights.hpp"
 #include "coordinator/store/store_writer.hpp"
 
 namespace proofmass::coordinator {

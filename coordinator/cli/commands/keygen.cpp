@@ -13,7 +13,7 @@
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/exit_code.hpp"
-#include "coordinator/net/allow_list.hpp"
+#include "coordinator/net/authentication/allow_list.hpp"
 #include "core/error.hpp"
 #include "proto/link/key_files.hpp"
 #include "proto/link/whole_file.hpp"

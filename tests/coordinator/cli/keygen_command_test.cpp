@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "coordinator/cli/exit_code.hpp"
-#include "coordinator/net/allow_list.hpp"
+#include "coordinator/net/authentication/allow_list.hpp"
 #include "proto/link/security.hpp"
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/proto/link/scratch_directory.hpp"

@@ -8,7 +8,7 @@
 #include <thread>
 #include <zmq.hpp>
 
-#include "coordinator/net/refusal_log.hpp"
+#include "coordinator/net/authentication/refusal_log.hpp"
 #include "proto/link/connection_monitor.hpp"
 #include "proto/link/key_files.hpp"
 #include "proto/link/socket.hpp"

@@ -1,4 +1,4 @@
-#include "coordinator/net/refusal_log.hpp"
+#include "coordinator/net/authentication/refusal_log.hpp"
 
 #include <zmq.h>
 

@@ -1,4 +1,4 @@
-#include "coordinator/net/rights.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 
 #include <fmt/format.h>
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "coordinator/net/rights.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 #include "proto/link/security.hpp"
 
 namespace proofmass::coordinator {

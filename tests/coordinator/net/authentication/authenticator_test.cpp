@@ -1,4 +1,4 @@
-#include "coordinator/net/authenticator.hpp"
+#include "coordinator/net/authentication/authenticator.hpp"
 
 #include <gtest/gtest.h>
 

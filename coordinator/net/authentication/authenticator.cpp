@@ -1,4 +1,4 @@
-#include "coordinator/net/authenticator.hpp"
+#include "coordinator/net/authentication/authenticator.hpp"
 
 #include <fmt/format.h>
 #include <zmq.h>
@@ -11,8 +11,8 @@
 #include <vector>
 #include <zmq.hpp>
 
-#include "coordinator/net/allow_list.hpp"
-#include "coordinator/net/refusal_log.hpp"
+#include "coordinator/net/authentication/allow_list.hpp"
+#include "coordinator/net/authentication/refusal_log.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {

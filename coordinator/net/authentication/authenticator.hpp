@@ -9,8 +9,8 @@
 #include <string_view>
 
 #include "coordinator/dispatch/outbox.hpp"
-#include "coordinator/net/refusal_log.hpp"
-#include "coordinator/net/rights.hpp"
+#include "coordinator/net/authentication/refusal_log.hpp"
+#include "coordinator/net/authentication/rights.hpp"
 #include "proto/link/security.hpp"
 
 namespace zmq {

@@ -1,4 +1,4 @@
-#include "coordinator/net/allow_list.hpp"
+#include "coordinator/net/authentication/allow_list.hpp"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
