@@ -10,8 +10,8 @@
 
 namespace proofmass::coordinator {
 
-/// A thread for what takes long: reading large requests, making and opening campaign databases. One
-/// thing at a time, in the order in which they were handed over.
+/// A thread for work that takes long: reading large requests, making and opening campaign
+/// databases. It does one piece of work at a time, in the order in which they were posted.
 class Background {
  public:
   /// What is to be done in the service's thread when some work is done. May throw.
@@ -29,7 +29,7 @@ class Background {
 
   /// False if too much work is pending.
   [[nodiscard]] bool post(Work work);
-  /// Hands over work however much is pending: for the next step of what was accepted.
+  /// Posts work however much is pending: for the next step of work that was accepted.
   void post_next(Work work);
 
   /// Of the work that is done, in order.

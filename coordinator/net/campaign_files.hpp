@@ -30,13 +30,13 @@ struct ServedCampaign {
 [[nodiscard]] std::uint64_t horizon_of(const StopPlan& plan, std::uint64_t num_runs_wanted,
                                        std::uint64_t num_runs_now);
 
-/// What becomes of runs that crashed too many workers of the coordinator before this one.
+/// How runs are treated that crashed workers of an earlier coordinator.
 enum class GivenUpRuns : std::uint8_t {
   keep,   ///< They stay given up, and runs that crashed once or twice stay suspect.
   retry,  ///< They are lent like all others.
 };
 
-/// What a service wants done with campaign databases and does not know how to do.
+/// What a service wants done with campaign databases. Its caller knows how.
 class CampaignFiles {
  public:
   virtual ~CampaignFiles() = default;
@@ -74,7 +74,7 @@ class CampaignFiles {
       const std::function<void(const std::function<void(Store&)>&)>& write) = 0;
 };
 
-/// A directory whose campaign databases are all to be served. Called in a background thread.
+/// A directory all of whose campaign databases are to be served. Called in a background thread.
 class CampaignDirectory {
  public:
   virtual ~CampaignDirectory() = default;

@@ -23,12 +23,13 @@ bool is_over(Phase phase) { return phase == Phase::finished || phase == Phase::c
 
 }  // namespace
 
-CampaignService::CampaignService(Surroundings surroundings)
-    : surroundings_(std::move(surroundings)),
-      state_(surroundings_.state),
-      writer_(surroundings_.writer),
-      outbox_(surroundings_.outbox),
-      files_(surroundings_.files) {}
+CampaignService::CampaignService(const ServiceContext& context, WorkerHistory& history)
+    : context_(context),
+      history_(history),
+      state_(context.state),
+      writer_(context.writer),
+      outbox_(context.outbox),
+      files_(context.config.files) {}
 
 CampaignService::~CampaignService() = default;
 
@@ -42,7 +43,7 @@ void CampaignService::serve(PreparedCampaign prepared) {
     throw Error(fmt::format("campaign = {} in {} (is served already, from another file)", name,
                             campaign.file.string()));
   }
-  const TimePoint now = surroundings_.now();
+  const TimePoint now = context_.now();
   served_.emplace(id, Served{.file = campaign.file,
                              .name = name,
                              .owner = prepared.owner,
@@ -155,13 +156,13 @@ void CampaignService::change(CampaignId id, const Change& change) {
 void CampaignService::extend(CampaignId id, std::shared_ptr<const Campaign> definition) {
   if (definition->num_runs <= state_.campaigns.at(id).definition->num_runs) return;
   served_.at(id).is_decided = false;
-  on_extended(state_, id, std::move(definition), surroundings_.now(), outbox_);
+  on_extended(state_, id, std::move(definition), context_.now(), outbox_);
 }
 
 void CampaignService::resume(CampaignId id) {
   const Phase phase = state_.campaigns.at(id).phase;
   if (phase != Phase::paused && phase != Phase::cancelled) return;
-  on_resume(state_, id, surroundings_.now(), outbox_);
+  on_resume(state_, id, context_.now(), outbox_);
 }
 
 wire::ClientReply CampaignService::control(CampaignId id, const wire::ControlRequest& request) {
@@ -181,7 +182,7 @@ wire::ClientReply CampaignService::control(CampaignId id, const wire::ControlReq
       break;
     case wire::ControlAction::retry:
       writer_.retry_given_up(id);
-      on_retry(state_, id, surroundings_.now(), outbox_);
+      on_retry(state_, id, context_.now(), outbox_);
       break;
   }
   review();
@@ -205,7 +206,7 @@ wire::CampaignStatus CampaignService::status_of(CampaignId id) const {
 wire::CampaignStatus CampaignService::status_of_served(CampaignId id) const {
   const CampaignState& campaign = state_.campaigns.at(id);
   const Served& served = served_.at(id);
-  const double rate_hz = served.rate.rate_hz(surroundings_.now());
+  const double rate_hz = served.rate.rate_hz(context_.now());
   return {.name = served.name,
           .phase = phase_of(id),
           .priority = campaign.priority,
@@ -237,7 +238,7 @@ Phase CampaignService::phase_of(CampaignId id) const {
 }
 
 void CampaignService::review() {
-  const TimePoint now = surroundings_.now();
+  const TimePoint now = context_.now();
   std::vector<CampaignId> ended;
   for (auto& [id, served] : served_) {
     const CampaignState& campaign = state_.campaigns.at(id);
@@ -294,7 +295,7 @@ void CampaignService::review_summary(CampaignId id, Served& served) {
     if (served.summary.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     take_summary(id, served);
   }
-  if (served.is_held || surroundings_.now() < served.summary_after) return;
+  if (served.is_held || context_.now() < served.summary_after) return;
   const bool is_due = std::exchange(served.is_summary_due, false);
   if (is_due || is_undecided(id)) begin_summary(id, served);
 }
@@ -307,7 +308,7 @@ void CampaignService::take_summary(CampaignId id, Served& served) {
   const bool is_news = failure != std::exchange(served.summary_failure, failure);
   if (!failure.empty()) {
     served.is_summary_due = true;
-    served.summary_after = surroundings_.now() + surroundings_.retry_after;
+    served.summary_after = context_.now() + context_.config.writer.retry_after;
     if (!is_news) return;
     outbox_.log({.severity = Severity::error,
                  .kind = "statistics_failed",
@@ -330,7 +331,7 @@ void CampaignService::go_on_to(CampaignId id, std::uint64_t num_runs) {
   // Shared by the copies that std::function makes.
   const std::shared_ptr<Campaign> wanted = state_.campaigns.at(id).definition->clone();
   wanted->num_runs = num_runs;
-  surroundings_.background.post_next([this, id, wanted]() -> Background::Finish {
+  context_.background.post_next([this, id, wanted]() -> Background::Finish {
     std::shared_ptr<const Campaign> extended;
     std::string failure;
     try {
@@ -378,14 +379,15 @@ bool CampaignService::has_ended(CampaignId id, const Served& served) const {
 
 // A file that is open can be restored if somebody removes it. So the last ones stay open.
 void CampaignService::close_surplus(std::vector<CampaignId> ended, TimePoint now) {
-  const std::optional<std::size_t> count_max = surroundings_.finished_open_max;
-  if (!count_max || ended.size() <= *count_max) return;
+  const std::size_t count_max = context_.config.finished_open_max;
+  // Without a directory, a file that was closed could not be opened again.
+  if (context_.config.directory == nullptr || ended.size() <= count_max) return;
   const auto ended_at = [this](CampaignId id) { return served_.at(id).ended_at; };
   std::ranges::stable_sort(ended, {}, ended_at);
-  ended.resize(ended.size() - *count_max);
+  ended.resize(ended.size() - count_max);
   for (const CampaignId id : ended) {
     const std::optional<TimePoint> tried_at = served_.at(id).closing_at;
-    if (!tried_at || now - *tried_at >= surroundings_.retry_after) begin_closing(id);
+    if (!tried_at || now - *tried_at >= context_.config.writer.retry_after) begin_closing(id);
   }
 }
 
@@ -402,7 +404,7 @@ void CampaignService::review_rest(CampaignId id, Served& served) {
 // Nobody must be reading an old state of the file: then it is closed later.
 void CampaignService::begin_closing(CampaignId id) {
   served_.at(id).is_held = true;
-  surroundings_.background.post_next([this, id]() -> Background::Finish {
+  context_.background.post_next([this, id]() -> Background::Finish {
     bool is_folded = false;
     try {
       writer_.access(id, [&](Store& store) { is_folded = !store.rest(); });
@@ -412,7 +414,7 @@ void CampaignService::begin_closing(CampaignId id) {
     return [this, id, is_folded] {
       Served& served = served_.at(id);
       served.is_held = false;
-      served.closing_at = surroundings_.now();
+      served.closing_at = context_.now();
       if (is_folded && has_ended(id, served)) close_ended(id);
     };
   });
@@ -424,13 +426,13 @@ void CampaignService::close_ended(CampaignId id) {
   EndedCampaign ended{.id = id, .file = file, .status = status_of_served(id), .stamp = {}};
   ended.status.rate_hz = 0.0;
   ended.status.remaining_s.reset();
-  surroundings_.on_closing(id);
+  history_.note_closed(id);
   on_removed(state_, id, outbox_);
   on_ended(state_, id, ended.status.num_runs);
   served_.erase(id);
   ended_.emplace(id, std::move(ended));
-  surroundings_.background.post_next([this, id, file,
-                                      epoch = surroundings_.start.epoch]() -> Background::Finish {
+  context_.background.post_next([this, id, file,
+                                 epoch = context_.start.epoch]() -> Background::Finish {
     try {
       Store store = writer_.close(id);
       std::vector<coordinator::Entry> entries;
@@ -472,7 +474,7 @@ std::vector<ServedCampaign> CampaignService::close() {
     if (served.summary.valid()) served.summary.wait();
     Store store = writer_.close(id);
     try {
-      store.end_coordinator(surroundings_.start.epoch);
+      store.end_coordinator(context_.start.epoch);
     } catch (const std::exception& error) {
       say_not_closed(error.what());
     }

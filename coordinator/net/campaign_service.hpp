@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <future>
 #include <map>
 #include <memory>
@@ -11,13 +10,12 @@
 #include <string_view>
 #include <vector>
 
-#include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
-#include "coordinator/net/authentication/rights.hpp"
-#include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
-#include "coordinator/net/rate_meter.hpp"
+#include "coordinator/net/service_context.hpp"
+#include "coordinator/net/timing.hpp"
+#include "coordinator/net/worker_history.hpp"
 #include "coordinator/store/store_writer.hpp"
 #include "proto/wire/client_messages.hpp"
 
@@ -28,22 +26,6 @@ namespace proofmass::coordinator {
 /// what may wait for a disk is done in the background.
 class CampaignService {
  public:
-  /// What it works with; all of that outlives it.
-  struct Surroundings {
-    State& state;
-    StoreWriter& writer;
-    Background& background;
-    Outbox& outbox;
-    std::function<TimePoint()> now;
-    CampaignFiles* files;  ///< Null if nothing can be submitted and nobody wants statistics.
-    /// How many files of finished campaigns stay open. Those that are closed can be opened again
-    /// later; with nothing none is closed.
-    std::optional<std::size_t> finished_open_max;
-    Duration retry_after;                        ///< Until what a disk prevented is tried again.
-    std::function<void(CampaignId)> on_closing;  ///< The dispatch is about to forget it.
-    CoordinatorStart start;
-  };
-
   /// A campaign by its name.
   struct Entry {
     CampaignId id;
@@ -60,7 +42,8 @@ class CampaignService {
     std::optional<double> audit_fraction = {};
   };
 
-  explicit CampaignService(Surroundings surroundings);
+  /// @param history  Told which campaigns are closed; outlives this object.
+  CampaignService(const ServiceContext& context, WorkerHistory& history);
   ~CampaignService();  ///< Waits for statistics that are being computed.
   CampaignService(const CampaignService&) = delete;
   CampaignService& operator=(const CampaignService&) = delete;
@@ -86,9 +69,9 @@ class CampaignService {
   };
   [[nodiscard]] Holdings holdings_of(std::string_view owner) const;
 
-  /// Keeps a served campaign from being closed or changed by a stop rule, until change() or
+  /// Keeps a served campaign from being closed, or changed by a stop rule, until change() or
   /// let_go().
-  /// @throws Error if somebody else has it, or if nothing can be stored.
+  /// @throws Error if another request is changing it, or if nothing can be stored.
   void take_hold(CampaignId id);
   [[nodiscard]] bool is_held(CampaignId id) const { return served_.at(id).is_held; }
   void let_go(CampaignId id) { served_.at(id).is_held = false; }
@@ -106,11 +89,11 @@ class CampaignService {
   [[nodiscard]] wire::ClientReply control(CampaignId id, const wire::ControlRequest& request);
   [[nodiscard]] wire::DoneReply done_reply(CampaignId id) const;
 
-  /// Takes notice of what the dispatch did: rates, phases, campaigns that are finished. To be
-  /// called some times a second.
+  /// Follows what the dispatch did: measures rates, stores phases, brings the statistics of
+  /// finished campaigns up to date. To be called several times a second.
   void review();
 
-  /// In the order in which they came, from the index on and at most so many.
+  /// At most `count_max` campaigns from the index `first` on, in the order in which they came.
   [[nodiscard]] std::vector<wire::CampaignStatus> statuses(std::size_t first,
                                                            std::size_t count_max) const;
   [[nodiscard]] std::size_t num_campaigns() const { return order_.size(); }
@@ -173,7 +156,8 @@ class CampaignService {
   void close_ended(CampaignId id);
   void say_not_closed(std::string_view reason);
 
-  Surroundings surroundings_;
+  const ServiceContext& context_;
+  WorkerHistory& history_;
   State& state_;
   StoreWriter& writer_;
   Outbox& outbox_;

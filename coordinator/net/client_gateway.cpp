@@ -4,15 +4,32 @@
 
 #include <exception>
 #include <functional>
+#include <iterator>
 #include <utility>
 #include <variant>
 
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 constexpr std::chrono::seconds told_every(1);
+constexpr std::chrono::seconds silence_max(30);  // Between two parts of a request.
+
+Request read(wire::SubmitRequest&& sent) {
+  return Submission{.campaign = model().campaign_of(std::move(sent.definition),
+                                                    TableColumns::included, "definition"),
+                    .priority = sent.priority,
+                    .audit_fraction = sent.audit_fraction,
+                    .stop_rule = std::move(sent.stop_rule),
+                    .failures_max = sent.failures_max};
+}
+
+template <typename Other>
+Request read(Other&& sent) {
+  return std::forward<Other>(sent);
+}
 
 wire::ErrorReply refusal(std::string text) { return {.text = std::move(text)}; }
 
@@ -38,8 +55,60 @@ Decoded decode(std::string_view bytes) {
 
 }  // namespace
 
-ClientGateway::ClientGateway(Background& background, Surroundings surroundings)
-    : background_(background), surroundings_(std::move(surroundings)) {}
+Request request_of(wire::ClientRequest sent) {
+  return std::visit([](auto&& content) { return read(std::move(content)); }, std::move(sent));
+}
+
+RequestParts::Outcome RequestParts::take(const std::string& connection, std::uint64_t request,
+                                         const wire::RequestPart& part, TimePoint now) {
+  auto found = unfinished_.find(connection);
+  const bool is_known = found != unfinished_.end() && found->second.request == request &&
+                        found->second.total_size == part.total_size;
+  if (!is_known) {
+    if (part.offset != 0) return wire::PartReply{0};
+    if (found != unfinished_.end()) drop(found);
+    if (part.total_size > size_max_ - size_held_) {
+      return wire::ErrorReply{
+          fmt::format("request size = {} bytes (the coordinator is receiving {} bytes of others, "
+                      "at most {} together: try again later)",
+                      part.total_size, size_held_, size_max_)};
+    }
+    Unfinished begun{
+        .request = request, .total_size = part.total_size, .bytes = {}, .heard_at = now};
+    begun.bytes.reserve(begun.total_size);
+    size_held_ += begun.total_size;
+    found = unfinished_.emplace(connection, std::move(begun)).first;
+  }
+  Unfinished& unfinished = found->second;
+  unfinished.heard_at = now;
+  if (part.offset == unfinished.bytes.size()) unfinished.bytes += part.slice;
+  if (unfinished.bytes.size() < unfinished.total_size) {
+    return wire::PartReply{unfinished.bytes.size()};
+  }
+  Whole whole{.bytes = std::move(unfinished.bytes)};
+  unfinished_.erase(found);
+  return whole;
+}
+
+void RequestParts::release(std::size_t size) {
+  PROOFMASS_EXPECT(size <= size_held_);
+  size_held_ -= size;
+}
+
+void RequestParts::drop_stale(TimePoint now) {
+  for (auto connection = unfinished_.begin(); connection != unfinished_.end();) {
+    const bool is_stale = now - connection->second.heard_at > silence_max;
+    connection = is_stale ? drop(connection) : std::next(connection);
+  }
+}
+
+RequestParts::Connections::iterator RequestParts::drop(Connections::iterator connection) {
+  size_held_ -= connection->second.total_size;
+  return unfinished_.erase(connection);
+}
+
+ClientGateway::ClientGateway(Background& background, Callbacks callbacks)
+    : background_(background), callbacks_(std::move(callbacks)) {}
 
 void ClientGateway::receive(const Incoming& message) {
   try {
@@ -51,7 +120,7 @@ void ClientGateway::receive(const Incoming& message) {
 
 void ClientGateway::take(const Incoming& message) {
   const Waiter unknown{.routing_id = message.from.routing_id, .request = 0};
-  if (!surroundings_.asker_of(message.from.key)) {
+  if (!callbacks_.asker_of(message.from.key)) {
     return send(unknown,
                 refusal(fmt::format("key = {} (is not authorized any more)", message.from.key)));
   }
@@ -79,7 +148,7 @@ void ClientGateway::take(const Incoming& message) {
 
 void ClientGateway::take_part(const Address& from, std::uint64_t request,
                               const wire::RequestPart& part) {
-  RequestParts::Outcome outcome = impl_.take(from.routing_id, request, part, surroundings_.now());
+  RequestParts::Outcome outcome = parts_.take(from.routing_id, request, part, callbacks_.now());
   const Waiter waiter{.routing_id = from.routing_id, .request = request};
   if (const auto* const next = std::get_if<wire::PartReply>(&outcome)) return send(waiter, *next);
   if (const auto* const error = std::get_if<wire::ErrorReply>(&outcome)) {
@@ -92,7 +161,7 @@ void ClientGateway::take_part(const Address& from, std::uint64_t request,
 void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::string bytes) {
   const std::size_t size = bytes.size();
   const auto begun = begin(from, request, bytes);
-  if (!begun) return impl_.release(size);
+  if (!begun) return parts_.release(size);
   const std::uint64_t ticket = *begun;
   const auto shared = std::make_shared<std::string>(std::move(bytes));
   const bool is_posted =
@@ -100,7 +169,7 @@ void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::
         const auto decoded = std::make_shared<Decoded>(decode(*shared));
         std::string().swap(*shared);
         return [this, ticket, decoded, size, key] {
-          impl_.release(size);
+          parts_.release(size);
           if (const auto* const error = std::get_if<wire::DecodeError>(decoded.get())) {
             return respond(ticket, refusal(error->text));
           }
@@ -108,7 +177,7 @@ void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::
         };
       });
   if (is_posted) return;
-  impl_.release(size);
+  parts_.release(size);
   respond(ticket, refusal(fmt::format("requests = {} (are under way, as many as may be; try again "
                                       "later)",
                                       Background::num_pending_max)));
@@ -116,9 +185,9 @@ void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::
 
 void ClientGateway::carry_out(std::uint64_t ticket, const std::string& key, Request request) {
   try {
-    const std::optional<Asker> asker = surroundings_.asker_of(key);
+    const std::optional<Asker> asker = callbacks_.asker_of(key);
     if (!asker) throw Error(fmt::format("key = {} (is not authorized any more)", key));
-    surroundings_.carry_out(
+    callbacks_.carry_out(
         std::move(request), *asker,
         [this, ticket](const wire::ClientReply& reply) { respond(ticket, reply); });
   } catch (const std::exception& error) {
@@ -146,7 +215,7 @@ std::optional<std::uint64_t> ClientGateway::begin(const Address& from, std::uint
                                    .size = bytes.size(),
                                    .hash = hash,
                                    .waiters = {waiter},
-                                   .told_at = surroundings_.now()});
+                                   .told_at = callbacks_.now()});
   return ticket;
 }
 
@@ -165,12 +234,12 @@ void ClientGateway::send(const Waiter& waiter, const wire::ClientReply& reply) {
   } catch (const Error& error) {
     bytes = wire::encode(wire::ReplyPacket{.id = waiter.request, .reply = refusal(error.what())});
   }
-  surroundings_.transmit(waiter.routing_id, bytes);
+  callbacks_.transmit(waiter.routing_id, bytes);
 }
 
 void ClientGateway::review() {
-  const TimePoint now = surroundings_.now();
-  impl_.drop_stale(now);
+  const TimePoint now = callbacks_.now();
+  parts_.drop_stale(now);
   for (auto& [ticket, pending] : pending_) {
     if (now - pending.told_at < told_every) continue;
     pending.told_at = now;

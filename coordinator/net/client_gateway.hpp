@@ -8,29 +8,103 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
+#include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/background.hpp"
-#include "coordinator/net/request.hpp"
-#include "coordinator/net/worker_gateway.hpp"
+#include "coordinator/net/peers.hpp"
+#include "core/campaign/campaign.hpp"
 #include "proto/wire/client_codec.hpp"
+#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
+
+/// A SubmitRequest whose definition has been read.
+struct Submission {
+  /// Valid, with its table columns; shared with the work that stores it.
+  std::shared_ptr<const Campaign> campaign;
+  std::optional<int> priority = {};
+  std::optional<double> audit_fraction = {};
+  std::string stop_rule = {};
+  std::optional<std::uint64_t> failures_max = {};
+};
+
+namespace detail {
+
+template <typename Sent>
+struct ReadyToCarryOut;
+template <typename... Sent>
+struct ReadyToCarryOut<std::variant<Sent...>> {
+  using type = std::variant<
+      std::conditional_t<std::is_same_v<Sent, wire::SubmitRequest>, Submission, Sent>...>;
+};
+
+}  // namespace detail
+
+/// What a client asks for, ready to be carried out: a Submission in place of the SubmitRequest.
+using Request = detail::ReadyToCarryOut<wire::ClientRequest>::type;
+
+/// @throws DefinitionError if a submission's definition is not one.
+[[nodiscard]] Request request_of(wire::ClientRequest sent);
+
+/// Joins requests that are too large for one message from their parts. A connection has one such
+/// request at a time: the first part of another one replaces it.
+class RequestParts {
+ public:
+  /// All parts of a request are here.
+  struct Whole {
+    std::string bytes;
+  };
+  using Outcome = std::variant<wire::PartReply, Whole, wire::ErrorReply>;
+
+  /// @param size_max  Of all requests together, bytes. Room for a request is taken with its first
+  ///                  part.
+  explicit RequestParts(std::size_t size_max = 2 * wire::submit_size_max) : size_max_(size_max) {}
+
+  /// @param connection  Its routing id.
+  [[nodiscard]] Outcome take(const std::string& connection, std::uint64_t request,
+                             const wire::RequestPart& part, TimePoint now);
+
+  /// The bytes of a whole request have been read and freed.
+  void release(std::size_t size);
+
+  /// Drops requests of which no part came for half a minute.
+  void drop_stale(TimePoint now);
+
+  [[nodiscard]] std::size_t size_held() const { return size_held_; }
+
+ private:
+  struct Unfinished {
+    std::uint64_t request = 0;
+    std::size_t total_size = 0;
+    std::string bytes;
+    TimePoint heard_at;
+  };
+  using Connections = std::map<std::string, Unfinished>;
+
+  Connections::iterator drop(Connections::iterator connection);
+
+  std::size_t size_max_;
+  std::size_t size_held_ = 0;  ///< Counted by total_size; with whole ones until release().
+  Connections unfinished_;
+};
 
 /// Answers a request, now or later; called once, in the service's thread.
 using Respond = std::function<void(wire::ClientReply)>;
 
-/// Between the clients' socket and what carries requests out: puts large requests together from
-/// their parts, reads them in the background, and sends each reply to the connections that
-/// wait for it. Knows no socket. Nothing that a client sends makes one of its functions throw.
+/// Stands between the clients' socket and the RequestService: checks messages, reads large requests
+/// in the background, and sends each reply to all connections that wait for it. It knows no socket.
+/// Nothing that a client sends makes one of its functions throw.
 class ClientGateway {
  public:
   /// What it needs from the service.
-  struct Surroundings {
+  struct Callbacks {
     /// Hands bytes to a connection, which may be gone.
     std::function<void(const std::string& routing_id, const std::string& bytes)> transmit;
-    /// Who has the key; nothing if it may not speak (any more).
+    /// The client that has the key; nothing if the key is not authorized, or not any more.
     std::function<std::optional<Asker>(const std::string& key)> asker_of;
     /// Carries out a request that has been checked. May throw instead of responding.
     std::function<void(Request request, const Asker& asker, Respond respond)> carry_out;
@@ -42,12 +116,13 @@ class ClientGateway {
   static constexpr std::size_t waiters_max = 16;
 
   /// @param background  Outlives the gateway.
-  ClientGateway(Background& background, Surroundings surroundings);
+  ClientGateway(Background& background, Callbacks callbacks);
 
   /// Handles one message, anything at all.
   void receive(const Incoming& message);
 
-  /// Tells those who wait for a reply that it will come. To be called some times a second.
+  /// Tells clients that wait that their request is being carried out. To be called several times a
+  /// second.
   void review();
 
  private:
@@ -78,8 +153,8 @@ class ClientGateway {
   void send(const Waiter& waiter, const wire::ClientReply& reply);
 
   Background& background_;
-  Surroundings surroundings_;
-  RequestParts impl_;
+  Callbacks callbacks_;
+  RequestParts parts_;
   std::map<std::uint64_t, Pending> pending_;  ///< By ticket.
   std::uint64_t next_ticket_ = 1;
 };

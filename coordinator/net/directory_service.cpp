@@ -39,23 +39,23 @@ DirectoryService::Findings DirectoryService::look(const CampaignDirectory& direc
   return findings;
 }
 
-DirectoryService::DirectoryService(Surroundings surroundings)
-    : surroundings_(std::move(surroundings)) {}
+DirectoryService::DirectoryService(const ServiceContext& context, CampaignService& campaigns)
+    : context_(context), campaigns_(campaigns) {}
 
 void DirectoryService::take(FileOutcome outcome) {
   const std::filesystem::path file = file_of(outcome);
   try {
     if (auto* const failure = std::get_if<FileFailure>(&outcome)) return note(std::move(*failure));
     if (auto* const ended = std::get_if<EndedCampaign>(&outcome)) {
-      surroundings_.campaigns.list(std::move(*ended));
+      campaigns_.list(std::move(*ended));
     } else {
-      surroundings_.campaigns.serve(std::get<PreparedCampaign>(std::move(outcome)));
+      campaigns_.serve(std::get<PreparedCampaign>(std::move(outcome)));
     }
   } catch (const std::exception& error) {
     return note({.file = file, .reason = error.what()});
   }
   if (unserved_.erase(file) == 0) return;
-  surroundings_.outbox.log({.kind = "campaign_file_served", .fields = {{"file", file.string()}}});
+  context_.outbox.log({.kind = "campaign_file_served", .fields = {{"file", file.string()}}});
 }
 
 void DirectoryService::note(FileFailure failure) {
@@ -63,19 +63,20 @@ void DirectoryService::note(FileFailure failure) {
   const bool is_news = known.reason != failure.reason;
   known = std::move(failure);
   if (!is_news) return;
-  surroundings_.outbox.log({.severity = Severity::error,
-                            .kind = "campaign_not_served",
-                            .fields = {Field::reason(known.reason)}});
+  context_.outbox.log({.severity = Severity::error,
+                       .kind = "campaign_not_served",
+                       .fields = {Field::reason(known.reason)}});
 }
 
 void DirectoryService::review(TimePoint now) {
-  const auto& [campaigns, background, outbox, directory, retry_after, start] = surroundings_;
-  if (directory == nullptr || is_looking_ || now - looked_at_ < retry_after) return;
+  const CampaignDirectory* const directory = context_.config.directory;
+  if (directory == nullptr || is_looking_) return;
+  if (now - looked_at_ < context_.config.writer.retry_after) return;
   is_looking_ = true;
-  background.post_next([this, &directory = *directory, start = start, now,
-                        known = campaigns.known(),
-                        ended = campaigns.ended_files()]() -> Background::Finish {
-    const auto findings = std::make_shared<Findings>(look(directory, known, ended, start));
+  context_.background.post_next([this, directory, start = context_.start, now,
+                                 known = campaigns_.known(),
+                                 ended = campaigns_.ended_files()]() -> Background::Finish {
+    const auto findings = std::make_shared<Findings>(look(*directory, known, ended, start));
     return [this, findings, now] { finish(std::move(*findings), now); };
   });
 }
@@ -86,7 +87,7 @@ void DirectoryService::finish(Findings findings, TimePoint now) {
   std::set<std::filesystem::path> seen;
   for (const FileOutcome& outcome : findings.outcomes) seen.insert(file_of(outcome));
   for (const EndedFile& changed : findings.changed) unlist(changed, seen.contains(changed.file));
-  const std::set<std::filesystem::path> served = surroundings_.campaigns.known().files;
+  const std::set<std::filesystem::path> served = campaigns_.known().files;
   for (FileOutcome& outcome : findings.outcomes) {
     const std::filesystem::path file = file_of(outcome);
     // It may have been submitted meanwhile.
@@ -101,17 +102,17 @@ void DirectoryService::finish(Findings findings, TimePoint now) {
 }
 
 void DirectoryService::unlist(const EndedFile& changed, bool is_there) {
-  if (!surroundings_.campaigns.unlist(changed) || is_there) return;
-  surroundings_.outbox.log({.severity = Severity::warning,
-                            .kind = "campaign_file_gone",
-                            .fields = {{"file", changed.file.string()}}});
+  if (!campaigns_.unlist(changed) || is_there) return;
+  context_.outbox.log({.severity = Severity::warning,
+                       .kind = "campaign_file_gone",
+                       .fields = {{"file", changed.file.string()}}});
 }
 
 void DirectoryService::forget(const std::filesystem::path& file) {
   unserved_.erase(file);
-  const bool is_served = surroundings_.campaigns.known().files.contains(file);
-  surroundings_.outbox.log({.kind = is_served ? "campaign_file_served" : "campaign_file_gone",
-                            .fields = {{"file", file.string()}}});
+  const bool is_served = campaigns_.known().files.contains(file);
+  context_.outbox.log({.kind = is_served ? "campaign_file_served" : "campaign_file_gone",
+                       .fields = {{"file", file.string()}}});
 }
 
 bool DirectoryService::is_all_served() const {

@@ -6,34 +6,25 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
+#include "coordinator/net/service_context.hpp"
 #include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
-/// The files of a directory that are not served: looks at them again every few seconds, in the
-/// background, and serves those that can be by then. So a file that was locked, on a full disk or
-/// damaged is served once it can be, and one that is put into the directory is served as well. The
-/// closed file of a campaign that has ended is looked at when it changes: an older copy in its
-/// place is served, and a file that was removed takes its campaign from the list.
+/// The files of a directory that are not served. They are looked at again every few seconds, in the
+/// background, and served as soon as possible: files that were locked, damaged or on a full disk,
+/// and files that are new in the directory. The closed file of a campaign that has ended is looked
+/// at when it changes: an older copy in its place is served, and if it was removed, its campaign is
+/// no longer listed.
 class DirectoryService {
  public:
-  /// What it works with; all of that outlives it.
-  struct Surroundings {
-    CampaignService& campaigns;
-    Background& background;
-    Outbox& outbox;
-    const CampaignDirectory* directory;  ///< Null if there is none.
-    Duration retry_after;
-    CoordinatorStart start;
-  };
+  /// @param campaigns  Outlives this object.
+  DirectoryService(const ServiceContext& context, CampaignService& campaigns);
 
-  explicit DirectoryService(Surroundings surroundings);
-
-  /// Serves, lists or notes what came of looking at a file.
+  /// Serves or lists the campaign of a file, or notes why that is not possible.
   void take(FileOutcome outcome);
 
   /// Looks again if it is time. To be called some times a second.
@@ -59,7 +50,8 @@ class DirectoryService {
   void forget(const std::filesystem::path& file);
   void finish(Findings findings, TimePoint now);
 
-  Surroundings surroundings_;
+  const ServiceContext& context_;
+  CampaignService& campaigns_;
   std::map<std::filesystem::path, FileFailure> unserved_;
   TimePoint looked_at_;
   bool is_looking_ = false;

@@ -9,12 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
-#include <chrono>
-#include <condition_variable>
 #include <cstring>
-#include <mutex>
-#include <string_view>
-#include <thread>
 #include <utility>
 
 #include "core/error.hpp"
@@ -69,101 +64,78 @@ std::size_t ResidentMemory::size() const {
   return pages[1] * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
-class MemoryGuard::Impl {
- public:
-  Impl(std::size_t size_max, Actions actions)
-      : bound_(size_max),
-        size_max_(size_max),
-        actions_(std::move(actions)),
-        thread_([this] { watch(); }) {}
-
-  ~Impl() {
-    {
-      const std::lock_guard lock(mutex_);
-      is_stopping_ = true;
-    }
-    stopping_.notify_all();
-    thread_.join();
-  }
-
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
- private:
-  void watch() {
-    while (!is_stopping_after(look_interval)) {
-      if (!is_open_) open();
-      const std::size_t size = memory_.size();
-      if (bound_.is_exceeded(size)) reset(size);
-    }
-  }
-
-  void reset(std::size_t size_before) {
-    actions_.close();
-    const std::size_t size = settled_size();
-    is_open_ = actions_.open();
-    const bool is_news = bound_.note_reset(size);
-    note("sockets_reset", {{"resident_mib", mebibytes(size_before)},
-                           {"left_mib", mebibytes(size)},
-                           {"memory_max_mib", mebibytes(size_max_)},
-                           Field::remark("(peers connect anew)")});
-    if (is_news) {
-      note("memory_high", {{"resident_mib", mebibytes(size)},
-                           {"memory_max_mib", mebibytes(size_max_)},
-                           Field::remark(fmt::format("(not held by sockets; next reset at {} MiB)",
-                                                     mebibytes(bound_.limit())))});
-    }
-    if (!is_open_) {
-      note("sockets_unbound", {Field::remark("an address is taken; tried again until it is free")});
-    }
-  }
-
-  void open() {
-    is_open_ = actions_.open();
-    if (is_open_) note("sockets_bound", {});
-  }
-
-  /// Size of the process once what the sockets held is free. Nothing comes in meanwhile.
-  std::size_t settled_size() {
-    const auto begin = Clock::now();
-    auto shrunk_at = begin;
-    std::size_t smallest = memory_.size();
-    for (;;) {
-      malloc_trim(0);
-      const std::size_t size = memory_.size();
-      const auto now = Clock::now();
-      if (size < smallest) shrunk_at = now;
-      smallest = std::min(smallest, size);
-      const bool is_settled = now - shrunk_at > settled_after || now - begin > settle_time_max;
-      if (is_settled || is_stopping_after(look_interval)) return size;
-    }
-  }
-
-  void note(std::string_view kind, wire::Fields fields) {
-    actions_.note({.severity = kind == "sockets_unbound" ? Severity::error : Severity::warning,
-                   .kind = kind,
-                   .fields = std::move(fields)});
-  }
-
-  bool is_stopping_after(Clock::duration duration) {
-    std::unique_lock lock(mutex_);
-    return stopping_.wait_for(lock, duration, [this] { return is_stopping_; });
-  }
-
-  ResidentMemory memory_;
-  MemoryBound bound_;
-  std::size_t size_max_;
-  Actions actions_;
-  bool is_open_ = true;
-  std::mutex mutex_;
-  std::condition_variable stopping_;
-  bool is_stopping_ = false;
-  std::thread thread_;
-};
-
 MemoryGuard::MemoryGuard(std::size_t size_max, Actions actions)
-    : impl_(std::make_unique<Impl>(size_max, std::move(actions))) {}
+    : bound_(size_max),
+      size_max_(size_max),
+      actions_(std::move(actions)),
+      thread_([this] { watch(); }) {}
 
-MemoryGuard::~MemoryGuard() = default;
+MemoryGuard::~MemoryGuard() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_stopping_ = true;
+  }
+  stopping_.notify_all();
+  thread_.join();
+}
+
+void MemoryGuard::watch() {
+  while (!is_stopping_after(look_interval)) {
+    if (!is_open_) open();
+    const std::size_t size = memory_.size();
+    if (bound_.is_exceeded(size)) reset(size);
+  }
+}
+
+void MemoryGuard::reset(std::size_t size_before) {
+  actions_.close();
+  const std::size_t size = settled_size();
+  is_open_ = actions_.open();
+  const bool is_news = bound_.note_reset(size);
+  note("sockets_reset", {{"resident_mib", mebibytes(size_before)},
+                         {"left_mib", mebibytes(size)},
+                         {"memory_max_mib", mebibytes(size_max_)},
+                         Field::remark("(peers connect anew)")});
+  if (is_news) {
+    note("memory_high", {{"resident_mib", mebibytes(size)},
+                         {"memory_max_mib", mebibytes(size_max_)},
+                         Field::remark(fmt::format("(not held by sockets; next reset at {} MiB)",
+                                                   mebibytes(bound_.limit())))});
+  }
+  if (!is_open_) {
+    note("sockets_unbound", {Field::remark("an address is taken; tried again until it is free")});
+  }
+}
+
+void MemoryGuard::open() {
+  is_open_ = actions_.open();
+  if (is_open_) note("sockets_bound", {});
+}
+
+std::size_t MemoryGuard::settled_size() {
+  const auto begin = Clock::now();
+  auto shrunk_at = begin;
+  std::size_t smallest = memory_.size();
+  for (;;) {
+    malloc_trim(0);
+    const std::size_t size = memory_.size();
+    const auto now = Clock::now();
+    if (size < smallest) shrunk_at = now;
+    smallest = std::min(smallest, size);
+    const bool is_settled = now - shrunk_at > settled_after || now - begin > settle_time_max;
+    if (is_settled || is_stopping_after(look_interval)) return size;
+  }
+}
+
+void MemoryGuard::note(std::string_view kind, wire::Fields fields) const {
+  actions_.note({.severity = kind == "sockets_unbound" ? Severity::error : Severity::warning,
+                 .kind = kind,
+                 .fields = std::move(fields)});
+}
+
+bool MemoryGuard::is_stopping_after(Clock::duration duration) {
+  std::unique_lock lock(mutex_);
+  return stopping_.wait_for(lock, duration, [this] { return is_stopping_; });
+}
 
 }  // namespace proofmass::coordinator

@@ -1,15 +1,19 @@
 #pragma once
 
+#include <chrono>
+#include <condition_variable>
 #include <cstddef>
 #include <functional>
-#include <memory>
+#include <mutex>
+#include <string_view>
+#include <thread>
 
 #include "coordinator/dispatch/outbox.hpp"
 
 namespace proofmass::coordinator {
 
-/// When the sockets of a process are to be closed for the memory that they hold. Bytes are those of
-/// its resident memory.
+/// Decides when the sockets of a process are closed to free the memory that they hold. Sizes are
+/// those of its resident memory.
 class MemoryBound {
  public:
   /// @param size_max  Of the process, bytes. The sockets are closed from three quarters of it on,
@@ -47,14 +51,14 @@ class ResidentMemory {
   int file_;
 };
 
-/// Looks at the memory of this process many times a second, in a thread of its own, so that it also
-/// does while the service's thread is busy or waits for a disk.
+/// Watches the memory of this process 40 times a second, in a thread of its own, and therefore also
+/// while the service's thread is busy or waits for a disk.
 class MemoryGuard {
  public:
   /// What a guard does to sockets, in its own thread.
   struct Actions {
-    std::function<void()> close;  ///< Lets all go that the sockets hold; nothing comes in then.
-    std::function<bool()> open;   ///< False if the addresses cannot be had now: called again.
+    std::function<void()> close;  ///< Frees all that the sockets hold; nothing is received then.
+    std::function<bool()> open;   ///< False if the addresses are taken now: called again.
     Log note;                     ///< `sockets_reset`, `memory_high`, `sockets_unbound`.
   };
 
@@ -64,8 +68,24 @@ class MemoryGuard {
   MemoryGuard& operator=(const MemoryGuard&) = delete;
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  void watch();
+  void reset(std::size_t size_before);
+  void open();
+  /// Size of the process once what the sockets held is free. Nothing comes in meanwhile.
+  [[nodiscard]] std::size_t settled_size();
+  void note(std::string_view kind, wire::Fields fields) const;
+  /// Waits; true if the guard is ending.
+  bool is_stopping_after(std::chrono::steady_clock::duration duration);
+
+  ResidentMemory memory_;
+  MemoryBound bound_;
+  std::size_t size_max_;
+  Actions actions_;
+  bool is_open_ = true;
+  std::mutex mutex_;  ///< For the end of the thread.
+  std::condition_variable stopping_;
+  bool is_stopping_ = false;
+  std::thread thread_;  ///< Begins when all else is there.
 };
 
 }  // namespace proofmass::coordinator

@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 #include <vector>
 
@@ -23,11 +24,17 @@ struct Address {
   std::string host;
 };
 
+/// A message as it comes out of a socket.
+struct Incoming {
+  Address from;
+  std::vector<std::string_view> frames;  ///< Valid while the message is handled.
+};
+
 /// `address=10.0.0.7 key=...`, for logs.
 [[nodiscard]] wire::Fields fields_of(const Address& address);
 
-/// Who is who: session (of a worker process), its number in the dispatch, and the connection that
-/// it was last heard on.
+/// Connects the session of a worker process with its number in the dispatch, and with the
+/// connection on which it was heard last.
 class Peers {
  public:
   /// Limits of what is kept about peers.
@@ -66,7 +73,7 @@ class Peers {
 
   void forget(wire::WorkerId worker);
 
-  /// Nothing more is heard from a connection.
+  /// Ignores the connection from now on.
   void close_out(const std::string& routing_id);
   [[nodiscard]] bool is_closed_out(const std::string& routing_id) const;
 

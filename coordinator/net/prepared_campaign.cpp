@@ -1,17 +1,24 @@
 #include "coordinator/net/prepared_campaign.hpp"
 
 #include <fmt/format.h>
+#include <sys/random.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <exception>
 #include <map>
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include "coordinator/store/campaign_peek.hpp"
 #include "coordinator/store/store_error.hpp"
+#include "core/error.hpp"
+#include "proto/link/host_name.hpp"
 #include "proto/link/kill_point.hpp"
 
 namespace proofmass::coordinator {
@@ -116,6 +123,23 @@ std::string created_utc(const FileOutcome& outcome) {
   return ended == nullptr ? "" : ended->created_utc;
 }
 
+wire::Epoch random_epoch() {
+  wire::Epoch epoch;
+  while (epoch.value == 0) {
+    if (getrandom(&epoch.value, sizeof epoch.value, 0) < 0 && errno != EINTR) {
+      throw Error(fmt::format("getrandom: {}", std::strerror(errno)));
+    }
+  }
+  return epoch;
+}
+
+CoordinatorStart coordinator_start(wire::Epoch epoch, const std::string& version) {
+  return {.epoch = epoch,
+          .host = wire::host_name(),
+          .process_id = static_cast<std::uint64_t>(getpid()),
+          .version = version};
+}
+
 }  // namespace
 
 void KnownCampaigns::add(const FileOutcome& outcome) {
@@ -184,6 +208,28 @@ std::vector<FileOutcome> look_at_all(const CampaignDirectory& directory, KnownCa
   // The order of submission, which `status` shows and in which campaigns of one priority are lent.
   std::ranges::stable_sort(outcomes, {}, created_utc);
   return outcomes;
+}
+
+Beginning beginning_of(std::vector<ServedCampaign> campaigns, GivenUpRuns given_up,
+                       const CampaignDirectory* directory, const std::string& version) {
+  Beginning beginning{
+      .start = coordinator_start(random_epoch(), version), .campaigns = {}, .attached = {}};
+  KnownCampaigns known;
+  for (ServedCampaign& campaign : campaigns) {
+    beginning.campaigns.emplace_back(prepare(std::move(campaign), given_up, beginning.start));
+    known.add(beginning.campaigns.back());
+  }
+  if (directory != nullptr) {
+    for (FileOutcome& outcome : look_at_all(*directory, known, beginning.start)) {
+      beginning.campaigns.push_back(std::move(outcome));
+    }
+  }
+  for (const FileOutcome& outcome : beginning.campaigns) {
+    const auto* const prepared = std::get_if<PreparedCampaign>(&outcome);
+    if (prepared == nullptr) continue;
+    beginning.attached.insert(prepared->sessions.begin(), prepared->sessions.end());
+  }
+  return beginning;
 }
 
 std::uint64_t definition_size(const Campaign& campaign) {

@@ -91,6 +91,22 @@ struct KnownCampaigns {
                                                    KnownCampaigns& known,
                                                    const CoordinatorStart& start);
 
+/// What a service begins with.
+struct Beginning {
+  CoordinatorStart start;
+  std::vector<FileOutcome> campaigns;  ///< Those that are handed over come first.
+  std::set<SessionId> attached;        ///< Workers that may come back.
+};
+
+/// Reads what must be known of the campaigns that are handed over and of those in the directory.
+/// @param directory  Null if there is none.
+/// @param version    Of the program, for people.
+/// @throws Error, StoreError if a campaign that is handed over cannot be served, or the directory
+///         cannot be read.
+[[nodiscard]] Beginning beginning_of(std::vector<ServedCampaign> campaigns, GivenUpRuns given_up,
+                                     const CampaignDirectory* directory,
+                                     const std::string& version);
+
 /// Bytes that the tables of a campaign take.
 [[nodiscard]] std::uint64_t definition_size(const Campaign& campaign);
 

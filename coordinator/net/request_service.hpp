@@ -1,48 +1,81 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <map>
+#include <memory>
 #include <string>
+#include <vector>
 
-#include "coordinator/dispatch/outbox.hpp"
-#include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/authentication/rights.hpp"
+#include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
 #include "coordinator/net/directory_service.hpp"
-#include "coordinator/net/submission_service.hpp"
+#include "coordinator/net/service_context.hpp"
 #include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
-/// Carries out what clients ask for, if they may ask for it.
+/// Carries out what clients ask for, if they may ask for it. The files of submitted campaigns are
+/// made, opened and extended in the background, so that the service goes on meanwhile.
 class RequestService {
  public:
-  /// What it works with; all of that outlives it.
-  struct Surroundings {
-    State& state;
-    CampaignService& campaigns;
-    SubmissionService& submissions;
-    DirectoryService& directory;
-    Outbox& outbox;
-    std::function<TimePoint()> now;
-    std::string version;  ///< Of the program.
-  };
+  /// @param campaigns, directory  Outlive this object.
+  RequestService(const ServiceContext& context, CampaignService& campaigns,
+                 const DirectoryService& directory);
 
-  explicit RequestService(Surroundings surroundings);
-
-  /// Responds at once, or later if a file must be opened or made.
-  /// @throws Error, std::exception with the reason if it is not carried out.
+  /// Responds at once, or later if a file must be opened, made or extended, or if the campaign of a
+  /// submission is being changed, opened or closed.
+  /// @throws Error, std::exception with the reason if the request is not carried out: the asker may
+  ///         not ask for it, has submitted too much, or too many requests are under way.
   void carry_out(Request request, const Asker& asker, Respond respond);
 
+  /// Carries out submissions that had to wait. To be called several times a second.
+  void review();
+
  private:
+  using Submitted = std::shared_ptr<const Submission>;
+
+  /// What is being opened or made in the background.
+  struct UnderWay {
+    std::string owner;
+    std::uint64_t size = 0;
+  };
+
+  /// A submission that waits.
+  struct Deferred {
+    Submitted request;
+    Asker asker;
+    Respond respond;
+  };
+
   /// Has a specialisation for each kind of Request.
   template <typename Content>
   void take(Content&& request, const Asker& asker, const Respond& respond) = delete;
   void control_ended(const CampaignService::Entry& campaign, wire::ControlAction action,
                      const Respond& respond);
 
-  Surroundings surroundings_;
+  void submit(const Submitted& request, const Asker& asker, Respond respond);
+  [[nodiscard]] bool is_busy(const std::string& name) const;
+  void check_limits(const std::string& owner, std::uint64_t size, bool is_new) const;
+  void open_file(const Submitted& request, const Asker& asker, const std::string& owner,
+                 Respond respond);
+  /// Opens the file of a campaign that has ended, and resumes it or retries its runs.
+  void reopen(const CampaignService::Entry& campaign, wire::ControlAction action, Respond respond);
+  void change_served(CampaignId id, const Submitted& request, Respond respond);
+  /// Opens or makes a file with `open` in the background, and serves it.
+  /// @param activate  Stores what is to be different from now on, the phase at least.
+  void serve_opened(const std::string& name, UnderWay under_way,
+                    std::function<ServedCampaign()> open, std::function<void(Store&)> activate,
+                    Respond respond);
+
+  const ServiceContext& context_;
+  CampaignService& campaigns_;
+  const DirectoryService& directory_;
   TimePoint began_at_;
+  std::map<std::string, UnderWay> under_way_;  ///< By the campaign's name.
+  std::vector<Deferred> deferred_;
 };
 
 }  // namespace proofmass::coordinator

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -8,18 +9,19 @@
 #include <string_view>
 
 #include "coordinator/dispatch/state.hpp"
-#include "coordinator/net/worker_gateway.hpp"
+#include "coordinator/net/peers.hpp"
 #include "proto/link/connection_monitor.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/security.hpp"
 
 namespace zmq {
 class context_t;
+class socket_t;
 }  // namespace zmq
 
 namespace proofmass::coordinator {
 
-/// The socket at one of a coordinator's doors. It never waits.
+/// The socket at one of a coordinator's addresses. It never waits.
 ///
 /// One thread uses it; another may close and open it meanwhile, to free what it holds. Peers then
 /// connect anew to the same address, and what was under way is lost.
@@ -37,12 +39,12 @@ class RouterSocket {
   RouterSocket& operator=(const RouterSocket&) = delete;
 
   /// Keeps the socket from being closed while it is polled.
-  [[nodiscard]] std::unique_lock<std::mutex> hold() const;
+  [[nodiscard]] std::unique_lock<std::mutex> hold() { return std::unique_lock(mutex_); }
   /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t, while it is held; null if it is closed.
   [[nodiscard]] void* handle() const;
 
   /// The address to connect to, with the port that was chosen.
-  [[nodiscard]] const std::string& endpoint() const;
+  [[nodiscard]] const std::string& endpoint() const { return endpoint_; }
 
   /// The next handshake that failed, if there are keys.
   [[nodiscard]] std::optional<wire::SocketEvent> take_event();
@@ -60,8 +62,28 @@ class RouterSocket {
   [[nodiscard]] bool open();
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  /// A message with the frames that hold its bytes.
+  struct Received;
+  struct Faults {
+    wire::FaultyLink sending;
+    wire::FaultyLink receiving;
+    std::map<std::string, Address> addresses;  ///< Of those whose messages are delayed.
+  };
+
+  void bind(const std::string& endpoint);
+  void wait_for_unbound();
+  [[nodiscard]] std::optional<Received> next();
+  void pass_due(TimePoint now, const std::function<void(const Incoming&)>& handle);
+  bool send_now(const std::string& routing_id, const std::string& bytes);
+
+  zmq::context_t& context_;
+  std::string option_;
+  wire::ServerSecurity security_;
+  std::string endpoint_;
+  std::mutex mutex_;                            ///< For the socket and its events.
+  std::unique_ptr<zmq::socket_t> socket_;       ///< Null while it is closed.
+  std::unique_ptr<wire::SocketEvents> events_;  ///< Of the socket: gone before it.
+  std::optional<Faults> faults_;
 };
 
 }  // namespace proofmass::coordinator

@@ -15,10 +15,9 @@
 #include "coordinator/net/directory_service.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
 #include "coordinator/net/request_service.hpp"
-#include "coordinator/net/service_beginning.hpp"
+#include "coordinator/net/service_context.hpp"
 #include "coordinator/net/service_sockets.hpp"
-#include "coordinator/net/submission_service.hpp"
-#include "coordinator/net/waking_time.hpp"
+#include "coordinator/net/timing.hpp"
 #include "coordinator/net/worker_gateway.hpp"
 #include "coordinator/net/worker_history.hpp"
 #include "core/error.hpp"
@@ -63,12 +62,12 @@ class Service::Impl final : public Outbox {
         state_(initial_state(config.dispatch, beginning.attached, now())),
         writer_([this] { sockets_.wake(); }, config.writer),
         history_(state_, writer_, beginning.attached),
-        worker_gateway_(state_, start_.epoch, surroundings_of_workers()),
-        campaign_service_(surroundings_of_campaigns()),
-        directory_service_(surroundings_of_directory()),
-        submission_service_(surroundings_of_submissions()),
-        request_service_(surroundings_of_requests()),
-        client_gateway_(background_, surroundings_of_clients()),
+        worker_gateway_(state_, start_.epoch, worker_callbacks()),
+        context_{config_, start_, state_, writer_, background_, *this, [this] { return now(); }},
+        campaign_service_(context_, history_),
+        directory_service_(context_, campaign_service_),
+        request_service_(context_, campaign_service_, directory_service_),
+        client_gateway_(background_, client_callbacks()),
         background_([this] { sockets_.wake(); }) {
     raise_descriptor_limit();
     for (FileOutcome& outcome : beginning.campaigns) begin_with(std::move(outcome));
@@ -158,7 +157,7 @@ class Service::Impl final : public Outbox {
     campaign_service_.serve(std::get<PreparedCampaign>(std::move(outcome)));
   }
 
-  WorkerGateway::Surroundings surroundings_of_workers() {
+  WorkerGateway::Callbacks worker_callbacks() {
     return {.transmit =
                 [this](const std::string& routing_id, const std::string& bytes) {
                   return sockets_.send_to_worker(routing_id, bytes, now());
@@ -171,51 +170,7 @@ class Service::Impl final : public Outbox {
                                  LossReason reason) { history_.note_reason(worker, reason); }};
   }
 
-  CampaignService::Surroundings surroundings_of_campaigns() {
-    return {.state = state_,
-            .writer = writer_,
-            .background = background_,
-            .outbox = *this,
-            .now = [this] { return now(); },
-            .files = config_.files,
-            .finished_open_max = config_.directory == nullptr
-                                     ? std::nullopt
-                                     : std::optional(config_.finished_open_max),
-            .retry_after = config_.writer.retry_after,
-            .on_closing = [this](CampaignId id) { history_.note_closed(id); },
-            .start = start_};
-  }
-
-  DirectoryService::Surroundings surroundings_of_directory() {
-    return {.campaigns = campaign_service_,
-            .background = background_,
-            .outbox = *this,
-            .directory = config_.directory,
-            .retry_after = config_.writer.retry_after,
-            .start = start_};
-  }
-
-  SubmissionService::Surroundings surroundings_of_submissions() {
-    return {.campaigns = campaign_service_,
-            .writer = writer_,
-            .background = background_,
-            .files = config_.files,
-            .directory = config_.directory,
-            .limits = config_.limits,
-            .start = start_};
-  }
-
-  RequestService::Surroundings surroundings_of_requests() {
-    return {.state = state_,
-            .campaigns = campaign_service_,
-            .submissions = submission_service_,
-            .directory = directory_service_,
-            .outbox = *this,
-            .now = [this] { return now(); },
-            .version = config_.version};
-  }
-
-  ClientGateway::Surroundings surroundings_of_clients() {
+  ClientGateway::Callbacks client_callbacks() {
     return {.transmit =
                 [this](const std::string& routing_id, const std::string& bytes) {
                   (void)sockets_.send_to_client(routing_id, bytes, now());
@@ -278,7 +233,7 @@ class Service::Impl final : public Outbox {
     on_tick(state_, ticked_at_, *this);
     campaign_service_.review();
     directory_service_.review(ticked_at_);
-    submission_service_.review();
+    request_service_.review();
     client_gateway_.review();
     history_.review();
     if (ticked_at_ - reviewed_at_ < review_interval) return;
@@ -426,9 +381,9 @@ class Service::Impl final : public Outbox {
   StoreWriter writer_;
   WorkerHistory history_;
   WorkerGateway worker_gateway_;
+  ServiceContext context_;
   CampaignService campaign_service_;
   DirectoryService directory_service_;
-  SubmissionService submission_service_;
   RequestService request_service_;
   ClientGateway client_gateway_;
   std::optional<TimePoint> drained_until_;
@@ -441,8 +396,9 @@ class Service::Impl final : public Outbox {
 };
 
 Service::Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log)
-    : impl_(std::make_unique<Impl>(beginning_of(std::move(campaigns), config), config,
-                                   std::move(log))) {}
+    : impl_(std::make_unique<Impl>(
+          beginning_of(std::move(campaigns), config.given_up, config.directory, config.version),
+          config, std::move(log))) {}
 
 Service::~Service() = default;
 

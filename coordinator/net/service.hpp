@@ -24,44 +24,44 @@ namespace proofmass::coordinator {
 /// How a service is asked to end; set by signal handlers.
 enum class StopRequest : std::uint8_t {
   none,
-  drain,  ///< When the runs that workers hold are stored, or the time for that is over.
-  now,    ///< With what has been delivered; workers end, too.
-  leave,  ///< With what has been delivered; workers go on and wait for the next coordinator.
+  drain,  ///< Ends when the runs that workers hold are stored, or after ServiceConfig::drain_max.
+  now,    ///< Stores what has been delivered and ends; workers end as well.
+  leave,  ///< Stores what has been delivered and ends; workers wait for the next coordinator.
 };
 
-/// When a service ends that nobody asks to.
+/// Whether a service ends by itself.
 enum class ServiceEnd : std::uint8_t {
   never,
-  /// Every campaign is finished or cancelled, no file of the directory waits to be served, and
-  /// clients that follow can know it.
+  /// It ends when every campaign is finished or cancelled, no file of the directory waits to be
+  /// served, and clients that follow a campaign have had the time to learn that it is over.
   when_done,
 };
 
 /// Settings of a service.
 struct ServiceConfig {
   std::string workers_endpoint;                 ///< Where workers connect; the port may be `*`.
-  std::optional<std::string> clients_endpoint;  ///< Where clients do, if any.
-  /// With coordinator.key and the lists of authorized keys; without keys, every peer that reaches
-  /// the addresses is served.
+  std::optional<std::string> clients_endpoint;  ///< Where clients connect; none are served without.
+  /// Directory with coordinator.key and the lists of authorized keys. Without it, every peer that
+  /// reaches the addresses is served.
   std::optional<std::filesystem::path> keys;
-  bool is_plain_waived = false;  ///< No keys beyond this machine: the user knows it.
+  bool is_plain_waived = false;  ///< --insecure-plain: other machines may connect without keys.
   ServiceEnd end = ServiceEnd::never;
   GivenUpRuns given_up = GivenUpRuns::keep;
   Duration drain_max = std::chrono::seconds(120);  ///< Then a drain becomes a stop.
-  /// Of the process, bytes. Sockets are closed and bound again before it is reached; nothing if all
-  /// that can connect is trusted.
+  /// Memory that the process may have, bytes. The sockets are closed and bound again before it is
+  /// reached. Without it, all peers that can connect are trusted.
   std::optional<std::size_t> memory_size_max;
   CampaignFiles* files = nullptr;  ///< Outlives the service; null if nothing can be submitted.
-  /// Whose campaigns are served beside those that are handed over; null if there is none.
+  /// Its campaigns are served besides those that are handed over; null if there is none.
   const CampaignDirectory* directory = nullptr;
   /// With a directory: how many files of finished campaigns stay open. The others are closed, and
   /// opened again when somebody asks for more runs.
   std::size_t finished_open_max = 16;
-  SubmissionLimits limits;  ///< Of each client's key.
+  SubmissionLimits limits;  ///< Hold for each client's key.
   std::string version;      ///< Of the program, for people.
   DispatchConfig dispatch;
   WriterConfig writer;
-  std::optional<wire::FaultPlan> faults;  ///< On the workers' messages; for tests of this program.
+  std::optional<wire::FaultPlan> faults;  ///< Of workers' messages; for tests of this program.
 };
 
 /// A coordinator: lends the runs of its campaigns to the workers that connect, stores their results

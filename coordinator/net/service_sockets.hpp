@@ -1,13 +1,19 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <functional>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "coordinator/net/authentication/authenticator.hpp"
+#include "coordinator/net/memory_guard.hpp"
+#include "coordinator/net/router_socket.hpp"
 #include "coordinator/net/service.hpp"
-#include "coordinator/net/worker_gateway.hpp"
+#include "proto/link/socket.hpp"
 
 namespace proofmass::coordinator {
 
@@ -32,16 +38,16 @@ class ServiceSockets {
   ServiceSockets& operator=(const ServiceSockets&) = delete;
 
   /// The addresses to connect to, with the ports that were chosen.
-  [[nodiscard]] std::string workers_endpoint() const;
+  [[nodiscard]] std::string workers_endpoint() const { return workers_->endpoint(); }
   [[nodiscard]] std::string clients_endpoint() const;  ///< Empty if there are no clients.
 
   /// Who may connect; null if there are no keys.
-  [[nodiscard]] Authenticator* authenticator();
+  [[nodiscard]] Authenticator* authenticator() { return authenticator_.get(); }
 
   /// Until a message, a handshake or a wake() is there, or the time is over.
   void wait(std::chrono::milliseconds duration_max);
   /// Ends a wait(); from any thread.
-  void wake() const;
+  void wake() const { wake_.notify(); }
   /// Answers handshakes and logs what happened to the sockets. Never waits.
   void serve(TimePoint now);
 
@@ -54,8 +60,25 @@ class ServiceSockets {
   bool send_to_client(const std::string& routing_id, const std::string& bytes, TimePoint now);
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  // Called in the guard's thread.
+  void close();
+  bool open();
+  void note(Event event);
+  void set_closing(bool is_closing);
+
+  std::vector<Event> take_notes();
+
+  Log log_;
+  wire::Wake wake_;
+  std::unique_ptr<zmq::context_t> context_;
+  std::unique_ptr<Authenticator> authenticator_;  ///< Made before any socket is bound.
+  std::unique_ptr<RouterSocket> workers_;
+  std::unique_ptr<RouterSocket> clients_;  ///< Null if there are no clients.
+  std::mutex mutex_;                       ///< For what follows.
+  std::condition_variable closed_;
+  bool is_closing_ = false;
+  std::vector<Event> notes_;
+  std::optional<MemoryGuard> guard_;  ///< Uses all the others: the last one.
 };
 
 /// Lets the process have as many open descriptors as the system allows: each connection is one, and

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 #include <variant>
 
@@ -30,12 +31,42 @@ bool is_of_a_worker(const wire::Message& message) {
 
 }  // namespace
 
-WorkerGateway::WorkerGateway(State& state, wire::Epoch epoch, Surroundings surroundings)
-    : state_(state), epoch_(epoch), surroundings_(std::move(surroundings)) {}
+wire::DefinitionPart DefinitionCache::part(const wire::CampaignRequest& request,
+                                           const std::shared_ptr<const Campaign>& definition) {
+  auto found = entries_.find(request.campaign);
+  if (found != entries_.end() && found->second.definition != definition) {
+    size_ -= found->second.encoded.size();
+    entries_.erase(found);
+    found = entries_.end();
+  }
+  if (found == entries_.end()) {
+    make_room();
+    Entry entry{.definition = definition,
+                .encoded = wire::EncodedDefinition(definition->definition(TableColumns::left_out))};
+    size_ += entry.encoded.size();
+    ++num_encoded_;
+    found = entries_.emplace(request.campaign, std::move(entry)).first;
+  }
+  found->second.used = ++num_uses_;
+  return found->second.encoded.part(request);
+}
+
+void DefinitionCache::make_room() {
+  while (size_ > size_max_) {
+    const auto oldest = std::min_element(
+        entries_.begin(), entries_.end(),
+        [](const auto& a, const auto& b) { return a.second.used < b.second.used; });
+    size_ -= oldest->second.encoded.size();
+    entries_.erase(oldest);
+  }
+}
+
+WorkerGateway::WorkerGateway(State& state, wire::Epoch epoch, Callbacks callbacks)
+    : state_(state), epoch_(epoch), callbacks_(std::move(callbacks)) {}
 
 void WorkerGateway::receive(const Incoming& message, TimePoint now, Outbox& outbox) {
   if (peers_.is_closed_out(message.from.routing_id)) return;
-  if (!surroundings_.is_allowed(message.from.key, now)) {
+  if (!callbacks_.is_allowed(message.from.key, now)) {
     return close_out(message.from, RejectReason::revoked, revoked_text(message.from), now, outbox);
   }
   const std::optional<wire::Packet> packet = decode(message, now, outbox);
@@ -52,7 +83,7 @@ void WorkerGateway::receive(const Incoming& message, TimePoint now, Outbox& outb
     return reject_unregistered(*worker, outbox);
   }
   if (const auto* const bye = std::get_if<wire::Bye>(&packet->message)) {
-    surroundings_.on_leaving(*worker, bye->reason);
+    callbacks_.on_leaving(*worker, bye->reason);
   }
   if (is_a<wire::ResultBatch>(packet->message)) wire::kill_point(KillPoint::after_receive);
   on_packet(state_, *worker, message.from.key, *std::move(packet), now, outbox);
@@ -91,7 +122,7 @@ void WorkerGateway::close_out(const Address& from, RejectReason reason, const st
   const auto worker = peers_.worker_at(from.routing_id);
   if (worker) {
     send(*worker, reject);
-    surroundings_.on_leaving(*worker, LossReason::protocol);
+    callbacks_.on_leaving(*worker, LossReason::protocol);
     on_gone(state_, *worker, LossReason::protocol, now, outbox);
     peers_.forget(*worker);
   } else {
@@ -119,13 +150,13 @@ void WorkerGateway::send_definition(WorkerId worker, const wire::CampaignRequest
 }
 
 void WorkerGateway::send_packet(const Address& to, const wire::Packet& packet) {
-  if (!surroundings_.transmit(to.routing_id, wire::encode(packet))) ++num_unsent_;
+  if (!callbacks_.transmit(to.routing_id, wire::encode(packet))) ++num_unsent_;
 }
 
 void WorkerGateway::review(TimePoint now, Outbox& outbox) {
   for (const WorkerId worker : peers_.workers()) {
     const Address address = *peers_.address_of(worker);
-    if (surroundings_.is_allowed(address.key, now)) continue;
+    if (callbacks_.is_allowed(address.key, now)) continue;
     close_out(address, RejectReason::revoked, revoked_text(address), now, outbox);
   }
   peers_.limit([&](WorkerId worker) { return state_.workers.contains(worker); });

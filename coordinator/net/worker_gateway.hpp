@@ -1,50 +1,78 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
-#include <vector>
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
-#include "coordinator/net/definition_cache.hpp"
 #include "coordinator/net/peers.hpp"
+#include "core/campaign/campaign.hpp"
+#include "proto/wire/definition_codec.hpp"
 
 namespace proofmass::coordinator {
 
-/// A message as it comes out of a socket.
-struct Incoming {
-  Address from;
-  std::vector<std::string_view> frames;  ///< Valid while the message is handled.
+/// Encoded definitions of the campaigns that workers asked for last: each is encoded once for all
+/// of them, and again after the campaign was extended.
+class DefinitionCache {
+ public:
+  /// Bytes that are kept: with the newest one at most this and definition_size_max.
+  static constexpr std::size_t default_size_max = wire::definition_size_max;
+
+  explicit DefinitionCache(std::size_t size_max = default_size_max) : size_max_(size_max) {}
+
+  /// The answer to a request. @pre The definition was accepted as a submission: it is not too
+  /// large.
+  [[nodiscard]] wire::DefinitionPart part(const wire::CampaignRequest& request,
+                                          const std::shared_ptr<const Campaign>& definition);
+
+  [[nodiscard]] std::uint64_t num_encoded() const { return num_encoded_; }  ///< So far.
+  [[nodiscard]] std::size_t size() const { return size_; }                  ///< Bytes kept.
+
+ private:
+  struct Entry {
+    std::shared_ptr<const Campaign> definition;  ///< Shared with the dispatch: the one encoded.
+    wire::EncodedDefinition encoded;
+    std::uint64_t used = 0;  ///< Grows with each use: the smallest is the longest ago.
+  };
+
+  void make_room();
+
+  std::size_t size_max_;
+  std::size_t size_ = 0;
+  std::uint64_t num_uses_ = 0;
+  std::uint64_t num_encoded_ = 0;
+  std::map<wire::CampaignId, Entry> entries_;
 };
 
-/// Between the workers' socket and the dispatch: checks who speaks and whether what they say has
-/// the right form, calls the function of the event, and addresses what goes out. Knows neither
-/// socket nor clock.
+/// Stands between the workers' socket and the dispatch: checks sender and form of each message,
+/// calls the dispatch's function for it, and addresses what goes out. It knows neither socket nor
+/// clock.
 ///
 /// A peer that violates the protocol gets one error and is then ignored on that connection.
 class WorkerGateway {
  public:
   /// What it needs from the service.
-  struct Surroundings {
+  struct Callbacks {
     /// Hands bytes to a connection; false if it is gone or its queue is full.
     std::function<bool(const std::string& routing_id, const std::string& bytes)> transmit;
-    /// Whether a public key may speak (still).
+    /// True if the public key is authorized, and has not been revoked.
     std::function<bool(const std::string& key, TimePoint now)> is_allowed;
     /// Told why a worker leaves, before the dispatch is.
     std::function<void(WorkerId worker, LossReason reason)> on_leaving;
   };
 
   /// @param state  Outlives the gateway.
-  WorkerGateway(State& state, wire::Epoch epoch, Surroundings surroundings);
+  WorkerGateway(State& state, wire::Epoch epoch, Callbacks callbacks);
 
   void receive(const Incoming& message, TimePoint now, Outbox& outbox);
 
-  /// Carries out Outbox::send(). What the connection has no room for is lost and counted: the
-  /// dispatch is made for that.
+  /// Carries out Outbox::send(). A message for which the connection has no room is dropped and
+  /// counted: the dispatch is made for that.
   void send(WorkerId worker, wire::Message message);
 
   /// Carries out Outbox::send_definition().
@@ -56,7 +84,7 @@ class WorkerGateway {
   void review(TimePoint now, Outbox& outbox);
 
   [[nodiscard]] const Peers& peers() const { return peers_; }
-  /// Messages that found no room.
+  /// Messages that were dropped.
   [[nodiscard]] std::uint64_t num_unsent() const { return num_unsent_; }
 
  private:
@@ -68,7 +96,7 @@ class WorkerGateway {
 
   State& state_;
   wire::Epoch epoch_;
-  Surroundings surroundings_;
+  Callbacks callbacks_;
   Peers peers_;
   DefinitionCache definitions_;
   std::uint64_t num_unsent_ = 0;

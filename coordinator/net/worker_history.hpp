@@ -8,9 +8,9 @@
 
 namespace proofmass::coordinator {
 
-/// Keeps in the campaign databases which workers were lent their runs, so that the next coordinator
-/// knows whom to wait for, and how each of them ended. A worker that comes, or goes, without runs
-/// of a campaign changes nothing in its file.
+/// Keeps in each campaign database which workers were lent its runs, and how they ended. The next
+/// coordinator knows from it for which workers to wait. A worker that was lent no run of a campaign
+/// changes nothing in its file.
 class WorkerHistory {
  public:
   /// @param state, writer  Outlive this object.

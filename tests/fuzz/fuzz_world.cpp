@@ -57,8 +57,7 @@ coordinator::DispatchConfig config() {
 /// The coordinator without sockets and files, in a time of its own.
 class World final : public coordinator::Outbox {
  public:
-  World()
-      : state_(initial_state(config(), {}, now_)), gateway_(state_, fuzz_epoch, surroundings()) {
+  World() : state_(initial_state(config(), {}, now_)), gateway_(state_, fuzz_epoch, callbacks()) {
     on_campaign(state_, fuzz_campaign, stored(false), now_, *this);
     on_campaign(state_, fuzz_table_campaign, stored(true), now_, *this);
     check_invariants(state_);
@@ -102,7 +101,7 @@ class World final : public coordinator::Outbox {
   }
 
  private:
-  coordinator::WorkerGateway::Surroundings surroundings() {
+  coordinator::WorkerGateway::Callbacks callbacks() {
     return {.transmit =
                 [this](const std::string&, const std::string& bytes) {
                   note_sent(bytes);

@@ -27,8 +27,8 @@ struct AllowedKey {
 /// Owners by public key.
 using AllowedKeys = std::map<std::string, AllowedKey, std::less<>>;
 
-/// The keys in the text of an allow-list: one line `KEY NAME` each, of clients also
-/// `KEY NAME RIGHTS`; empty lines and lines that begin with `#` say nothing.
+/// The keys in the text of an allow-list. Each has a line `KEY NAME`, or `KEY NAME RIGHTS` for a
+/// client. Empty lines and lines that begin with `#` are ignored.
 ///
 /// @param domain  Whose list it is.
 /// @param file    For messages.
@@ -37,14 +37,14 @@ using AllowedKeys = std::map<std::string, AllowedKey, std::less<>>;
 [[nodiscard]] AllowedKeys parse_allow_list(std::string_view text, wire::Domain domain,
                                            const std::filesystem::path& file);
 
-/// The keys that may enter by one door, from a file that may change at any time: a line that is
-/// removed is a key revoked.
+/// The keys that may connect to one address of the coordinator, from a file that may change at any
+/// time. A key whose line is removed is revoked.
 class AllowList {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  /// @throws Error if the file cannot be read, can be written by others than its owner, or says
-  ///         something else than keys and names.
+  /// @throws Error if the file cannot be read, can be written by others than its owner, or holds
+  ///         anything but keys and names.
   AllowList(std::filesystem::path file, wire::Domain domain);
 
   /// Reads the file again if it changed. A file that is wrong or gone leaves the list as it was.

@@ -7,21 +7,24 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "coordinator/dispatch/outbox.hpp"
+#include "coordinator/net/authentication/allow_list.hpp"
 #include "coordinator/net/authentication/refusal_log.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "proto/link/security.hpp"
 
 namespace zmq {
 class context_t;
+class socket_t;
 }  // namespace zmq
 
 namespace proofmass::coordinator {
 
 /// Decides who may connect, by the ZAP protocol [ZeroMQ RFC 27]: a worker whose key is in
-/// authorized_workers, at the workers' address; a client likewise. Part of a service's loop, not a
-/// thread: a handshake is answered when the loop comes round.
+/// authorized_workers, at the workers' address; a client whose key is in authorized_clients, at the
+/// clients' address. It has no thread: the service's loop calls serve() to answer handshakes.
 ///
 /// The user id of an admitted peer is its public key: `message.gets("User-Id")` gives it with each
 /// message, and is_allowed() says whether it may still speak.
@@ -42,7 +45,7 @@ class Authenticator {
   /// Socket to poll for ZMQ_POLLIN, as in zmq::pollitem_t; then call serve().
   [[nodiscard]] void* handle() const;
 
-  /// Logs peers that do not get as far as showing a key to a socket.
+  /// Logs peers of a socket whose handshake ends before they show a key.
   ///
   /// @param next_event  Gives the next failed handshake of a ROUTER of the same context, if any.
   void watch(wire::Domain domain, HandshakeWatch::EventSource next_event);
@@ -55,14 +58,28 @@ class Authenticator {
   [[nodiscard]] bool is_allowed(wire::Domain domain, std::string_view public_key, TimePoint now);
 
   /// Name of the key's owner as in the list; empty if it is not on it.
-  [[nodiscard]] std::string name_of(wire::Domain domain, std::string_view public_key) const;
+  [[nodiscard]] std::string name_of(wire::Domain domain, std::string_view public_key);
 
   /// Name and rights of a client's key, as is_allowed(); nothing if it is not on the list.
   [[nodiscard]] std::optional<Asker> client(std::string_view public_key, TimePoint now);
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  struct Handshake;
+  struct Answer;
+
+  [[nodiscard]] AllowList& list_of(wire::Domain domain);
+  [[nodiscard]] Answer answer(const Handshake& handshake, TimePoint now);
+  /// Why the peer is refused; empty if it is admitted.
+  [[nodiscard]] std::string_view refusal(const Handshake& handshake);
+  void reply(std::string_view id, const Answer& answer);
+  void report(const std::optional<std::string>& what_is_wrong) const;
+
+  Log log_;
+  RefusalLog refusals_;
+  AllowList workers_;
+  AllowList clients_;
+  std::unique_ptr<zmq::socket_t> socket_;
+  std::vector<HandshakeWatch> watches_;
 };
 
 }  // namespace proofmass::coordinator

@@ -16,7 +16,7 @@
 
 namespace proofmass::coordinator {
 
-/// A peer that was not let in.
+/// A peer that was refused.
 struct Refusal {
   std::string_view domain;
   std::string_view address;     ///< Of the peer; empty if it is not known.
@@ -24,8 +24,8 @@ struct Refusal {
   std::string_view reason;
 };
 
-/// Logs refusals, but not a flood of them: one peer once a minute for the same reason, and 20 lines
-/// a minute altogether; the rest is counted.
+/// Logs refusals, but not a flood of them: a peer is logged once a minute for the same reason, and
+/// at most 20 lines a minute are written in all. The other refusals are counted.
 class RefusalLog {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -46,8 +46,8 @@ class RefusalLog {
 /// Events that a HandshakeWatch looks for: ZMQ_EVENT_..., joined by |.
 extern const int failed_handshakes;
 
-/// Notices peers that do not get as far as showing a key: those that use none, that trust another
-/// coordinator's key, or that speak another protocol. ZeroMQ does not say where they are.
+/// Notices peers whose handshake ends before they show a key: those that use none, that trust
+/// another coordinator's key, or that speak another protocol. ZeroMQ does not report their address.
 class HandshakeWatch {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;

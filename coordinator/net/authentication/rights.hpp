@@ -44,11 +44,11 @@ struct Asker {
   Rights rights = Rights::all();
 };
 
-/// @throws Error reading `key = NAME (must have the right to ...)` if the asker has it not.
+/// @throws Error reading `key = NAME (must have the right ...)` if the asker does not have it.
 void require_right(const Asker& asker, Right right);
 
-/// Whether the asker may control a campaign: with `control` any, with `submit` its own and those
-/// without an owner.
+/// Checks that the asker may control a campaign: with the right `control` any, with `submit` its
+/// own and those without an owner.
 ///
 /// @param owner  Name of the key that submitted it; empty if not known.
 /// @throws Error reading `campaign = NAME (rule)` or as require_right() does.

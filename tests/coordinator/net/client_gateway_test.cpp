@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <new>
@@ -9,6 +10,9 @@
 #include <utility>
 #include <variant>
 #include <vector>
+
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/message_of.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -19,7 +23,7 @@ class ClientGatewayTest : public testing::Test {
   void ask(const std::string& routing_id, std::uint64_t id) {
     const std::string bytes =
         wire::encode(wire::RequestPacket{.id = id, .request = wire::ReleaseHostRequest{"n7"}});
-    campaign_service_.receive(
+    gateway_.receive(
         {.from = {.routing_id = routing_id, .key = {}, .host = {}}, .frames = {bytes}});
   }
 
@@ -34,7 +38,7 @@ class ClientGatewayTest : public testing::Test {
   std::function<void()> before_carrying_out = [] {};
 
  private:
-  ClientGateway::Surroundings surroundings() {
+  ClientGateway::Callbacks callbacks() {
     return {.transmit = [this](const std::string& routing_id,
                                const std::string& bytes) { note(routing_id, bytes); },
             .asker_of =
@@ -59,7 +63,7 @@ class ClientGatewayTest : public testing::Test {
 
   std::map<std::string, std::vector<std::pair<std::uint64_t, std::string>>> replies_;
   Background background_{[] {}};
-  ClientGateway campaign_service_{background_, surroundings()};
+  ClientGateway gateway_{background_, callbacks()};
 };
 
 TEST_F(ClientGatewayTest, CarriesARepeatedRequestOutOnceAndTellsAllWhoWait) {
@@ -101,6 +105,131 @@ TEST_F(ClientGatewayTest, OutlivesWhateverIsThrown) {
     EXPECT_EQ(replies_to(client)[0].second, "std::bad_alloc") << client;
   }
   EXPECT_EQ(carried_out.size(), 1U);
+}
+
+wire::SubmitRequest some_submit() {
+  MicroscopeCampaign campaign;
+  campaign.name = "tables";
+  campaign.num_runs = 2;
+  campaign.dispersions[5] = {.law = Law::table, .file = "f.csv", .column = "a"};
+  campaign.table_columns = {{0.1, -2.0 / 3.0}};
+  return {.definition = definition_of(campaign),
+          .priority = -7,
+          .audit_fraction = 0.1,
+          .stop_rule = "std(a_c13) within 5%",
+          .failures_max = 3};
+}
+
+TEST(RequestOf, HasTheCampaignThatTheDefinitionSays) {
+  const auto submission = std::get<Submission>(request_of(some_submit()));
+  EXPECT_EQ(submission.campaign->definition(TableColumns::included), some_submit().definition);
+  EXPECT_EQ(submission.campaign->table_columns[0][1], -2.0 / 3.0);
+  EXPECT_EQ(submission.priority, -7);
+  EXPECT_EQ(submission.audit_fraction, 0.1);
+  EXPECT_EQ(submission.stop_rule, "std(a_c13) within 5%");
+  EXPECT_EQ(submission.failures_max, 3U);
+}
+
+TEST(RequestOf, HasAllElseAsItCame) {
+  const auto control = std::get<wire::ControlRequest>(
+      request_of(wire::ControlRequest{.action = wire::ControlAction::cancel, .campaign = "a"}));
+  EXPECT_EQ(control.action, wire::ControlAction::cancel);
+  EXPECT_EQ(control.campaign, "a");
+}
+
+TEST(RequestOf, RefusesADefinitionThatIsNone) {
+  const auto refusal = [](const std::function<void(Definition&)>& change) {
+    wire::SubmitRequest submit = some_submit();
+    change(submit.definition);
+    return test::message_of<DefinitionError>([&] { (void)request_of(submit); });
+  };
+  EXPECT_EQ(refusal([](Definition& d) { d.text.insert(0, "x = 1\n"); }),
+            "definition:1: x = 1 (unknown key)");
+  EXPECT_EQ(refusal([](Definition& d) { d.text.replace(d.text.find("tables"), 6, "../a"); }),
+            "definition:2: campaign.name = \"../a\" (must be 1 to 64 letters, digits, _, - or .)");
+  EXPECT_NE(refusal([](Definition& d) { d.table_columns.clear(); }), "");
+  EXPECT_NE(refusal([](Definition& d) { d.table_columns[0].pop_back(); }), "");
+}
+
+using wire::RequestPart;
+
+constexpr TimePoint start{};
+
+std::uint64_t next_offset(const RequestParts::Outcome& outcome) {
+  return std::get<wire::PartReply>(outcome).next_offset;
+}
+
+TEST(RequestParts, MakeARequestWhole) {
+  RequestParts parts;
+  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 0, "abc"}, start)), 3U);
+  EXPECT_EQ(parts.size_held(), 6U);
+  const auto outcome = parts.take("a", 1, {6, 3, "def"}, start);
+  EXPECT_EQ(std::get<RequestParts::Whole>(outcome).bytes, "abcdef");
+  EXPECT_EQ(parts.size_held(), 6U);  // Until it has been read.
+  parts.release(6);
+  EXPECT_EQ(parts.size_held(), 0U);
+}
+
+TEST(RequestParts, OfSeveralConnectionsMayInterleave) {
+  RequestParts parts;
+  (void)parts.take("a", 1, {4, 0, "ab"}, start);
+  (void)parts.take("b", 1, {4, 0, "wx"}, start);
+  EXPECT_EQ(std::get<RequestParts::Whole>(parts.take("a", 1, {4, 2, "cd"}, start)).bytes, "abcd");
+  EXPECT_EQ(std::get<RequestParts::Whole>(parts.take("b", 1, {4, 2, "yz"}, start)).bytes, "wxyz");
+}
+
+TEST(RequestParts, OutOfOrderAreAskedForAgain) {
+  RequestParts parts;
+  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 3, "def"}, start)), 0U);
+  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 0, "ab"}, start)), 2U);
+  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 0, "ab"}, start)), 2U);  // Repeated.
+  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 4, "ef"}, start)), 2U);  // One is missing.
+  const auto outcome = parts.take("a", 1, {6, 2, "cdef"}, start);
+  EXPECT_EQ(std::get<RequestParts::Whole>(outcome).bytes, "abcdef");
+}
+
+TEST(RequestParts, OfAnotherRequestTakeThePlaceOfTheFirst) {
+  RequestParts parts;
+  (void)parts.take("a", 1, {100, 0, "abc"}, start);
+  EXPECT_EQ(next_offset(parts.take("a", 2, {10, 0, "xyz"}, start)), 3U);
+  EXPECT_EQ(parts.size_held(), 10U);
+  EXPECT_EQ(next_offset(parts.take("a", 1, {100, 3, "def"}, start)), 0U);
+  // The same number with another size is another request.
+  EXPECT_EQ(next_offset(parts.take("a", 2, {12, 0, "x"}, start)), 1U);
+  EXPECT_EQ(parts.size_held(), 12U);
+}
+
+TEST(RequestParts, TakeNoMoreMemoryThanTheyMay) {
+  RequestParts parts(10);
+  (void)parts.take("a", 1, {6, 0, "a"}, start);
+  const auto refused = parts.take("b", 1, {5, 0, "b"}, start);
+  EXPECT_EQ(std::get<wire::ErrorReply>(refused).text,
+            "request size = 5 bytes (the coordinator is receiving 6 bytes of others, at most 10 "
+            "together: try again later)");
+  EXPECT_EQ(next_offset(parts.take("b", 1, {4, 0, "b"}, start)), 1U);
+  // A whole one counts until it has been read.
+  (void)parts.take("b", 1, {4, 1, "bcd"}, start);
+  EXPECT_TRUE(std::holds_alternative<wire::ErrorReply>(parts.take("c", 1, {1, 0, "c"}, start)));
+  parts.release(4);
+  EXPECT_TRUE(std::holds_alternative<RequestParts::Whole>(parts.take("c", 1, {1, 0, "c"}, start)));
+}
+
+// Room is counted with the first part of a request.
+TEST(RequestParts, Take128MebibytesUnlessToldOtherwise) {
+  constexpr std::uint64_t half = std::uint64_t{64} << 20;
+  RequestParts parts;
+  EXPECT_EQ(next_offset(parts.take("a", 1, {half, 0, "a"}, start)), 1U);
+  EXPECT_EQ(next_offset(parts.take("b", 1, {half, 0, "b"}, start)), 1U);
+  EXPECT_TRUE(std::holds_alternative<wire::ErrorReply>(parts.take("c", 1, {1, 0, "c"}, start)));
+}
+
+TEST(RequestParts, ThatDoNotComeAreWaitedForHalfAMinute) {
+  RequestParts parts;
+  (void)parts.take("a", 1, {6, 0, "abc"}, start);
+  (void)parts.take("b", 1, {6, 0, "abc"}, start + std::chrono::seconds(20));
+  parts.drop_stale(start + std::chrono::seconds(31));
+  EXPECT_EQ(parts.size_held(), 6U);
+  EXPECT_EQ(next_offset(parts.take("a", 1, {6, 3, "def"}, start)), 0U);
 }
 
 }  // namespace

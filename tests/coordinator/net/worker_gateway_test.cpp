@@ -1,4 +1,4 @@
-#include "coordinator/net/definition_cache.hpp"
+#include "coordinator/net/worker_gateway.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "coordinator/net/rate_meter.hpp"
+#include "coordinator/net/timing.hpp"
 
 #include <algorithm>
 

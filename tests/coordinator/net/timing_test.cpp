@@ -1,4 +1,4 @@
-#include "coordinator/net/waking_time.hpp"
+#include "coordinator/net/timing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +7,7 @@ namespace {
 
 using std::chrono::hours;
 using std::chrono::milliseconds;
+using std::chrono::seconds;
 
 constexpr TimePoint start{hours(5)};
 
@@ -23,6 +24,28 @@ TEST(WakingTime, LeavesOutWhatIsLongerThanAGap) {
   EXPECT_EQ(time.at(start + hours(1) + milliseconds(100)),
             start + WakingTime::gap_max + milliseconds(100));
   EXPECT_EQ(time.at(start + hours(2)), start + 2 * WakingTime::gap_max + milliseconds(100));
+}
+
+TEST(RateMeter, CountsFromItsBeginning) {
+  RateMeter meter(start);
+  EXPECT_EQ(meter.rate_hz(start), 0.0);
+  meter.add(30, start + seconds(5));
+  EXPECT_EQ(meter.rate_hz(start + seconds(10)), 3.0);
+}
+
+TEST(RateMeter, ForgetsWhatIsOlderThanTwoMinutes) {
+  RateMeter meter(start);
+  meter.add(1000, start + seconds(1));
+  meter.add(240, start + seconds(200));
+  EXPECT_EQ(meter.rate_hz(start + seconds(200)), 2.0);
+  EXPECT_EQ(meter.rate_hz(start + seconds(400)), 0.0);
+}
+
+// Its memory does not grow with the number of commits.
+TEST(RateMeter, CountsAllOfASecondTogether) {
+  RateMeter meter(start);
+  for (int i = 0; i < 1000; ++i) meter.add(2, start + milliseconds(i));
+  EXPECT_EQ(meter.rate_hz(start + seconds(10)), 200.0);
 }
 
 }  // namespace
