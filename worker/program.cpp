@@ -16,7 +16,7 @@
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
-#include "proto/link/host_name.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
 #include "worker/net/serve.hpp"
@@ -66,10 +66,8 @@ SignalSource signal_source(const Options& options) {
 }
 
 wire::ClientSecurity security_for(const Options& options, const wire::Log& log) {
-  const auto protection = options.keys              ? wire::Protection::keys
-                          : options.is_plain_waived ? wire::Protection::waived
-                                                    : wire::Protection::none;
-  wire::check_endpoint("connect", options.endpoint, wire::EndpointUse::connect, protection);
+  wire::check_endpoint("connect", options.endpoint, wire::EndpointUse::connect,
+                       wire::protection_by(options.keys, options.is_plain_waived));
   if (options.keys) return wire::read_client_security(*options.keys, wire::KeyRole::worker);
   if (!wire::is_local(options.endpoint)) {
     log({.severity = wire::Severity::warning,

@@ -14,7 +14,7 @@
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
 #include "proto/text/visible_text.hpp"
-#include "proto/wire/client_codec.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "proto/wire/client_codec.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -12,7 +12,7 @@
 #include "coordinator/cli/progress_display.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "proto/text/visible_text.hpp"
-#include "proto/wire/client_codec.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {

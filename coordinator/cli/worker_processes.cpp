@@ -15,8 +15,7 @@
 
 #include "coordinator/query/child_process.hpp"
 #include "core/error.hpp"
-#include "proto/link/host_name.hpp"
-#include "proto/link/process_end.hpp"
+#include "proto/link/machine.hpp"
 
 extern char** environ;
 

@@ -9,6 +9,7 @@
 
 #include "coordinator/dispatch/blame.hpp"
 #include "core/error.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

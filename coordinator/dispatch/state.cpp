@@ -64,34 +64,6 @@ bool is_blamed(LossReason reason) {
          reason == LossReason::hung;
 }
 
-std::string_view name_of(LossReason reason) {
-  switch (reason) {
-    case LossReason::silent:
-      return "silent";
-    case LossReason::crashed:
-      return "crashed";
-    case LossReason::out_of_memory:
-      return "out_of_memory";
-    case LossReason::hung:
-      return "hung";
-    case LossReason::drained:
-      return "drained";
-    case LossReason::walltime:
-      return "walltime";
-    case LossReason::preempted:
-      return "preempted";
-    case LossReason::retracted:
-      return "retracted";
-    case LossReason::never_arrived:
-      return "never_arrived";
-    case LossReason::protocol:
-      return "protocol";
-    case LossReason::failed:
-      return "failed";
-  }
-  PROOFMASS_EXPECT(false);
-}
-
 double running_mean(double mean, double value) {
   constexpr double weight = 0.2;  // Of the newest value.
   return mean > 0.0 ? mean + weight * (value - mean) : value;

@@ -7,7 +7,6 @@
 #include <memory>
 #include <set>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "coordinator/dispatch/run_set.hpp"
@@ -267,9 +266,6 @@ struct State {
 
 /// True if these losses count against the runs that were being computed.
 [[nodiscard]] bool is_blamed(LossReason reason);
-
-/// `out_of_memory`, for logs and the database.
-[[nodiscard]] std::string_view name_of(LossReason reason);
 
 /// The mean of about the last ten values, with one more.
 /// @param mean  Before it; 0 if there was no value yet.

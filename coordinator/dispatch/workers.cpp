@@ -15,6 +15,7 @@
 #include "coordinator/dispatch/speculation.hpp"
 #include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {

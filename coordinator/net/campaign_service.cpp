@@ -9,7 +9,7 @@
 
 #include "coordinator/dispatch/campaigns.hpp"
 #include "core/error.hpp"
-#include "proto/wire/client_codec.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {

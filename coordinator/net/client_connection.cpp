@@ -24,10 +24,8 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 wire::ClientSecurity security_of(const ClientConnectionConfig& config) {
-  const auto protection = config.keys              ? wire::Protection::keys
-                          : config.is_plain_waived ? wire::Protection::waived
-                                                   : wire::Protection::none;
-  wire::check_endpoint("connect", config.endpoint, wire::EndpointUse::connect, protection);
+  wire::check_endpoint("connect", config.endpoint, wire::EndpointUse::connect,
+                       wire::protection_by(config.keys, config.is_plain_waived));
   if (!config.keys) return {};
   return wire::read_client_security(*config.keys, wire::KeyRole::client);
 }

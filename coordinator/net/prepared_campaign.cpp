@@ -18,8 +18,8 @@
 #include "coordinator/store/campaign_peek.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
-#include "proto/link/host_name.hpp"
 #include "proto/link/kill_point.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -12,7 +12,7 @@
 #include "coordinator/net/peers.hpp"
 #include "proto/link/connection_monitor.hpp"
 #include "proto/link/faults.hpp"
-#include "proto/link/security.hpp"
+#include "proto/link/keys.hpp"
 
 namespace zmq {
 class context_t;

@@ -9,7 +9,7 @@
 #include <zmq.hpp>
 
 #include "core/error.hpp"
-#include "proto/link/key_files.hpp"
+#include "proto/link/keys.hpp"
 #include "proto/wire/endpoint.hpp"
 
 namespace proofmass::coordinator {
@@ -21,9 +21,7 @@ wire::ServerSecurity security_of(const ServiceConfig& config, wire::Domain domai
 }
 
 void check_endpoints(const ServiceConfig& config) {
-  const auto protection = config.keys              ? wire::Protection::keys
-                          : config.is_plain_waived ? wire::Protection::waived
-                                                   : wire::Protection::none;
+  const wire::Protection protection = wire::protection_by(config.keys, config.is_plain_waived);
   wire::check_endpoint("bind", config.workers_endpoint, wire::EndpointUse::bind, protection);
   if (!config.clients_endpoint) return;
   wire::check_endpoint("bind-clients", *config.clients_endpoint, wire::EndpointUse::bind,

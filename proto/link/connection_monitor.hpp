@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "proto/link/security.hpp"
+#include "proto/link/keys.hpp"
 
 namespace zmq {
 class context_t;

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "proto/link/security.hpp"
+#include "proto/link/keys.hpp"
 
 // Only sources see the whole of these.
 namespace zmq {

@@ -10,7 +10,7 @@
 #include "core/error.hpp"
 #include "proto/client.pb.h"
 #include "proto/wire/checks.hpp"
-#include "proto/wire/definition_message.hpp"
+#include "proto/wire/definition_codec.hpp"
 
 namespace proofmass::wire {
 namespace {

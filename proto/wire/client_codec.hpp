@@ -55,8 +55,4 @@ struct ReplyPacket {
 [[nodiscard]] std::variant<RequestPacket, DecodeError> decode_request(std::string_view bytes);
 [[nodiscard]] std::variant<ReplyPacket, DecodeError> decode_reply(std::string_view bytes);
 
-/// `pause`, `active`: for people, logs and JSON.
-[[nodiscard]] std::string_view name_of(ControlAction action);
-[[nodiscard]] std::string_view name_of(CampaignPhase phase);
-
 }  // namespace proofmass::wire

@@ -10,6 +10,10 @@
 #include "proto/wire/codec.hpp"
 #include "proto/wire/messages.hpp"
 
+namespace proofmass::proto {
+class Definition;
+}  // namespace proofmass::proto
+
 namespace proofmass::wire {
 
 /// The bytes of a definition.
@@ -61,4 +65,13 @@ class IncomingDefinition {
   std::string bytes_;
 };
 
+namespace detail {
+
+/// `message` is empty at first.
+void write_definition(const Definition& definition, proto::Definition& message);
+
+/// @throws Error if there is too much of anything, rows are not whole, or a number is not finite.
+[[nodiscard]] Definition read_definition(const proto::Definition& message);
+
+}  // namespace detail
 }  // namespace proofmass::wire

@@ -4,7 +4,6 @@
 #include <cstddef>
 
 #include "core/error.hpp"
-#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -57,6 +56,34 @@ std::string_view name_of(CampaignPhase phase) {
       return "finished";
     case CampaignPhase::cancelled:
       return "cancelled";
+  }
+  PROOFMASS_EXPECT(false);
+}
+
+std::string_view name_of(LossReason reason) {
+  switch (reason) {
+    case LossReason::silent:
+      return "silent";
+    case LossReason::crashed:
+      return "crashed";
+    case LossReason::out_of_memory:
+      return "out_of_memory";
+    case LossReason::hung:
+      return "hung";
+    case LossReason::drained:
+      return "drained";
+    case LossReason::walltime:
+      return "walltime";
+    case LossReason::preempted:
+      return "preempted";
+    case LossReason::retracted:
+      return "retracted";
+    case LossReason::never_arrived:
+      return "never_arrived";
+    case LossReason::protocol:
+      return "protocol";
+    case LossReason::failed:
+      return "failed";
   }
   PROOFMASS_EXPECT(false);
 }

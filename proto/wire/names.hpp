@@ -3,14 +3,22 @@
 #include <string>
 #include <string_view>
 
+#include "proto/wire/client_messages.hpp"
+#include "proto/wire/messages.hpp"
+
 namespace proofmass::wire {
 
-/// True for 1 to 128 of [A-Za-z0-9._-]: names of workers, hosts and models, which go into logs and
-/// the database as they are.
+/// True for 1 to 128 characters of [A-Za-z0-9._-]: names of workers, hosts and models, which go
+/// into logs and the database as they are.
 [[nodiscard]] bool is_name(std::string_view text);
 
 /// The text with every character that a name may not have replaced by `-`, cut to 128; `unnamed` if
 /// nothing is left.
 [[nodiscard]] std::string name_from(std::string_view text);
+
+/// Names of values for people, logs, JSON and the database: `pause`, `active`, `out_of_memory`.
+[[nodiscard]] std::string_view name_of(ControlAction action);
+[[nodiscard]] std::string_view name_of(CampaignPhase phase);
+[[nodiscard]] std::string_view name_of(LossReason reason);
 
 }  // namespace proofmass::wire

@@ -28,7 +28,7 @@
 
 #include "core/microscope/simulation/reference_digest.hpp"
 #include "core/microscope/simulation/run.hpp"
-#include "proto/link/key_files.hpp"
+#include "proto/link/keys.hpp"
 #include "proto/link/socket.hpp"
 #include "tests/benchmarks/swarm_worker.hpp"
 

@@ -9,7 +9,7 @@
 #include <vector>
 #include <zmq.hpp>
 
-#include "proto/link/security.hpp"
+#include "proto/link/keys.hpp"
 #include "proto/wire/messages.hpp"
 #include "tests/benchmarks/null_execution.hpp"
 #include "worker/net/conversation.hpp"

@@ -20,7 +20,7 @@
 #include "core/error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/simulation/run.hpp"
-#include "proto/link/key_files.hpp"
+#include "proto/link/keys.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/fuzz/file_mutator.hpp"
 #include "tests/fuzz/file_world.hpp"

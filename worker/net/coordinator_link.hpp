@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "proto/link/faults.hpp"
-#include "proto/link/security.hpp"
+#include "proto/link/keys.hpp"
 #include "worker/execution/execution.hpp"
 
 namespace proofmass::worker {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "proto/link/faults.hpp"
-#include "proto/link/security.hpp"
+#include "proto/link/keys.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"

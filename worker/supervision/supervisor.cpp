@@ -16,7 +16,7 @@
 #include <utility>
 
 #include "core/error.hpp"
-#include "proto/link/process_end.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::worker {
 namespace {

@@ -15,7 +15,7 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/net/authentication/allow_list.hpp"
 #include "core/error.hpp"
-#include "proto/link/key_files.hpp"
+#include "proto/link/keys.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/wire/names.hpp"
 

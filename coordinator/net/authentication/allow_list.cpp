@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "core/error.hpp"
-#include "proto/link/key_files.hpp"
+#include "proto/link/keys.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {

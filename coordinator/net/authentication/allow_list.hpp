@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "coordinator/net/authentication/rights.hpp"
-#include "proto/link/security.hpp"
+#include "proto/link/keys.hpp"
 
 namespace proofmass::coordinator {
 

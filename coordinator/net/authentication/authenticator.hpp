@@ -13,7 +13,7 @@
 #include "coordinator/net/authentication/allow_list.hpp"
 #include "coordinator/net/authentication/refusal_log.hpp"
 #include "coordinator/net/authentication/rights.hpp"
-#include "proto/link/security.hpp"
+#include "proto/link/keys.hpp"
 
 namespace zmq {
 class context_t;

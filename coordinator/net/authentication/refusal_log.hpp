@@ -12,7 +12,7 @@
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "proto/link/connection_monitor.hpp"
-#include "proto/link/security.hpp"
+#include "proto/link/keys.hpp"
 
 namespace proofmass::coordinator {
 

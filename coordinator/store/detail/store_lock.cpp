@@ -13,7 +13,7 @@
 #include <system_error>
 
 #include "coordinator/store/store_error.hpp"
-#include "proto/link/host_name.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/net/authentication/allow_list.hpp"
-#include "proto/link/security.hpp"
+#include "proto/link/keys.hpp"
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "coordinator/net/authentication/refusal_log.hpp"
 #include "proto/link/connection_monitor.hpp"
-#include "proto/link/key_files.hpp"
+#include "proto/link/keys.hpp"
 #include "proto/link/socket.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 

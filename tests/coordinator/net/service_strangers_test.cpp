@@ -6,8 +6,7 @@
 
 #include <fstream>
 
-#include "proto/link/key_files.hpp"
-#include "proto/link/security.hpp"
+#include "proto/link/keys.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 
 namespace proofmass::coordinator {

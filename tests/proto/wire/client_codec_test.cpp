@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/error.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::wire {
 namespace {

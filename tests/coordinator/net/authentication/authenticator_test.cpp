@@ -12,7 +12,7 @@
 
 #include "core/error.hpp"
 #include "proto/link/connection_monitor.hpp"
-#include "proto/link/key_files.hpp"
+#include "proto/link/keys.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/link/whole_file.hpp"
 #include "tests/proto/link/scratch_directory.hpp"

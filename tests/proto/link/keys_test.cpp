@@ -1,4 +1,5 @@
-#include "proto/link/key_files.hpp"
+
+#include "proto/link/keys.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/types.h>
@@ -11,7 +12,6 @@
 #include <type_traits>
 
 #include "core/error.hpp"
-#include "proto/link/security.hpp"
 #include "proto/link/whole_file.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
 #include "tests/skip_for_want.hpp"

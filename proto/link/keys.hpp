@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "proto/wire/endpoint.hpp"
+
 namespace proofmass::wire {
 
 /// Whom a pair of keys stands for.
@@ -80,5 +82,50 @@ inline constexpr std::string_view worker_key_name = "worker";
 inline constexpr std::string_view client_key_name = "client";
 inline constexpr std::string_view authorized_workers_name = "authorized_workers";
 inline constexpr std::string_view authorized_clients_name = "authorized_clients";
+
+// How sockets use keys.
+
+/// The two addresses of a coordinator. Each has its own list of keys: a worker may not submit, a
+/// client may not deliver results.
+enum class Domain : std::uint8_t { workers, clients };
+
+[[nodiscard]] std::string_view to_text(Domain domain);  ///< `workers`, `clients`.
+
+/// How a coordinator's socket proves who it is. With keys, only peers that an Authenticator in the
+/// same context admits to the domain get in; without, everybody who reaches the address.
+struct ServerSecurity {
+  Domain domain = Domain::workers;
+  std::optional<KeyPair> keys;
+};
+
+/// The keys of a worker or client, and the coordinator that it trusts.
+struct CurveIdentity {
+  KeyRole role = KeyRole::worker;  ///< Worker or client.
+  KeyPair keys;
+  PublicKey coordinator;
+};
+
+/// How a worker's or client's socket proves who it is; without an identity it says all in the
+/// clear.
+struct ClientSecurity {
+  std::optional<CurveIdentity> identity;
+};
+
+/// What keeps strangers away from an address, with or without a directory of keys.
+/// @param is_plain_waived  The option --insecure-plain.
+[[nodiscard]] Protection protection_by(const std::optional<std::filesystem::path>& keys,
+                                       bool is_plain_waived);
+
+/// Reads DIRECTORY/coordinator.key.
+/// @throws Error as read_key_pair() does.
+[[nodiscard]] ServerSecurity read_server_security(const std::filesystem::path& directory,
+                                                  Domain domain);
+
+/// Reads DIRECTORY/worker.key or client.key, and coordinator.pub.
+///
+/// @param role  Worker or client.
+/// @throws Error as read_key_pair() and read_public_key() do.
+[[nodiscard]] ClientSecurity read_client_security(const std::filesystem::path& directory,
+                                                  KeyRole role);
 
 }  // namespace proofmass::wire

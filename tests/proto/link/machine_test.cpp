@@ -1,4 +1,4 @@
-#include "proto/link/process_end.hpp"
+#include "proto/link/machine.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>

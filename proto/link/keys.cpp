@@ -1,4 +1,4 @@
-#include "proto/link/key_files.hpp"
+#include "proto/link/keys.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -127,6 +127,11 @@ bool belong_together(const PublicKey& public_key, const SecretKey& secret_key) {
          public_key.text() == derived.data();
 }
 
+std::filesystem::path key_file(const std::filesystem::path& directory, KeyRole role,
+                               std::string_view ending) {
+  return directory / fmt::format("{}.{}", to_text(role), ending);
+}
+
 }  // namespace
 
 std::string_view to_text(KeyRole role) {
@@ -199,6 +204,27 @@ PublicKey read_public_key(const std::filesystem::path& file, KeyRole role) {
   const auto public_key = PublicKey::parse(value_of("public", lines[1]));
   if (!public_key) refuse(file, "is damaged");
   return *public_key;
+}
+
+std::string_view to_text(Domain domain) {
+  return domain == Domain::workers ? "workers" : "clients";
+}
+
+Protection protection_by(const std::optional<std::filesystem::path>& keys, bool is_plain_waived) {
+  if (keys) return Protection::keys;
+  return is_plain_waived ? Protection::waived : Protection::none;
+}
+
+ServerSecurity read_server_security(const std::filesystem::path& directory, Domain domain) {
+  const std::filesystem::path file = key_file(directory, KeyRole::coordinator, "key");
+  return {.domain = domain, .keys = read_key_pair(file, KeyRole::coordinator)};
+}
+
+ClientSecurity read_client_security(const std::filesystem::path& directory, KeyRole role) {
+  const std::filesystem::path trusted = key_file(directory, KeyRole::coordinator, "pub");
+  return {.identity = CurveIdentity{.role = role,
+                                    .keys = read_key_pair(key_file(directory, role, "key"), role),
+                                    .coordinator = read_public_key(trusted, KeyRole::coordinator)}};
 }
 
 }  // namespace proofmass::wire

@@ -1,14 +1,24 @@
-#include "proto/link/process_end.hpp"
+#include "proto/link/machine.hpp"
 
 #include <sys/wait.h>
+#include <unistd.h>
 
+#include <array>
 #include <charconv>
 #include <csignal>
 #include <fstream>
 #include <iterator>
 #include <string>
 
+#include "proto/wire/names.hpp"
+
 namespace proofmass::wire {
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  gethostname(name.data(), name.size() - 1);
+  return name_from(name.data());
+}
 
 std::uint64_t num_oom_kills() {
   std::ifstream stream("/proc/vmstat");
