@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "proto/wire/names.hpp"
 #include "tests/coordinator/dispatch/invariants.hpp"
 
 namespace proofmass::test {
@@ -347,7 +348,7 @@ void PlayedCoordinator::compare(wire::WorkerId worker, wire::LeasedResult result
 }
 
 void PlayedCoordinator::record(const coordinator::Loss& loss) {
-  ++num_events_[std::string(coordinator::name_of(loss.reason))];
+  ++num_events_[std::string(wire::name_of(loss.reason))];
   const bool is_of_a_crash = coordinator::is_blamed(loss.reason);
   const bool is_honest = life_->peers.at(loss.worker).key == honest_key;
   EXPECT_TRUE(may_crash_ || !is_of_a_crash || !is_honest) << "a liar has ended an honest worker";

@@ -8,7 +8,7 @@
 
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "tests/worker/temporary_directory.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -88,7 +88,7 @@ TEST(WorkerOptions, ComeFromTheEnvironment) {
 }
 
 TEST(WorkerOptions, ComeFromAFileUnlessTheyAreArguments) {
-  const TemporaryDirectory directory;
+  const test::ScratchDirectory directory;
   const std::string file = (directory / "worker.toml").string();
   std::ofstream(file) << "connect = \"tcp://c:5\"\nthreads = 2\nmax-walltime = \"2h\"\n"
                          "insecure-plain = true\n";
@@ -100,7 +100,7 @@ TEST(WorkerOptions, ComeFromAFileUnlessTheyAreArguments) {
 }
 
 TEST(WorkerOptions, AreNotMistypedInAFile) {
-  const TemporaryDirectory directory;
+  const test::ScratchDirectory directory;
   const std::string file = (directory / "worker.toml").string();
   std::ofstream(file) << "connect = \"ipc:///tmp/a\"\nthread = 2\n";
   EXPECT_EQ(error_of({"--config", file}), "config = thread (is no option)");

@@ -6,10 +6,12 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/definition.hpp"
+#include "core/campaign/model.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::worker {
@@ -18,7 +20,8 @@ namespace proofmass::worker {
 using TimePoint = std::chrono::steady_clock::time_point;
 using Duration = std::chrono::steady_clock::duration;
 
-/// A finished run and the campaign that it belongs to.
+/// A finished run and the campaign that it belongs to. The execution does not know under which
+/// attempt a run was lent: the attempt may change while the run is being computed.
 struct FinishedRun {
   wire::CampaignId campaign;
   wire::ComputedRun computed;
@@ -43,7 +46,9 @@ class Execution {
   [[nodiscard]] virtual bool is_defined(wire::CampaignId campaign) const = 0;
   /// The campaign of a definition that was received; it has no table columns.
   /// @throws DefinitionError if it is none.
-  [[nodiscard]] virtual std::shared_ptr<const Campaign> read(Definition definition) const;
+  [[nodiscard]] virtual std::shared_ptr<const Campaign> read(Definition definition) const {
+    return model().campaign_of(std::move(definition), TableColumns::left_out, "definition");
+  }
   /// What the runs of a campaign compute. @pre It is not defined.
   virtual void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) = 0;
 

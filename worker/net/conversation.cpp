@@ -10,7 +10,6 @@
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
 #include "core/runs.hpp"
-#include "worker/net/held_runs.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -53,7 +52,8 @@ Conversation::Conversation(wire::SessionId session, wire::Hello hello, Execution
       config_(config),
       heard_at_(now),
       refusal_delay_(config.refusal_delay),
-      refused_at_(now) {
+      refused_at_(now),
+      unacknowledged_(config.resend_after, config.resend_after_max) {
   PROOFMASS_EXPECT(session.value != 0);
   register_again(now);
 }
@@ -73,7 +73,7 @@ void Conversation::handle(const wire::Welcome& welcome, const wire::Header& head
   heartbeat_interval_ = std::chrono::duration_cast<Duration>(
       std::chrono::duration<double>(welcome.heartbeat_interval_s));
   send_heartbeat(now);
-  repeat_results(now);
+  send_all_results(now);
 }
 
 template <>
@@ -120,7 +120,7 @@ void Conversation::handle(const wire::Forget& forget, const wire::Header&, TimeP
     table_widths_.erase(forget.campaign);
     execution_.forget(forget.campaign);
   }
-  if (const std::size_t count = drop_results(forget.campaign, known); count > 0) {
+  if (const std::size_t count = unacknowledged_.drop(forget.campaign, known); count > 0) {
     note({.severity = wire::Severity::warning,
           .kind = "results_forgotten",
           .fields = {{"campaign", fmt::format("{:016x}", forget.campaign.value)},
@@ -168,10 +168,7 @@ void Conversation::handle(const wire::Retract& retract, const wire::Header&, Tim
 
 template <>
 void Conversation::handle(const wire::ResultAck& ack, const wire::Header&, TimePoint) {
-  for (const RunIndex run : ack.runs) {
-    const auto found = unacknowledged_.find({ack.campaign, run});
-    if (found != unacknowledged_.end()) drop_result(found);
-  }
+  unacknowledged_.drop(ack.campaign, ack.runs);
   leave_if_done();
 }
 
@@ -210,7 +207,7 @@ void Conversation::on_connected(TimePoint now) {
   refusal_.clear();
   if (!is_registered_) return register_again(now);
   send_heartbeat(now);
-  repeat_results(now);
+  send_all_results(now);
 }
 
 void Conversation::on_refused(const std::string& reason) { refusal_ = reason; }
@@ -222,7 +219,7 @@ void Conversation::on_progress(TimePoint now) {
     if (is_registered_) send(wire::Bye{wire::LossReason::failed});
     return end(Ending::Kind::failed, *failure);
   }
-  if (is_registered_) send_results(runs, now);
+  if (is_registered_) send_results(unacknowledged_.take(runs, now));
   leave_if_done();
 }
 
@@ -245,7 +242,7 @@ void Conversation::on_tick(TimePoint now) {
     return say_hello(now);
   }
   request_definitions(now);
-  send_due_results(now);
+  send_results(unacknowledged_.take_due(now));  // The next tick has what exceeds one message.
   const Duration since_heartbeat = now - heartbeat_at_;
   const bool has_news = since_heartbeat >= config_.news_interval && computes_other_batches();
   if (has_news || since_heartbeat >= heartbeat_interval_) send_heartbeat(now);
@@ -302,7 +299,8 @@ std::uint32_t Conversation::credit() const {
   if (leaving_) return 0;
   constexpr std::size_t credit_max = wire::runs_per_lease_max;
   const std::size_t num_kept = unacknowledged_.size();
-  const std::size_t used = num_kept - num_set_aside_ + std::min(num_set_aside_, credit_max / 2);
+  const std::size_t num_aside = unacknowledged_.num_set_aside();
+  const std::size_t used = num_kept - num_aside + std::min(num_aside, credit_max / 2);
   const std::size_t room = config_.num_kept_max - std::min(config_.num_kept_max, num_kept);
   return static_cast<std::uint32_t>(std::min(room, credit_max - std::min(credit_max, used)));
 }
@@ -313,9 +311,7 @@ void Conversation::send_heartbeat(TimePoint now) {
   std::vector<HeldRun> aside;
   held.reserve(unfinished_.size() + unacknowledged_.size());
   for (const auto& [key, attempt] : unfinished_) held.push_back({key.first, attempt, key.second});
-  for (const auto& [key, result] : unacknowledged_) {
-    (result.is_set_aside ? aside : held).push_back({key.first, result.attempt, key.second});
-  }
+  unacknowledged_.list(held, aside);
   wire::Heartbeat heartbeat{.num_runs_max = credit(),
                             .num_orbits_done = execution_.num_orbits_done(),
                             .held = grouped(std::move(held), wire::ranges_per_message_max),
@@ -400,6 +396,49 @@ std::vector<RunRange> Conversation::new_runs(const wire::RunLease& lease) {
     }
   }
   return ranges_of(runs);
+}
+
+// Results.
+
+void Conversation::restore(std::vector<wire::LeasedResult> results) {
+  for (wire::LeasedResult& result : results) {
+    unacknowledged_.add(std::move(result), TimePoint::min());
+  }
+}
+
+void Conversation::set_aside(wire::CampaignId campaign, std::span<const RunRange> ranges) {
+  const std::size_t count = unacknowledged_.set_aside(campaign, ranges);
+  if (count == 0) return;
+  note({.severity = wire::Severity::warning,
+        .kind = "results_set_aside",
+        .fields = {{"campaign", fmt::format("{:016x}", campaign.value)},
+                   {"results", count},
+                   wire::Field::remark("(not served now)")}});
+}
+
+std::vector<RunKey> Conversation::keep_finished(TimePoint now) {
+  std::vector<RunKey> runs;
+  for (FinishedRun& finished : execution_.take_finished()) {
+    const RunKey key{finished.campaign, finished.computed.result.run};
+    const auto found = unfinished_.find(key);
+    PROOFMASS_EXPECT(found != unfinished_.end());
+    unacknowledged_.add({.campaign = finished.campaign,
+                         .attempt = found->second,
+                         .computed = std::move(finished.computed)},
+                        now);
+    unfinished_.erase(found);
+    runs.push_back(key);
+  }
+  return runs;
+}
+
+void Conversation::send_results(std::vector<wire::ResultBatch> batches) {
+  for (wire::ResultBatch& batch : batches) send(std::move(batch));
+}
+
+void Conversation::send_all_results(TimePoint now) {
+  unacknowledged_.make_due(now);
+  send_results(unacknowledged_.take_due(now));
 }
 
 void Conversation::give_back(wire::LossReason reason, wire::CampaignId campaign,

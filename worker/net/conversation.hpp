@@ -15,6 +15,7 @@
 #include "proto/wire/definition_codec.hpp"
 #include "proto/wire/messages.hpp"
 #include "worker/execution/execution.hpp"
+#include "worker/net/held_runs.hpp"
 
 namespace proofmass::worker {
 
@@ -101,23 +102,15 @@ class Conversation {
   [[nodiscard]] bool is_leaving() const { return leaving_.has_value(); }
   [[nodiscard]] std::size_t num_unacknowledged() const { return unacknowledged_.size(); }
   /// Those among them that the coordinator could not take: it does not serve their campaigns.
-  [[nodiscard]] std::size_t num_set_aside() const { return num_set_aside_; }
+  [[nodiscard]] std::size_t num_set_aside() const { return unacknowledged_.num_set_aside(); }
   /// Results without an acknowledgement, in order of campaign and run.
-  [[nodiscard]] std::vector<wire::LeasedResult> unacknowledged() const;
+  [[nodiscard]] std::vector<wire::LeasedResult> unacknowledged() const {
+    return unacknowledged_.all();
+  }
   /// Runs that wait or are being computed.
   [[nodiscard]] std::size_t num_unfinished() const { return unfinished_.size(); }
 
  private:
-  using RunKey = std::pair<wire::CampaignId, RunIndex>;
-
-  struct SentResult {
-    wire::Attempt attempt;
-    wire::ComputedRun computed;
-    TimePoint due_at;       ///< When to send it (again).
-    Duration resend_after;  ///< From then on.
-    bool is_set_aside = false;
-  };
-
   struct WantedDefinition {
     wire::IncomingDefinition incoming;
     TimePoint request_due_at;  ///< When to ask (again) for the part that is missing.
@@ -145,13 +138,10 @@ class Conversation {
   void send_heartbeat(TimePoint now);
   [[nodiscard]] bool computes_other_batches() const;
   [[nodiscard]] std::uint32_t credit() const;
-  void drop_result(std::map<RunKey, SentResult>::iterator result);
-  [[nodiscard]] std::size_t drop_results(wire::CampaignId campaign, RunRange runs);
   void set_aside(wire::CampaignId campaign, std::span<const RunRange> ranges);
   [[nodiscard]] std::vector<RunKey> keep_finished(TimePoint now);
-  void repeat_results(TimePoint now);
-  void send_due_results(TimePoint now);
-  void send_results(std::span<const RunKey> runs, TimePoint now);
+  void send_results(std::vector<wire::ResultBatch> batches);
+  void send_all_results(TimePoint now);
   void watch_time(TimePoint now);
   [[nodiscard]] Duration time_to_leave() const;  ///< Before the walltime is over.
   void begin_to_leave(const Leaving& leaving, TimePoint now);
@@ -192,8 +182,7 @@ class Conversation {
   std::map<wire::CampaignId, std::size_t> table_widths_;
   std::map<wire::CampaignId, WantedDefinition> wanted_;  ///< Definitions that runs wait for.
   std::map<RunKey, wire::Attempt> unfinished_;           ///< All runs that the execution has.
-  std::map<RunKey, SentResult> unacknowledged_;
-  std::size_t num_set_aside_ = 0;  ///< Of those.
+  UnacknowledgedResults unacknowledged_;
   std::vector<wire::Event> events_;
   std::optional<Leaving> leaving_;
   std::optional<Ending> ending_;

@@ -15,7 +15,8 @@ enum class SignalSource : std::uint8_t {
 /// What signals have asked for so far.
 enum class StopRequest : std::uint8_t { none, drain, abandon };
 
-/// Receives signals as a file descriptor does.
+/// Receives signals by a file descriptor, so that one poll waits for them and for a socket. (The
+/// coordinator and the commands use handlers instead: some of their threads never poll.)
 class StopSignals {
  public:
   /// Blocks the signals for the calling thread and those that it makes from now on.

@@ -12,8 +12,8 @@
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/wire/codec.hpp"
 #include "proto/wire/definition_codec.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
 #include "tests/support/microscope_results.hpp"
-#include "tests/worker/temporary_directory.hpp"
 #include "worker/execution/executor.hpp"
 #include "worker/spool/spool.hpp"
 
@@ -116,7 +116,7 @@ class ServeTest : public testing::Test {
     });
   }
 
-  TemporaryDirectory directory;
+  test::ScratchDirectory directory;
   ServeConfig config;
   std::future<pthread_t> worker_thread;
 };

@@ -10,8 +10,8 @@
 #include <sstream>
 
 #include "core/error.hpp"
+#include "tests/proto/link/scratch_directory.hpp"
 #include "tests/support/microscope_results.hpp"
-#include "tests/worker/temporary_directory.hpp"
 
 namespace proofmass::worker {
 namespace {
@@ -59,7 +59,7 @@ class SpoolTest : public testing::Test {
     return "none";
   }
 
-  TemporaryDirectory directory;
+  test::ScratchDirectory directory;
   std::filesystem::path path = directory / "spool";
 };
 
@@ -247,7 +247,7 @@ class SpoolerTest : public testing::Test {
     spooler.emplace(*spool);
   }
 
-  TemporaryDirectory directory;
+  test::ScratchDirectory directory;
   std::filesystem::path path = directory / "spool";
   std::optional<Spool> spool;
   std::optional<Spooler> spooler;
