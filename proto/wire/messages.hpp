@@ -194,7 +194,10 @@ struct ComputedRun {
   double elapsed_s = 0.0;  ///< From its beginning to its end: the time of that batch; 0 to 1e9.
 };
 
-/// A result, and the lease under which it was computed.
+/// A result, and the lease under which it was computed. A RunResult is what a run yields, a
+/// ComputedRun adds the time that it took, and this adds the campaign and the attempt: what a
+/// worker keeps and the dispatch hands to the store. There it becomes a coordinator::Delivery, with
+/// the session of the worker, which outlives the worker's number.
 struct LeasedResult {
   CampaignId campaign;
   Attempt attempt;
