@@ -51,6 +51,7 @@ Conversation::Conversation(wire::SessionId session, wire::Hello hello, Execution
       send_(std::move(send)),
       config_(config),
       heard_at_(now),
+      busy_at_(now),
       refusal_delay_(config.refusal_delay),
       refused_at_(now),
       unacknowledged_(config.resend_after, config.resend_after_max) {
@@ -231,6 +232,7 @@ void Conversation::on_tick(TimePoint now) {
                            refusal_.empty() ? "is it running?" : refusal_));
   }
   watch_time(now);
+  watch_idleness(now);
   if (ending_) return;
   if (!is_registered_) {
     if (now < hello_due_at_) return;

@@ -53,6 +53,8 @@ struct ConversationConfig {
   /// Kept free at the end of the drain or walltime, for results to be sent and acknowledged.
   Duration delivery_time = std::chrono::seconds(5);
   std::optional<TimePoint> walltime_end = {};  ///< When the process must have ended.
+  /// A worker that has neither a run nor a result for so long leaves. Nothing: it stays.
+  std::optional<Duration> idle_timeout = {};
   /// Results that are not acknowledged and runs at hand, altogether: a coordinator that cannot take
   /// results must not fill this worker's memory.
   std::size_t num_kept_max = 65'536;
@@ -90,7 +92,10 @@ class Conversation {
   /// To be called some times a second.
   void on_tick(TimePoint now);
   /// The process was stopped for so long: nothing that was said meanwhile has been heard.
-  void on_slept(Duration duration) { heard_at_ += duration; }
+  void on_slept(Duration duration) {
+    heard_at_ += duration;
+    busy_at_ += duration;
+  }
   /// Gives back what has not begun, finishes what can be finished in time, delivers, leaves.
   void on_drain_request(TimePoint now);
   /// Leaves at once. The caller keeps the results, or they will be computed again.
@@ -143,6 +148,7 @@ class Conversation {
   void send_results(std::vector<wire::ResultBatch> batches);
   void send_all_results(TimePoint now);
   void watch_time(TimePoint now);
+  void watch_idleness(TimePoint now);
   [[nodiscard]] Duration time_to_leave() const;  ///< Before the walltime is over.
   void begin_to_leave(const Leaving& leaving, TimePoint now);
   void give_back_waiting();
@@ -165,6 +171,7 @@ class Conversation {
   bool is_registered_ = false;
   Duration heartbeat_interval_{};
   TimePoint heard_at_;
+  TimePoint busy_at_;  ///< When it last had a run or a result.
   TimePoint hello_due_at_;
   Duration hello_delay_{};
   std::uint64_t welcome_sequence_ = 0;  ///< Of the newest Welcome.

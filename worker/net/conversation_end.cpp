@@ -41,6 +41,15 @@ void Conversation::watch_time(TimePoint now) {
   }
 }
 
+void Conversation::watch_idleness(TimePoint now) {
+  if (ending_ || leaving_ || !config_.idle_timeout) return;
+  if (!unfinished_.empty() || unacknowledged_.size() > 0) busy_at_ = now;
+  if (now - busy_at_ < *config_.idle_timeout) return;
+  leaving_ = Leaving{};
+  leave(fmt::format("no run for {} s",
+                    std::chrono::duration_cast<std::chrono::seconds>(now - busy_at_).count()));
+}
+
 /// Half again of the usual time of a batch, so that one that begins now is finished; and up to
 /// once more, for each worker another part of it: those of one job end at the same time, and shall
 /// not all give back and deliver at once.

@@ -278,5 +278,46 @@ TEST_F(ConversationTest, HeedsItsWalltimeAlsoWhenDrainedByTheCoordinator) {
   expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
+TEST_F(ConversationTest, LeavesAfterTheIdleTimeout) {
+  register_with_campaign({.idle_timeout = 300s});
+  now += 299s;
+  conversation->on_slept(298s);
+  tick_after(1s);  // The coordinator has been silent for 2 s, and the worker idle for as long.
+  (void)take_sent<wire::Heartbeat>();
+  EXPECT_FALSE(conversation->ending().has_value());
+  tick_after(298s);
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::drained);
+  expect_ending(Ending::Kind::done, "no run for 300 s");
+}
+
+TEST_F(ConversationTest, IsNotIdleWithARunOrAResult) {
+  register_with_campaign({.resend_after = std::chrono::hours(1), .idle_timeout = 300s});
+  receive(lease(0, 1));
+  tick_after(400s);
+  (void)take_sent<wire::Heartbeat>();
+  execution.finish_lease();
+  conversation->on_progress(now);
+  (void)take_sent<wire::ResultBatch>();
+  tick_after(400s);
+  (void)take_sent<wire::Heartbeat>();
+  acknowledge({{0}});
+  tick_after(299s);
+  (void)take_sent<wire::Heartbeat>();
+  EXPECT_FALSE(conversation->ending().has_value());
+  tick_after(1s);
+  (void)take_sent<wire::Bye>();
+  expect_ending(Ending::Kind::done, "no run for 300 s");
+}
+
+TEST_F(ConversationTest, StaysIdleWithoutATimeout) {
+  register_with_campaign();
+  for (int i = 0; i < 50; ++i) {
+    receive(wire::HeartbeatAck{});
+    tick_after(3000s);
+    (void)take_sent<wire::Heartbeat>();
+  }
+  EXPECT_FALSE(conversation->ending().has_value());
+}
+
 }  // namespace
 }  // namespace proofmass::worker
