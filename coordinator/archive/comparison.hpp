@@ -10,7 +10,7 @@
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/report/missing_estimates.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"

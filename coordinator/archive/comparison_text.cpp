@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "coordinator/report/text_cells.hpp"
 #include "core/campaign/model.hpp"
@@ -15,13 +17,38 @@ namespace proofmass::coordinator {
 namespace {
 
 constexpr std::size_t line_width = 80;
-constexpr std::size_t label_width = 11;
-constexpr std::size_t unit_width = 9;
-constexpr std::size_t figure_width = 9;
-constexpr std::size_t change_width = 10;
+
+constexpr std::array<TextColumn, 9> bias_columns{{{"parameter", 11, true},
+                                                  {"unit", 9, true},
+                                                  {"A", 9},
+                                                  {"B", 9},
+                                                  {"change", 10},
+                                                  {"from", 10},
+                                                  {"to", 10},
+                                                  {"p", 9},
+                                                  {"", 2, true}}};
+
+constexpr std::array<TextColumn, 10> scatter_columns{{{"parameter", 11, true},
+                                                      {"unit", 9, true},
+                                                      {"std A", 9},
+                                                      {"std B", 9},
+                                                      {"p", 9},
+                                                      {"", 2, true},
+                                                      {"tail A", 9},
+                                                      {"tail B", 9},
+                                                      {"p", 9},
+                                                      {"", 2, true}}};
+
+constexpr std::array<TextColumn, 6> magnitude_columns{{{"parameter", 11, true},
+                                                       {"unit", 9, true},
+                                                       {"mean A", 10},
+                                                       {"mean B", 10},
+                                                       {"worst A", 10},
+                                                       {"worst B", 10}}};
+
 constexpr double significance = 1.0 - default_confidence;
 
-std::string signed_figure(double value) {
+std::string figure_with_sign(double value) {
   const std::string figure = measured_figure(std::abs(value));
   if (figure == "0") return figure;
   return (value < 0.0 ? "-" : "+") + figure;
@@ -61,39 +88,30 @@ std::string left_out(const CampaignComparison& comparison) {
   return text;
 }
 
-std::string heading(std::initializer_list<std::pair<std::string_view, std::size_t>> titles) {
-  std::string line = left_aligned("parameter", label_width) + left_aligned("unit", unit_width);
-  for (const auto& [title, width] : titles) line += right_aligned(title, width);
-  return line + "\n" + horizontal_rule(display_width(line)) + "\n";
+using Cells = std::vector<std::string>;
+
+Cells label_cells(const Quantity& quantity) {
+  return {std::string(quantity.symbol), std::string(quantity.display_unit)};
 }
 
-std::string row_label(const Quantity& quantity) {
-  return left_aligned(quantity.symbol, label_width) +
-         left_aligned(quantity.display_unit, unit_width);
-}
-
-std::string p_cell(double p_value) {
-  return right_aligned(measured_figure(p_value), figure_width) +
-         (p_value < significance ? " *" : "  ");
-}
-
-std::string ended(std::string row) {
-  row.erase(row.find_last_not_of(' ') + 1);
-  return row + "\n";
+/// The p-value, and a mark if it is significant.
+void add_p(double p_value, Cells& cells) {
+  cells.push_back(measured_figure(p_value));
+  cells.emplace_back(p_value < significance ? " *" : "");
 }
 
 std::string bias_row(const Quantity& quantity, const ParameterComparison& parameter) {
   const double scale = quantity.display_scale;
-  const double change = parameter.second.bias - parameter.first.bias;
-  std::string text = row_label(quantity);
-  for (const double bias : {parameter.first.bias, parameter.second.bias}) {
-    text += right_aligned(signed_figure(bias / scale), figure_width);
+  Cells cells = label_cells(quantity);
+  for (const double bias : {parameter.first.bias, parameter.second.bias,
+                            parameter.second.bias - parameter.first.bias}) {
+    cells.push_back(figure_with_sign(bias / scale));
   }
-  text += right_aligned(signed_figure(change / scale), change_width);
   const auto& interval = parameter.bias_interval;
-  text += right_aligned(interval ? signed_figure(interval->lower / scale) : "-", change_width);
-  text += right_aligned(interval ? signed_figure(interval->upper / scale) : "-", change_width);
-  return ended(text + p_cell(parameter.adjusted_p_values.location));
+  cells.push_back(interval ? figure_with_sign(interval->lower / scale) : "-");
+  cells.push_back(interval ? figure_with_sign(interval->upper / scale) : "-");
+  add_p(parameter.adjusted_p_values.location, cells);
+  return table_row(bias_columns, cells, WideCell::keep);
 }
 
 /// The tests of bias, scatter and tail.
@@ -111,12 +129,7 @@ TestNames tests_of(const CampaignComparison& comparison) {
 }
 
 std::string bias_table(const CampaignComparison& comparison) {
-  std::string text = "Bias: mean of estimate − truth\n\n" + heading({{"A", figure_width},
-                                                                     {"B", figure_width},
-                                                                     {"change", change_width},
-                                                                     {"from", change_width},
-                                                                     {"to", change_width},
-                                                                     {"p", figure_width}});
+  std::string text = "Bias: mean of estimate − truth\n\n" + table_heading(bias_columns);
   for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
     const Quantity& quantity = model().results().quantities[i];
     text += bias_row(quantity, comparison.parameters[i]);
@@ -125,33 +138,26 @@ std::string bias_table(const CampaignComparison& comparison) {
          fmt::format("from, to: 95 % interval of the change; p: {}\n", tests_of(comparison).bias);
 }
 
-std::string percent_cell(std::size_t count, std::size_t of) {
-  const double share = static_cast<double>(count) / static_cast<double>(of);
-  return right_aligned(fmt::format("{:.1f} %", 100.0 * share), figure_width);
+std::string percent(std::size_t count, std::size_t of) {
+  return fmt::format("{:.1f} %", 100.0 * static_cast<double>(count) / static_cast<double>(of));
 }
 
 std::string scatter_table(const CampaignComparison& comparison) {
   std::string text =
       "Scatter and tail: standard deviation of estimate − truth, and runs far off\n\n" +
-      heading({{"std A", figure_width},
-               {"std B", figure_width},
-               {"p", figure_width},
-               {"tail A", figure_width + 2},
-               {"tail B", figure_width},
-               {"p", figure_width}});
+      table_heading(scatter_columns);
   for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
     const Quantity& quantity = model().results().quantities[i];
     const auto& parameter = comparison.parameters[i];
-    std::string row = row_label(quantity);
+    Cells cells = label_cells(quantity);
     for (const ComparedAccuracy& side : {parameter.first, parameter.second}) {
-      row += right_aligned(measured_figure(side.standard_deviation / quantity.display_scale),
-                           figure_width);
+      cells.push_back(measured_figure(side.standard_deviation / quantity.display_scale));
     }
-    row += p_cell(parameter.adjusted_p_values.scale) +
-           percent_cell(parameter.first.num_in_tail, comparison.num_first) +
-           percent_cell(parameter.second.num_in_tail, comparison.num_second) +
-           p_cell(parameter.adjusted_p_values.tail);
-    text += ended(row);
+    add_p(parameter.adjusted_p_values.scale, cells);
+    cells.push_back(percent(parameter.first.num_in_tail, comparison.num_first));
+    cells.push_back(percent(parameter.second.num_in_tail, comparison.num_second));
+    add_p(parameter.adjusted_p_values.tail, cells);
+    text += table_row(scatter_columns, cells, WideCell::keep);
   }
   const TestNames tests = tests_of(comparison);
   return text + fmt::format(
@@ -163,20 +169,16 @@ std::string scatter_table(const CampaignComparison& comparison) {
 }
 
 std::string magnitude_table(const CampaignComparison& comparison) {
-  std::string text =
-      "Mean and worst of |estimate − truth|\n\n" + heading({{"mean A", change_width},
-                                                            {"mean B", change_width},
-                                                            {"worst A", change_width},
-                                                            {"worst B", change_width}});
+  std::string text = "Mean and worst of |estimate − truth|\n\n" + table_heading(magnitude_columns);
   for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
     const Quantity& quantity = model().results().quantities[i];
     const auto& parameter = comparison.parameters[i];
-    text += row_label(quantity);
+    Cells cells = label_cells(quantity);
     for (const double value : {parameter.first.mean, parameter.second.mean, parameter.first.worst,
                                parameter.second.worst}) {
-      text += right_aligned(measured_figure(value / quantity.display_scale), change_width);
+      cells.push_back(measured_figure(value / quantity.display_scale));
     }
-    text += "\n";
+    text += table_row(magnitude_columns, cells, WideCell::keep);
   }
   return text;
 }

@@ -2,28 +2,174 @@
 
 #include <fmt/format.h>
 
-#include <optional>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
 
-#include "coordinator/report/digest.hpp"
+#include "coordinator/report/requirements.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/model.hpp"
-#include "core/campaign/statistics.hpp"
-#include "core/runs.hpp"
+#include "core/statistics/interval.hpp"
 
 namespace proofmass::coordinator {
-
 namespace {
 
-// A run that is given up is one of those that lack a result, and as many as were counted with the
-// statistics.
-void check_given_up(const Store& store, const CampaignStatistics& statistics,
-                    std::uint64_t num_given_up) {
-  const std::optional<Summary> summary = store.summary();
-  if (summary && summary->num_finished == statistics.num_runs &&
-      num_given_up < summary->num_given_up) {
-    store.refuse_as_damaged(fmt::format("{} runs are given up, and its statistics are beside {}",
-                                        num_given_up, summary->num_given_up));
+// Widths of columns include the blanks between them. Columns of one table add up to 80 at most.
+
+constexpr std::string_view ours = "this campaign";
+constexpr std::string_view theirs = "the paper";
+
+constexpr std::array<TextColumn, 10> accuracy_columns{{{"parameter", 11, true},
+                                                       {"unit", 9, true},
+                                                       {"objective", 9},
+                                                       {"worst", 8, false, ours},
+                                                       {"mean", 8, false, ours},
+                                                       {"std", 8, false, ours},
+                                                       {"beyond", 8, false, ours},
+                                                       {"worst", 6, false, theirs, true},
+                                                       {"mean", 6, false, theirs},
+                                                       {"std", 6, false, theirs}}};
+
+constexpr std::array<TextColumn, 9> interval_columns{{{"parameter", 11, true},
+                                                      {"mean", 8, false, "|error|"},
+                                                      {"from", 8, false, "|error|"},
+                                                      {"to", 9, false, "|error|"},
+                                                      {"std", 8, false, "|error|", true},
+                                                      {"from", 8, false, "|error|"},
+                                                      {"to", 9, false, "|error|"},
+                                                      {"bias", 9, false, "error", true},
+                                                      {"skew", 7, false, "error"}}};
+
+constexpr std::string_view percentiles = "percentiles of |error|";
+static_assert(percentile_levels == std::array{0.5, 0.9, 0.95, 0.99});
+constexpr std::array<TextColumn, 9> error_columns{{{"parameter", 10, true},
+                                                   {"from", 9, false, "bias"},
+                                                   {"to", 10, false, "bias"},
+                                                   {"50 %", 8, false, percentiles, true},
+                                                   {"90 %", 8, false, percentiles},
+                                                   {"95 %", 8, false, percentiles},
+                                                   {"99 %", 9, false, percentiles},
+                                                   {"from", 7, false, "beyond, %", true},
+                                                   {"to", 8, false, "beyond, %"}}};
+
+constexpr std::array<TextColumn, 7> budget_columns{{{"term", 23, true},
+                                                    {"before", 9, false, ours},
+                                                    {"worst", 9, false, ours},
+                                                    {"mean", 10, false, ours},
+                                                    {"before", 9, false, theirs, true},
+                                                    {"worst", 9, false, theirs},
+                                                    {"mean", 9, false, theirs}}};
+
+using Cells = std::vector<std::string>;
+
+std::string row_of(std::span<const TextColumn> columns, const Cells& cells) {
+  return table_row(columns, cells, WideCell::keep);
+}
+
+std::string accuracy_row(const Quantity& quantity, double objective,
+                         const AccuracyStatistic& accuracy, std::uint64_t num_runs) {
+  const double scale = quantity.display_scale;
+  Cells cells{std::string(quantity.symbol), std::string(quantity.display_unit),
+              std::isfinite(objective) ? given_figure(objective / scale) : "-"};
+  const std::uint64_t beyond = accuracy.num_beyond_objective;
+  cells.push_back(num_runs < 1 ? "-" : measured_figure(accuracy.worst / scale));
+  cells.push_back(num_runs < 1 ? "-" : measured_figure(accuracy.mean / scale));
+  cells.push_back(num_runs < 2 ? "-" : measured_figure(accuracy.standard_deviation / scale));
+  cells.push_back(num_runs < 1         ? "-"
+                  : beyond < 1'000'000 ? std::to_string(beyond)
+                                       : measured_figure(static_cast<double>(beyond)));
+  const auto& published = quantity.published;
+  for (const double PublishedAccuracy::*figure :
+       {&PublishedAccuracy::worst, &PublishedAccuracy::mean,
+        &PublishedAccuracy::standard_deviation}) {
+    cells.push_back(published ? given_figure((*published).*figure / scale) : "");
   }
+  return row_of(accuracy_columns, cells);
+}
+
+// Of |error|: of few runs the symmetric interval of a mean may begin below 0, where none can lie.
+void add_triple(double value, const std::optional<Interval>& interval, double scale, Cells& cells) {
+  const auto figure = [&](double number) { return measured_figure(std::max(number, 0.0) / scale); };
+  cells.push_back(figure(value));
+  cells.push_back(interval ? figure(interval->lower) : "-");
+  cells.push_back(interval ? figure(interval->upper) : "-");
+}
+
+std::string interval_row(const Quantity& quantity, const AccuracyStatistic& accuracy,
+                         std::uint64_t num_runs) {
+  const double scale = quantity.display_scale;
+  Cells cells{std::string(quantity.symbol)};
+  add_triple(accuracy.mean, accuracy.mean_interval, scale, cells);
+  if (num_runs < 2) {
+    cells.insert(cells.end(), 3, "-");
+  } else {
+    add_triple(accuracy.standard_deviation, accuracy.deviation_interval, scale, cells);
+  }
+  cells.push_back(signed_figure(accuracy.error.bias / scale));
+  cells.push_back(num_runs < 3 ? "-" : fmt::format("{:.2f}", accuracy.error.skewness));
+  return row_of(interval_columns, cells);
+}
+
+/// Fewest runs from which on the bootstrap covers what it says; core/statistics/README.md.
+constexpr std::uint64_t num_runs_of_bootstrap = 200;
+
+constexpr std::string_view of_one_parameter = "  (one parameter by itself, not all together)\n";
+
+/// What "the worst of n" is worth [Wilks1941].
+std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_estimate) {
+  const double coverage = std::pow(1.0 - default_confidence, 1.0 / static_cast<double>(num_runs));
+  // Rounded down: no more is claimed than holds.
+  const std::string text =
+      fmt::format("worst of {}: with 95 % confidence {} % of all draws stay below", num_runs,
+                  std::floor(coverage * 1e5) / 1e3);
+  if (num_without_estimate == 0) return fmt::format("{}\n{}", text, of_one_parameter);
+  return text + fmt::format(",\n  of those that have an estimate; {} more {} none\n{}",
+                            num_without_estimate, num_without_estimate == 1 ? "has" : "have",
+                            of_one_parameter);
+}
+
+std::string error_row(const Quantity& quantity, const AccuracyStatistic& accuracy) {
+  const double scale = quantity.display_scale;
+  const std::optional<Interval>& bias = accuracy.error.bias_interval;
+  Cells cells{std::string(quantity.symbol), bias ? signed_figure(bias->lower / scale) : "-",
+              bias ? signed_figure(bias->upper / scale) : "-"};
+  for (const PercentileStatistic& percentile : accuracy.percentiles) {
+    cells.push_back(measured_figure(percentile.value / scale));
+  }
+  cells.push_back(measured_figure(100.0 * accuracy.beyond_objective.lower));
+  cells.push_back(measured_figure(100.0 * accuracy.beyond_objective.upper));
+  return row_of(error_columns, cells);
+}
+
+std::string joint_text(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
+  constexpr std::size_t margin = 2;
+  return line_of(fmt::format("all objectives together: {} of {} runs,",
+                             statistics.num_within_objectives, statistics.num_runs + num_given_up),
+                 interval_percent(*statistics.within_objectives(num_given_up)) + " of all draws",
+                 margin);
+}
+
+// Contributions before calibration and after it, with the worst and the mean errors.
+using Figures = std::array<std::optional<double>, 3>;
+
+std::string budget_row(const BudgetEntryInfo& info, const Figures& figures) {
+  Cells cells{std::string(info.label)};
+  const Figures paper{info.paper_before, info.paper_after_worst, info.paper_after_mean};
+  for (const Figures& side : {figures, paper}) {
+    for (const auto& figure : side) cells.push_back(figure ? fmt::format("{:.1e}", *figure) : "-");
+  }
+  return row_of(budget_columns, cells);
+}
+
+// The paper adds up the worst errors of all parameters, which no single run has.
+std::string totals_text(const RunTotals& totals) {
+  return fmt::format(
+      "worst adds up the worst errors of different runs, as the paper does; totals of\n"
+      "single runs: median {:.1e}, 95 % below {:.1e}, worst {:.1e} (run {})\n",
+      totals.median, totals.percentile_95, totals.worst, totals.worst_run.value);
 }
 
 std::string report_of_one_state(const Store& store, const Campaign& campaign) {
@@ -43,19 +189,6 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign) {
 }
 
 }  // namespace
-
-CheckedResults read_checked_results(const Store& store, const Campaign& campaign) {
-  CheckedResults checked;
-  store.read_one_state([&] {
-    checked.results = read_results(store, campaign);
-    const CampaignStatistics& statistics = checked.results.statistics;
-    checked.check = check_digest(store, statistics.num_runs, checked.results.digests);
-    checked.given_up = store.given_up_runs();
-    check_given_up(store, statistics, num_runs_in(checked.given_up));
-    check_stop_checks(store, campaign.objectives());
-  });
-  return checked;
-}
 
 std::string report_text(const Store& store, const Campaign& campaign) {
   std::string text;
@@ -99,62 +232,65 @@ std::string given_up_text(std::span<const RunRange> given_up) {
   return line + "\n";
 }
 
-namespace {
-
-// Results never change: as many of them are the same ones.
-bool are_current(const Store& store) {
-  const std::optional<Summary> summary = store.summary();
-  return summary && summary->num_finished == num_runs_in(store.finished_runs()) &&
-         summary->num_given_up == num_runs_in(store.given_up_runs());
-}
-
-}  // namespace
-
-ReadResults read_results(const Store& store, const Campaign& campaign) {
-  StatisticsPasses passes(campaign.objectives());
-  std::optional<RunTotalPasses> totals;
-  if (std::optional<ErrorBudget> budget = campaign.error_budget()) {
-    totals.emplace(*std::move(budget));
+std::string accuracy_table(const Campaign& campaign, const CampaignStatistics& statistics) {
+  std::string text = fmt::format(
+      "Accuracy of calibration: |estimate − truth| of {} {}\n\n{}", statistics.num_estimated,
+      statistics.num_estimated == 1 ? "run" : "runs", table_heading(accuracy_columns));
+  const std::vector<double> objectives = campaign.objectives();
+  const std::vector<Quantity>& quantities = model().results().quantities;
+  for (std::size_t i = 0; i < quantities.size(); ++i) {
+    const bool has_runs = statistics.num_estimated > 0;
+    text += accuracy_row(quantities[i], objectives[i],
+                         has_runs ? statistics.accuracy[i] : AccuracyStatistic{},
+                         statistics.num_estimated);
   }
-  ReadResults results{.statistics = {}, .digests = {}, .totals = {}};
-  // Both are asked each time: they may need different numbers of passes.
-  const auto is_pass_needed = [&] {
-    const bool is_for_statistics = passes.end_pass();
-    return (totals && totals->end_pass()) || is_for_statistics;
+  return text + "beyond: runs whose error exceeds the objective; the paper: Hardy et al. 2013\n";
+}
+
+std::string interval_table(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
+  if (statistics.num_estimated == 0) return "";
+  std::string text = "95 % intervals, in the units above\n\n" + table_heading(interval_columns);
+  for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
+    text += interval_row(model().results().quantities[i], statistics.accuracy[i],
+                         statistics.num_estimated);
+  }
+  if (statistics.num_estimated < num_runs_of_bootstrap) {
+    text += "std: an interval from fewer than 200 runs is too narrow, see core/statistics\n";
+  }
+  return text + worth_of_worst(statistics.num_estimated,
+                               statistics.num_runs - statistics.num_estimated + num_given_up);
+}
+
+std::string error_table(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
+  if (statistics.num_estimated == 0) return "";
+  std::string text =
+      "95 % intervals of bias and of draws beyond the objective\n\n" + table_heading(error_columns);
+  for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
+    text += error_row(model().results().quantities[i], statistics.accuracy[i]);
+  }
+  return text + joint_text(statistics, num_given_up);
+}
+
+std::string budget_table(const Campaign& campaign, const CampaignStatistics& statistics,
+                         const std::optional<RunTotals>& totals) {
+  const std::optional<ErrorBudget> budget = campaign.error_budget();
+  if (!budget) return "";
+  const bool has_errors = statistics.num_estimated > 0;
+  const Budget after_worst = has_errors ? budget->after(statistics.worst_errors()) : Budget{};
+  const Budget after_mean = has_errors ? budget->after(statistics.mean_errors()) : Budget{};
+  const auto figures = [&](const auto& value_of) -> Figures {
+    if (!has_errors) return {value_of(budget->before), std::nullopt, std::nullopt};
+    return {value_of(budget->before), value_of(after_worst), value_of(after_mean)};
   };
-  store.read_one_state([&] {
-    Digest digest;
-    store.for_each_result([&](const RunResult& result) {
-      require_in_range(result, model().results());
-      passes.add(result);
-      if (totals) totals->add(result);
-      digest.add(result);
-    });
-    while (is_pass_needed()) {
-      store.for_each_result([&](const RunResult& result) {
-        passes.add(result);
-        if (totals) totals->add(result);
-      });
-    }
-    results.statistics = passes.statistics();
-    results.digests = digest.finish();
-    if (totals) results.totals = totals->totals();
-  });
-  return results;
-}
-
-void update_statistics(Store& store, const Campaign& campaign) {
-  if (are_current(store)) return;
-  write_statistics(store, campaign, read_results(store, campaign));
-}
-
-void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results) {
-  store.write_statistics(results.statistics, campaign.error_budget(), results.digests);
-}
-
-std::vector<std::string> statistic_differences(const Store& store, const Campaign& campaign,
-                                               const CampaignStatistics& statistics) {
-  return store.statistic_differences(statistics, campaign.error_budget());
+  std::string text = fmt::format("{}\n\n{}", budget->title, table_heading(budget_columns));
+  for (std::size_t i = 0; i < budget->infos.size(); ++i) {
+    text += budget_row(budget->infos[i], figures([&](const Budget& of) { return of.entries[i]; }));
+  }
+  text += table_rule(budget_columns) +
+          budget_row(budget->total_info, figures([](const Budget& of) { return of.total; })) +
+          "before: bounds of construction; worst, mean: left by the errors of calibration\n" +
+          budget->note;
+  return totals ? text + totals_text(*totals) : text;
 }
 
 }  // namespace proofmass::coordinator

@@ -5,13 +5,12 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
-#include "coordinator/report/digest.hpp"
-#include "coordinator/report/run_totals.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/statistics.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 
@@ -55,41 +54,5 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string budget_table(const Campaign& campaign,
                                        const CampaignStatistics& statistics,
                                        const std::optional<RunTotals>& totals);
-
-/// What the results of a campaign database yield.
-struct ReadResults {
-  CampaignStatistics statistics;
-  ResultDigests digests;
-  std::optional<RunTotals> totals;  ///< Empty if no run has an estimate.
-};
-
-/// Reads all results, of one state of the file, as often as StatisticsPasses needs them: twice if
-/// they are many. Memory does not grow with them.
-/// @throws Error if a number is out of range, see require_in_range().
-[[nodiscard]] ReadResults read_results(const Store& store, const Campaign& campaign);
-
-/// What a report is made of.
-struct CheckedResults {
-  ReadResults results;
-  DigestCheck check = DigestCheck::holds;
-  std::vector<RunRange> given_up;  ///< Ascending.
-};
-
-/// Reads all results, of one state of the file, and holds them against what is stored beside them.
-/// @throws StoreError as report_text() does.
-[[nodiscard]] CheckedResults read_checked_results(const Store& store, const Campaign& campaign);
-
-/// Stores statistics, their digest, and the budgets that follow from them in the file.
-void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results);
-
-/// What `statistic` and `budget_entry` have other than write_statistics() would store, a line each:
-/// `statistic.mean of k2d = 1 (must be 25.5)`.
-[[nodiscard]] std::vector<std::string> statistic_differences(const Store& store,
-                                                             const Campaign& campaign,
-                                                             const CampaignStatistics& statistics);
-
-/// Brings the statistics and budgets that are stored in the file up to its results; does nothing
-/// if they are.
-void update_statistics(Store& store, const Campaign& campaign);
 
 }  // namespace proofmass::coordinator

@@ -3,7 +3,7 @@
 #include <span>
 #include <string>
 
-#include "coordinator/report/requirement_text.hpp"
+#include "coordinator/report/requirements.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 

@@ -7,9 +7,8 @@
 #include <iterator>
 #include <vector>
 
-#include "coordinator/report/missing_estimates.hpp"
-#include "coordinator/report/report.hpp"
-#include "coordinator/report/requirement_text.hpp"
+#include "coordinator/report/read_results.hpp"
+#include "coordinator/report/requirements.hpp"
 #include "core/campaign/model_rules.hpp"
 #include "core/statistics/value_passes.hpp"
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace proofmass::coordinator {
@@ -12,6 +13,33 @@ namespace {
 std::string spaces(std::size_t width, std::string_view text) {
   const std::size_t taken = display_width(text);
   return std::string(width > taken ? width - taken : 0, ' ');
+}
+
+std::string without_end_blanks(std::string line) {
+  line.erase(line.find_last_not_of(' ') + 1);
+  return line;
+}
+
+bool is_before_line(std::span<const TextColumn> columns, std::size_t i) {
+  return i + 1 < columns.size() && columns[i + 1].is_after_line;
+}
+
+/// Each group in the middle of its columns; empty if no column has one.
+std::string group_line(std::span<const TextColumn> columns) {
+  std::string line;
+  bool has_group = false;
+  for (std::size_t i = 0; i < columns.size();) {
+    const std::string_view group = columns[i].group;
+    if (columns[i].is_after_line) line += "│";
+    std::size_t width = columns[i].width;
+    while (++i < columns.size() && columns[i].group == group && !columns[i].is_after_line) {
+      width += columns[i].width;
+    }
+    const std::string margin(spaces(width, group).size() / 2, ' ');
+    line += left_aligned(margin + std::string(group), width);
+    has_group = has_group || !group.empty();
+  }
+  return has_group ? without_end_blanks(std::move(line)) + "\n" : "";
 }
 
 }  // namespace
@@ -24,27 +52,11 @@ std::string right_aligned(std::string_view text, std::size_t width) {
   return spaces(width, text) + std::string(text);
 }
 
-std::string centred(std::string_view text, std::size_t width) {
-  const std::size_t margin = spaces(width, text).size() / 2;
-  return std::string(margin, ' ') + std::string(text);
-}
-
 std::string line_of(std::string_view first, std::string_view second, std::size_t margin) {
   constexpr std::size_t columns_max = 80;
   const bool fits = display_width(first) + 1 + display_width(second) <= columns_max;
   return fits ? fmt::format("{} {}\n", first, second)
               : fmt::format("{}\n{:{}}{}\n", first, "", margin, second);
-}
-
-std::string table_row(std::span<const TextColumn> columns, std::span<const std::string> cells) {
-  std::string text;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const auto& [title, width, is_text] = columns[i];
-    const std::string cell = shortened(cells[i], width - 1);
-    text += is_text ? left_aligned(cell, width) : right_aligned(cell, width);
-  }
-  text.erase(text.find_last_not_of(' ') + 1);
-  return text + "\n";
 }
 
 std::vector<TextColumn> widened(std::span<const TextColumn> columns,
@@ -65,14 +77,40 @@ std::vector<TextColumn> widened(std::span<const TextColumn> columns,
   return wide;
 }
 
+std::string table_row(std::span<const TextColumn> columns, std::span<const std::string> cells,
+                      WideCell wide_cell) {
+  std::string text;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const TextColumn& column = columns[i];
+    const std::string cell =
+        wide_cell == WideCell::keep ? cells[i] : shortened(cells[i], column.width - 1);
+    if (column.is_after_line) text += "│";
+    if (column.is_text) {
+      text += left_aligned(cell, column.width);
+    } else if (is_before_line(columns, i)) {
+      text += right_aligned(cell, column.width - 1) + " ";
+    } else {
+      text += right_aligned(cell, column.width);
+    }
+  }
+  return without_end_blanks(std::move(text)) + "\n";
+}
+
+std::string table_rule(std::span<const TextColumn> columns) {
+  while (!columns.empty() && columns.back().title.empty())
+    columns = columns.first(columns.size() - 1);
+  std::string rule;
+  for (const TextColumn& column : columns) {
+    if (column.is_after_line) rule += "┼";
+    rule += horizontal_rule(column.width);
+  }
+  return rule + "\n";
+}
+
 std::string table_heading(std::span<const TextColumn> columns) {
   std::vector<std::string> titles;
-  std::size_t width = 0;
-  for (const TextColumn& column : columns) {
-    titles.emplace_back(column.title);
-    width += column.width;
-  }
-  return table_row(columns, titles) + horizontal_rule(width) + "\n";
+  for (const TextColumn& column : columns) titles.emplace_back(column.title);
+  return group_line(columns) + table_row(columns, titles, WideCell::keep) + table_rule(columns);
 }
 
 std::string horizontal_rule(std::size_t count) {

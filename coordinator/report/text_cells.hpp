@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -16,8 +17,6 @@ using wire::shortened;
 /// Text filled up with spaces on the right or left to `width` columns of a terminal.
 [[nodiscard]] std::string left_aligned(std::string_view text, std::size_t width);
 [[nodiscard]] std::string right_aligned(std::string_view text, std::size_t width);
-/// Text in the middle of `width` columns, without spaces behind it.
-[[nodiscard]] std::string centred(std::string_view text, std::size_t width);
 
 /// Two parts of a line with a space between; below each other, the second behind `margin` spaces,
 /// if they take more than the 80 columns of a terminal.
@@ -27,22 +26,32 @@ using wire::shortened;
 /// A column of a table: text stands left, numbers right.
 struct TextColumn {
   std::string_view title;
-  std::size_t width;  ///< A space at least stays between it and the next.
+  std::size_t width;  ///< At least one space of it separates the column from the next.
   bool is_text = false;
+  /// Heading above this column and the next ones with the same one, up to a vertical line.
+  std::string_view group = {};
+  bool is_after_line = false;  ///< A vertical line separates it from the column before it.
 };
 
-/// The columns with room for the longest text of each as far as a line of `line_width_max` columns
-/// of a terminal allows, the first ones first; none becomes narrower.
+/// The columns, widened for the longest text of each as far as a line of `line_width_max` columns
+/// of a terminal allows. The first columns come first; none becomes narrower.
 /// @param rows  As many cells each as there are columns.
 [[nodiscard]] std::vector<TextColumn> widened(std::span<const TextColumn> columns,
                                               std::span<const std::vector<std::string>> rows,
                                               std::size_t line_width_max);
 
-/// A line of a table, of as many cells as there are columns; what does not fit is shortened.
-[[nodiscard]] std::string table_row(std::span<const TextColumn> columns,
-                                    std::span<const std::string> cells);
+/// What happens to a cell that is wider than its column.
+enum class WideCell : std::uint8_t { shorten, keep };
 
-/// The titles, and a line below them.
+/// A line of a table, of as many cells as there are columns.
+[[nodiscard]] std::string table_row(std::span<const TextColumn> columns,
+                                    std::span<const std::string> cells,
+                                    WideCell wide_cell = WideCell::shorten);
+
+/// The horizontal line below the titles, up to the last one; the vertical lines cross it.
+[[nodiscard]] std::string table_rule(std::span<const TextColumn> columns);
+
+/// The groups, if there are any, the titles, and table_rule().
 [[nodiscard]] std::string table_heading(std::span<const TextColumn> columns);
 
 /// `count` times the line ─.

@@ -11,7 +11,7 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/report/report_json.hpp"
-#include "coordinator/report/requirement_text.hpp"
+#include "coordinator/report/requirements.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {

@@ -13,7 +13,7 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
-#include "coordinator/report/sensitivity_text.hpp"
+#include "coordinator/report/sensitivity.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/dispersion.hpp"
 #include "core/campaign/model.hpp"

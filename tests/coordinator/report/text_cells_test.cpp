@@ -12,14 +12,12 @@ namespace {
 TEST(Alignment, FillsUpWithSpaces) {
   EXPECT_EQ(left_aligned("Δx", 4), "Δx  ");
   EXPECT_EQ(right_aligned("Δx", 4), "  Δx");
-  EXPECT_EQ(centred("Δx", 6), "  Δx");
   EXPECT_EQ(horizontal_rule(3), "───");
 }
 
 TEST(Alignment, CutsNothing) {
   EXPECT_EQ(left_aligned("Δxyz", 2), "Δxyz");
   EXPECT_EQ(right_aligned("Δxyz", 2), "Δxyz");
-  EXPECT_EQ(centred("Δxyz", 2), "Δxyz");
 }
 
 TEST(Table, KeepsASpaceBetweenColumns) {
@@ -29,6 +27,29 @@ TEST(Table, KeepsASpaceBetweenColumns) {
   EXPECT_EQ(table_row(columns, std::array<std::string, 2>{"calibration", "1234567"}),
             "cali…  1234…\n");
   EXPECT_EQ(table_row(columns, std::array<std::string, 2>{"a", ""}), "a\n");
+}
+
+TEST(Table, KeepsAWideCellOnRequest) {
+  const std::array<TextColumn, 2> columns{{{"name", 6, true}, {"runs", 6}}};
+  EXPECT_EQ(
+      table_row(columns, std::array<std::string, 2>{"calibration", "1234567"}, WideCell::keep),
+      "calibration1234567\n");
+}
+
+TEST(Table, HasGroupsAndVerticalLines) {
+  constexpr std::array<TextColumn, 5> columns{{{"name", 6, true},
+                                               {"mean", 6, false, "this"},
+                                               {"std", 6, false, "this"},
+                                               {"mean", 6, false, "this", true},
+                                               {"", 2, true}}};
+  EXPECT_EQ(table_heading(columns),
+            "          this    │ this\n"
+            "name    mean  std │  mean\n"
+            "──────────────────┼──────\n");
+  EXPECT_EQ(
+      table_row(columns, std::array<std::string, 5>{"a", "1", "2", "3", " *"}, WideCell::keep),
+      "a          1    2 │     3 *\n");
+  EXPECT_EQ(table_rule(columns), "──────────────────┼──────\n");
 }
 
 TEST(LineOf, BreaksWhatATerminalHasNoRoomFor) {

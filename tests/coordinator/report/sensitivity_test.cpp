@@ -1,4 +1,4 @@
-#include "coordinator/report/sensitivity_text.hpp"
+#include "coordinator/report/sensitivity.hpp"
 
 #include <gmock/gmock.h>
 

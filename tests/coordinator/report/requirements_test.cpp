@@ -1,4 +1,4 @@
-#include "coordinator/report/requirement_text.hpp"
+#include "coordinator/report/requirements.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
-#include "coordinator/report/missing_estimates.hpp"
+#include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/run_result.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/requirement.hpp"
 
@@ -30,6 +33,27 @@ namespace proofmass::coordinator {
 
 /// The same of the probability that a requirement holds, and of what is required.
 [[nodiscard]] std::string success_text(const Interval& bounds, double required, Verdict verdict);
+
+/// Counts the runs that exceed what is required.
+class Exceedances {
+ public:
+  /// @param objectives  Largest acceptable |error| of each quantity, SI.
+  Exceedances(const Requirement& requirement, std::span<const double> objectives)
+      : requirement_(requirement), objectives_(objectives.begin(), objectives.end()) {}
+
+  /// Counts a result that has an estimate; others are none.
+  void add(const RunResult& result);
+
+  /// Of so many runs; those that were not counted have no estimate and count as exceedances.
+  /// @throws InvalidArgument if more were counted.
+  [[nodiscard]] ExceedanceCount of(std::uint64_t num_runs) const;
+
+ private:
+  Requirement requirement_;
+  std::vector<double> objectives_;
+  std::uint64_t num_estimated_ = 0;
+  std::uint64_t num_exceeding_ = 0;
+};
 
 /// A requirement as somebody wrote it, and what the results of a campaign say about it.
 struct RequirementAnswer {

@@ -1,35 +1,49 @@
-#include "coordinator/report/sensitivity_text.hpp"
+#include "coordinator/report/sensitivity.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "coordinator/report/digest.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/runs.hpp"
 #include "core/statistics/sensitivity.hpp"
 #include "core/statistics/term_search.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-constexpr std::size_t name_width = 39;
-constexpr std::size_t share_width = 21;
-constexpr std::size_t rank_width = 9;
-constexpr std::size_t p_width = 11;
-constexpr std::size_t explained_name_width = 38;
-constexpr std::size_t value_width = 10;  // `-0.000477` and a space.
-constexpr std::size_t percentile_width = 11;
-constexpr std::size_t terms_width = 44;
-constexpr std::size_t slope_width = 12;
-constexpr std::size_t term_share_width = 13;
+constexpr std::array<TextColumn, 4> term_columns{
+    {{"error as a sum of", 44, true}, {"slope", 12}, {"of variance", 13}, {"p", 11}}};
 constexpr std::size_t num_terms_max = 3;
 constexpr double p_value_min = 1e-9;  // Below it the approximations of the tests do not hold.
+
+std::vector<std::string> column_names() {
+  std::vector<std::string> names;
+  for (const DrawnQuantity& drawn : model().drawn()) names.emplace_back(drawn.name);
+  for (const Quantity& quantity : model().results().quantities) {
+    names.push_back("truth_" + quantity.column());
+  }
+  return names;
+}
+
+void append(const RunResult& result, const RunDraw& draw, DrawnRuns& drawn) {
+  drawn.runs.push_back(result.run);
+  const std::size_t num_drawn = draw.values.size();
+  for (std::size_t i = 0; i < num_drawn; ++i) drawn.columns[i].push_back(draw.values[i]);
+  for (std::size_t i = 0; i < result.truth.size(); ++i) {
+    drawn.columns[num_drawn + i].push_back(result.truth[i]);
+    drawn.errors[i].push_back(result.error(i));
+  }
+}
 
 std::vector<double> magnitudes_of(const std::vector<double>& errors) {
   std::vector<double> magnitudes(errors.size());
@@ -62,15 +76,15 @@ std::string p_value_cell(double p_value) {
 
 std::string sensitivity_rows(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
                              std::string_view output) {
-  std::string text = left_aligned(fmt::format("drives {}", output), name_width) +
-                     right_aligned("% of variance (95 %)", share_width) +
-                     right_aligned("rank", rank_width) + right_aligned("p", p_width) + "\n" +
-                     horizontal_rule(name_width + share_width + rank_width + p_width) + "\n";
+  const std::string title = fmt::format("drives {}", output);
+  const std::array<TextColumn, 4> columns{
+      {{title, 39, true}, {"% of variance (95 %)", 21}, {"rank", 9}, {"p", 11}}};
+  std::string text = table_heading(columns);
   for (const Sensitivity& row : rows) {
-    text += left_aligned(drawn.names[row.input], name_width) +
-            right_aligned(share_of(row.first_order), share_width) +
-            right_aligned(fmt::format("{:+.2f}", row.rank.coefficient), rank_width) +
-            right_aligned(p_value_cell(row.adjusted_p_value), p_width) + "\n";
+    const std::array cells{drawn.names[row.input], share_of(row.first_order),
+                           fmt::format("{:+.2f}", row.rank.coefficient),
+                           p_value_cell(row.adjusted_p_value)};
+    text += table_row(columns, cells, WideCell::keep);
   }
   return text;
 }
@@ -92,11 +106,10 @@ std::string name_of(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
 
 std::string term_row(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
   const std::string name = name_of(drawn, term);
-  const bool fits = display_width(name) < terms_width;
-  return (fits ? left_aligned(name, terms_width) : name + "\n" + left_aligned("", terms_width)) +
-         right_aligned(fmt::format("{:.3g}", term.slope), slope_width) +
-         right_aligned(fmt::format("{:.1f} %", 100.0 * term.share), term_share_width) +
-         right_aligned(p_value_cell(term.p_value), p_width) + "\n";
+  const bool fits = display_width(name) < term_columns[0].width;
+  const std::array cells{fits ? name : std::string(), fmt::format("{:.3g}", term.slope),
+                         fmt::format("{:.1f} %", 100.0 * term.share), p_value_cell(term.p_value)};
+  return (fits ? "" : name + "\n") + table_row(term_columns, cells, WideCell::keep);
 }
 
 /// The sum of quantities and products of two that explains the error.
@@ -104,10 +117,7 @@ std::string term_table(const DrawnRuns& drawn, std::size_t quantity) {
   const std::vector<ExplanatoryTerm> terms = explanatory_terms(
       inputs_of(drawn), drawn.errors[quantity], num_terms_max, default_confidence);
   if (terms.empty()) return "No quantity and no product of two explains the error.\n";
-  std::string text =
-      left_aligned("error as a sum of", terms_width) + right_aligned("slope", slope_width) +
-      right_aligned("of variance", term_share_width) + right_aligned("p", p_width) + "\n" +
-      horizontal_rule(terms_width + slope_width + term_share_width + p_width) + "\n";
+  std::string text = table_heading(term_columns);
   for (const ExplanatoryTerm& term : terms) text += term_row(drawn, term);
   return text +
          "slope: in SI units; of variance: R², beyond that of the terms above; p: that\n"
@@ -169,19 +179,17 @@ double percentile_of(const std::vector<double>& values, double value) {
 
 std::string explanation_rows(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
                              std::size_t position, std::string_view output) {
-  std::string text =
-      left_aligned(fmt::format("drives {}", output), explained_name_width) +
-      right_aligned("% of variance (95 %)", share_width) + right_aligned("value", value_width) +
-      right_aligned("percentile", percentile_width) + "\n" +
-      horizontal_rule(explained_name_width + share_width + value_width + percentile_width) + "\n";
+  const std::string title = fmt::format("drives {}", output);
+  const std::array<TextColumn, 4> columns{
+      {{title, 38, true}, {"% of variance (95 %)", 21}, {"value", 10}, {"percentile", 11}}};
+  std::string text = table_heading(columns);
   for (const Sensitivity& row : rows) {
     const std::vector<double>& values = drawn.columns[row.input];
     const double value = values[position];
-    text += left_aligned(drawn.names[row.input], explained_name_width) +
-            right_aligned(share_of(row.first_order), share_width) +
-            right_aligned(fmt::format("{:.3g}", value), value_width) +
-            right_aligned(fmt::format("{:.1f}", percentile_of(values, value)), percentile_width) +
-            "\n";
+    const std::array cells{drawn.names[row.input], share_of(row.first_order),
+                           fmt::format("{:.3g}", value),
+                           fmt::format("{:.1f}", percentile_of(values, value))};
+    text += table_row(columns, cells, WideCell::keep);
   }
   return text;
 }
@@ -224,6 +232,34 @@ Json terms_of(const DrawnRuns& drawn, std::size_t quantity) {
 }
 
 }  // namespace
+
+DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uint64_t num_runs_max,
+                          std::optional<RunIndex> also) {
+  DrawnRuns drawn;
+  drawn.names = column_names();
+  drawn.columns.resize(drawn.names.size());
+  drawn.errors.resize(model().results().quantities.size());
+  drawn.missing.num_given_up = num_runs_in(store.given_up_runs());
+  (void)walk_checked(store, [&](const RunResult& result) {
+    const bool is_first = drawn.num_first < num_runs_max;
+    if (!result.has_estimate()) {
+      if (is_first) drawn.missing.add(result);
+      return;
+    }
+    ++drawn.num_with_estimate;
+    drawn.last_with_estimate = result.run;
+    if (!is_first && result.run != also) return;
+    if (is_first) ++drawn.num_first;
+    require_in_range(result, model().results());
+    const RunDraw draw = campaign.draw(result.run);
+    if (draw.values.empty()) {
+      store.refuse_as_damaged(fmt::format(
+          "run {} has an estimate, and its definition yields no draw", result.run.value));
+    }
+    append(result, draw, drawn);
+  });
+  return drawn;
+}
 
 std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity, std::size_t num_rows) {
   const auto both = sensitivities_of(drawn, quantity);

@@ -1,0 +1,146 @@
+#include "coordinator/report/read_results.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "coordinator/report/summarise.hpp"
+#include "core/campaign/model.hpp"
+#include "core/runs.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+// A run that is given up is one of those that lack a result, and as many as were counted with the
+// statistics.
+void check_given_up(const Store& store, const CampaignStatistics& statistics,
+                    std::uint64_t num_given_up) {
+  const std::optional<Summary> summary = store.summary();
+  if (summary && summary->num_finished == statistics.num_runs &&
+      num_given_up < summary->num_given_up) {
+    store.refuse_as_damaged(fmt::format("{} runs are given up, and its statistics are beside {}",
+                                        num_given_up, summary->num_given_up));
+  }
+}
+
+// Results never change: as many of them are the same ones.
+bool are_current(const Store& store) {
+  const std::optional<Summary> summary = store.summary();
+  return summary && summary->num_finished == num_runs_in(store.finished_runs()) &&
+         summary->num_given_up == num_runs_in(store.given_up_runs());
+}
+
+}  // namespace
+
+void MissingEstimates::add(const RunResult& result) {
+  if (result.status == RunStatus::not_finite) ++num_not_finite;
+  if (result.status == RunStatus::no_draw) ++num_no_draw;
+  if (result.status == RunStatus::lost) ++num_lost;
+}
+
+std::uint64_t MissingEstimates::total() const {
+  return num_not_finite + num_no_draw + num_lost + num_given_up;
+}
+
+std::string reasons_text(const MissingEstimates& missing) {
+  const std::array<std::pair<std::uint64_t, std::string_view>, 4> reasons{
+      {{missing.num_not_finite, "not finite"},
+       {missing.num_no_draw, "without draw"},
+       {missing.num_lost, "lost"},
+       {missing.num_given_up, "given up"}}};
+  std::string text;
+  for (const auto& [count, reason] : reasons) {
+    if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, reason);
+  }
+  return text;
+}
+
+RunTotalPasses::RunTotalPasses(ErrorBudget budget)
+    : budget_(std::move(budget)), passes_({.levels = {0.5, 0.95}}) {}
+
+void RunTotalPasses::add(const RunResult& result) {
+  if (!result.has_estimate()) return;
+  errors_.resize(result.estimate.size());
+  for (std::size_t i = 0; i < errors_.size(); ++i) errors_[i] = std::abs(result.error(i));
+  const double total = budget_.after(errors_).total;
+  passes_.add(total);
+  if (!is_first_ && total <= totals_.worst) return;
+  is_first_ = false;
+  totals_.worst = total;
+  totals_.worst_run = result.run;
+}
+
+bool RunTotalPasses::end_pass() { return passes_.end_pass(); }
+
+std::optional<RunTotals> RunTotalPasses::totals() const {
+  if (passes_.count() == 0) return std::nullopt;
+  RunTotals totals = totals_;
+  totals.median = passes_.percentile(0.5);
+  totals.percentile_95 = passes_.percentile(0.95);
+  return totals;
+}
+
+ReadResults read_results(const Store& store, const Campaign& campaign) {
+  StatisticsPasses passes(campaign.objectives());
+  std::optional<RunTotalPasses> totals;
+  if (std::optional<ErrorBudget> budget = campaign.error_budget()) {
+    totals.emplace(*std::move(budget));
+  }
+  ReadResults results{.statistics = {}, .digests = {}, .totals = {}};
+  // Both are asked each time: they may need different numbers of passes.
+  const auto is_pass_needed = [&] {
+    const bool is_for_statistics = passes.end_pass();
+    return (totals && totals->end_pass()) || is_for_statistics;
+  };
+  store.read_one_state([&] {
+    Digest digest;
+    store.for_each_result([&](const RunResult& result) {
+      require_in_range(result, model().results());
+      passes.add(result);
+      if (totals) totals->add(result);
+      digest.add(result);
+    });
+    while (is_pass_needed()) {
+      store.for_each_result([&](const RunResult& result) {
+        passes.add(result);
+        if (totals) totals->add(result);
+      });
+    }
+    results.statistics = passes.statistics();
+    results.digests = digest.finish();
+    if (totals) results.totals = totals->totals();
+  });
+  return results;
+}
+
+CheckedResults read_checked_results(const Store& store, const Campaign& campaign) {
+  CheckedResults checked;
+  store.read_one_state([&] {
+    checked.results = read_results(store, campaign);
+    const CampaignStatistics& statistics = checked.results.statistics;
+    checked.check = check_digest(store, statistics.num_runs, checked.results.digests);
+    checked.given_up = store.given_up_runs();
+    check_given_up(store, statistics, num_runs_in(checked.given_up));
+    check_stop_checks(store, campaign.objectives());
+  });
+  return checked;
+}
+
+void update_statistics(Store& store, const Campaign& campaign) {
+  if (are_current(store)) return;
+  write_statistics(store, campaign, read_results(store, campaign));
+}
+
+void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results) {
+  store.write_statistics(results.statistics, campaign.error_budget(), results.digests);
+}
+
+std::vector<std::string> statistic_differences(const Store& store, const Campaign& campaign,
+                                               const CampaignStatistics& statistics) {
+  return store.statistic_differences(statistics, campaign.error_budget());
+}
+
+}  // namespace proofmass::coordinator

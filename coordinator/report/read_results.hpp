@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "coordinator/report/digest.hpp"
+#include "coordinator/store/store.hpp"
+#include "core/campaign/campaign.hpp"
+#include "core/campaign/run_result.hpp"
+#include "core/campaign/statistics.hpp"
+#include "core/statistics/value_passes.hpp"
+
+namespace proofmass::coordinator {
+
+/// Runs that have no estimate, by reason: statistics leave them out, and say so.
+struct MissingEstimates {
+  std::uint64_t num_not_finite = 0;
+  std::uint64_t num_no_draw = 0;
+  std::uint64_t num_lost = 0;
+  std::uint64_t num_given_up = 0;  ///< Having crashed workers: without a result.
+
+  /// Counts a result if it has no estimate.
+  void add(const RunResult& result);
+  [[nodiscard]] std::uint64_t total() const;
+
+  bool operator==(const MissingEstimates&) const = default;
+};
+
+/// `2 not finite, 1 without draw`, at most 76 characters; empty if there are none.
+[[nodiscard]] std::string reasons_text(const MissingEstimates& missing);
+
+/// The budget totals that the errors of single runs leave, m/s². The total of the worst errors of
+/// all parameters is larger: no run has them all.
+struct RunTotals {
+  double worst = 0.0;
+  RunIndex worst_run;  ///< The first run that reaches `worst`.
+  double median = 0.0;
+  double percentile_95 = 0.0;
+};
+
+/// Computes them of results that are seen in passes, see ValuePasses.
+class RunTotalPasses {
+ public:
+  explicit RunTotalPasses(ErrorBudget budget);
+
+  /// Leaves out a result without an estimate.
+  void add(const RunResult& result);
+  /// @return True if another pass, with the same results, is needed.
+  [[nodiscard]] bool end_pass();
+  /// Empty without a run that has an estimate. @pre No further pass is needed.
+  [[nodiscard]] std::optional<RunTotals> totals() const;
+
+ private:
+  ErrorBudget budget_;
+  ValuePasses passes_;
+  std::vector<double> errors_;  // Of the last result.
+  RunTotals totals_;
+  bool is_first_ = true;  ///< No total was added in any pass.
+};
+
+/// What the results of a campaign database yield.
+struct ReadResults {
+  CampaignStatistics statistics;
+  ResultDigests digests;
+  std::optional<RunTotals> totals;  ///< Empty if no run has an estimate.
+};
+
+/// Reads all results, of one state of the file, as often as StatisticsPasses needs them: twice if
+/// they are many. Memory does not grow with them.
+/// @throws Error if a number is out of range, see require_in_range().
+[[nodiscard]] ReadResults read_results(const Store& store, const Campaign& campaign);
+
+/// What a report is made of.
+struct CheckedResults {
+  ReadResults results;
+  DigestCheck check = DigestCheck::holds;
+  std::vector<RunRange> given_up;  ///< Ascending.
+};
+
+/// Reads all results, of one state of the file, and holds them against what is stored beside them.
+/// @throws StoreError as report_text() does.
+[[nodiscard]] CheckedResults read_checked_results(const Store& store, const Campaign& campaign);
+
+/// Stores statistics, their digest, and the budgets that follow from them in the file.
+void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results);
+
+/// What `statistic` and `budget_entry` have other than write_statistics() would store, a line each:
+/// `statistic.mean of k2d = 1 (must be 25.5)`.
+[[nodiscard]] std::vector<std::string> statistic_differences(const Store& store,
+                                                             const Campaign& campaign,
+                                                             const CampaignStatistics& statistics);
+
+/// Brings the statistics and budgets that are stored in the file up to its results; does nothing
+/// if they are.
+void update_statistics(Store& store, const Campaign& campaign);
+
+}  // namespace proofmass::coordinator
