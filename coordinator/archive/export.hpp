@@ -2,15 +2,46 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/archive/result_columns.hpp"
-#include "coordinator/archive/text_output.hpp"
 #include "coordinator/report/digest.hpp"
+#include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/run_result.hpp"
 
 namespace proofmass::coordinator {
+
+/// @throws ArchiveError `output = path (cannot be written: why)` for an errno.
+[[noreturn]] void fail_to_write(const std::filesystem::path& path, int error_number);
+
+/// Text that goes to standard output as it comes, or to a file that appears when it is complete.
+class TextOutput {
+ public:
+  /// To standard output. A reader that goes away is an error, if SIGPIPE is ignored.
+  TextOutput() = default;
+  /// To a file; one that has this name is replaced at the end.
+  /// @throws ArchiveError `output = path (cannot be written: why)`; so do all below.
+  explicit TextOutput(const std::filesystem::path& path);
+  ~TextOutput();
+  TextOutput(const TextOutput&) = delete;
+  TextOutput& operator=(const TextOutput&) = delete;
+
+  void write(std::string_view text);
+  /// Writes what is left. Without it, a file does not appear.
+  void finish();
+
+ private:
+  void flush();
+  [[nodiscard]] std::filesystem::path name() const;
+
+  std::optional<DraftFile> file_;  ///< Nothing: standard output.
+  int descriptor_ = 1;
+  std::string buffer_;
+};
 
 // All results of a campaign database, in run order, in formats that others read. Numbers are SI and
 // keep all bits; columns are named as in the table `run_result`. README.md describes the formats.
@@ -38,6 +69,13 @@ void export_json(const Store& store, TextOutput& output, const IsStopped& is_sto
 /// campaign are attributes of the root. A file of this name is replaced.
 void export_hdf5(const Store& store, const std::filesystem::path& file, const IsStopped& is_stopped,
                  DrawColumns draws = DrawColumns::left_out);
+
+/// Gives a complete draft its name.
+/// @throws ArchiveError `output = path (cannot be written: why)`.
+void publish(DraftFile& file);
+
+/// The ending of drafts of this process: `.PROCESS.new`.
+[[nodiscard]] std::string draft_ending();
 
 /// walk_checked() with an end.
 /// @throws Interrupted soon after `is_stopped` says so.

@@ -13,7 +13,6 @@
 
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
-#include "coordinator/archive/text_output.hpp"
 #include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
@@ -300,7 +299,7 @@ void write_results(const Writer& writer, const Store& store, const IsStopped& is
 
 void export_hdf5(const Store& store, const std::filesystem::path& file, const IsStopped& is_stopped,
                  DrawColumns draws) {
-  DraftFile draft(file);
+  DraftFile draft(file, draft_ending());
   Writer writer(draft);
   store.read_one_state([&] {
     check_definition_digest(store);
@@ -308,7 +307,7 @@ void export_hdf5(const Store& store, const std::filesystem::path& file, const Is
     write_results(writer, store, is_stopped, draws);
   });
   writer.close();
-  draft.publish();
+  publish(draft);
 }
 
 }  // namespace proofmass::coordinator

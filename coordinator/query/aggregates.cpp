@@ -8,9 +8,9 @@
 #include <cstddef>
 #include <utility>
 
-#include "coordinator/query/interval_functions.hpp"
 #include "core/error.hpp"
 #include "core/statistics/correlation.hpp"
+#include "core/statistics/interval.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
 #include "core/statistics/tolerance.hpp"
@@ -23,6 +23,14 @@ constexpr double any_confidence = 0.95;
 
 // Values beyond are scaled: fourth powers of what is 2^-53 of them stay in the range of a double.
 constexpr int exponent_max = 128;
+
+// A coverage or a confidence that SQL states in per cent, as a fraction. One below 1 % is of no use
+// and would be a fraction where per cent is meant.
+double fraction_of(std::string_view name, double per_cent) {
+  if (per_cent >= 1.0 && per_cent < 100.0) return per_cent / 100.0;
+  throw InvalidArgument(
+      fmt::format("{} = {} (must be per cent in [1, 100), not a fraction)", name, per_cent));
+}
 
 bool varies(std::span<const double> column) {
   return std::ranges::any_of(column, [&](double value) { return value != column.front(); });
@@ -136,6 +144,32 @@ std::vector<double> scaled(std::span<const double> column, int exponent) {
   std::vector<double> values(column.begin(), column.end());
   for (double& value : values) value = std::ldexp(value, -exponent);
   return values;
+}
+
+constexpr double num_runs_counted_max = 1e9;
+
+double count_of(std::string_view name, double value, double largest) {
+  if (value >= 0.0 && value <= largest && std::floor(value) == value) return value;
+  throw InvalidArgument(
+      fmt::format("{} = {} (must be a whole number in [0, {}])", name, value, largest));
+}
+
+std::optional<Interval> interval_of(std::span<const std::optional<double>> arguments) {
+  const bool is_known =
+      std::ranges::all_of(arguments, [](const auto& argument) { return argument.has_value(); });
+  if (!is_known) return std::nullopt;
+  const double num_runs = count_of("runs", *arguments[1], num_runs_counted_max);
+  const double num_hits = count_of("hits", *arguments[0], num_runs);
+  const double confidence = fraction_of("confidence", *arguments[2]);
+  if (num_runs == 0.0) return std::nullopt;
+  return probability_interval(num_hits, num_runs, confidence);
+}
+
+template <double Interval::*bound>
+std::optional<double> bound_of(std::span<const std::optional<double>> arguments) {
+  const std::optional<Interval> interval = interval_of(arguments);
+  if (!interval) return std::nullopt;
+  return (*interval).*bound;
 }
 
 }  // namespace
@@ -253,6 +287,19 @@ std::optional<double> AggregateRows::evaluate(std::span<const double> x,
                                               std::span<const double> y) const {
   return aggregate_->evaluate(
       {.x = x, .y = y, .num_unknown = num_unknown_, .parameters = parameters_});
+}
+
+std::span<const std::string_view> interval_argument_names() {
+  static constexpr std::array<std::string_view, interval_arguments> names{"hits", "runs",
+                                                                          "confidence"};
+  return names;
+}
+
+std::span<const IntervalFunction> interval_functions() {
+  static constexpr std::array<IntervalFunction, 2> all{
+      {{"binomial_interval_lower", bound_of<&Interval::lower>},
+       {"binomial_interval_upper", bound_of<&Interval::upper>}}};
+  return all;
 }
 
 }  // namespace proofmass::coordinator

@@ -84,4 +84,21 @@ class AggregateRows {
   std::vector<std::pair<double, double>> pairs_;  ///< Of one with two.
 };
 
+inline constexpr std::size_t interval_arguments = 3;
+
+/// A function of one row that yields one bound of an interval.
+struct IntervalFunction {
+  const char* name;
+  /// @param arguments  hits, runs, confidence; empty is NULL.
+  /// @returns Empty (NULL in SQL) if an argument is NULL or there are no runs.
+  /// @throws InvalidArgument if an argument breaks its rule.
+  std::optional<double> (*evaluate)(std::span<const std::optional<double>> arguments);
+};
+
+/// Names of the arguments, for messages.
+[[nodiscard]] std::span<const std::string_view> interval_argument_names();
+
+/// binomial_interval_lower and binomial_interval_upper; see README.md.
+[[nodiscard]] std::span<const IntervalFunction> interval_functions();
+
 }  // namespace proofmass::coordinator

@@ -1,14 +1,16 @@
+#include "coordinator/query/draw_table.hpp"
+
 #include <sqlite3ext.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
-#include "coordinator/query/drawn_campaign.hpp"
 #include "coordinator/query/functions.hpp"
 #include "coordinator/query/virtual_table-inl.hpp"
 #include "core/campaign/model.hpp"
@@ -20,35 +22,32 @@ namespace {
 
 enum Column : int { run_index_column, quantity_column, unit_column, value_column, campaign_column };
 
-struct Draw {
+struct DrawCursor : sqlite3_vtab_cursor {
   static constexpr const char* name = "draw";
+  static constexpr const char* module = "proofmass_draw";
   static constexpr const char* declaration =
       "CREATE TABLE draw(run_index INTEGER, quantity TEXT, unit TEXT, value REAL, "
       "campaign TEXT HIDDEN)";
-  static constexpr const char* module = "proofmass_draw";
   static constexpr const char* creation =
       "CREATE VIRTUAL TABLE IF NOT EXISTS temp.draw USING proofmass_draw";
-
+  static constexpr int argument_column = campaign_column;
   using Made = DrawnCampaign;
-  struct Cursor : sqlite3_vtab_cursor {
-    std::shared_ptr<DrawnCampaign> runs;
-    DrawScan scan;
-    std::uint64_t run = 0;
-    std::size_t quantity = 0;
-    std::vector<double> values;  // Of the run; empty if all draws were rejected.
-  };
 
-  static int choose_plan(sqlite3_vtab* table, sqlite3_index_info* plan);
-  static int filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value** values);
-  static int next(sqlite3_vtab_cursor* base);
-  static int is_at_end(sqlite3_vtab_cursor* base);
-  static int column(sqlite3_vtab_cursor* base, sqlite3_context* context, int number);
-  static int row_identifier(sqlite3_vtab_cursor* base, sqlite3_int64* identifier);
+  static void choose_plan(sqlite3_index_info& plan);
+  void begin(VirtualTable<DrawCursor>& table, int plan, sqlite3_value** arguments);
+  void next();
+  [[nodiscard]] bool is_at_end() const { return run >= scan.end_run; }
+  [[nodiscard]] std::int64_t row() const;
+  void give_column(sqlite3_context* context, int number) const;
+
+  void go_to_run(std::uint64_t index);
+
+  std::shared_ptr<DrawnCampaign> runs;
+  DrawScan scan;
+  std::uint64_t run = 0;
+  std::size_t quantity = 0;
+  std::vector<double> values;  // Of the run; empty if all draws were rejected.
 };
-
-using DrawTable = VirtualTable<Draw>;
-
-Draw::Cursor& cursor_of(sqlite3_vtab_cursor* cursor) { return *static_cast<Draw::Cursor*>(cursor); }
 
 /// What a plan may hand to the scan, in the order of its arguments; bit i of the plan's number says
 /// that it does.
@@ -74,13 +73,13 @@ constexpr int range_bits = 0b1111 << 3;
 
 // The place of the first usable constraint that fits an offer. Names are compared byte by byte, so
 // that only such a comparison of quantities is one.
-std::optional<int> constraint_for(const Offer& offer, sqlite3_index_info* plan) {
-  for (int i = 0; i < plan->nConstraint; ++i) {
-    const auto& constraint = plan->aConstraint[i];
+std::optional<int> constraint_for(const Offer& offer, sqlite3_index_info& plan) {
+  for (int i = 0; i < plan.nConstraint; ++i) {
+    const auto& constraint = plan.aConstraint[i];
     if (constraint.iColumn != offer.column || constraint.op != offer.comparison) continue;
     if (constraint.usable == 0) continue;
     const bool is_text = offer.column == quantity_column;
-    if (is_text && std::string_view(sqlite3_vtab_collation(plan, i)) != "BINARY") continue;
+    if (is_text && std::string_view(sqlite3_vtab_collation(&plan, i)) != "BINARY") continue;
     return i;
   }
   return std::nullopt;
@@ -99,25 +98,18 @@ void estimate_cost(sqlite3_index_info& plan) {
   if ((plan.idxNum & one_row) == one_row) plan.idxFlags = SQLITE_INDEX_SCAN_UNIQUE;
 }
 
-int Draw::choose_plan(sqlite3_vtab*, sqlite3_index_info* plan) {
-  if (ignores_the_argument(*plan, campaign_column)) return SQLITE_CONSTRAINT;
+void DrawCursor::choose_plan(sqlite3_index_info& plan) {
   int num_arguments = 0;
   for (std::size_t i = 0; i < offers.size(); ++i) {
     const std::optional<int> constraint = constraint_for(offers[i], plan);
     if (!constraint) continue;
-    plan->idxNum |= 1 << i;
-    plan->aConstraintUsage[*constraint].argvIndex = ++num_arguments;
-    plan->aConstraintUsage[*constraint].omit = offers[i].column == campaign_column;
+    plan.idxNum |= 1 << i;
+    plan.aConstraintUsage[*constraint].argvIndex = ++num_arguments;
+    plan.aConstraintUsage[*constraint].omit = offers[i].column == campaign_column;
   }
-  estimate_cost(*plan);
-  plan->orderByConsumed = plan->nOrderBy == 1 && plan->aOrderBy[0].desc == 0 &&
-                          plan->aOrderBy[0].iColumn == run_index_column;
-  return SQLITE_OK;
-}
-
-// The database whose runs a plan asks for: the main one unless it names another.
-std::string database_in(DrawTable& table, int plan, sqlite3_value** values) {
-  return (plan & campaign_bit) == 0 ? "main" : database_of(table.connection, values[0]);
+  estimate_cost(plan);
+  plan.orderByConsumed = plan.nOrderBy == 1 && plan.aOrderBy[0].desc == 0 &&
+                         plan.aOrderBy[0].iColumn == run_index_column;
 }
 
 // Other types than these compare by rules of SQLite's own, and narrow nothing.
@@ -137,79 +129,100 @@ void narrow(DrawScan& scan, const Offer& offer, sqlite3_value* value) {
 }
 
 // Behind the end there are no values.
-void go_to_run(Draw::Cursor& cursor, std::uint64_t run) {
-  cursor.run = run;
-  cursor.quantity = cursor.scan.quantity.value_or(0);
-  if (run < cursor.scan.end_run) cursor.values = cursor.runs->values_of(RunIndex{run});
+void DrawCursor::go_to_run(std::uint64_t index) {
+  run = index;
+  quantity = scan.quantity.value_or(0);
+  if (run < scan.end_run) values = runs->values_of(RunIndex{run});
 }
 
-int Draw::filter(sqlite3_vtab_cursor* base, int plan, const char*, int, sqlite3_value** values) {
-  Cursor& cursor = cursor_of(base);
-  return guarded(*base->pVtab, name, [&] {
-    DrawTable& table = DrawTable::of(*base);
-    cursor.runs =
-        table.databases.current(table.connection, database_in(table, plan, values),
-                                [](std::shared_ptr<const Campaign> campaign) {
-                                  return std::make_shared<DrawnCampaign>(std::move(campaign));
-                                });
-    cursor.scan = {.first_run = 0, .end_run = cursor.runs->num_runs(), .quantity = {}};
-    for (std::size_t i = 0; i < offers.size(); ++i) {
-      if ((plan & (1 << i)) == 0) continue;
-      sqlite3_value* value = *values++;
-      if (offers[i].column != campaign_column) narrow(cursor.scan, offers[i], value);
-    }
-    go_to_run(cursor, cursor.scan.first_run);
-  });
+// Without an argument, the main database is meant.
+void DrawCursor::begin(VirtualTable<DrawCursor>& table, int plan, sqlite3_value** arguments) {
+  const bool is_named = (plan & campaign_bit) != 0;
+  runs = table.databases.current(table.connection,
+                                 is_named ? database_of(table.connection, arguments[0]) : "main",
+                                 [](std::shared_ptr<const Campaign> campaign) {
+                                   return std::make_shared<DrawnCampaign>(std::move(campaign));
+                                 });
+  scan = {.first_run = 0, .end_run = runs->num_runs(), .quantity = {}};
+  for (std::size_t i = 0; i < offers.size(); ++i) {
+    if ((plan & (1 << i)) == 0) continue;
+    sqlite3_value* value = *arguments++;
+    if (offers[i].column != campaign_column) narrow(scan, offers[i], value);
+  }
+  go_to_run(scan.first_run);
 }
 
-int Draw::next(sqlite3_vtab_cursor* base) {
-  Cursor& cursor = cursor_of(base);
-  return guarded(*base->pVtab, name, [&] {
-    ++cursor.quantity;
-    if (cursor.scan.quantity || cursor.quantity == model().drawn().size())
-      go_to_run(cursor, cursor.run + 1);
-  });
+void DrawCursor::next() {
+  ++quantity;
+  if (scan.quantity || quantity == model().drawn().size()) go_to_run(run + 1);
 }
 
-int Draw::is_at_end(sqlite3_vtab_cursor* cursor) {
-  return cursor_of(cursor).run >= cursor_of(cursor).scan.end_run ? 1 : 0;
+std::int64_t DrawCursor::row() const {
+  return static_cast<std::int64_t>(run * model().drawn().size() + quantity);
 }
 
 void set_text(sqlite3_context* context, std::string_view text) {
   sqlite3_result_text(context, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
 }
 
-int Draw::column(sqlite3_vtab_cursor* base, sqlite3_context* context, int number) {
-  const Cursor& cursor = cursor_of(base);
+void DrawCursor::give_column(sqlite3_context* context, int number) const {
   switch (number) {
     case run_index_column:
-      sqlite3_result_int64(context, static_cast<sqlite3_int64>(cursor.run));
-      break;
+      return sqlite3_result_int64(context, static_cast<sqlite3_int64>(run));
     case quantity_column:
-      set_text(context, std::string(model().drawn()[cursor.quantity].name));
-      break;
+      return set_text(context, model().drawn()[quantity].name);
     case unit_column:
-      set_text(context, std::string(model().drawn()[cursor.quantity].unit));
-      break;
+      return set_text(context, model().drawn()[quantity].unit);
     case value_column:
-      if (!cursor.values.empty()) {
-        sqlite3_result_double(context, cursor.values[cursor.quantity]);
-      }
-      break;
+      if (!values.empty()) sqlite3_result_double(context, values[quantity]);
+      return;
     default:
-      set_text(context, cursor.runs->campaign_name());
+      set_text(context, runs->campaign_name());
   }
-  return SQLITE_OK;
-}
-
-int Draw::row_identifier(sqlite3_vtab_cursor* base, sqlite3_int64* identifier) {
-  const Cursor& cursor = cursor_of(base);
-  *identifier = static_cast<sqlite3_int64>(cursor.run * model().drawn().size() + cursor.quantity);
-  return SQLITE_OK;
 }
 
 }  // namespace
 
-int register_draw_table(sqlite3* connection) { return DrawTable::add_to(connection); }
+DrawnCampaign::DrawnCampaign(std::shared_ptr<const Campaign> campaign)
+    : campaign_(std::move(campaign)) {}
+
+const std::vector<double>& DrawnCampaign::values_of(RunIndex run) {
+  if (last_run_ == run) return last_values_;
+  last_values_ = campaign_->draw(run).values;
+  last_run_ = run;
+  return last_values_;
+}
+
+void DrawScan::narrow(RunComparison comparison, std::int64_t bound) {
+  // One step outside all run indices excludes or admits as much as any further one.
+  const auto limit = static_cast<std::int64_t>(num_runs_max);
+  const std::int64_t run = std::clamp<std::int64_t>(bound, -1, limit);
+  const auto not_negative = [](std::int64_t value) {
+    return static_cast<std::uint64_t>(std::max<std::int64_t>(value, 0));
+  };
+  const bool is_lower = comparison != RunComparison::below && comparison != RunComparison::at_most;
+  const bool is_upper = comparison != RunComparison::above && comparison != RunComparison::at_least;
+  const std::int64_t first = comparison == RunComparison::above ? run + 1 : run;
+  const std::int64_t end = comparison == RunComparison::below ? run : run + 1;
+  if (is_lower) first_run = std::max(first_run, not_negative(first));
+  if (is_upper) end_run = std::min(end_run, not_negative(end));
+  end_run = std::max(first_run, end_run);
+}
+
+void DrawScan::narrow(RunComparison comparison, double bound) {
+  const double limit = static_cast<double>(num_runs_max);
+  const double run = std::floor(std::clamp(bound, -1.0, limit));
+  // Between two indices, or at one: what is below it is at most the index before or it.
+  const bool is_below = comparison == RunComparison::below;
+  const bool is_above = comparison == RunComparison::above;
+  narrow(is_below   ? RunComparison::at_most
+         : is_above ? RunComparison::at_least
+                    : comparison,
+         static_cast<std::int64_t>(run));
+}
+
+int register_draw_table(sqlite3* connection) {
+  return VirtualTable<DrawCursor>::add_to(connection);
+}
 
 }  // namespace proofmass::coordinator

@@ -13,10 +13,10 @@
 #include <string_view>
 
 #include "coordinator/query/aggregates.hpp"
-#include "coordinator/query/interval_functions.hpp"
 #include "core/error.hpp"
 
-SQLITE_EXTENSION_INIT3
+// Where the program that loads the extension keeps SQLite's functions; empty in our own programs.
+SQLITE_EXTENSION_INIT1
 
 namespace proofmass::coordinator {
 namespace {
@@ -153,3 +153,12 @@ int register_functions(sqlite3* connection) {
 }
 
 }  // namespace proofmass::coordinator
+
+#ifndef SQLITE_CORE
+/// Called by SQLite, which derives the name from that of the file, `proofmass_sqlite.so`.
+extern "C" __attribute__((visibility("default"))) int sqlite3_proofmasssqlite_init(
+    sqlite3* connection, char**, const sqlite3_api_routines* api) {
+  SQLITE_EXTENSION_INIT2(api)
+  return proofmass::coordinator::register_functions(connection);
+}
+#endif

@@ -11,8 +11,7 @@
 #include <vector>
 
 #include "coordinator/query/functions.hpp"
-#include "coordinator/query/open_files.hpp"
-#include "coordinator/query/read_rule.hpp"
+#include "coordinator/query/read_only_connection.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "proto/text/visible_text.hpp"
@@ -22,16 +21,12 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int busy_timeout_ms = 5000;
 constexpr std::size_t shown_sql_width = 60;
 // So often, counted in steps of SQLite's machine, somebody looks at the clock; a row of draw()
 // takes a few steps, and 10 ms in the worst case.
 constexpr int steps_between_looks = 100;
 
-struct Finalize {
-  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
-};
-using Statement = std::unique_ptr<sqlite3_stmt, Finalize>;
+using Statement = std::unique_ptr<sqlite3_stmt, detail::FinalizeStatement>;
 
 // One line of the query, that of the position if there is one.
 std::string shown_sql(std::string_view sql, std::size_t position) {
@@ -81,6 +76,7 @@ class Reader {
   [[nodiscard]] bool is_interrupted() const { return is_interrupted_; }
 
  private:
+  [[nodiscard]] sqlite3* connection() const { return database_->handle(); }
   void restrict_connection();
   void set_limits();
   static int on_progress(void* reader);
@@ -95,7 +91,7 @@ class Reader {
   bool is_late_ = false;
   bool is_interrupted_ = false;
   ReadRule rule_;
-  Connection connection_;
+  std::unique_ptr<detail::Database> database_;
 };
 
 std::string text_of(const QueryFiles& files) {
@@ -105,31 +101,24 @@ std::string text_of(const QueryFiles& files) {
 }
 
 Reader::Reader(const QueryFiles& files, const QueryLimits& limits, Clock::time_point end)
-    : files_text_(text_of(files)), limits_(limits), end_(end), connection_(open_files(files)) {
-  sqlite3* const connection = connection_.get();
-  sqlite3_extended_result_codes(connection, 1);
-  sqlite3_busy_timeout(connection, busy_timeout_ms);
-  check(register_functions(connection));
+    : files_text_(text_of(files)), limits_(limits), end_(end), database_(open_files(files)) {
+  check(register_functions(connection()));
   set_limits();
   restrict_connection();
 }
 
-// A file from elsewhere is data: nothing in its schema may call a function with side effects, and
-// text in double quotes is a name and never a value.
+// Beside what holds for every reader, see detail::configure(). Text in double quotes is a name and
+// never a value.
 void Reader::restrict_connection() {
-  sqlite3* connection = connection_.get();
-  constexpr std::array<std::pair<int, int>, 5> settings{{{SQLITE_DBCONFIG_DEFENSIVE, 1},
-                                                         {SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0},
-                                                         {SQLITE_DBCONFIG_ENABLE_LOAD_EXTENSION, 0},
+  constexpr std::array<std::pair<int, int>, 3> settings{{{SQLITE_DBCONFIG_ENABLE_LOAD_EXTENSION, 0},
                                                          {SQLITE_DBCONFIG_ENABLE_FTS3_TOKENIZER, 0},
                                                          {SQLITE_DBCONFIG_DQS_DML, 0}}};
   for (const auto& [setting, value] : settings) {
-    check(sqlite3_db_config(connection, setting, value, nullptr));
+    check(sqlite3_db_config(connection(), setting, value, nullptr));
   }
-  check(sqlite3_exec(connection, "PRAGMA cell_size_check = ON; PRAGMA query_only = ON", nullptr,
-                     nullptr, nullptr));
-  rule_.apply_to(connection);
-  sqlite3_progress_handler(connection, steps_between_looks, &Reader::on_progress, this);
+  database_->execute("PRAGMA query_only = ON");
+  rule_.apply_to(connection());
+  sqlite3_progress_handler(connection(), steps_between_looks, &Reader::on_progress, this);
 }
 
 void Reader::set_limits() {
@@ -142,7 +131,7 @@ void Reader::set_limits() {
        {SQLITE_LIMIT_LIKE_PATTERN_LENGTH, 1000},
        {SQLITE_LIMIT_ATTACHED, 0},
        {SQLITE_LIMIT_WORKER_THREADS, 0}}};
-  for (const auto& [limit, value] : bounds) sqlite3_limit(connection_.get(), limit, value);
+  for (const auto& [limit, value] : bounds) sqlite3_limit(connection(), limit, value);
 }
 
 int Reader::on_progress(void* self) {
@@ -159,7 +148,7 @@ void Reader::check(int code) const {
 // What the file is to blame for, what the time, and what the query.
 void Reader::fail(int code, const std::string& sql) const {
   if (!rule_.refusal().empty()) refuse(sql, rule_.refusal());
-  const char* text = sqlite3_errmsg(connection_.get());
+  const char* text = sqlite3_errmsg(connection());
   switch (code & 0xff) {
     case SQLITE_INTERRUPT:
       throw TimeLimitError(time_limit_text(limits_));
@@ -182,8 +171,8 @@ void Reader::fail(int code, const std::string& sql) const {
 }
 
 void Reader::fail_query(const std::string& sql) const {
-  const std::string text = with_remedy(sqlite3_errmsg(connection_.get()));
-  const int offset = sqlite3_error_offset(connection_.get());
+  const std::string text = with_remedy(sqlite3_errmsg(connection()));
+  const int offset = sqlite3_error_offset(connection());
   if (offset < 0) refuse(sql, text);
   const auto position = static_cast<std::size_t>(offset);
   throw QueryError(fmt::format("sql = {} ({}, at {})", shown_sql(sql, position), text,
@@ -197,7 +186,7 @@ Statement Reader::prepare(const std::string& sql) {
   if (sql.find('\0') != std::string::npos) refuse(sql, "must not hold a zero byte");
   sqlite3_stmt* statement = nullptr;
   const char* rest = nullptr;
-  const int code = sqlite3_prepare_v2(connection_.get(), sql.c_str(), -1, &statement, &rest);
+  const int code = sqlite3_prepare_v2(connection(), sql.c_str(), -1, &statement, &rest);
   Statement prepared(statement);
   if (code != SQLITE_OK) fail(code, sql);
   if (!prepared) refuse(sql, "holds no statement");
@@ -215,7 +204,7 @@ void Reader::require_one_statement(const std::string& sql, const char* rest) {
   while (*rest != '\0') {
     sqlite3_stmt* statement = nullptr;
     const char* begin = rest;
-    const int code = sqlite3_prepare_v2(connection_.get(), begin, -1, &statement, &rest);
+    const int code = sqlite3_prepare_v2(connection(), begin, -1, &statement, &rest);
     const Statement prepared(statement);
     if (code == SQLITE_OK && !prepared) continue;
     const auto position = static_cast<std::size_t>(begin - sql.c_str());

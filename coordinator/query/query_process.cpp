@@ -16,7 +16,6 @@
 #include <vector>
 
 #include "coordinator/query/child_process.hpp"
-#include "coordinator/query/part_stream.hpp"
 #include "coordinator/store/store_error.hpp"
 
 namespace proofmass::coordinator {

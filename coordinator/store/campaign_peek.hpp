@@ -9,7 +9,7 @@
 
 namespace proofmass::coordinator {
 
-/// What a campaign database says about itself at a glance.
+/// What a few rows of a campaign database tell.
 struct CampaignPeek {
   wire::CampaignId id;
   std::string name;
@@ -20,8 +20,8 @@ struct CampaignPeek {
   std::uint64_t num_finished = 0;
   std::uint64_t num_given_up = 0;
   std::string owner;  ///< Empty if not known.
-  /// The campaign is finished or cancelled, its statistics are those of its results, and no
-  /// coordinator left a log: everything is in this one file, and nothing remains to be done.
+  /// The campaign is finished or cancelled, its statistics are up to date, and there is no log:
+  /// everything is in this one file, and nothing remains to be done.
   bool is_at_rest = false;
 };
 
@@ -31,15 +31,14 @@ enum class PeekDepth : std::uint8_t {
   pages,  ///< Every page of its tables as well, which tells most damage.
 };
 
-/// Whether a file has a write-ahead log or a rollback journal that is not empty: it may lack pages
-/// that stand there.
+/// Whether a file has a write-ahead log or a rollback journal that is not empty: pages that are
+/// there may be missing in the file itself.
 [[nodiscard]] bool has_journal(const std::filesystem::path& path);
 
-/// Reads a few rows of a campaign database without opening it for anybody else to notice: no lock,
-/// no log, no write, whether a coordinator has it or not. What stands in the log of a file that is
-/// being written is not seen.
-/// @throws StoreError if it is missing, no campaign database, newer than this program or damaged
-/// where it is looked at; also if it lacks pages that stand in its log.
+/// Reads a few rows of a campaign database without a lock, without its log and without writing,
+/// whether a coordinator has it open or not. Changes that are in the log only are not seen.
+/// @throws StoreError if the file is missing, is no campaign database, is newer than this program,
+/// is damaged in the part that is read, or lacks pages that are in its log only.
 [[nodiscard]] CampaignPeek peek_campaign(const std::filesystem::path& path,
                                          PeekDepth depth = PeekDepth::rows);
 

@@ -22,7 +22,6 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
-#include "coordinator/store/detail/store_lock.hpp"
 #include "core/campaign/model.hpp"
 #include "proto/link/kill_point.hpp"
 #include "proto/text/visible_text.hpp"
@@ -34,14 +33,6 @@ using detail::Database;
 using detail::Transaction;
 
 namespace {
-
-void check_presence(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (std::filesystem::is_regular_file(path, ignored)) return;
-  throw StoreError(
-      fmt::format("campaign database = {} ({})", path.string(),
-                  std::filesystem::exists(path, ignored) ? "is no file" : "does not exist"));
-}
 
 // Lock and log go by the name of the file: by another name it has others, and both would write.
 void check_that_name_is_the_only_one(const std::filesystem::path& path) {
@@ -105,7 +96,7 @@ Store Store::create_filled(const std::filesystem::path& path, const Campaign& ca
   detail::check_directory_of(path);
   auto lock = std::make_unique<detail::StoreLock>(path);
   detail::check_absence(path);
-  detail::appear_complete(path, detail::IfThere::keep, [&](const std::filesystem::path& draft) {
+  detail::appear_complete(path, IfThere::keep, [&](const std::filesystem::path& draft) {
     write_draft(draft, campaign, definition, fill);
   });
   return Store(std::make_unique<Impl>(path, std::move(lock)));
@@ -130,7 +121,7 @@ Store Store::merge(const std::filesystem::path& path, const Campaign& campaign,
 }
 
 Store Store::open(const std::filesystem::path& path) {
-  check_presence(path);
+  detail::check_presence(path);
   check_that_name_is_the_only_one(path);
   detail::check_directory_of(path);
   Store store(std::make_unique<Impl>(path, std::make_unique<detail::StoreLock>(path)));
@@ -141,13 +132,13 @@ Store Store::open(const std::filesystem::path& path) {
 }
 
 Store Store::open_read_only(const std::filesystem::path& path) {
-  check_presence(path);
+  detail::check_presence(path);
   return Store(std::make_unique<Impl>(path));
 }
 
 void Store::annotate(const std::filesystem::path& path,
                      const std::vector<Annotation>& annotations) {
-  check_presence(path);
+  detail::check_presence(path);
   check_that_name_is_the_only_one(path);
   detail::check_directory_of(path);
   const std::unique_ptr<detail::StoreLock> lock = lock_if_free(path);
@@ -340,7 +331,7 @@ CommitSummary Store::write(std::span<const Entry> entries) {
   return summary;
 }
 
-bool Store::is_of_older_version() const { return impl_->is_older; }
+bool Store::is_of_older_version() const { return impl_->database.is_private_copy(); }
 
 bool Store::has_lost_its_log() const { return impl_->is_log_lost; }
 
@@ -414,15 +405,14 @@ void Store::back_up(const std::filesystem::path& destination) const {
   check_name(destination);
   const detail::StoreLock lock(destination);
   detail::check_absence(destination);
-  detail::appear_complete(
-      destination, detail::IfThere::keep, [&](const std::filesystem::path& draft) {
-        Database copy(draft, Access::create);
-        impl_->database.copy_to(copy);
-        copy.execute("PRAGMA cell_size_check = ON");
-        (void)detail::check_all_pages(copy);  // Nobody shall rely on the copy of a damaged file.
-        // What is copied may say that there is a log.
-        copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
-      });
+  detail::appear_complete(destination, IfThere::keep, [&](const std::filesystem::path& draft) {
+    Database copy(draft, Access::create);
+    impl_->database.copy_to(copy);
+    copy.execute("PRAGMA cell_size_check = ON");
+    (void)detail::check_all_pages(copy);  // Nobody shall rely on the copy of a damaged file.
+    // What is copied may say that there is a log.
+    copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
+  });
 }
 
 }  // namespace proofmass::coordinator

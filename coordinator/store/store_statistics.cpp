@@ -5,9 +5,9 @@
 #include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/integrity.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
-#include "coordinator/store/detail/table_differences.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {

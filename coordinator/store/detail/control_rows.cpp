@@ -12,8 +12,8 @@
 #include <span>
 #include <string>
 
+#include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/integrity.hpp"
-#include "coordinator/store/detail/worker_rows.hpp"
 #include "coordinator/store/store_error.hpp"
 
 namespace proofmass::coordinator::detail {

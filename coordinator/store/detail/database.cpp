@@ -19,31 +19,32 @@ constexpr int sql_size_max = 1'000'000;  // Of a statement, a definition in the 
 
 // One thread at a time uses a connection, so that SQLite need not lock it for each column.
 int open_flags(Access access) {
+  constexpr int common = SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX;
   switch (access) {
     case Access::create:
     case Access::memory:
-      return SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
+      return common | SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
     case Access::read_write:
-      return SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
-    case Access::read_only:
-      break;
+    case Access::read_only:  // The name says that this file is read-only.
+      return common | SQLITE_OPEN_READWRITE;
     case Access::immutable:
-      return SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX;
+      break;
   }
-  return SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX;
+  return common | SQLITE_OPEN_READONLY;
 }
 
 // An absolute path is never mistaken for `:memory:` or a URI.
 std::string name_of(const std::filesystem::path& path, Access access) {
-  if (access == Access::memory) return ":memory:";
-  std::string name = std::filesystem::absolute(path).string();
-  if (access != Access::immutable) return name;
-  std::string uri = "file://";
-  for (const char c : name) {
-    const bool is_special = c == '%' || c == '?' || c == '#';
-    uri += is_special ? fmt::format("%{:02X}", static_cast<int>(c)) : std::string(1, c);
+  switch (access) {
+    case Access::memory:
+      return ":memory:";
+    case Access::read_only:
+      return file_uri(path, "mode=ro");
+    case Access::immutable:
+      return file_uri(path, "immutable=1");
+    default:
+      return std::filesystem::absolute(path).string();
   }
-  return uri + "?immutable=1";
 }
 
 // SQLite applies a log to whatever file has the name, also to one that was put there since.
@@ -97,8 +98,8 @@ std::string explanation(int code, sqlite3* connection, const std::filesystem::pa
 
 // In one step: with several, a writer in another process would begin the copy anew each time. The
 // end does not tell that the step found the file locked and copied nothing.
-int copy_all(sqlite3* from, sqlite3* to) {
-  sqlite3_backup* const backup = sqlite3_backup_init(to, "main", from, "main");
+int copy_all(sqlite3* from, sqlite3* to, const char* name = "main") {
+  sqlite3_backup* const backup = sqlite3_backup_init(to, name, from, "main");
   if (backup == nullptr) return sqlite3_errcode(to);
   const int step_code = sqlite3_backup_step(backup, -1);
   const int end_code = sqlite3_backup_finish(backup);
@@ -107,7 +108,17 @@ int copy_all(sqlite3* from, sqlite3* to) {
 
 }  // namespace
 
-void Statement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+std::string file_uri(const std::filesystem::path& file, std::string_view parameter) {
+  std::string uri = "file://";
+  for (const char character : std::filesystem::absolute(file).string()) {
+    const bool has_meaning = character == '%' || character == '?' || character == '#';
+    uri += has_meaning ? fmt::format("%{:02X}", static_cast<int>(character))
+                       : std::string(1, character);
+  }
+  return fmt::format("{}?{}", uri, parameter);
+}
+
+void FinalizeStatement::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 
 Statement::Statement(const Database& database, sqlite3_stmt* statement)
     : database_(&database), statement_(statement) {}
@@ -309,6 +320,26 @@ void Database::go_on_with_private_copy() {
   const int off =
       sqlite3_exec(connection_.get(), "PRAGMA journal_mode = OFF", nullptr, nullptr, nullptr);
   if (off != SQLITE_OK) fail(off);
+}
+
+void Database::attach(const std::string& database, const std::string& name,
+                      const std::filesystem::path& file) {
+  try {
+    prepare("ATTACH ? AS ?").run(database, name);
+  } catch (const StoreError&) {
+    throw StoreError(fmt::format("campaign database = {} ({})", file.string(),
+                                 sqlite3_errmsg(connection_.get())));
+  }
+}
+
+void Database::attach_read_only(const std::filesystem::path& file, const std::string& name) {
+  attach(file_uri(file, "mode=ro"), name, file);
+}
+
+void Database::attach_copy_of(const Database& other, const std::string& name) {
+  attach("", name, other.path_);
+  const int code = copy_all(other.connection_.get(), connection_.get(), name.c_str());
+  if (code != SQLITE_OK) other.refuse_copy(code);
 }
 
 bool Database::is_in_place() const {

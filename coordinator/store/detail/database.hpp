@@ -12,8 +12,9 @@ struct sqlite3_stmt;
 
 namespace proofmass::coordinator::detail {
 
-/// How a database file is opened; `memory` opens none, and the path is for messages. `immutable`
-/// reads the file alone, as it is, without locks and without its log.
+/// How a database file is opened. `memory` opens no file, and the path is for messages only.
+/// `immutable` reads the file alone, as it is, without locks and without its log. The file of
+/// `read_only` cannot be changed through the connection; other databases may be attached to it.
 enum class Access { create, read_write, read_only, immutable, memory };
 
 /// How long a connection waits for the locks of others.
@@ -21,6 +22,13 @@ inline constexpr int busy_timeout_ms = 5000;
 
 /// What of a write-ahead log goes into its file.
 enum class Fold { what_no_reader_needs, all_and_empty_it };
+
+/// The URI of a database file with a parameter of SQLite's: `file:///a/b.db?mode=ro`.
+[[nodiscard]] std::string file_uri(const std::filesystem::path& file, std::string_view parameter);
+
+struct FinalizeStatement {
+  void operator()(sqlite3_stmt* statement) const;
+};
 
 class Database;
 
@@ -74,15 +82,11 @@ class Statement {
 
  private:
   friend class Database;
-  struct Finalize {
-    void operator()(sqlite3_stmt* statement) const;
-  };
-
   Statement(const Database& database, sqlite3_stmt* statement);
   void check(int code) const;
 
   const Database* database_;
-  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+  std::unique_ptr<sqlite3_stmt, FinalizeStatement> statement_;
 };
 
 /// One connection to one database file, for one thread.
@@ -126,8 +130,16 @@ class Database {
   /// @throws StoreError if the copy cannot be made, for want of space for instance.
   void go_on_with_private_copy();
 
-  /// The connection; the caller closes it, and the Database is of no use any more.
-  [[nodiscard]] sqlite3* release() { return connection_.release(); }
+  [[nodiscard]] bool is_private_copy() const { return is_private_copy_; }
+
+  /// Makes the tables of another file known under `name.`; the file can only be read.
+  /// @throws StoreError naming that file.
+  void attach_read_only(const std::filesystem::path& file, const std::string& name);
+  /// The same of a private copy of another database.
+  void attach_copy_of(const Database& other, const std::string& name);
+
+  /// The connection, for what SQLite can do and this class cannot.
+  [[nodiscard]] sqlite3* handle() const { return connection_.get(); }
 
   /// False if the file has been removed, renamed or replaced since it was opened.
   [[nodiscard]] bool is_in_place() const;
@@ -164,6 +176,8 @@ class Database {
     void operator()(sqlite3* connection) const;
   };
 
+  void attach(const std::string& database, const std::string& name,
+              const std::filesystem::path& file);
   [[noreturn]] void refuse_copy(int code) const;
 
   std::filesystem::path path_;

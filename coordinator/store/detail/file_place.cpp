@@ -34,17 +34,6 @@ constexpr std::uint32_t log_magic = 0x377f0682;
 constexpr std::size_t log_header_size = 32;
 constexpr std::size_t frame_header_size = 24;
 
-// SQLite takes only an address of a file for one that nobody changes, and then reads no log.
-std::string address_of(const std::filesystem::path& file) {
-  std::string address = "file://";
-  for (const char character : std::filesystem::absolute(file).string()) {
-    const bool has_meaning = character == '%' || character == '?' || character == '#';
-    address += has_meaning ? fmt::format("%{:02X}", static_cast<int>(character))
-                           : std::string(1, character);
-  }
-  return address + "?immutable=1";
-}
-
 // By its canonical name, so that a directory that the process leaves changes nothing.
 std::filesystem::path canonical_path(const std::filesystem::path& path) {
   std::error_code error;
@@ -141,9 +130,10 @@ bool has_log(const std::filesystem::path& file) {
   return (magic & ~std::uint32_t{1}) == log_magic;
 }
 
+// Without a Database: that would ask this function what to say of an error.
 bool is_sound_without_log(const std::filesystem::path& file) {
   sqlite3* opened = nullptr;
-  const int code = sqlite3_open_v2(address_of(file).c_str(), &opened,
+  const int code = sqlite3_open_v2(file_uri(file, "immutable=1").c_str(), &opened,
                                    SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
   const std::unique_ptr<sqlite3, int (*)(sqlite3*)> connection(opened, &sqlite3_close_v2);
   if (code != SQLITE_OK) return false;

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statfs.h>
 #include <sys/sysmacros.h>
@@ -18,6 +19,7 @@
 #include <system_error>
 
 #include "coordinator/store/store_error.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -51,12 +53,6 @@ constexpr std::array<std::string_view, 16> network_fuse_types{
     "fuse.cvmfs2",    "fuse.davfs2",  "fuse.gcsfuse",   "fuse.glusterfs",
     "fuse.goofys",    "fuse.juicefs", "fuse.lizardfs",  "fuse.mfs",
     "fuse.rclone",    "fuse.s3fs",    "fuse.seaweedfs", "fuse.sshfs"};
-
-std::filesystem::path directory_of(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::filesystem::path absolute = std::filesystem::absolute(path, error);
-  return (error ? path : absolute).parent_path();
-}
 
 }  // namespace
 
@@ -110,55 +106,88 @@ void check_directory_of(const std::filesystem::path& path) {
   }
 }
 
-void synchronise_directory_of(const std::filesystem::path& path) {
-  const std::string directory = directory_of(path).string();
-  const int descriptor = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  const bool is_done = descriptor >= 0 && ::fsync(descriptor) == 0;
-  const int error = errno;
-  if (descriptor >= 0) ::close(descriptor);
-  if (!is_done) {
-    throw StoreError(fmt::format("directory = {} ({})", directory, std::strerror(error)));
+void check_presence(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(path, ignored)) return;
+  throw StoreError(
+      fmt::format("campaign database = {} ({})", path.string(),
+                  std::filesystem::exists(path, ignored) ? "is no file" : "does not exist"));
+}
+
+void appear_complete(const std::filesystem::path& path, IfThere if_there,
+                     const std::function<void(const std::filesystem::path& draft)>& write) {
+  DraftFile file(path, ".unfinished");
+  write(file.draft());
+  if (const int error = file.publish(if_there)) {
+    throw StoreError(fmt::format("campaign database = {} (cannot be given its name: {})",
+                                 path.string(), std::strerror(error)));
+  }
+  if (const int error = synchronise_directory_of(path)) {
+    throw StoreError(
+        fmt::format("directory = {} ({})", directory_of(path).string(), std::strerror(error)));
   }
 }
 
 namespace {
 
-// Removes an unfinished file, its rollback journal with it.
-void remove_draft(const std::filesystem::path& draft) {
-  std::error_code ignored;
-  std::filesystem::remove(draft, ignored);
-  std::filesystem::remove(std::filesystem::path(draft).concat("-journal"), ignored);
+std::string this_process() {
+  return fmt::format("process {} on {}", ::getpid(), wire::host_name());
 }
 
-// Not all file systems know how to keep what is there; the name was free a moment ago.
-bool rename_to(const std::filesystem::path& draft, const std::filesystem::path& path,
-               IfThere if_there) {
-  if (if_there == IfThere::keep) {
-    if (::renameat2(AT_FDCWD, draft.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0) {
-      return true;
-    }
-    if (errno != EINVAL && errno != ENOSYS) return false;
-  }
-  return ::rename(draft.c_str(), path.c_str()) == 0;
+std::string holder(const std::filesystem::path& path) {
+  std::string line;
+  std::getline(std::ifstream(path), line);
+  return line.empty() ? "another process" : line;
+}
+
+int open_lock_file(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (descriptor >= 0) return descriptor;
+  const int error = errno;
+  throw StoreError(
+      fmt::format("lock = {} (cannot be created: {}; the directory of a campaign database "
+                  "must be writable)",
+                  path.string(), std::strerror(error)));
+}
+
+// False if the last holder removed the file between our opening and locking it.
+bool is_file_at(int descriptor, const std::filesystem::path& path) {
+  struct stat opened {};
+  struct stat present {};
+  return ::fstat(descriptor, &opened) == 0 && ::stat(path.c_str(), &present) == 0 &&
+         opened.st_dev == present.st_dev && opened.st_ino == present.st_ino;
+}
+
+std::filesystem::path lock_path(const std::filesystem::path& campaign_file) {
+  std::error_code error;
+  std::filesystem::path path = std::filesystem::weakly_canonical(campaign_file, error);
+  if (error) path = campaign_file;
+  return path.concat(".lock");
+}
+
+int acquire(const std::filesystem::path& path) {
+  const int descriptor = open_lock_file(path);
+  if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0 && is_file_at(descriptor, path))
+    return descriptor;
+  ::close(descriptor);
+  throw StoreError(fmt::format("lock = {} (held by {}; a campaign has one coordinator at a time)",
+                               path.string(), holder(path)));
 }
 
 }  // namespace
 
-void appear_complete(const std::filesystem::path& path, IfThere if_there,
-                     const std::function<void(const std::filesystem::path& draft)>& write) {
-  const std::filesystem::path draft = std::filesystem::path(path).concat(".unfinished");
-  remove_draft(draft);
-  try {
-    write(draft);
-    if (!rename_to(draft, path, if_there)) {
-      throw StoreError(fmt::format("campaign database = {} (cannot be given its name: {})",
-                                   path.string(), std::strerror(errno)));
-    }
-  } catch (...) {
-    remove_draft(draft);
-    throw;
-  }
-  synchronise_directory_of(path);
+StoreLock::StoreLock(const std::filesystem::path& campaign_file)
+    : path_(lock_path(campaign_file)), descriptor_(acquire(path_)) {
+  // For people only: the lock holds even if this cannot be written.
+  std::ofstream(path_) << this_process() << '\n';
 }
+
+// Somebody may have removed the file, and another process may have made one.
+StoreLock::~StoreLock() {
+  if (is_in_place()) ::unlink(path_.c_str());
+  ::close(descriptor_);
+}
+
+bool StoreLock::is_in_place() const { return is_file_at(descriptor_, path_); }
 
 }  // namespace proofmass::coordinator::detail

@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "coordinator/store/draft_file.hpp"
+
 namespace proofmass::coordinator::detail {
 
 /// Name of the network file system with this statfs(2) type, or empty if the type is none of those.
@@ -22,8 +24,8 @@ namespace proofmass::coordinator::detail {
 ///         system below it.
 void check_directory_of(const std::filesystem::path& path);
 
-/// What becomes of a file that has the name already.
-enum class IfThere : std::uint8_t { keep, replace };
+/// @throws StoreError unless there is a file of this name.
+void check_presence(const std::filesystem::path& path);
 
 /// Lets `write` make a file beside `path`, which then takes that name: complete or not at all, and
 /// durable.
@@ -31,7 +33,23 @@ enum class IfThere : std::uint8_t { keep, replace };
 void appear_complete(const std::filesystem::path& path, IfThere if_there,
                      const std::function<void(const std::filesystem::path& draft)>& write);
 
-/// Makes the directory entry of `path` durable.
-void synchronise_directory_of(const std::filesystem::path& path);
+/// Exclusive right to write a campaign database, held through an advisory lock on `<file>.lock`.
+/// The kernel releases it when the process ends in whatever way; a file left behind holds nothing
+/// back.
+class StoreLock {
+ public:
+  /// @throws StoreError naming the holder if the lock is taken, or if the directory is not
+  /// writable.
+  explicit StoreLock(const std::filesystem::path& campaign_file);
+  ~StoreLock();  ///< Removes the lock file.
+  /// Whether the lock file still has its name, without which it keeps nobody away.
+  [[nodiscard]] bool is_in_place() const;
+  StoreLock(const StoreLock&) = delete;
+  StoreLock& operator=(const StoreLock&) = delete;
+
+ private:
+  std::filesystem::path path_;
+  int descriptor_;
+};
 
 }  // namespace proofmass::coordinator::detail

@@ -80,26 +80,21 @@ std::optional<std::string> bring_to_rest(Database& database) {
   return std::nullopt;
 }
 
-sqlite3* open_private_copy(const std::filesystem::path& file) {
-  Database database(file, Access::read_only);
+void prepare_reader(Database& database, const std::filesystem::path& file) {
   configure(database);
   check_campaign_file(database, file);
-  migrate_privately(database);
-  return database.release();
+  if (is_older(database)) {
+    migrate_privately(database);
+  } else {
+    check_that_log_is_there(database, file);
+  }
 }
 
 }  // namespace detail
 
 Store::Impl::Impl(const std::filesystem::path& file)
     : path(file), database(file, Access::read_only) {
-  detail::configure(database);
-  detail::check_campaign_file(database, file);
-  if (detail::is_older(database)) {
-    detail::migrate_privately(database);
-    is_older = true;
-    return;
-  }
-  detail::check_that_log_is_there(database, file);
+  detail::prepare_reader(database, file);
 }
 
 Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::StoreLock> held_lock)

@@ -9,10 +9,8 @@
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/file_place.hpp"
-#include "coordinator/store/detail/store_lock.hpp"
+#include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/store.hpp"
-
-struct sqlite3;
 
 namespace proofmass::coordinator {
 
@@ -28,10 +26,10 @@ void check_that_log_is_there(const Database& database, const std::filesystem::pa
 /// but the caller.
 [[nodiscard]] std::optional<std::string> bring_to_rest(Database& database);
 
-/// A connection to a private copy of a campaign database of an older version, brought up to date;
-/// see Database::go_on_with_private_copy(). The caller closes it.
+/// Prepares a connection to a campaign database for reading: checks the file, and if it is of an
+/// older version goes on with a private copy, see Database::go_on_with_private_copy().
 /// @throws StoreError as Store::open_read_only() does.
-[[nodiscard]] sqlite3* open_private_copy(const std::filesystem::path& file);
+void prepare_reader(Database& database, const std::filesystem::path& file);
 
 }  // namespace detail
 
@@ -63,7 +61,6 @@ struct Store::Impl {
   std::unique_ptr<detail::FilePlace> place;  ///< The same. Closed after the database.
   detail::Database database;
   std::optional<detail::EntryRows> rows;  ///< Prepared when they are first needed.
-  bool is_older = false;     ///< The file has an older version, and `database` is a copy of it.
   bool is_log_lost = false;  ///< The file needed a log when it was opened; none was there.
 
  private:

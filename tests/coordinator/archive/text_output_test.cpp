@@ -1,5 +1,3 @@
-#include "coordinator/archive/text_output.hpp"
-
 #include <gmock/gmock.h>
 #include <signal.h>
 #include <unistd.h>
@@ -7,6 +5,7 @@
 #include <array>
 #include <string>
 
+#include "coordinator/archive/export.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 
 namespace proofmass::coordinator {

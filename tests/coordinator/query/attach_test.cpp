@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <sqlite3.h>
 
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/store/detail/database.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 #include "tests/message_of.hpp"
@@ -17,6 +17,8 @@ namespace {
 using coordinator::AttachedFile;
 using coordinator::QueryFiles;
 using coordinator::Store;
+using coordinator::detail::Access;
+using coordinator::detail::Database;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using Rows = std::vector<std::vector<OwnCell>>;
@@ -119,10 +121,7 @@ TEST_F(Attach, ChecksEachFileAsTheMainOne) {
             "campaign database = " + broken.string() + " (is not an SQLite database)");
   EXPECT_EQ(text_with(directory() / "none.db"),
             "campaign database = " + (directory() / "none.db").string() + " (does not exist)");
-  sqlite3* connection = nullptr;
-  ASSERT_EQ(sqlite3_open(other_file().c_str(), &connection), SQLITE_OK);
-  sqlite3_exec(connection, "CREATE VIEW trap AS SELECT 1", nullptr, nullptr, nullptr);
-  sqlite3_close(connection);
+  Database(other_file(), Access::read_write).execute("CREATE VIEW trap AS SELECT 1");
   EXPECT_EQ(text_with(other_file()), "campaign database = " + other_file().string() +
                                          " (has what is no part of a campaign: view trap)");
 }

@@ -1,5 +1,3 @@
-#include "coordinator/query/interval_functions.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "coordinator/query/aggregates.hpp"
 #include "core/error.hpp"
 #include "core/statistics/interval.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"

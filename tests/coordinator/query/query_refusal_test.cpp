@@ -1,12 +1,14 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <sqlite3.h>
 
+#include "coordinator/store/detail/database.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 
 namespace proofmass::test {
 namespace {
 
+using coordinator::detail::Access;
+using coordinator::detail::Database;
 using testing::HasSubstr;
 
 class QueryRefusal : public QueryTest {
@@ -14,13 +16,7 @@ class QueryRefusal : public QueryTest {
   QueryRefusal() { make_file(campaign_of(2), 1); }
 
   /// Does to the file what only a hostile program does.
-  void tamper(const std::string& sql) {
-    sqlite3* connection = nullptr;
-    ASSERT_EQ(sqlite3_open(file().c_str(), &connection), SQLITE_OK);
-    EXPECT_EQ(sqlite3_exec(connection, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
-        << sqlite3_errmsg(connection);
-    sqlite3_close(connection);
-  }
+  void tamper(const std::string& sql) { Database(file(), Access::read_write).execute(sql); }
   [[nodiscard]] std::string content() const {
     std::ifstream stream(file(), std::ios::binary);
     return {std::istreambuf_iterator<char>(stream), {}};

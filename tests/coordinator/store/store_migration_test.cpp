@@ -148,6 +148,14 @@ TEST_F(StoreMigration, OfFilesThatAreQueriedReadsCopies) {
   EXPECT_TRUE(test::content_of(file()) == before);
 }
 
+TEST_F(StoreMigration, OfOneFileThatIsQueriedReadsACopy) {
+  make_older_file();
+  const std::string before = test::content_of(file());
+  test::RecordingWriter writer;
+  EXPECT_EQ(run_query(file(), "SELECT count(*) FROM notes", {}, writer), QueryEnd::complete);
+  EXPECT_TRUE(test::content_of(file()) == before);
+}
+
 // The connection to the copy of an older main file may write; the last one that may would fold the
 // log of an attached file into it when it ends.
 TEST_F(StoreMigration, OfAMainFileThatIsQueriedLeavesTheLogOfAnotherAlone) {

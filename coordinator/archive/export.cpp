@@ -1,19 +1,26 @@
-#include <fmt/format.h>
+#include "coordinator/archive/export.hpp"
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 
-#include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
 #include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+constexpr std::size_t buffer_size = 1 << 18;  // Of a TextOutput.
 
 // No cell has a comma, a quotation mark or a line break, so that none needs quotation marks.
 constexpr std::string_view line_end = "\r\n";
@@ -128,6 +135,59 @@ class RunLines {
 };
 
 }  // namespace
+
+void fail_to_write(const std::filesystem::path& path, int error_number) {
+  throw ArchiveError(fmt::format("output = {} (cannot be written: {})", path.string(),
+                                 std::strerror(error_number)));
+}
+
+void publish(DraftFile& file) {
+  if (const int error_number = file.publish(IfThere::replace)) {
+    fail_to_write(file.path(), error_number);
+  }
+  (void)synchronise_directory_of(file.path());
+}
+
+std::string draft_ending() { return fmt::format(".{}.new", ::getpid()); }
+
+TextOutput::TextOutput(const std::filesystem::path& path) {
+  file_.emplace(path, draft_ending());
+  constexpr mode_t mode = 0666;  // Less what the user masks.
+  descriptor_ = ::open(file_->draft().c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
+  if (descriptor_ < 0) fail_to_write(path, errno);
+}
+
+TextOutput::~TextOutput() {
+  if (file_ && descriptor_ >= 0) ::close(descriptor_);
+}
+
+void TextOutput::write(std::string_view text) {
+  buffer_ += text;
+  if (buffer_.size() >= buffer_size) flush();
+}
+
+void TextOutput::finish() {
+  flush();
+  if (!file_) return;
+  const int descriptor = descriptor_;
+  descriptor_ = -1;
+  if (::close(descriptor) != 0) fail_to_write(name(), errno);
+  publish(*file_);
+}
+
+void TextOutput::flush() {
+  std::string_view rest = buffer_;
+  while (!rest.empty()) {
+    const ssize_t size = ::write(descriptor_, rest.data(), rest.size());
+    if (size < 0 && errno != EINTR) fail_to_write(name(), errno);
+    if (size > 0) rest.remove_prefix(static_cast<std::size_t>(size));
+  }
+  buffer_.clear();
+}
+
+std::filesystem::path TextOutput::name() const {
+  return file_ ? file_->path() : std::filesystem::path("-");
+}
 
 WalkedResults walk_results(const Store& store, const IsStopped& is_stopped,
                            const std::function<void(const RunResult&)>& visit) {

@@ -1,11 +1,18 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 
-struct sqlite3;
+#include "coordinator/query/query.hpp"
+#include "coordinator/store/detail/database.hpp"
 
 namespace proofmass::coordinator {
+
+/// A connection to campaign databases that cannot write to them; each is checked first. Of a file
+/// of an older version it has a private copy, brought up to date.
+/// @throws StoreError if a file is no campaign database or cannot be read.
+[[nodiscard]] std::unique_ptr<detail::Database> open_files(const QueryFiles& files);
 
 /// Lets the statements of a connection read and do nothing else: no change, no other file, no
 /// function or PRAGMA that is not harmless.

@@ -1,4 +1,4 @@
-#include "coordinator/query/read_rule.hpp"
+#include "coordinator/query/read_only_connection.hpp"
 
 #include <fmt/format.h>
 #include <sqlite3.h>
@@ -7,6 +7,8 @@
 #include <array>
 #include <cctype>
 #include <utility>
+
+#include "coordinator/store/detail/store_impl.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -41,6 +43,43 @@ bool is_harmless_pragma(std::string_view name, bool has_argument) {
 }
 
 }  // namespace
+
+void check_attached_name(std::string_view name) {
+  const auto is_letter = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+  };
+  const auto is_allowed = [&](char c) { return is_letter(c) || (c >= '0' && c <= '9'); };
+  const bool is_name = !name.empty() && name.size() <= 64 && is_letter(name[0]) &&
+                       std::ranges::all_of(name, is_allowed);
+  const std::string text(name);
+  const bool is_taken =
+      sqlite3_stricmp(text.c_str(), "main") == 0 || sqlite3_stricmp(text.c_str(), "temp") == 0;
+  if (is_name && !is_taken) return;
+  throw InvalidArgument(fmt::format(
+      "name = {} (must be 1 to 64 letters, digits and _, not begin with a digit, and be neither "
+      "main nor temp)",
+      name));
+}
+
+std::unique_ptr<detail::Database> open_files(const QueryFiles& files) {
+  PROOFMASS_EXPECT(files.attached.size() <= attached_files_max);
+  detail::check_presence(files.main);
+  auto database = std::make_unique<detail::Database>(files.main, detail::Access::read_only);
+  detail::prepare_reader(*database, files.main);
+  for (const auto& [name, file] : files.attached) {
+    detail::check_presence(file);
+    detail::Database other(file, detail::Access::read_only);
+    detail::prepare_reader(other, file);
+    if (other.is_private_copy()) {
+      database->attach_copy_of(other, name);
+    } else {
+      database->attach_read_only(file, name);
+    }
+  }
+  // A private copy has it on: the caller has tables of its own to add before it is turned on again.
+  database->execute("PRAGMA query_only = OFF");
+  return database;
+}
 
 void ReadRule::apply_to(sqlite3* connection) {
   sqlite3_set_authorizer(connection, &ReadRule::on_action, this);

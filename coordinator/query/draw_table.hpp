@@ -4,38 +4,13 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/campaign/campaign.hpp"
-
-struct sqlite3;
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
-
-/// The campaign that a database of a connection holds, read through that connection.
-/// @param database  `main`, or the name under which it is attached.
-/// @throws Error if it holds none or a damaged one.
-[[nodiscard]] std::shared_ptr<const Campaign> read_campaign_of(sqlite3* connection,
-                                                               const std::string& database);
-
-/// The database of a connection that a query means by an argument of a table.
-/// @param argument  `main`, the name under which a database is attached, or the name of the
-/// campaign
-///                  in the main database. @throws InvalidArgument if it is neither, or two of them.
-[[nodiscard]] std::string database_meant_by(sqlite3* connection, const std::string& argument);
-
-/// Counts whatever may have changed the database, by this connection or by others.
-struct DatabaseState {
-  std::int64_t data_version = 0;
-  std::int64_t num_changes = 0;
-
-  bool operator==(const DatabaseState&) const = default;
-};
-
-/// @throws Error if the database cannot be read.
-[[nodiscard]] DatabaseState state_of(sqlite3* connection, const std::string& database);
 
 /// What the runs of a campaign draw, computed again when asked for.
 class DrawnCampaign {
