@@ -16,6 +16,7 @@ packages=(
   iproute2 iptables faketime python3-scipy python3-mpmath python3-h5py
   sshfs openssh-sftp-server busybox-static
   slurmctld slurmd slurm-client slurm-wlm-basic-plugins munge
+  groff-base zsh fish
 )
 # The fuzzer, and the systems that the dispatch is measured beside.
 more_packages=(clang libclang-rt-14-dev parallel python3-distributed python3-ipyparallel)

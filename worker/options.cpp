@@ -10,6 +10,7 @@
 
 #include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/wire/messages.hpp"
 
@@ -46,6 +47,7 @@ void add_connection(CLI::App& app, Options& options) {
       ->envname("PROOFMASS_CONNECT")
       ->required();
   app.add_option("--keys", options.keys, "Directory with worker.key and coordinator.pub")
+      ->type_name(wire::directory_type)
       ->envname("PROOFMASS_KEYS");
   app.add_flag("--insecure-plain", options.is_plain_waived,
                "Allow an address beyond this machine without\nkeys: on a network that you trust");
@@ -64,6 +66,7 @@ void add_work(CLI::App& app, Options& options) {
       ->check(wire::in_range(1U, threads_max()));
   app.add_option("--spool", options.spool,
                  "File for results that are not acknowledged\nwhen the worker ends")
+      ->type_name(wire::file_type)
       ->envname("PROOFMASS_SPOOL");
   add_duration(app, "max-walltime", options.walltime_max,
                "Time after which the worker must have ended,\ne.g. 3600, 90m, 2h")
@@ -78,7 +81,8 @@ void add_work(CLI::App& app, Options& options) {
 }
 
 void add_process(CLI::App& app, Options& options) {
-  app.set_config("--config", "", "File with these options, as in\n`connect = \"tcp://a:5555\"`");
+  app.set_config("--config", "", "File with these options, as in\n`connect = \"tcp://a:5555\"`")
+      ->type_name(wire::file_type);
   app.allow_config_extras(CLI::config_extras_mode::error);
   static const std::map<std::string, wire::LogFormat> formats{{"json", wire::LogFormat::json},
                                                               {"text", wire::LogFormat::text}};

@@ -14,6 +14,7 @@
 
 #include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "proto/command_line/manual_option.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
@@ -196,12 +197,18 @@ int run_worker(int argc, char** argv, const Program& program) {
   Options options;
   CLI::App app(
       "Simulates runs for a proofmass coordinator.\n"
-      "SIGTERM lets it finish and deliver what it computes; a second one does not.\n"
-      "Exit codes: 0 told to end, 1 cannot go on, 2 wrong usage, 3 a computation hangs.",
+      "SIGTERM lets it finish and deliver what it computes; a second one does not.",
       program.name);
+  app.footer(
+      "Exit codes:\n"
+      "  0    told to end\n"
+      "  1    cannot go on\n"
+      "  2    wrong usage\n"
+      "  3    a computation hangs");
   add_options(app, options);
   program.add_options(app);
   app.set_version_flag("--version", program.name + " " PROOFMASS_VERSION);
+  wire::add_manual_option(app, {"proofmass", "proofmass-coordinator"});
   return reporting_errors(program, [&] {
     try {
       app.parse(argc, argv);

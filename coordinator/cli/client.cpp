@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "coordinator/cli/exit_code.hpp"
+#include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/wire/endpoint.hpp"
@@ -35,6 +36,7 @@ void add_client_options(CLI::App& command, ClientOptions& options) {
       ->envname("PROOFMASS_CLIENT_CONNECT")
       ->required();
   command.add_option("--keys", connection.keys, "Directory with client.key and coordinator.pub")
+      ->type_name(wire::directory_type)
       ->envname("PROOFMASS_KEYS");
   command.add_flag("--insecure-plain", connection.is_plain_waived,
                    "Allow an address beyond this machine without keys");

@@ -15,6 +15,7 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_folder.hpp"
 #include "coordinator/cli/command_line.hpp"
+#include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/stop_signals.hpp"
@@ -22,6 +23,8 @@
 #include "coordinator/net/service.hpp"
 #include "coordinator/report/report.hpp"
 #include "core/campaign/model.hpp"
+#include "proto/command_line/described_program.hpp"
+#include "proto/command_line/manual_option.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/init_system.hpp"
 #include "proto/link/log.hpp"
@@ -176,14 +179,17 @@ void add_addresses(CLI::App& app, ServeOptions& options) {
                  "Where clients connect; a socket in the\ndirectory by default")
       ->envname("PROOFMASS_BIND_CLIENTS");
   app.add_option("--keys", options.keys, "Directory of keys, made by `proofmass keygen`")
+      ->type_name(wire::directory_type)
       ->envname("PROOFMASS_KEYS");
   app.add_flag("--insecure-plain", options.is_plain_waived,
                "Serve other machines without keys: on a\nnetwork that you trust");
 }
 
 void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
-  app.add_option("FILE", options.campaign_files, "Campaign files (TOML) to serve as well");
+  app.add_option("FILE", options.campaign_files, "Campaign files (TOML) to serve as well")
+      ->type_name(campaign_file_type);
   app.add_option("--directory", options.directory, "Directory of the campaigns, one NAME.db each")
+      ->type_name(wire::directory_type)
       ->envname("PROOFMASS_DIRECTORY")
       ->required();
   app.add_flag("--exit-when-done", ends_when_done, "End when every campaign is finished");
@@ -226,12 +232,14 @@ int run_proofmass_coordinator(int argc, char** argv) {
   app.footer(exit_codes_text({exit_interrupted}));
   app.set_version_flag("--version", "proofmass-coordinator " PROOFMASS_VERSION);
   app.set_config("--config", "", "File with these options, as in\n`bind = \"tcp://*:5555\"`")
-      ->envname("PROOFMASS_CONFIG");
+      ->envname("PROOFMASS_CONFIG")
+      ->type_name(wire::file_type);
   app.allow_config_extras(CLI::config_extras_mode::error);
   ServeOptions options;
   bool ends_when_done = false;
   add_service(app, options, ends_when_done);
   add_addresses(app, options);
+  wire::add_manual_option(app, {"proofmass", "proofmass-worker"});
   return run_program(app, argc, argv, [&] {
     if (ends_when_done) options.end = ServiceEnd::when_done;
     return serve_campaigns(options);

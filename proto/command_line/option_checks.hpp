@@ -1,6 +1,6 @@
 #pragma once
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <charconv>
@@ -33,7 +33,7 @@ template <typename Number>
 /// Takes one of some words.
 [[nodiscard]] CLI::Validator one_of(const std::vector<std::string>& words);
 
-/// Declares an option whose words stand for values.
+/// Declares an option whose words stand for values; `--help` and completions show the words.
 ///
 /// @param choices  Lives as long as the command, as does the target.
 template <typename Value>
@@ -46,6 +46,7 @@ CLI::Option* add_choice(CLI::App& command, const std::string& name, Value& targe
       .add_option_function<std::string>(
           name, [&target, &choices](const std::string& word) { target = choices.at(word); },
           description)
+      ->type_name(fmt::to_string(fmt::join(words, "|")))
       ->check(one_of(words));
 }
 

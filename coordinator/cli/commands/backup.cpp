@@ -32,8 +32,10 @@ int back_up_database(const BackupOptions& options) {
 void add_backup(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<BackupOptions>(
       app, chosen, "backup", "Copy a database, also while it is written", back_up_database);
-  command.add_option("DB", options.database, database_text)->required();
-  command.add_option("DESTINATION", options.destination, "File to make")->required();
+  add_database(command, options.database);
+  command.add_option("DESTINATION", options.destination, "File to make")
+      ->type_name(database_type)
+      ->required();
 }
 
 }  // namespace proofmass::coordinator

@@ -47,7 +47,7 @@ int check_campaign_file(const CheckOptions& options) {
 void add_check(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<CheckOptions>(
       app, chosen, "check", "Check a campaign file and show what it changes", check_campaign_file);
-  command.add_option("FILE", options.file, "Campaign file (TOML)")->required();
+  add_campaign_file(command, options.file);
   add_override_options(command, options.overrides);
 }
 

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -37,7 +38,24 @@ inline void add_json_flag(CLI::App& command, OutputFormat& format) {
       "--json", [&format] { format = OutputFormat::json; }, "Print JSON");
 }
 
-inline constexpr const char* database_text = "Database of a campaign";
+/// Type names of campaign databases and campaign files, see described_program().
+inline constexpr const char* database_type = "FILE.db";
+inline constexpr const char* campaign_file_type = "FILE.toml";
+
+/// Declares an argument that names a campaign database.
+inline void add_database(CLI::App& command, std::filesystem::path& database,
+                         const std::string& name = "DB") {
+  command.add_option(name, database, "Database of a campaign")
+      ->type_name(database_type)
+      ->required();
+}
+
+/// Declares the argument FILE, a campaign file.
+inline void add_campaign_file(CLI::App& command, std::filesystem::path& file) {
+  command.add_option("FILE", file, "Campaign file (TOML)")
+      ->type_name(campaign_file_type)
+      ->required();
+}
 
 // Each of these functions declares the command of its name, see add_command(), and stands in the
 // file of that name. What a command throws becomes an exit code in run_program().

@@ -40,8 +40,8 @@ void add_compare(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<CompareOptions>(
       app, chosen, "compare", "Tell what two campaigns differ in", compare_databases);
   command.footer(exit_codes_text({exit_interrupted}));
-  command.add_option("A", options.first, database_text)->required();
-  command.add_option("B", options.second, database_text)->required();
+  add_database(command, options.first, "A");
+  add_database(command, options.second, "B");
   add_json_flag(command, options.format);
 }
 

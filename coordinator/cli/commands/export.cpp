@@ -16,6 +16,7 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/store/store.hpp"
+#include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
@@ -94,9 +95,10 @@ void add_export(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<ExportOptions>(
       app, chosen, "export", "Write all results of a database for others", export_results);
   command.footer(exit_codes_text({exit_interrupted}));
-  command.add_option("DB", options.database, database_text)->required();
-  wire::add_choice(command, "--format", options.format, formats, "csv (the default), json or hdf5");
-  command.add_option("--output", options.output, "File; standard output by default");
+  add_database(command, options.database);
+  wire::add_choice(command, "--format", options.format, formats, "csv by default");
+  command.add_option("--output", options.output, "File; standard output by default")
+      ->type_name(wire::file_type);
   command.add_flag("--force", options.is_forced, "Replace an existing file");
   command.add_flag_callback(
       "--draws", [&draws = options.draws] { draws = DrawColumns::included; },

@@ -35,7 +35,9 @@ int write_example(const InitOptions& options) {
 void add_init(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<InitOptions>(
       app, chosen, "init", "Write the paper's campaign file, commented", write_example);
-  command.add_option("FILE", options.file, "File to write")->capture_default_str();
+  command.add_option("FILE", options.file, "File to write")
+      ->type_name(campaign_file_type)
+      ->capture_default_str();
   command.add_flag("--force", options.is_forced, "Replace an existing file");
 }
 

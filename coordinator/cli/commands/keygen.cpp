@@ -15,6 +15,7 @@
 #include "coordinator/cli/exit_code.hpp"
 #include "coordinator/net/authentication/allow_list.hpp"
 #include "core/error.hpp"
+#include "proto/command_line/described_program.hpp"
 #include "proto/link/keys.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/wire/names.hpp"
@@ -161,6 +162,7 @@ void add_keygen(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<KeygenOptions>(
       app, chosen, "keygen", "Make keys of a coordinator, workers, clients", make_keys);
   command.add_option("DIRECTORY", options.directory, "Directory to make, or to add a key to")
+      ->type_name(wire::directory_type)
       ->required();
   command.add_option("--worker", options.worker, "Add a key of this name for a worker");
   command.add_option("--client", options.client, "Add a key of this name for a client");

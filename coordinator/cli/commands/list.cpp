@@ -28,7 +28,8 @@ int list_databases(const ListOptions& options) {
 void add_list(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<ListOptions>(
       app, chosen, "list", "List the campaigns of directories and files", list_databases);
-  command.add_option("PLACE", options.places, "Directories, databases; this directory by default");
+  command.add_option("PLACE", options.places, "Directories, databases; this directory by default")
+      ->type_name(database_type);
   add_json_flag(command, options.format);
 }
 

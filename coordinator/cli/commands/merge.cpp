@@ -118,8 +118,11 @@ void add_merge(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<MergeOptions>(
       app, chosen, "merge", "Join databases of parts of a campaign", merge_databases);
   command.footer(exit_codes_text({exit_interrupted}));
-  command.add_option("OUT", options.whole, "Database to be made of all parts")->required();
+  command.add_option("OUT", options.whole, "Database to be made of all parts")
+      ->type_name(database_type)
+      ->required();
   command.add_option("PART", options.parts, "Databases of one campaign, as of `run --range`")
+      ->type_name(database_type)
       ->required();
   command
       .add_option("--fraction", options.fraction,

@@ -43,7 +43,7 @@ int note_database(const NoteOptions& options) {
 void add_note(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<NoteOptions>(
       app, chosen, "note", "Add a note to a campaign, or print its notes", note_database);
-  command.add_option("DB", options.database, database_text)->required();
+  add_database(command, options.database);
   command.add_option("TEXT", options.text, "Up to 2,000 bytes; without it prints the notes");
 }
 

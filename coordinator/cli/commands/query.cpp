@@ -130,7 +130,7 @@ void add_query(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<QueryOptions>(
       app, chosen, "query", "Ask a database a question in SQL", query_database);
   command.footer(exit_codes_text({exit_interrupted}));
-  command.add_option("DB", options.database, database_text)->required();
+  add_database(command, options.database);
   command.add_option("SQL", options.sql, "One statement that reads; - for standard input")
       ->required();
   command
@@ -138,8 +138,7 @@ void add_query(CLI::App& app, Command& chosen) {
                   "NAME=FILE: another campaign, whose tables are\n"
                   "NAME.run_result and so on; may be repeated")
       ->allow_extra_args(false);
-  wire::add_choice(command, "--format", options.format, formats,
-                   "table, csv, json or markdown; table by default");
+  wire::add_choice(command, "--format", options.format, formats, "table by default");
   command.add_option("--timeout", options.timeout_s, "Seconds that it may take")
       ->check(wire::in_range(0.001, timeout_s_max))
       ->capture_default_str();

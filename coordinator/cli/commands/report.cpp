@@ -63,7 +63,7 @@ void add_report(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<ReportOptions>(
       app, chosen, "report", "Print the tables of a database", print_report);
   command.footer(exit_codes_text({exit_not_met}));
-  command.add_option("DB", options.database, database_text)->required();
+  add_database(command, options.database);
   command.add_option("--requirement", options.requirements,
                      "Answer instead whether it is met, as in\n"
                      "\"a_c12 < 9e-4 for 99% with 95%\" or\n"

@@ -341,8 +341,9 @@ void add_run(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<RunOptions>(
       app, chosen, "run", "Run a campaign, or what is missing of it", run_campaign);
   command.footer(exit_codes_text({exit_not_met, exit_interrupted}));
-  command.add_option("FILE", options.campaign_file, "Campaign file (TOML)")->required();
-  command.add_option("--db", options.database, "Database; FILE's stem with .db, here, by default");
+  add_campaign_file(command, options.campaign_file);
+  command.add_option("--db", options.database, "Database; FILE's stem with .db, here, by default")
+      ->type_name(database_type);
   add_override_options(command, options.overrides);
   add_range_option(command, options.part);
   add_audit_option(command, options.audit_fraction);

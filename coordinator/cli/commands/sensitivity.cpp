@@ -82,7 +82,7 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<SensitivityOptions>(
       app, chosen, "sensitivity", "Print which drawn quantities drive the errors",
       print_sensitivity);
-  command.add_option("DB", options.database, database_text)->required();
+  add_database(command, options.database);
   command.add_option("--parameter", options.parameter,
                      "Of this parameter; all by default, or with --run\n"
                      "the one that is worst beside its objective");

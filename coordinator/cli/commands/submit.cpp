@@ -50,7 +50,7 @@ int submit_campaign(const SubmitOptions& options) {
 void add_submit(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<SubmitOptions>(
       app, chosen, "submit", "Hand a campaign or more runs to a coordinator", submit_campaign);
-  command.add_option("FILE", options.campaign_file, "Campaign file (TOML)")->required();
+  add_campaign_file(command, options.campaign_file);
   command.add_option("--name", options.name, "Name of the campaign; the one in FILE by default");
   command
       .add_option("--priority", options.priority,

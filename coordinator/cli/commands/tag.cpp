@@ -47,9 +47,8 @@ void add_tag(CLI::App& app, Command& chosen) {
                                                         {"remove", TagAction::remove}};
   auto [command, options] = add_command<TagOptions>(
       app, chosen, "tag", "Add, remove or print tags of a campaign", tag_database);
-  command.add_option("DB", options.database, database_text)->required();
-  wire::add_choice(command, "ACTION", options.action, actions,
-                   "add or remove; without it prints the tags");
+  add_database(command, options.database);
+  wire::add_choice(command, "ACTION", options.action, actions, "Without it prints the tags");
   command.add_option("TAG", options.tags, "1 to 64 letters, digits, dots, _ and -");
 }
 

@@ -71,7 +71,7 @@ void add_verify(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<VerifyCommandOptions>(
       app, chosen, "verify", "Check a database, simulate some runs again", verify_database);
   command.footer(exit_codes_text({exit_interrupted}));
-  command.add_option("DB", options.database, database_text)->required();
+  add_database(command, options.database);
   command.add_option("--fraction", options.fraction, "Of the runs to simulate again")
       ->check(wire::in_range(0.0, 1.0))
       ->capture_default_str();
