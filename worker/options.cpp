@@ -72,7 +72,7 @@ void add_work(CLI::App& app, Options& options) {
                "Time after which the worker must have ended,\ne.g. 3600, 90m, 2h")
       ->envname("PROOFMASS_MAX_WALLTIME");
   app.add_option("--end-time", options.end_time_unix_s,
-                 "When the worker must have ended, in seconds\nsince 1970 (UTC), as Slurm says it")
+                 "When the worker must have ended, in seconds\nsince 1970 (UTC), as Slurm sets it")
       ->envname("SLURM_JOB_END_TIME")
       ->check(wire::in_range(std::int64_t{0}, end_time_unix_s_max));
   add_duration(app, "drain-time", options.drain_time,
@@ -87,7 +87,7 @@ void add_process(CLI::App& app, Options& options) {
   static const std::map<std::string, wire::LogFormat> formats{{"json", wire::LogFormat::json},
                                                               {"text", wire::LogFormat::text}};
   wire::add_choice(app, "--log-format", options.log_format, formats,
-                   "Of the log on standard error; text by default")
+                   "Format of the log; text by default")
       ->envname("PROOFMASS_LOG_FORMAT");
   app.add_flag_callback(
       "--no-supervisor", [&options] { options.is_supervised = false; },

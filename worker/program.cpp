@@ -74,7 +74,7 @@ wire::ClientSecurity security_for(const Options& options, const wire::Log& log) 
     log({.severity = wire::Severity::warning,
          .kind = "insecure_plain",
          .fields = {{"connect", options.endpoint},
-                    Field::remark("(anybody on the way can read and change what is said)")}});
+                    Field::remark("(anybody on the network can read and change messages)")}});
   }
   return {};
 }
@@ -197,7 +197,7 @@ int run_worker(int argc, char** argv, const Program& program) {
   Options options;
   CLI::App app(
       "Simulates runs for a proofmass coordinator.\n"
-      "SIGTERM lets it finish and deliver what it computes; a second one does not.",
+      "On SIGTERM it finishes and delivers its batches; on a second one it exits.",
       program.name);
   app.footer(
       "Exit codes:\n"

@@ -13,7 +13,7 @@
 #include "coordinator/bench/bench_parts.hpp"
 #include "coordinator/bench/bench_report.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "core/microscope/session/session_signals.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "proto/command_line/option_checks.hpp"

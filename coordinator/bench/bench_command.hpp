@@ -1,6 +1,6 @@
 #pragma once
 
-#include "coordinator/cli/command_line.hpp"
+#include "coordinator/cli/program.hpp"
 
 namespace proofmass::coordinator {
 

@@ -109,10 +109,6 @@ double weights_ns(const Bench& bench) {
   return block_ns / static_cast<double>(LineWeights::block_size);
 }
 
-}  // namespace
-
-namespace {
-
 NoiseCost scalar_noise(const MicroscopeCampaign& campaign, const NoiseModel& model) {
   SessionNoise noise(model, campaign.seed, RunIndex{0}, campaign.scenario.sessions.front().name);
   return {.deviate_ns = scalar_deviate_ns(), .step_ns = ns_per_call([&] { keep(noise.next()); })};

@@ -1,13 +1,56 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "coordinator/bench/bench_figures.hpp"
 #include "core/campaign/run_result.hpp"
+#include "core/math/instruction_set.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 
 namespace proofmass::coordinator {
+
+/// What noise alone costs, on one core.
+struct NoiseCost {
+  double deviate_ns = 0.0;  ///< One normal deviate.
+  double step_ns = 0.0;     ///< All noise of one step of one run.
+};
+
+/// What a run costs with one instruction set, on one core.
+struct SetCost {
+  InstructionSet set = InstructionSet::scalar;
+  double run_s = 0.0;  ///< In batches, a run's share of its batch; > 0.
+  NoiseCost noise;
+  bool has_reference_bits = true;  ///< Its results are those of the sets before.
+};
+
+/// What the parts of a step of one scalar run cost, each measured alone: their sum is not `whole`.
+struct StepCost {
+  double noise_ns = 0.0;
+  double shared_signals_ns = 0.0;  ///< What all runs see alike: orbit, environment, excitation.
+  double dynamics_ns = 0.0;
+  double estimation_ns = 0.0;  ///< Ground signals, weights and sums.
+  double whole_ns = 0.0;       ///< Of a step inside a run.
+};
+
+/// Where the figures were measured.
+struct Machine {
+  std::string processor;
+  unsigned num_processors = 1;
+  std::string compiler;
+  std::string build_type;
+};
+
+/// What `proofmass bench` shows.
+struct BenchFigures {
+  Machine machine;
+  std::uint64_t num_runs = 0;   ///< Runs of each set but `scalar`, which computes one.
+  int num_orbits = 0;           ///< Of a run.
+  std::uint64_t num_steps = 0;  ///< Of a run: samples, settling included.
+  std::vector<SetCost> sets;    ///< `scalar` first.
+  StepCost scalar_step;
+};
 
 /// Measures noise alone, for one run; for a set with lanes, of a full batch.
 [[nodiscard]] NoiseCost measure_noise(const MicroscopeCampaign& campaign, InstructionSet set);

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "coordinator/bench/bench_figures.hpp"
+#include "coordinator/bench/bench_parts.hpp"
 
 namespace proofmass::coordinator {
 

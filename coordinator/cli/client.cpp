@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
@@ -55,8 +55,8 @@ void warn_if_plain(const ClientOptions& options) {
   const ClientConnectionConfig& connection = options.connection;
   if (connection.keys || wire::is_local(connection.endpoint)) return;
   wire::say(fmt::format(
-      "proofmass: warning: connect = {} (--insecure-plain: anybody on the way can read and "
-      "change what is said)\n",
+      "proofmass: warning: connect = {} (--insecure-plain: anybody on the network can read "
+      "and change messages)\n",
       connection.endpoint));
 }
 

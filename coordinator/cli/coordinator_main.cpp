@@ -1,4 +1,4 @@
-#include "coordinator/cli/command_line.hpp"
+#include "coordinator/cli/program.hpp"
 
 int main(int argc, char** argv) {
   return proofmass::coordinator::run_proofmass_coordinator(argc, argv);

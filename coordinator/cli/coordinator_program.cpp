@@ -13,10 +13,8 @@
 #include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/cli/campaign_folder.hpp"
-#include "coordinator/cli/command_line.hpp"
+#include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/net/authentication/rights.hpp"
@@ -199,7 +197,7 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
       ->capture_default_str();
   app.add_option(
          "--memory-max", options.memory_mib_max,
-         "MiB of memory; before it has more it closes\nall connections, and peers connect anew")
+         "Memory in MiB; near this limit it closes all\nconnections, and peers connect again")
       ->check(wire::in_range(memory_mib_min, memory_mib_max))
       ->envname("PROOFMASS_MEMORY_MAX")
       ->capture_default_str();
@@ -214,7 +212,7 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
   static const std::map<std::string, wire::LogFormat> formats{{"json", wire::LogFormat::json},
                                                               {"text", wire::LogFormat::text}};
   wire::add_choice(app, "--log-format", options.log_format, formats,
-                   "Of the log on standard error; text by default")
+                   "Format of the log; text by default")
       ->envname("PROOFMASS_LOG_FORMAT");
   // For tests of the program by itself.
   app.add_option("--faults", options.faults)->group("");
@@ -226,8 +224,8 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
 int run_proofmass_coordinator(int argc, char** argv) {
   CLI::App app(
       "Lends the runs of campaigns to workers and stores their results.\n"
-      "SIGTERM lets workers deliver what they hold; SIGINT, or a second one, does not.\n"
-      "SIGHUP is for a restart: workers go on and wait for the next coordinator.",
+      "On SIGTERM it first lets workers deliver their results; on SIGINT or a second\n"
+      "SIGTERM it ends at once; on SIGHUP it leaves workers to the next coordinator.",
       "proofmass-coordinator");
   app.footer(exit_codes_text({exit_interrupted}));
   app.set_version_flag("--version", "proofmass-coordinator " PROOFMASS_VERSION);

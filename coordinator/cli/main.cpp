@@ -1,5 +1,5 @@
 #include "coordinator/bench/bench_command.hpp"
-#include "coordinator/cli/command_line.hpp"
+#include "coordinator/cli/program.hpp"
 
 int main(int argc, char** argv) {
   using namespace proofmass::coordinator;

@@ -2,7 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "core/campaign/model_rules.hpp"
 #include "core/error.hpp"
 #include "core/runs.hpp"
@@ -25,7 +25,7 @@ void add_override_options(CLI::App& command, Overrides& overrides) {
 void add_stop_options(CLI::App& command, StopOptions& options) {
   command
       .add_option("--until", options.rule,
-                  "Compute no more runs than it takes, as in\n\"std(a_c13) within 5%\",\n"
+                  "Stop as soon as the rule holds, as in\n\"std(a_c13) within 5%\",\n"
                   "\"all objectives within 2%\" or\n\"a_c12 < 9e-4 for 99% with 95% decided\"")
       ->check([](const std::string& rule) {
         try {
@@ -36,7 +36,8 @@ void add_stop_options(CLI::App& command, StopOptions& options) {
         return std::string();
       });
   command
-      .add_option("--failures", options.failures_max, "Cancel it when more runs have no estimate")
+      .add_option("--failures", options.failures_max,
+                  "Cancel when more runs than this lack an estimate")
       ->check(wire::in_range(std::uint64_t{0}, num_runs_max));
 }
 

@@ -1,49 +1,48 @@
 #pragma once
 
-#include <fmt/format.h>
-
-#include <CLI/CLI.hpp>
-#include <exception>
 #include <functional>
-#include <iostream>
+#include <initializer_list>
 #include <string>
-#include <string_view>
 
-#include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/cli/exit_code.hpp"
-#include "coordinator/cli/standard_output.hpp"
 #include "core/error.hpp"
-#include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace proofmass::coordinator {
 
+/// How the programs end; documented in their --help.
+enum ExitCode : int {
+  exit_done = 0,
+  exit_cannot_be_done = 1,  ///< Disk, database, address, workers that crash, time limits.
+  exit_wrong_usage = 2,     ///< Arguments, campaign file or query.
+  exit_not_met = 3,         ///< A requirement is not met or undecided, a stop rule not reached.
+  exit_interrupted = 130,   ///< SIGINT or SIGTERM; what is stored stands.
+};
+
+/// The end of `--help`.
+/// @param further  What the command may end with beside 0, 1 and 2.
+[[nodiscard]] std::string exit_codes_text(std::initializer_list<ExitCode> further);
+
+/// The user asked for something that makes no sense.
+class UsageError : public Error {
+ public:
+  using Error::Error;
+};
+
+/// What is to be done once all arguments are parsed; returns an ExitCode.
+using Command = std::function<int()>;
+
 /// Parses the arguments, does the work and turns what goes wrong into a message and an exit code.
-inline int run_program(CLI::App& app, int argc, char** argv, const std::function<int()>& work) {
-  const auto fail = [&app](std::string_view what, int exit_code) {
-    wire::say(fmt::format("{}: error: {}\n", app.get_name(), what));
-    return exit_code;
-  };
-  try {
-    app.parse(argc, argv);
-    const int exit_code = work();
-    flush_standard_output();
-    return exit_code;
-  } catch (const CLI::Success& wish) {
-    const int exit_code = app.exit(wish);  // --help or --version.
-    if (std::cout.flush()) return exit_code;
-    return fail("standard output: cannot be written", exit_cannot_be_done);
-  } catch (const CLI::ParseError& error) {
-    return fail(wire::refusal_of(app, error), exit_wrong_usage);
-  } catch (const DefinitionError& error) {
-    return fail(error.what(), exit_wrong_usage);
-  } catch (const UsageError& error) {
-    return fail(error.what(), exit_wrong_usage);
-  } catch (const InvalidArgument& error) {
-    return fail(error.what(), exit_wrong_usage);
-  } catch (const std::exception& error) {
-    return fail(error.what(), exit_cannot_be_done);
-  }
-}
+[[nodiscard]] int run_program(CLI::App& app, int argc, char** argv, const Command& work);
+
+/// All of `proofmass`, from its arguments to its exit code.
+/// @param add_further_commands  Declares commands that are about the model, see add_command().
+[[nodiscard]] int run_proofmass(
+    int argc, char** argv, const std::function<void(CLI::App&, Command&)>& add_further_commands);
+
+/// All of `proofmass-coordinator`.
+[[nodiscard]] int run_proofmass_coordinator(int argc, char** argv);
 
 }  // namespace proofmass::coordinator

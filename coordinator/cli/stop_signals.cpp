@@ -5,7 +5,7 @@
 #include <mutex>
 #include <stop_token>
 
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "proto/command_line/standard_error.hpp"
 
 namespace proofmass::coordinator {

@@ -4,7 +4,6 @@
 #include <system_error>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/store/store.hpp"
 
@@ -31,7 +30,7 @@ int back_up_database(const BackupOptions& options) {
 
 void add_backup(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<BackupOptions>(
-      app, chosen, "backup", "Copy a database, also while it is written", back_up_database);
+      app, chosen, "backup", "Copy a database, even while it is written", back_up_database);
   add_database(command, options.database);
   command.add_option("DESTINATION", options.destination, "File to make")
       ->type_name(database_type)

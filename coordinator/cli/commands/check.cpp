@@ -7,7 +7,6 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "core/campaign/campaign.hpp"

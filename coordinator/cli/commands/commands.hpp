@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "coordinator/cli/command_line.hpp"
+#include "coordinator/cli/program.hpp"
 
 namespace proofmass::coordinator {
 
@@ -57,8 +57,8 @@ inline void add_campaign_file(CLI::App& command, std::filesystem::path& file) {
       ->required();
 }
 
-// Each of these functions declares the command of its name, see add_command(), and stands in the
-// file of that name. What a command throws becomes an exit code in run_program().
+// Each of these functions declares the command of its name, see add_command(). What a command
+// throws becomes an exit code in run_program().
 
 void add_run(CLI::App& app, Command& chosen);
 void add_init(CLI::App& app, Command& chosen);
@@ -82,7 +82,7 @@ void add_note(CLI::App& app, Command& chosen);
 void add_submit(CLI::App& app, Command& chosen);
 void add_status(CLI::App& app, Command& chosen);
 void add_watch(CLI::App& app, Command& chosen);
-void add_control(CLI::App& app, Command& chosen);  ///< `pause`, `resume` and `cancel`.
+void add_control(CLI::App& app, Command& chosen);  ///< `pause`, `resume`, `cancel` and so on.
 void add_workers(CLI::App& app, Command& chosen);
 void add_release(CLI::App& app, Command& chosen);
 

@@ -3,7 +3,6 @@
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/comparison_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/store/store.hpp"
@@ -38,7 +37,7 @@ int compare_databases(const CompareOptions& options) {
 
 void add_compare(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<CompareOptions>(
-      app, chosen, "compare", "Tell what two campaigns differ in", compare_databases);
+      app, chosen, "compare", "Compare the results of two campaigns", compare_databases);
   command.footer(exit_codes_text({exit_interrupted}));
   add_database(command, options.first, "A");
   add_database(command, options.second, "B");

@@ -1,9 +1,10 @@
+#include <fmt/format.h>
+
 #include <string>
 
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/client_json.hpp"
+#include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/wire/client_codec.hpp"
@@ -48,14 +49,40 @@ void add_action(CLI::App& app, Command& chosen, ControlAction action,
   add_client_options(command, options.client);
 }
 
+struct ReleaseOptions {
+  ClientOptions client;
+  std::string host;
+};
+
+int release_host(const ReleaseOptions& options) {
+  if (!wire::is_name(options.host)) {
+    throw UsageError(
+        fmt::format("host = \"{}\" (must be 1 to 128 of [A-Za-z0-9._-])", options.host));
+  }
+  return with_connection(options.client, [&](const Ask& ask) {
+    const auto done =
+        reply_of<wire::DoneReply>(ask, wire::ReleaseHostRequest{.host = options.host});
+    const bool is_json = options.client.format == OutputFormat::json;
+    print_lines(is_json ? released_json(options.host, done) : done.text + "\n");
+    return exit_done;
+  });
+}
+
 }  // namespace
 
 void add_control(CLI::App& app, Command& chosen) {
-  add_action(app, chosen, ControlAction::pause, "Lend no more runs of a campaign for now");
-  add_action(app, chosen, ControlAction::resume, "Go on with a paused or cancelled campaign");
+  add_action(app, chosen, ControlAction::pause, "Lend no more runs of a campaign until `resume`");
+  add_action(app, chosen, ControlAction::resume, "Continue a paused or cancelled campaign");
   add_action(app, chosen, ControlAction::cancel, "Drop a campaign's open runs; results stay");
   add_action(app, chosen, ControlAction::set_priority, "Compute a campaign earlier or later");
-  add_action(app, chosen, ControlAction::retry, "Compute the runs that were given up again");
+  add_action(app, chosen, ControlAction::retry, "Compute the given-up runs of a campaign again");
+}
+
+void add_release(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<ReleaseOptions>(
+      app, chosen, "release", "Lend runs to a host in quarantine again", release_host);
+  command.add_option("HOST", options.host, "Host, as `proofmass workers` names it")->required();
+  add_client_options(command, options.client);
 }
 
 }  // namespace proofmass::coordinator

@@ -13,7 +13,6 @@
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/store/store.hpp"
 #include "proto/command_line/described_program.hpp"
@@ -93,7 +92,7 @@ void add_export(CLI::App& app, Command& chosen) {
   static const std::map<std::string, ExportFormat> formats{
       {"csv", ExportFormat::csv}, {"json", ExportFormat::json}, {"hdf5", ExportFormat::hdf5}};
   auto [command, options] = add_command<ExportOptions>(
-      app, chosen, "export", "Write all results of a database for others", export_results);
+      app, chosen, "export", "Write all results in a format of other programs", export_results);
   command.footer(exit_codes_text({exit_interrupted}));
   add_database(command, options.database);
   wire::add_choice(command, "--format", options.format, formats, "csv by default");

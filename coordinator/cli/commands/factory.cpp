@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/client_tables.hpp"
+#include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/factory/batch_system.hpp"

@@ -6,7 +6,6 @@
 #include <fstream>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {

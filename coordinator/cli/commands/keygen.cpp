@@ -12,7 +12,6 @@
 #include <string_view>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/net/authentication/allow_list.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/described_program.hpp"

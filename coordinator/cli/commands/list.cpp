@@ -3,7 +3,6 @@
 
 #include "coordinator/archive/listing.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 
 namespace proofmass::coordinator {

@@ -12,9 +12,8 @@
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
-#include "coordinator/cli/campaign_start.hpp"
+#include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/dispatch/run_set.hpp"
@@ -60,7 +59,7 @@ void require_part(const std::filesystem::path& part, const LargestPart& largest)
       fmt::format("{} has until = {} (must not be in a part of a campaign)", part.string(), rule));
 }
 
-/// @throws ArchiveError with what does not hold.
+/// @throws ArchiveError with the checks that fail.
 void require_sound(const std::filesystem::path& part, const MergeOptions& options,
                    const IsStopped& is_stopped) {
   const VerifyOptions how{.fraction = options.fraction,
@@ -71,7 +70,7 @@ void require_sound(const std::filesystem::path& part, const MergeOptions& option
   };
   if (verify(part, how, collect, is_stopped)) return;
   while (failing.ends_with('\n')) failing.pop_back();
-  throw ArchiveError(fmt::format("{} does not hold what it should:{}", part.string(), failing));
+  throw ArchiveError(fmt::format("{} fails these checks:{}", part.string(), failing));
 }
 
 std::string count_text(const MergedPart& part) {
@@ -125,8 +124,7 @@ void add_merge(CLI::App& app, Command& chosen) {
       ->type_name(database_type)
       ->required();
   command
-      .add_option("--fraction", options.fraction,
-                  "Of each part's runs to simulate again and compare")
+      .add_option("--fraction", options.fraction, "Fraction of each part's runs to simulate again")
       ->check(wire::in_range(0.0, 1.0))
       ->capture_default_str();
 }

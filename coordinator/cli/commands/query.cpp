@@ -21,10 +21,8 @@
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
-#include "coordinator/cli/watch_display.hpp"
 #include "coordinator/query/query_process.hpp"
 #include "coordinator/query/row_writer.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -139,7 +137,7 @@ void add_query(CLI::App& app, Command& chosen) {
                   "NAME.run_result and so on; may be repeated")
       ->allow_extra_args(false);
   wire::add_choice(command, "--format", options.format, formats, "table by default");
-  command.add_option("--timeout", options.timeout_s, "Seconds that it may take")
+  command.add_option("--timeout", options.timeout_s, "Seconds that the answer may take")
       ->check(wire::in_range(0.001, timeout_s_max))
       ->capture_default_str();
   command.add_option("--rows-max", options.num_rows_max, "Rows that a table shows")

@@ -8,7 +8,6 @@
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/report/report_json.hpp"
 #include "coordinator/report/requirements.hpp"
@@ -65,7 +64,7 @@ void add_report(CLI::App& app, Command& chosen) {
   command.footer(exit_codes_text({exit_not_met}));
   add_database(command, options.database);
   command.add_option("--requirement", options.requirements,
-                     "Answer instead whether it is met, as in\n"
+                     "Answer whether this requirement is met, as in\n"
                      "\"a_c12 < 9e-4 for 99% with 95%\" or\n"
                      "\"all objectives for 95% with 90%\"; may be repeated");
   add_json_flag(command, options.format);

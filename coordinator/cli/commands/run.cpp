@@ -17,9 +17,8 @@
 #include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/cli/campaign_start.hpp"
+#include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/progress_display.hpp"
 #include "coordinator/cli/standard_output.hpp"
@@ -339,10 +338,10 @@ void add_range_option(CLI::App& command, std::optional<RunRange>& part) {
 
 void add_run(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<RunOptions>(
-      app, chosen, "run", "Run a campaign, or what is missing of it", run_campaign);
+      app, chosen, "run", "Run a campaign, or its missing runs", run_campaign);
   command.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   add_campaign_file(command, options.campaign_file);
-  command.add_option("--db", options.database, "Database; FILE's stem with .db, here, by default")
+  command.add_option("--db", options.database, "Database; by default FILE's stem with .db, here")
       ->type_name(database_type);
   add_override_options(command, options.overrides);
   add_range_option(command, options.part);

@@ -11,7 +11,6 @@
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/report/sensitivity.hpp"
 #include "coordinator/store/store.hpp"
@@ -84,9 +83,9 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
       print_sensitivity);
   add_database(command, options.database);
   command.add_option("--parameter", options.parameter,
-                     "Of this parameter; all by default, or with --run\n"
-                     "the one that is worst beside its objective");
-  command.add_option("--run", options.run, "Why this run is as far off as it is")
+                     "Parameter; all by default, or with --run the one\n"
+                     "with the largest error beside its objective");
+  command.add_option("--run", options.run, "Explain the error of this run")
       ->check(wire::in_range(std::uint64_t{0}, num_runs_max - 1));
   command.add_option("--rows", options.num_rows, "Quantities to name for each error")
       ->check(wire::in_range(std::size_t{1},

@@ -1,8 +1,6 @@
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/client_json.hpp"
-#include "coordinator/cli/client_tables.hpp"
+#include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 
 namespace proofmass::coordinator {
@@ -18,11 +16,27 @@ int show_status(const ClientOptions& options) {
   });
 }
 
+int show_workers(const ClientOptions& options) {
+  return with_connection(options, [&](const Ask& ask) {
+    const wire::WorkersReply workers = all_workers(ask);
+    print_lines(options.format == OutputFormat::json
+                    ? workers_json(workers)
+                    : workers_table(workers, line_width_max_of(stdout)));
+    return exit_done;
+  });
+}
+
 }  // namespace
 
 void add_status(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<ClientOptions>(
-      app, chosen, "status", "Show where the campaigns of a coordinator stand", show_status);
+      app, chosen, "status", "Show the progress of a coordinator's campaigns", show_status);
+  add_client_options(command, options);
+}
+
+void add_workers(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<ClientOptions>(
+      app, chosen, "workers", "Show the workers of a coordinator", show_workers);
   add_client_options(command, options);
 }
 

@@ -1,15 +1,33 @@
-#include "coordinator/cli/commands/submit.hpp"
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
 
-#include "coordinator/cli/client_json.hpp"
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/client.hpp"
+#include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
+namespace {
 
+/// Arguments of `proofmass submit`.
+struct SubmitOptions {
+  ClientOptions client;
+  std::filesystem::path campaign_file;
+  Overrides overrides;
+  std::optional<std::string> name;       ///< By default the one in the file.
+  std::optional<int> priority;           ///< -100 to 100; as it is without one.
+  std::optional<double> audit_fraction;  ///< 0 to 1; likewise.
+  StopOptions stop;
+};
+
+/// The campaign that the arguments name.
 std::unique_ptr<Campaign> campaign_to_submit(const SubmitOptions& options) {
   std::unique_ptr<Campaign> campaign = read_campaign(options.campaign_file, options.overrides);
   if (options.name) {
@@ -31,8 +49,6 @@ wire::SubmitRequest submit_request(const SubmitOptions& options, const Campaign&
           .failures_max = options.stop.failures_max};
 }
 
-namespace {
-
 // A new campaign, or one that is there and has more runs now.
 int submit_campaign(const SubmitOptions& options) {
   const std::unique_ptr<Campaign> campaign = campaign_to_submit(options);
@@ -53,8 +69,9 @@ void add_submit(CLI::App& app, Command& chosen) {
   add_campaign_file(command, options.campaign_file);
   command.add_option("--name", options.name, "Name of the campaign; the one in FILE by default");
   command
-      .add_option("--priority", options.priority,
-                  "Runs of a higher one are computed first;\n0 by default, for more runs as it is")
+      .add_option(
+          "--priority", options.priority,
+          "Higher priorities come first; by default 0, or\nunchanged if the campaign exists")
       ->check(wire::in_range(-wire::priority_max, wire::priority_max));
   add_audit_option(command, options.audit_fraction);
   add_stop_options(command, options.stop);

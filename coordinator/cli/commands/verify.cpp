@@ -8,7 +8,6 @@
 
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -72,7 +71,7 @@ void add_verify(CLI::App& app, Command& chosen) {
       app, chosen, "verify", "Check a database, simulate some runs again", verify_database);
   command.footer(exit_codes_text({exit_interrupted}));
   add_database(command, options.database);
-  command.add_option("--fraction", options.fraction, "Of the runs to simulate again")
+  command.add_option("--fraction", options.fraction, "Fraction of the runs to simulate again")
       ->check(wire::in_range(0.0, 1.0))
       ->capture_default_str();
   add_json_flag(command, options.format);

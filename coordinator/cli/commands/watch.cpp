@@ -5,15 +5,95 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstdio>
 #include <thread>
+#include <utility>
 
-#include "coordinator/cli/client_tables.hpp"
+#include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/exit_code.hpp"
-#include "coordinator/cli/watch_display.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
+namespace {
+
+/// Changes when a line about the campaign is worth writing.
+std::string gist_of(const wire::CampaignStatus& campaign) {
+  const std::uint64_t tenths =
+      campaign.num_done * 10 / std::max<std::uint64_t>(1, campaign.num_runs);
+  return fmt::format("{} {} {} {} {}", static_cast<int>(campaign.phase), tenths,
+                     campaign.num_given_up, campaign.num_mismatches, campaign.storage_failure);
+}
+
+/// Campaigns that are over come last: they are the ones that a small screen leaves out.
+wire::StatusReply with_open_ones_first(wire::StatusReply status) {
+  std::ranges::stable_partition(status.campaigns,
+                                [](const auto& campaign) { return !is_over(campaign); });
+  return status;
+}
+
+}  // namespace
+
+Drawing drawn_over(std::size_t num_lines_before, std::string_view text, ScreenSize size) {
+  // The cursor stands below the last line, so one row stays free.
+  const std::size_t rows_max = std::max<std::size_t>(2, size.rows) - 1;
+  const auto num_lines = static_cast<std::size_t>(std::ranges::count(text, '\n')) +
+                         (text.empty() || text.ends_with('\n') ? 0 : 1);
+  const std::size_t num_shown = num_lines > rows_max ? rows_max - 1 : num_lines;
+  Drawing drawing;
+  if (num_lines_before > 0) drawing.text = fmt::format("\033[{}A", num_lines_before);
+  // What a longer line left behind is erased to the end of the line.
+  const auto draw = [&](std::string_view line) {
+    drawing.text += shortened(line, size.columns) + "\033[K\n";
+    ++drawing.num_lines;
+  };
+  while (drawing.num_lines < num_shown) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    draw(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  if (num_shown < num_lines) draw(fmt::format("and {} more lines", num_lines - num_shown));
+  drawing.text += "\033[J";
+  return drawing;
+}
+
+WatchDisplay::WatchDisplay(WatchMode mode, std::FILE* stream) : mode_(mode), stream_(stream) {}
+
+void WatchDisplay::update(const wire::StatusReply& status) {
+  switch (mode_) {
+    case WatchMode::screen:
+      show_screen(status);
+      break;
+    case WatchMode::lines:
+      show_lines(status);
+      break;
+    case WatchMode::json:
+      fmt::print(stream_, "{}", status_json(status, JsonLayout::one_line));
+      break;
+  }
+  std::fflush(stream_);
+}
+
+void WatchDisplay::show_screen(const wire::StatusReply& status) {
+  const ScreenSize size = screen_size_of(stream_);
+  const std::string table =
+      wire::visible_lines(status_table(with_open_ones_first(status), size.columns - 1));
+  const Drawing drawing = drawn_over(num_lines_drawn_, table, size);
+  fmt::print(stream_, "{}", drawing.text);
+  num_lines_drawn_ = drawing.num_lines;
+}
+
+void WatchDisplay::show_lines(const wire::StatusReply& status) {
+  for (const wire::CampaignStatus& campaign : status.campaigns) {
+    std::string gist = gist_of(campaign);
+    std::string& shown = shown_[campaign.name];
+    if (gist == shown) continue;
+    shown = std::move(gist);
+    fmt::print(stream_, "{}\n", wire::visible_text(campaign_line(campaign)));
+  }
+}
+
 namespace {
 
 [[noreturn]] void fail_unknown(const wire::StatusReply& status, const std::string& name) {
@@ -73,7 +153,7 @@ int watch_campaigns(const WatchOptions& options) {
 
 void add_watch(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<WatchOptions>(
-      app, chosen, "watch", "Show where campaigns stand until they are finished", watch_campaigns);
+      app, chosen, "watch", "Show the progress until campaigns are finished", watch_campaigns);
   command.add_option("NAME", options.campaign, "Campaign; all by default");
   add_client_options(command, options.client);
 }

@@ -1,14 +1,55 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "coordinator/cli/client.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
-class WatchDisplay;
+enum class WatchMode : std::uint8_t {
+  screen,  ///< The table of `status`, drawn again in its place: for a terminal.
+  lines,   ///< A line when a campaign has advanced by ten percent, or something happened.
+  json,    ///< An object a line, each time.
+};
+
+/// A text and what makes it take the place of the one drawn before.
+struct Drawing {
+  std::string text;
+  std::size_t num_lines = 0;  ///< Of it, on the screen.
+};
+
+/// Text cut to the screen, lines ended by `\n`, to be drawn over `num_lines_before` lines that end
+/// right above the cursor. If there are more lines than the screen has rows, the last one says how
+/// many are left out.
+[[nodiscard]] Drawing drawn_over(std::size_t num_lines_before, std::string_view text,
+                                 ScreenSize size);
+
+/// Shows where campaigns stand, again and again.
+class WatchDisplay {
+ public:
+  /// @param stream  Must outlive this object.
+  WatchDisplay(WatchMode mode, std::FILE* stream);
+
+  void update(const wire::StatusReply& status);
+
+ private:
+  void show_screen(const wire::StatusReply& status);
+  void show_lines(const wire::StatusReply& status);
+
+  WatchMode mode_;
+  std::FILE* stream_;
+  std::size_t num_lines_drawn_ = 0;
+  std::map<std::string, std::string> shown_;  ///< By campaign: what the last line was about.
+};
 
 /// Asks and shows where the campaign stands, or all do, until they are finished or cancelled.
 ///

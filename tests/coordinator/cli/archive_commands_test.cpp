@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/program.hpp"

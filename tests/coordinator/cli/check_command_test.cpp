@@ -4,7 +4,7 @@
 #include <fstream>
 #include <string>
 
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 

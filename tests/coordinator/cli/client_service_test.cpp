@@ -5,10 +5,14 @@
 #include <chrono>
 #include <fstream>
 #include <functional>
+#include <memory>
 #include <string>
+#include <vector>
 
+#include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
@@ -89,6 +93,40 @@ TEST_F(ClientCommands, PrintWhatTheCoordinatorSays) {
       {"submit", directory / "mine.toml", "--connect", service->clients_endpoint()});
   EXPECT_EQ(answer.exit_code, exit_done) << answer.error;
   EXPECT_EQ(answer.output, "campaign mine: active, 7 runs, 0 of them done\n");
+}
+
+TEST_F(ClientCommands, SubmitWhatTheArgumentsReplace) {
+  CampaignFolder folder(directory / "served");
+  config.files = &folder;
+  start({});
+  std::ofstream(directory / "mine.toml") << "[campaign]\nname = \"mine\"\nruns = 7\n";
+  const auto answer =
+      test::answer_of({"submit", directory / "mine.toml", "--connect", service->clients_endpoint(),
+                       "--name", "other", "--priority", "3", "--audit", "0.25", "--runs", "9",
+                       "--seed", "5", "--set", "noise.scale=0.5"});
+  EXPECT_EQ(answer.output, "campaign other: active, 9 runs, 0 of them done\n") << answer.error;
+  end(StopRequest::now);
+  const Store store = Store::open_read_only(directory / "served/other.db");
+  EXPECT_EQ(store.control().priority, 3);
+  EXPECT_EQ(store.control().audit_fraction, 0.25);
+  const auto campaign = std::dynamic_pointer_cast<const MicroscopeCampaign>(stored_campaign(store));
+  EXPECT_EQ(campaign->seed, 5U);
+  EXPECT_EQ(campaign->scenario.noise.scale, 0.5);
+}
+
+TEST_F(ClientCommands, CheckNamesBeforeAnythingIsSent) {
+  std::ofstream(directory / "mine.toml") << "[campaign]\nname = \"mine\"\n";
+  const std::vector<std::string> nowhere{"--connect", "tcp://127.0.0.1:1"};
+  const auto refusal = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), nowhere.begin(), nowhere.end());
+    const auto answer = test::answer_of(arguments);
+    EXPECT_EQ(answer.exit_code, exit_wrong_usage);
+    return answer.error;
+  };
+  EXPECT_EQ(refusal({"submit", directory / "mine.toml", "--name", "../other"}),
+            "campaign.name = \"../other\" (must be 1 to 64 letters, digits, _, - or .)");
+  EXPECT_EQ(refusal({"pause", "a b"}), "campaign = \"a b\" (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal({"release", "a b"}), "host = \"a b\" (must be 1 to 128 of [A-Za-z0-9._-])");
 }
 
 TEST_F(ClientCommands, FailInTheCoordinatorsWords) {

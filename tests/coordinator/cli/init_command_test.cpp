@@ -3,7 +3,7 @@
 #include <stdlib.h>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"

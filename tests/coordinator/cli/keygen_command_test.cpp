@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/net/authentication/allow_list.hpp"
 #include "proto/link/keys.hpp"
 #include "tests/coordinator/cli/program.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/report/digest.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 #include "tests/coordinator/cli/program.hpp"
@@ -136,7 +136,7 @@ TEST_F(MergeCommand, RefusesAPartWhoseResultsWereChanged) {
   test::change(path("b.db"), "UPDATE run_result SET estimate_k2d_s2_m = 1.0 WHERE run_index = 12");
   const Answer answer = merge({"a.db", "b.db"});
   EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
-  EXPECT_THAT(answer.error, HasSubstr("b.db does not hold what it should:\n"));
+  EXPECT_THAT(answer.error, HasSubstr("b.db fails these checks:\n"));
   EXPECT_THAT(answer.error, HasSubstr("digest"));
   EXPECT_FALSE(std::filesystem::exists(path("whole.db")));
 }

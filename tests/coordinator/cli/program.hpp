@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/cli/command_line.hpp"
+#include "coordinator/cli/program.hpp"
 
 namespace proofmass::test {
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/cli/exit_code.hpp"
+#include "coordinator/cli/program.hpp"
 #include "coordinator/report/digest.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"

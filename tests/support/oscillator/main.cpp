@@ -1,4 +1,4 @@
-#include "coordinator/cli/command_line.hpp"
+#include "coordinator/cli/program.hpp"
 
 int main(int argc, char** argv) {
   using namespace proofmass::coordinator;

@@ -1,0 +1,86 @@
+#include "coordinator/cli/program.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <exception>
+#include <iostream>
+#include <string_view>
+
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "core/campaign/definition.hpp"
+#include "proto/command_line/described_program.hpp"
+#include "proto/command_line/manual_option.hpp"
+#include "proto/command_line/option_checks.hpp"
+#include "proto/command_line/standard_error.hpp"
+
+namespace proofmass::coordinator {
+
+std::string exit_codes_text(std::initializer_list<ExitCode> further) {
+  const auto may_be = [&](ExitCode code) { return std::ranges::count(further, code) > 0; };
+  std::string text =
+      "Exit codes:\n"
+      "  0    done\n"
+      "  1    cannot be done: disk, database, address, workers that crash, time limit\n"
+      "  2    wrong usage, campaign file or query";
+  if (may_be(exit_not_met)) text += "\n  3    a requirement or stop rule is not met";
+  if (may_be(exit_interrupted)) {
+    text += "\n  130  interrupted by SIGINT or SIGTERM; what is stored stands";
+  }
+  return text;
+}
+
+int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
+  const auto fail = [&app](std::string_view what, int exit_code) {
+    wire::say(fmt::format("{}: error: {}\n", app.get_name(), what));
+    return exit_code;
+  };
+  try {
+    app.parse(argc, argv);
+    const int exit_code = work();
+    flush_standard_output();
+    return exit_code;
+  } catch (const CLI::Success& wish) {
+    const int exit_code = app.exit(wish);  // --help or --version.
+    if (std::cout.flush()) return exit_code;
+    return fail("standard output: cannot be written", exit_cannot_be_done);
+  } catch (const CLI::ParseError& error) {
+    return fail(wire::refusal_of(app, error), exit_wrong_usage);
+  } catch (const DefinitionError& error) {
+    return fail(error.what(), exit_wrong_usage);
+  } catch (const UsageError& error) {
+    return fail(error.what(), exit_wrong_usage);
+  } catch (const InvalidArgument& error) {
+    return fail(error.what(), exit_wrong_usage);
+  } catch (const std::exception& error) {
+    return fail(error.what(), exit_cannot_be_done);
+  }
+}
+
+int run_proofmass(int argc, char** argv,
+                  const std::function<void(CLI::App&, Command&)>& add_further_commands) {
+  CLI::App app("Validates the in-flight calibration of drag-free accelerometers.", "proofmass");
+  app.footer(exit_codes_text({}));  // Of the commands, unless they say otherwise.
+  app.set_version_flag("--version", "proofmass " PROOFMASS_VERSION);
+  app.require_subcommand(1);
+  app.set_config("--config", "", "TOML file with options, a section a command")
+      ->envname("PROOFMASS_CONFIG")
+      ->type_name(wire::file_type);
+  app.allow_config_extras(CLI::config_extras_mode::error);
+  Command chosen;
+  for (const auto add : {add_run, add_init, add_check, add_keygen}) add(app, chosen);
+  add_further_commands(app, chosen);
+  for (const auto add : {add_report, add_sensitivity, add_query, add_verify, add_export, add_backup,
+                         add_merge, add_compare, add_list, add_tag, add_note, add_submit,
+                         add_status, add_watch, add_control, add_workers, add_release}) {
+    add(app, chosen);
+  }
+  app.footer(exit_codes_text({exit_not_met, exit_interrupted}));
+  wire::add_manual_option(app, {"proofmass-coordinator", "proofmass-worker"});
+  return run_program(app, argc, argv, [&] { return chosen(); });
+}
+
+}  // namespace proofmass::coordinator
