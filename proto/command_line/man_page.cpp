@@ -171,6 +171,7 @@ std::string man_page(const DescribedCommand& program, const std::string& version
   const std::string purpose = program.text.substr(0, program.text.find(". "));
   return fmt::format(
       ".TH {} 1 \"\" \"{}\" \"Proofmass\"\n"
+      ".nh\n.ad l\n"  // Nothing that a reader copies may be broken into two words.
       ".SH NAME\n{} \\- {}\n"
       ".SH SYNOPSIS\n{}"
       ".SH DESCRIPTION\n{}\n"
