@@ -1,15 +1,46 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <regex>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "coordinator/cli/program.hpp"
+#include "coordinator/store/store.hpp"
+#include "core/microscope/campaign/results.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
 namespace {
+
+/// The text with `...` in place of the estimates, which depend on the machine.
+std::string without_figures(const std::string& text) {
+  const std::regex time(
+      "about ([0-9]+ [a-z]+ ?)+ of one core; about ([0-9]+ [a-z]+ ?)+ with `proofmass run` on the "
+      "[0-9]+ cores here\n");
+  return std::regex_replace(std::regex_replace(text, time, "...\n"),
+                            std::regex("about [0-9]+\\.[0-9] MB\n"), "...\n");
+}
+
+/// The time on one core in the output of `check`.
+double core_s_in(const std::string& text) {
+  std::istringstream stream(text.substr(text.find("Time      about ") + 16));
+  double total_s = 0.0, count = 0.0;
+  for (std::string unit; stream >> count >> unit;) {
+    total_s += count * (unit == "d" ? 86400.0 : unit == "h" ? 3600.0 : unit == "min" ? 60.0 : 1.0);
+  }
+  return total_s;
+}
+
+double disk_mb_in(const std::string& text) {
+  return std::stod(text.substr(text.find("Disk      about ") + 16));
+}
 
 class Check : public testing::Test {
  protected:
@@ -26,11 +57,13 @@ TEST_F(Check, SaysThatTheFileOfInitChangesNothing) {
   (void)test::answer_of({"init", file});
   const test::Answer answer = test::answer_of({"check", file});
   EXPECT_EQ(answer.exit_code, exit_done);
-  EXPECT_EQ(answer.output,
+  EXPECT_EQ(without_figures(answer.output),
             file.string() +
                 " is valid\n"
                 "Campaign  hardy2013, seed 1\n"
-                "Runs      100 of 140 orbits\n\n"
+                "Runs      100 of 140 orbits\n"
+                "Time      ...\n"
+                "Disk      ...\n\n"
                 "Beside the number of runs, nothing differs from what `proofmass init` writes.\n");
 }
 
@@ -38,11 +71,13 @@ TEST_F(Check, ShowsWhatAFileAndTheOptionsChange) {
   const auto file = write("campaign = { name = \"mine\", runs = 7 }\nnoise.scale = 0\n");
   const test::Answer answer = test::answer_of({"check", file, "--seed", "3"});
   EXPECT_EQ(answer.exit_code, exit_done);
-  EXPECT_EQ(answer.output,
+  EXPECT_EQ(without_figures(answer.output),
             file.string() +
                 " is valid\n"
                 "Campaign  mine, seed 3\n"
-                "Runs      7 of 140 orbits\n\n"
+                "Runs      7 of 140 orbits\n"
+                "Time      ...\n"
+                "Disk      ...\n\n"
                 "Beside the number of runs, these differ from what `proofmass init` writes:\n"
                 "  name = \"mine\" (instead of \"hardy2013\")\n"
                 "  seed = 3 (instead of 1)\n"
@@ -54,9 +89,56 @@ TEST_F(Check, CountsTheNumberOfRunsAsNoDifference) {
   const auto file = directory_ / "a.toml";
   (void)test::answer_of({"init", file});
   const std::string output = test::answer_of({"check", file, "--runs", "7"}).output;
-  EXPECT_NE(output.find("Runs      7 of 140 orbits\n\nBeside the number of runs, nothing differs"),
-            std::string::npos)
+  EXPECT_NE(output.find("Runs      7 of 140 orbits\n"), std::string::npos) << output;
+  EXPECT_NE(output.find("\n\nBeside the number of runs, nothing differs"), std::string::npos)
       << output;
+}
+
+// Both times are measured for half a second of processor time each, on a machine that other tests
+// use as well: they may differ by a factor of two.
+TEST_F(Check, EstimatesATimeInProportionToTheRuns) {
+  const auto file = write("campaign.name = \"mine\"\n");
+  const double few_s = core_s_in(test::answer_of({"check", file, "--runs", "16000"}).output);
+  const double many_s = core_s_in(test::answer_of({"check", file, "--runs", "1600000"}).output);
+  EXPECT_GT(few_s, 1.0);
+  EXPECT_GT(many_s, 50.0 * few_s);
+  EXPECT_LT(many_s, 200.0 * few_s);
+}
+
+// A batch costs the same with one run as with sixteen.
+TEST_F(Check, CountsAnIncompleteBatchAsAWhole) {
+  const auto file = write("campaign.name = \"mine\"\nnoise.scale = 0\n");
+  const double one_s = core_s_in(test::answer_of({"check", file, "--runs", "1"}).output);
+  const double sixteen_s = core_s_in(test::answer_of({"check", file, "--runs", "16"}).output);
+  EXPECT_LT(sixteen_s, 2.0 * one_s + 1.0);
+}
+
+TEST_F(Check, EstimatesTheDiskThatADatabaseTakes) {
+  constexpr std::uint64_t num_runs = 5000;
+  MicroscopeCampaign campaign = hardy2013_campaign();
+  campaign.num_runs = num_runs;
+  {
+    Store store = Store::create(directory_ / "a.db", campaign, canonical_definition(campaign));
+    std::vector<Delivery> deliveries;
+    for (std::uint64_t run = 0; run < num_runs; ++run) {
+      Delivery delivery{.result = test::zero_result({.run = {run}, .num_draws = 1}),
+                        .worker = {1},
+                        .attempt = {1}};
+      // SQLite stores numbers like 0 in fewer bytes.
+      delivery.result.truth.assign(num_parameters, 1e-7 / static_cast<double>(run + 3));
+      delivery.result.estimate.assign(num_parameters, 1.1e-7 / static_cast<double>(run + 3));
+      delivery.result.health.assign(num_health_values, 1e-9 / static_cast<double>(run + 3));
+      deliveries.push_back(delivery);
+    }
+    store.commit(deliveries);
+    (void)store.rest();
+  }
+  const double size_mb =
+      1e-6 * static_cast<double>(std::filesystem::file_size(directory_ / "a.db"));
+  const auto file = write("campaign.name = \"mine\"\n");
+  const std::string output =
+      test::answer_of({"check", file, "--runs", std::to_string(num_runs)}).output;
+  EXPECT_NEAR(disk_mb_in(output) / size_mb, 1.0, 0.15) << output << size_mb;
 }
 
 TEST_F(Check, RefusesWhatRunWouldRefuse) {
