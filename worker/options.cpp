@@ -75,6 +75,9 @@ void add_work(CLI::App& app, Options& options) {
                  "When the worker must have ended, in seconds\nsince 1970 (UTC), as Slurm sets it")
       ->envname("SLURM_JOB_END_TIME")
       ->check(wire::in_range(std::int64_t{0}, end_time_unix_s_max));
+  add_duration(app, "idle-timeout", options.idle_timeout,
+               "Leave after this time without a run; by default\nthe worker waits for work")
+      ->envname("PROOFMASS_IDLE_TIMEOUT");
   add_duration(app, "drain-time", options.drain_time,
                "Time to finish and deliver after SIGTERM; 100s\nby default")
       ->envname("PROOFMASS_DRAIN_TIME");

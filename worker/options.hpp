@@ -27,6 +27,7 @@ struct Options {
   unsigned num_threads = 1;
   std::optional<Duration> walltime_max;
   std::optional<std::int64_t> end_time_unix_s;  ///< When the job ends that the worker is part of.
+  std::optional<Duration> idle_timeout;         ///< Nothing: the worker waits for work.
   std::optional<std::filesystem::path> spool;
   Duration drain_time = std::chrono::seconds(100);
   std::optional<Duration> give_up_after;  ///< Nothing: 60 s with a parent, else an hour.

@@ -114,6 +114,7 @@ ServeConfig serve_config(const Options& options, TimePoint program_start, const 
   conversation.drain_time = options.drain_time;
   if (options.parent) conversation.give_up_after = give_up_with_parent;
   if (options.give_up_after) conversation.give_up_after = *options.give_up_after;
+  conversation.idle_timeout = options.idle_timeout;
   conversation.walltime_end = walltime_end(options, program_start);
   return config;
 }

@@ -270,7 +270,7 @@ void check_arguments(const std::filesystem::path& file, const VerifyOptions& opt
 
 constexpr std::size_t name_width = 12;
 constexpr std::size_t verdict_width = 13;
-constexpr std::size_t line_width = 80;
+constexpr std::size_t report_width = 80;
 
 // Text broken between words, from the second line on after `indent` spaces.
 std::string wrapped(const std::string& text, std::size_t indent) {
@@ -279,7 +279,7 @@ std::string wrapped(const std::string& text, std::size_t indent) {
   std::size_t column = indent;
   while (stream >> word) {
     const bool is_first = column == indent;
-    if (!is_first && column + 1 + display_width(word) > line_width) {
+    if (!is_first && column + 1 + display_width(word) > report_width) {
       lines += "\n" + std::string(indent, ' ');
       column = indent;
     } else if (!is_first) {

@@ -16,7 +16,7 @@ SQLITE_EXTENSION_INIT3
 namespace proofmass::coordinator {
 namespace {
 
-enum Column : int { key_column, value_column, campaign_column };
+enum EntryColumn : int { key_column, entry_value_column, entry_campaign_column };
 
 struct Definition {
   std::string campaign;
@@ -31,7 +31,7 @@ struct DefinitionCursor : sqlite3_vtab_cursor {
       "CREATE TABLE definition_entry(key TEXT, value, campaign TEXT HIDDEN)";
   static constexpr const char* creation =
       "CREATE VIRTUAL TABLE IF NOT EXISTS temp.definition_entry USING proofmass_definition";
-  static constexpr int argument_column = campaign_column;
+  static constexpr int argument_column = entry_campaign_column;
   using Made = Definition;
 
   static void choose_plan(sqlite3_index_info& plan);
@@ -49,7 +49,7 @@ struct DefinitionCursor : sqlite3_vtab_cursor {
 void DefinitionCursor::choose_plan(sqlite3_index_info& plan) {
   for (int i = 0; i < plan.nConstraint && plan.idxNum == 0; ++i) {
     const auto& constraint = plan.aConstraint[i];
-    if (constraint.iColumn != campaign_column || constraint.usable == 0 ||
+    if (constraint.iColumn != entry_campaign_column || constraint.usable == 0 ||
         constraint.op != SQLITE_INDEX_CONSTRAINT_EQ) {
       continue;
     }
@@ -90,7 +90,7 @@ void DefinitionCursor::give_column(sqlite3_context* context, int number) const {
   switch (number) {
     case key_column:
       return set(item.key);
-    case value_column:
+    case entry_value_column:
       return std::visit(set, item.value);
     default:
       set(definition->campaign);

@@ -20,7 +20,13 @@ SQLITE_EXTENSION_INIT3
 namespace proofmass::coordinator {
 namespace {
 
-enum Column : int { run_index_column, quantity_column, unit_column, value_column, campaign_column };
+enum DrawColumn : int {
+  run_index_column,
+  quantity_column,
+  unit_column,
+  draw_value_column,
+  draw_campaign_column
+};
 
 struct DrawCursor : sqlite3_vtab_cursor {
   static constexpr const char* name = "draw";
@@ -30,7 +36,7 @@ struct DrawCursor : sqlite3_vtab_cursor {
       "campaign TEXT HIDDEN)";
   static constexpr const char* creation =
       "CREATE VIRTUAL TABLE IF NOT EXISTS temp.draw USING proofmass_draw";
-  static constexpr int argument_column = campaign_column;
+  static constexpr int argument_column = draw_campaign_column;
   using Made = DrawnCampaign;
 
   static void choose_plan(sqlite3_index_info& plan);
@@ -58,7 +64,7 @@ struct Offer {
 };
 
 constexpr std::array<Offer, 7> offers{{
-    {campaign_column, SQLITE_INDEX_CONSTRAINT_EQ, {}},
+    {draw_campaign_column, SQLITE_INDEX_CONSTRAINT_EQ, {}},
     {quantity_column, SQLITE_INDEX_CONSTRAINT_EQ, {}},
     {run_index_column, SQLITE_INDEX_CONSTRAINT_EQ, RunComparison::equal},
     {run_index_column, SQLITE_INDEX_CONSTRAINT_GT, RunComparison::above},
@@ -105,7 +111,7 @@ void DrawCursor::choose_plan(sqlite3_index_info& plan) {
     if (!constraint) continue;
     plan.idxNum |= 1 << i;
     plan.aConstraintUsage[*constraint].argvIndex = ++num_arguments;
-    plan.aConstraintUsage[*constraint].omit = offers[i].column == campaign_column;
+    plan.aConstraintUsage[*constraint].omit = offers[i].column == draw_campaign_column;
   }
   estimate_cost(plan);
   plan.orderByConsumed = plan.nOrderBy == 1 && plan.aOrderBy[0].desc == 0 &&
@@ -147,7 +153,7 @@ void DrawCursor::begin(VirtualTable<DrawCursor>& table, int plan, sqlite3_value*
   for (std::size_t i = 0; i < offers.size(); ++i) {
     if ((plan & (1 << i)) == 0) continue;
     sqlite3_value* value = *arguments++;
-    if (offers[i].column != campaign_column) narrow(scan, offers[i], value);
+    if (offers[i].column != draw_campaign_column) narrow(scan, offers[i], value);
   }
   go_to_run(scan.first_run);
 }
@@ -173,7 +179,7 @@ void DrawCursor::give_column(sqlite3_context* context, int number) const {
       return set_text(context, model().drawn()[quantity].name);
     case unit_column:
       return set_text(context, model().drawn()[quantity].unit);
-    case value_column:
+    case draw_value_column:
       if (!values.empty()) sqlite3_result_double(context, values[quantity]);
       return;
     default:

@@ -97,7 +97,7 @@ std::string key_of(const std::vector<Sensitivity>& rows) {
       rows.size());
 }
 
-std::string name_of(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
+std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
   const std::string& first = drawn.names[term.first];
   if (!term.second) return first;
   return term.second == term.first ? fmt::format("({})²", first)
@@ -105,7 +105,7 @@ std::string name_of(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
 }
 
 std::string term_row(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
-  const std::string name = name_of(drawn, term);
+  const std::string name = term_name(drawn, term);
   const bool fits = display_width(name) < term_columns[0].width;
   const std::array cells{fits ? name : std::string(), fmt::format("{:.3g}", term.slope),
                          fmt::format("{:.1f} %", 100.0 * term.share), p_value_cell(term.p_value)};

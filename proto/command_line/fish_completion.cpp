@@ -8,7 +8,7 @@
 namespace proofmass::wire {
 namespace {
 
-std::string quoted(std::string_view text) {
+std::string quoted_for_fish(std::string_view text) {
   std::string result = "'";
   for (const char c : text) {
     if (c == '\\' || c == '\'') result += '\\';
@@ -29,13 +29,14 @@ std::string offer_for(const DescribedOption& value) {
       std::string words;
       for (const std::string& word : value.words) {
         if (!words.empty()) words += ' ';
-        words += quoted(word);
+        words += quoted_for_fish(word);
       }
-      return fmt::format(" -x -a {}", quoted(words));
+      return fmt::format(" -x -a {}", quoted_for_fish(words));
     }
     case ValueKind::file:
       if (value.extension.empty()) return " -r -F";
-      return fmt::format(" -r -k -a \"(__fish_complete_suffix {})\"", quoted(value.extension));
+      return fmt::format(" -r -k -a \"(__fish_complete_suffix {})\"",
+                         quoted_for_fish(value.extension));
     case ValueKind::directory:
       return " -x -a \"(__fish_complete_directories)\"";
   }
@@ -49,9 +50,9 @@ std::string lines_of(const DescribedCommand& command, const std::string& begin) 
     text += begin;
     for (const std::string& name : option.names) {
       const bool is_long = name.starts_with("--");
-      text += (is_long ? " -l " : " -s ") + quoted(name.substr(is_long ? 2 : 1));
+      text += (is_long ? " -l " : " -s ") + quoted_for_fish(name.substr(is_long ? 2 : 1));
     }
-    text += offer_for(option) + " -d " + quoted(option.text) + "\n";
+    text += offer_for(option) + " -d " + quoted_for_fish(option.text) + "\n";
   }
   const auto takes_file = [](const DescribedOption& argument) {
     return argument.kind == ValueKind::file && argument.extension.empty();
@@ -75,13 +76,13 @@ std::string fish_completion(const DescribedCommand& program) {
   if (program.commands.empty()) return text + lines_of(program, begin);
   text += lines_of(program, begin + " -n __fish_use_subcommand");
   for (const DescribedCommand& command : program.commands) {
-    text += fmt::format("{} -n __fish_use_subcommand -f -a {} -d {}\n", begin, quoted(command.name),
-                        quoted(command.text));
+    text += fmt::format("{} -n __fish_use_subcommand -f -a {} -d {}\n", begin,
+                        quoted_for_fish(command.name), quoted_for_fish(command.text));
   }
   for (const DescribedCommand& command : program.commands) {
-    text += lines_of(command,
-                     fmt::format("{} -n {}", begin,
-                                 quoted("__fish_seen_subcommand_from " + quoted(command.name))));
+    text += lines_of(command, fmt::format("{} -n {}", begin,
+                                          quoted_for_fish("__fish_seen_subcommand_from " +
+                                                          quoted_for_fish(command.name))));
   }
   return text;
 }

@@ -9,7 +9,7 @@
 namespace proofmass::wire {
 namespace {
 
-constexpr std::string_view script = R"(#compdef {program}
+constexpr std::string_view zsh_script = R"(#compdef {program}
 # Completes {program} in zsh; made from the declarations of its options.
 
 {function}() {{
@@ -114,7 +114,7 @@ std::string zsh_completion(const DescribedCommand& program) {
   if (!commands.empty()) commands = fmt::format("  local -a commands=(\n{}  )\n", commands);
   const std::string by_command =
       branches.empty() ? "" : fmt::format(by_command_script, fmt::arg("branches", branches));
-  return fmt::format(script, fmt::arg("program", program.name),
+  return fmt::format(zsh_script, fmt::arg("program", program.name),
                      fmt::arg("function", "_" + program.name), fmt::arg("commands", commands),
                      fmt::arg("specifications", specifications_of(program, "    ")),
                      fmt::arg("by_command", by_command));

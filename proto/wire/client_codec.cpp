@@ -152,7 +152,7 @@ using detail::require_count;
 using detail::require_in;
 
 /// A reply with 4096 workers has 37,000.
-constexpr std::size_t fields_max = std::size_t{1} << 16;
+constexpr std::size_t request_fields_max = std::size_t{1} << 16;
 
 int checked_priority(int priority) {
   require(priority >= -priority_max && priority <= priority_max, "priority",
@@ -346,12 +346,13 @@ std::optional<DecodeError> parse(std::string_view bytes, std::string_view what,
                                  std::size_t size_max, Envelope& envelope) {
   detail::silence_protobuf();
   if (bytes.size() > size_max) return too_large(what, bytes.size(), size_max);
-  const bool is_parsed = detail::has_fields_at_most(bytes, *Envelope::descriptor(), fields_max) &&
-                         envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+  const bool is_parsed =
+      detail::has_fields_at_most(bytes, *Envelope::descriptor(), request_fields_max) &&
+      envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
   if (!is_parsed) {
     return fault(DecodeFault::unparsable,
                  fmt::format("{} = {} bytes (must be an envelope of at most {} fields)", what,
-                             bytes.size(), fields_max));
+                             bytes.size(), request_fields_max));
   }
   if (envelope.protocol_version() != protocol_version) {
     return fault(DecodeFault::wrong_version,

@@ -15,7 +15,7 @@ namespace proofmass::wire {
 namespace {
 
 /// Tables and columns have at most some thousands; an array of numbers is one.
-constexpr std::size_t fields_max = 4096;
+constexpr std::size_t definition_fields_max = 4096;
 constexpr std::uint64_t tables_max = 64;
 constexpr std::uint64_t columns_of_a_table_max = 64;
 constexpr std::uint64_t table_columns_max = 1024;
@@ -95,13 +95,13 @@ std::variant<Definition, DecodeError> decode_definition(std::string_view bytes) 
   }
   proto::Definition message;
   const bool is_parsed =
-      detail::has_fields_at_most(bytes, *proto::Definition::descriptor(), fields_max) &&
+      detail::has_fields_at_most(bytes, *proto::Definition::descriptor(), definition_fields_max) &&
       message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
   if (!is_parsed) {
     return DecodeError{
         DecodeFault::unparsable,
         fmt::format("definition = {} bytes (must be a definition of at most {} fields)",
-                    bytes.size(), fields_max)};
+                    bytes.size(), definition_fields_max)};
   }
   try {
     return detail::read_definition(message);

@@ -50,12 +50,6 @@ struct SwarmOptions {
   int num_replaced = 0;  ///< Of the idle ones, each second.
 };
 
-TimePoint time_now() { return std::chrono::steady_clock::now(); }
-
-double seconds(worker::Duration duration) {
-  return std::chrono::duration<double>(duration).count();
-}
-
 /// Each worker has a connection and what wakes its thread.
 void raise_descriptor_limit() {
   rlimit limit{};

@@ -14,12 +14,6 @@ namespace {
 /// One run in so many is timed: enough, and cheap.
 constexpr std::uint64_t timed_run_step = 16;
 
-SwarmWorker::TimePoint time_now() { return std::chrono::steady_clock::now(); }
-
-double seconds(worker::Duration duration) {
-  return std::chrono::duration<double>(duration).count();
-}
-
 zmq::socket_t connected_dealer(zmq::context_t& context, const SwarmWorkerConfig& config) {
   zmq::socket_t socket = wire::make_dealer(context, config.security);
   socket.connect(config.endpoint);

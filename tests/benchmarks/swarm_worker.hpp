@@ -16,6 +16,12 @@
 
 namespace proofmass::test {
 
+inline std::chrono::steady_clock::time_point time_now() { return std::chrono::steady_clock::now(); }
+
+inline double seconds(worker::Duration duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
 /// What the workers of a swarm have seen since somebody last looked.
 struct SwarmCount {
   std::uint64_t num_leases = 0;  ///< Messages.

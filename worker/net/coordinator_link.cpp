@@ -18,7 +18,7 @@ namespace {
 
 using Direction = wire::FaultyLink::Direction;
 
-TimePoint time_now() { return std::chrono::steady_clock::now(); }
+TimePoint steady_now() { return std::chrono::steady_clock::now(); }
 
 std::chrono::milliseconds milliseconds_up(Duration time) {
   return std::chrono::ceil<std::chrono::milliseconds>(std::max(Duration::zero(), time));
@@ -31,7 +31,7 @@ class CoordinatorLink::Impl {
   Impl(const std::string& endpoint, const wire::ClientSecurity& security,
        const std::optional<wire::FaultPlan>& faults)
       : socket_(wire::make_dealer(context_, security)),
-        monitor_(context_, socket_, endpoint, security, time_now()) {
+        monitor_(context_, socket_, endpoint, security, steady_now()) {
     if (faults) {
       sending_.emplace(*faults, Direction::sending);
       receiving_.emplace(*faults, Direction::receiving);
@@ -50,7 +50,7 @@ class CoordinatorLink::Impl {
       // A process that was stopped and continued comes back here.
       if (error.num() != EINTR) throw;
     }
-    monitor_.update(time_now());
+    monitor_.update(steady_now());
     const bool is_connected = monitor_.is_connected();
     is_newly_connected_ = is_connected && (is_newly_connected_ || !was_connected_);
     was_connected_ = is_connected;

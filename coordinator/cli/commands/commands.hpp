@@ -85,5 +85,6 @@ void add_watch(CLI::App& app, Command& chosen);
 void add_control(CLI::App& app, Command& chosen);  ///< `pause`, `resume`, `cancel` and so on.
 void add_workers(CLI::App& app, Command& chosen);
 void add_release(CLI::App& app, Command& chosen);
+void add_factory(CLI::App& app, Command& chosen);
 
 }  // namespace proofmass::coordinator

@@ -162,7 +162,7 @@ double test_frequency_hz(const Session& session, double orbit_period_s) {
 
 namespace {
 
-using Lines = std::vector<LineMultiple>;
+using LineList = std::vector<LineMultiple>;
 
 // Calibration signals of model and mission: [Hardy2013] section 4.2 gives their kinds, the
 // frequencies are those flown, the amplitudes reach the paper's accuracies.
@@ -176,7 +176,7 @@ constexpr Excitation move_along(Axis axis, MassMotion motion) {
   return {test_mass, axis, 10e-6, 9.88e-3, motion};
 }
 
-Session session_of(SessionTarget target, Lines fit_lines, Lines known_lines) {
+Session session_of(SessionTarget target, LineList fit_lines, LineList known_lines) {
   Session session;
   session.name = name_of(target);
   session.target = target;
@@ -203,16 +203,16 @@ Session lasting(Session session, int num_orbits) {
 }  // namespace
 
 std::vector<Session> hardy2013_sessions() {
-  const Lines gradient{{2, 0}};
-  const Lines orbital{{1, 0}, {3, 0}, {4, 0}};
-  const Lines sidebands{{2, 1}, {-2, 1}};
-  const Lines all_sidebands{{1, 0}, {2, 0}, {2, 1}, {-2, 1}, {1, 1}, {-1, 1}};
+  const LineList gradient{{2, 0}};
+  const LineList orbital{{1, 0}, {3, 0}, {4, 0}};
+  const LineList sidebands{{2, 1}, {-2, 1}};
+  const LineList all_sidebands{{1, 0}, {2, 0}, {2, 1}, {-2, 1}, {1, 1}, {-1, 1}};
   // At eccentricity e the gradient has a line 7e/2 as strong as that at 2 f_orb, at 3 f_orb;
   // unfitted, its sideband leaks 3e-5 rad into a_c13.
-  const Lines carrier{{0, 1}, {1, 0}, {2, 0}, {1, 1}, {-1, 1}, {3, 1}, {-3, 1}};
-  const Lines with_harmonic{{1, 0}, {2, 0}, {0, 2}};
-  const Lines with_carrier{{0, 1}, {1, 0}, {2, 0}};
-  const Lines quadratic{{0, 1}, {1, 0}, {2, 0}, {2, 1}, {-2, 1}, {1, 1}, {-1, 1}};
+  const LineList carrier{{0, 1}, {1, 0}, {2, 0}, {1, 1}, {-1, 1}, {3, 1}, {-3, 1}};
+  const LineList with_harmonic{{1, 0}, {2, 0}, {0, 2}};
+  const LineList with_carrier{{0, 1}, {1, 0}, {2, 0}};
+  const LineList quadratic{{0, 1}, {1, 0}, {2, 0}, {2, 1}, {-2, 1}, {1, 1}, {-1, 1}};
   return {
       session_of(a_c11_delta_x, gradient, orbital),
       session_of(a_c11_delta_z, gradient, orbital),

@@ -14,6 +14,7 @@
 #include "coordinator/archive/export.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
+#include "tests/coordinator/archive/csv_cells.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -97,30 +98,13 @@ class ExportDraws : public test::StoreTest {
   Bits expected_;
 };
 
-double number(const std::string& text) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  EXPECT_TRUE(error == std::errc() && end == text.data() + text.size()) << text;
-  return value;
-}
-
-std::vector<std::string> cells_of(const std::string& line) {
-  std::vector<std::string> cells;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(',', begin), line.size());
-    cells.push_back(line.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return cells;
-}
-
 Bits bits_in_csv(const std::string& text) {
   Bits bits;
   std::vector<std::string> names;
   std::istringstream stream(text);
   for (std::string line; std::getline(stream, line);) {
     line.pop_back();  // A carriage return.
-    const std::vector<std::string> cells = cells_of(line);
+    const std::vector<std::string> cells = test::cells_of(line);
     if (names.empty()) {
       names = cells;
       continue;
@@ -129,7 +113,7 @@ Bits bits_in_csv(const std::string& text) {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       if (!names[i].starts_with("draw_")) continue;
       bits[{std::stoull(cells[0]), names[i].substr(5)}] =
-          cells[i].empty() ? std::nullopt : std::optional(test::bits_of(number(cells[i])));
+          cells[i].empty() ? std::nullopt : std::optional(test::bits_of(test::number(cells[i])));
     }
   }
   return bits;

@@ -10,6 +10,7 @@
 
 #include "coordinator/report/digest.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
+#include "tests/coordinator/archive/csv_cells.hpp"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
@@ -20,26 +21,6 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
-
-std::vector<std::string> cells_of(const std::string& line) {
-  std::vector<std::string> cells(1);
-  for (const char character : line) {
-    if (character == ',') {
-      cells.emplace_back();
-    } else {
-      cells.back() += character;
-    }
-  }
-  return cells;
-}
-
-double number(const std::string& text) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  EXPECT_EQ(error, std::errc()) << text;
-  EXPECT_EQ(end, text.data() + text.size()) << text;
-  return value;
-}
 
 class Export : public test::StoreTest {
  protected:
@@ -69,7 +50,7 @@ TEST_F(Export, OfCsvHasALineARunThatReadsBackToTheSameBits) {
   for (std::string line; std::getline(stream, line);) {
     ASSERT_EQ(line.back(), '\r');  // As of RFC 4180.
     line.pop_back();
-    rows.push_back(cells_of(line));
+    rows.push_back(test::cells_of(line));
   }
   ASSERT_EQ(rows.size(), 6U);
   EXPECT_EQ(rows[0][0], "run_index");
@@ -90,9 +71,9 @@ TEST_F(Export, OfCsvHasALineARunThatReadsBackToTheSameBits) {
       EXPECT_EQ(row[14 + i].empty(), !result.has_estimate());
       EXPECT_EQ(row[24 + i].empty(), !result.has_estimate());
       if (!result.has_estimate()) continue;
-      EXPECT_EQ(test::bits_of(number(row[4 + i])), test::bits_of(result.truth[i]));
-      EXPECT_EQ(test::bits_of(number(row[14 + i])), test::bits_of(result.estimate[i]));
-      EXPECT_EQ(test::bits_of(number(row[24 + i])),
+      EXPECT_EQ(test::bits_of(test::number(row[4 + i])), test::bits_of(result.truth[i]));
+      EXPECT_EQ(test::bits_of(test::number(row[14 + i])), test::bits_of(result.estimate[i]));
+      EXPECT_EQ(test::bits_of(test::number(row[24 + i])),
                 test::bits_of(result.estimate[i] - result.truth[i]));
     }
   }

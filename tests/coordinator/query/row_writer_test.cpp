@@ -16,7 +16,7 @@
 namespace proofmass::coordinator {
 namespace {
 
-using Row = std::vector<Cell>;
+using CellRow = std::vector<Cell>;
 constexpr Cell null{};
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -24,12 +24,12 @@ Cell integer(std::int64_t value) { return value; }
 Cell text(std::string_view value) { return value; }
 
 std::string written(RowFormat format, const std::vector<std::string>& columns,
-                    const std::vector<Row>& rows, const TableLimits& limits = {}) {
+                    const std::vector<CellRow>& rows, const TableLimits& limits = {}) {
   std::string out;
   const auto writer =
       make_row_writer(format, limits, [&](std::string_view piece) { out += piece; });
   writer->begin(columns);
-  for (const Row& row : rows) {
+  for (const CellRow& row : rows) {
     if (!writer->row(row)) break;
   }
   writer->end();
@@ -157,13 +157,13 @@ TEST(TableRows, WantNoneBeyondTheFirstThatIsNotShown) {
   const auto writer =
       make_row_writer(RowFormat::table, {.num_rows_max = 2, .num_columns = {}}, [](auto) {});
   writer->begin(std::vector<std::string>{"a"});
-  EXPECT_TRUE(writer->row(Row{null}));
-  EXPECT_TRUE(writer->row(Row{null}));
-  EXPECT_FALSE(writer->row(Row{null}));
+  EXPECT_TRUE(writer->row(CellRow{null}));
+  EXPECT_TRUE(writer->row(CellRow{null}));
+  EXPECT_FALSE(writer->row(CellRow{null}));
 }
 
 TEST(TableRows, CutTextToFitTheTerminalAndNeverANumber) {
-  const std::vector<Row> rows{{text("a long text that goes on and on"), integer(123456789)}};
+  const std::vector<CellRow> rows{{text("a long text that goes on and on"), integer(123456789)}};
   EXPECT_EQ(
       written(RowFormat::table, {"text", "value"}, rows, {.num_rows_max = 10, .num_columns = 25}),
       "text                value\n"
@@ -179,7 +179,7 @@ TEST(TableRows, HaveSixSignificantDigits) {
 // A table of these two columns takes at least 8 + 2 + 9 of the 16 columns of the terminal. In a
 // record text is cut and a number is not.
 TEST(TableRows, ThatAreWiderThanTheTerminalAreRecords) {
-  const std::vector<Row> rows{{text("a long text"), integer(123456789)}, {null, integer(2)}};
+  const std::vector<CellRow> rows{{text("a long text"), integer(123456789)}, {null, integer(2)}};
   EXPECT_EQ(
       written(RowFormat::table, {"text", "value"}, rows, {.num_rows_max = 10, .num_columns = 16}),
       "row 1\n"

@@ -14,6 +14,7 @@
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "coordinator/store/detail/database.hpp"
+#include "tests/coordinator/report/text_lines.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
 
@@ -23,15 +24,6 @@ namespace {
 using ::testing::Contains;
 using ::testing::Each;
 using ::testing::HasSubstr;
-
-std::vector<std::string> lines_of(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  return lines;
-}
-
-MATCHER(FitsATerminal, "has at most 80 characters") { return display_width(arg) <= 80; }
 
 /// Statistics with the paper's own errors and `num_runs` runs, all of them estimated.
 CampaignStatistics paper_statistics(std::uint64_t num_runs) {
@@ -59,16 +51,17 @@ TEST(GivenUpRuns, AreNamed) {
 TEST(GivenUpRuns, AreNamedAsFarAsTheLineHasRoom) {
   std::vector<RunRange> runs;
   for (std::uint64_t run = 100'000'000; run < 100'000'100; run += 2) runs.push_back({{run}, 1});
-  const std::vector<std::string> lines = lines_of(given_up_text(runs));
+  const std::vector<std::string> lines = test::lines_of(given_up_text(runs));
   ASSERT_EQ(lines.size(), 1U);
-  EXPECT_THAT(lines[0], FitsATerminal());
+  EXPECT_THAT(lines[0], test::FitsATerminal());
   EXPECT_THAT(lines[0], testing::EndsWith(" 100000004 ..."));
 }
 
 TEST(AccuracyTable, ShowsEachParameterBesideThePaper) {
   CampaignStatistics statistics = paper_statistics(100);
   statistics.accuracy[index(Parameter::a_c13)].num_beyond_objective = 3;
-  const std::vector<std::string> lines = lines_of(accuracy_table(MicroscopeCampaign{}, statistics));
+  const std::vector<std::string> lines =
+      test::lines_of(accuracy_table(MicroscopeCampaign{}, statistics));
   // Figures of [Hardy2013] tab:perfo-numerical in the units of the table, left and right.
   EXPECT_THAT(lines, Contains("a_c11·Δx   nm             100    40.0    10.0    7.30      0 │"
                               "    40    10   7.3"));
@@ -90,14 +83,14 @@ TEST(AccuracyTable, CountsTheRunsThatItIsAbout) {
 
 TEST(AccuracyTable, HasDashesWhileNoRunHasAnEstimate) {
   const std::vector<std::string> lines =
-      lines_of(accuracy_table(MicroscopeCampaign{}, CampaignStatistics{}));
+      test::lines_of(accuracy_table(MicroscopeCampaign{}, CampaignStatistics{}));
   EXPECT_THAT(lines, Contains("a_c12      1e-4 rad         9       -       -       -      - │"
                               "    10   2.6   2.3"));
 }
 
 TEST(BudgetTable, ShowsEachTermBesideThePaper) {
   const std::vector<std::string> lines =
-      lines_of(budget_table(MicroscopeCampaign{}, paper_statistics(100), {}));
+      test::lines_of(budget_table(MicroscopeCampaign{}, paper_statistics(100), {}));
   EXPECT_THAT(lines, Contains("a_c11·T_xx·Δx            8.4e-14  1.7e-16  4.2e-17 │"
                               "  8.4e-14  1.7e-16  4.2e-17"));
   EXPECT_THAT(lines, Contains("2·K2d·(Γ_d²+Γ_res,x²)    8.0e-16  7.1e-18  1.4e-18 │"
@@ -109,7 +102,7 @@ TEST(BudgetTable, ShowsEachTermBesideThePaper) {
 
 TEST(BudgetTable, HasDashesAfterCalibrationWhileNoRunHasAnEstimate) {
   const std::vector<std::string> lines =
-      lines_of(budget_table(MicroscopeCampaign{}, CampaignStatistics{}, {}));
+      test::lines_of(budget_table(MicroscopeCampaign{}, CampaignStatistics{}, {}));
   EXPECT_THAT(lines, Contains("Total                    2.0e-13        -        - │"
                               "  2.0e-13  1.1e-15  3.6e-16"));
 }
@@ -121,7 +114,7 @@ TEST(IntervalTable, ShowsHowSureTheFiguresAre) {
   accuracy.deviation_interval = Interval{.lower = 47.25, .upper = 63.75, .confidence = 0.95};
   accuracy.error.bias = -12.5;
   accuracy.error.skewness = -0.756;
-  const std::vector<std::string> lines = lines_of(interval_table(statistics, 0));
+  const std::vector<std::string> lines = test::lines_of(interval_table(statistics, 0));
   EXPECT_THAT(lines, Contains("K2c/K1c²       62.0    51.5    72.5 │    54.0    47.2    63.8 │"
                               "    -12.5  -0.76"));
   EXPECT_THAT(lines, Contains("K2d/K1c²       25.0       -       - │    23.0       -       - │"
@@ -155,16 +148,16 @@ TEST(IntervalTable, BeginsAtZeroWhereAMagnitudeDoes) {
   CampaignStatistics statistics = paper_statistics(2);
   AccuracyStatistic& accuracy = statistics.accuracy[index(Parameter::a_c11_delta_x)];
   accuracy.mean_interval = Interval{.lower = -83.0e-9, .upper = 125.4e-9, .confidence = 0.95};
-  EXPECT_THAT(lines_of(interval_table(statistics, 0)),
+  EXPECT_THAT(test::lines_of(interval_table(statistics, 0)),
               Contains("a_c11·Δx       10.0       0     125 │    7.30       -       - │"
                        "        0      -"));
 }
 
 TEST(IntervalTable, HasNoFiguresThatSoFewRunsDoNotGive) {
-  EXPECT_THAT(lines_of(interval_table(paper_statistics(1), 0)),
+  EXPECT_THAT(test::lines_of(interval_table(paper_statistics(1), 0)),
               Contains("a_c11·Δx       10.0       -       - │       -       -       - │"
                        "        0      -"));
-  EXPECT_THAT(lines_of(accuracy_table(MicroscopeCampaign{}, paper_statistics(1))),
+  EXPECT_THAT(test::lines_of(accuracy_table(MicroscopeCampaign{}, paper_statistics(1))),
               Contains("a_c11·Δx   nm             100    40.0    10.0       -      0 │"
                        "    40    10   7.3"));
 }
@@ -186,7 +179,7 @@ TEST(ErrorTable, ShowsBiasPercentilesAndHowOftenObjectivesHold) {
   accuracy.error.bias_interval = Interval{.lower = -1.25e-5, .upper = 9e-5, .confidence = 0.95};
   accuracy.percentiles[0].value = 2.5e-4;
   accuracy.percentiles[3].value = 1.1e-3;
-  const std::vector<std::string> lines = lines_of(error_table(statistics, 0));
+  const std::vector<std::string> lines = test::lines_of(error_table(statistics, 0));
   EXPECT_THAT(lines, Contains("a_c12        -0.125    0.900 │    2.50       0       0    11.0 │"
                               "  0.243    7.04"));
   EXPECT_THAT(lines, Contains("K2d/K1c²          -        - │       0       0       0       0 │"
@@ -277,15 +270,16 @@ TEST(Report, FitsATerminal) {
     }
     MicroscopeCampaign campaign;
     for (double& objective : campaign.scenario.objectives) objective *= factor;
-    EXPECT_THAT(lines_of(accuracy_table(campaign, statistics)), Each(FitsATerminal()));
-    EXPECT_THAT(lines_of(interval_table(statistics, 0)), Each(FitsATerminal()));
-    EXPECT_THAT(lines_of(error_table(statistics, most)), Each(FitsATerminal()));
-    EXPECT_THAT(lines_of(budget_table(campaign, statistics, RunTotals{.worst_run = {most}})),
-                Each(FitsATerminal()));
+    EXPECT_THAT(test::lines_of(accuracy_table(campaign, statistics)), Each(test::FitsATerminal()));
+    EXPECT_THAT(test::lines_of(interval_table(statistics, 0)), Each(test::FitsATerminal()));
+    EXPECT_THAT(test::lines_of(error_table(statistics, most)), Each(test::FitsATerminal()));
+    EXPECT_THAT(test::lines_of(budget_table(campaign, statistics, RunTotals{.worst_run = {most}})),
+                Each(test::FitsATerminal()));
   }
-  EXPECT_THAT(lines_of(summary_text(std::string(64, 'n'), std::numeric_limits<std::uint64_t>::max(),
-                                    most, statistics, std::string(64, 'f'))),
-              Each(FitsATerminal()));
+  EXPECT_THAT(
+      test::lines_of(summary_text(std::string(64, 'n'), std::numeric_limits<std::uint64_t>::max(),
+                                  most, statistics, std::string(64, 'f'))),
+      Each(test::FitsATerminal()));
 }
 
 // All rows of a table have the width of its rule, so that nothing is shifted.
@@ -294,7 +288,7 @@ TEST(Report, AlignsEveryRow) {
   for (const std::string& table :
        {accuracy_table(MicroscopeCampaign{}, statistics), interval_table(statistics, 0),
         error_table(statistics, 0), budget_table(MicroscopeCampaign{}, statistics, RunTotals{})}) {
-    const std::vector<std::string> lines = lines_of(table);
+    const std::vector<std::string> lines = test::lines_of(table);
     const auto is_row = [](const std::string& line) { return line.find("│") != line.npos; };
     for (std::size_t i = 3; i < lines.size(); ++i) {
       if (!is_row(lines[i]) && !lines[i].starts_with("─")) continue;

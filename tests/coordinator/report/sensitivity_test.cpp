@@ -16,6 +16,7 @@
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/coordinator/report/text_lines.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -25,15 +26,6 @@ using ::testing::Each;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-
-MATCHER(FitsATerminal, "has at most 80 characters") { return display_width(arg) <= 80; }
-
-std::vector<std::string> lines_of(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  return lines;
-}
 
 /// Every quantity uniform in [-1, 1]; the error of K2c is that with index 7, and that of a_c12 the
 /// square of that with index 20.
@@ -59,7 +51,7 @@ DrawnRuns made_up_runs() {
 }
 
 TEST(SensitivityText, NamesTheQuantityThatDrivesAnError) {
-  const auto lines = lines_of(sensitivity_text(made_up_runs(), index(Parameter::k2c), 2));
+  const auto lines = test::lines_of(sensitivity_text(made_up_runs(), index(Parameter::k2c), 2));
   ASSERT_EQ(lines.size(), 21U);
   EXPECT_EQ(lines[0], "K2c/K1c²: 1000 runs");
   EXPECT_THAT(lines[2], StartsWith("drives |error|"));
@@ -79,7 +71,8 @@ TEST(SensitivityText, SaysWhatItsFiguresAre) {
 
 // Of 59 quantities without influence none is called significant.
 TEST(SensitivityText, CorrectsForAllQuantitiesTried) {
-  const auto lines = lines_of(sensitivity_text(made_up_runs(), index(Parameter::k2c), num_drawn));
+  const auto lines =
+      test::lines_of(sensitivity_text(made_up_runs(), index(Parameter::k2c), num_drawn));
   const auto table = std::span(lines).subspan(4, num_drawn);
   EXPECT_THAT(table[0], EndsWith("  <1e-09"));
   for (const std::string& line : table.subspan(1)) {
@@ -93,14 +86,14 @@ TEST(SensitivityText, NamesTheProductThatMakesAnError) {
   for (std::size_t i = 0; i < drawn.runs.size(); ++i) {
     drawn.errors[index(Parameter::k2c)][i] = -3.03 * drawn.columns[7][i] * drawn.columns[40][i];
   }
-  const auto lines = lines_of(sensitivity_text(drawn, index(Parameter::k2c), 1));
+  const auto lines = test::lines_of(sensitivity_text(drawn, index(Parameter::k2c), 1));
   EXPECT_THAT(lines[12], StartsWith("error as a sum of "));
   EXPECT_EQ(lines[14], drawn_names()[7] + " × " + drawn_names()[40]);
   EXPECT_EQ(lines[15], std::string(51, ' ').append("-3.03      100.0 %     <1e-09"));
 }
 
 TEST(SensitivityText, NamesASquareAndSaysWhenNothingExplainsTheError) {
-  const auto lines = lines_of(sensitivity_text(made_up_runs(), index(Parameter::a_c12), 1));
+  const auto lines = test::lines_of(sensitivity_text(made_up_runs(), index(Parameter::a_c12), 1));
   EXPECT_THAT(lines[14], StartsWith("(" + drawn_names()[20] + ")²  "));
   EXPECT_THAT(lines[14], EndsWith(" 1      100.0 %     <1e-09"));
   EXPECT_THAT(sensitivity_text(made_up_runs(), index(Parameter::k2d), 1),
@@ -135,7 +128,7 @@ TEST(SensitivityText, CountsTheRunsThatItLeavesOut) {
 
 // |error| goes as the square, which no correlation sees.
 TEST(SensitivityText, FindsWhatActsThroughItsSquare) {
-  const auto lines = lines_of(sensitivity_text(made_up_runs(), index(Parameter::a_c12), 1));
+  const auto lines = test::lines_of(sensitivity_text(made_up_runs(), index(Parameter::a_c12), 1));
   EXPECT_THAT(lines[4], StartsWith(drawn_names()[20]));
   double share_percent = 0.0;  // Behind the name, as in ` 98.1 (97.6, 98.5)`.
   std::istringstream(lines[4].substr(drawn_names()[20].size())) >> share_percent;
@@ -144,14 +137,14 @@ TEST(SensitivityText, FindsWhatActsThroughItsSquare) {
 
 TEST(SensitivityText, FitsATerminal) {
   const DrawnRuns drawn = made_up_runs();
-  EXPECT_THAT(lines_of(sensitivity_text(drawn, index(Parameter::k2c), num_drawn)),
-              Each(FitsATerminal()));
-  EXPECT_THAT(lines_of(explanation_text(drawn, index(Parameter::k2c), {3}, num_drawn)),
-              Each(FitsATerminal()));
+  EXPECT_THAT(test::lines_of(sensitivity_text(drawn, index(Parameter::k2c), num_drawn)),
+              Each(test::FitsATerminal()));
+  EXPECT_THAT(test::lines_of(explanation_text(drawn, index(Parameter::k2c), {3}, num_drawn)),
+              Each(test::FitsATerminal()));
 }
 
 TEST(SensitivityText, SaysNothingOfAnErrorThatDoesNotVary) {
-  const auto lines = lines_of(sensitivity_text(made_up_runs(), index(Parameter::k2d), 5));
+  const auto lines = test::lines_of(sensitivity_text(made_up_runs(), index(Parameter::k2d), 5));
   EXPECT_EQ(lines.size(), 11U);
 }
 
@@ -159,7 +152,7 @@ TEST(ExplanationText, ShowsTheRunsValuesOfWhatDrivesTheError) {
   DrawnRuns drawn = made_up_runs();
   drawn.columns[7][42] = 1.5;
   drawn.errors[index(Parameter::k2c)][42] = 1.5;
-  const auto lines = lines_of(explanation_text(drawn, index(Parameter::k2c), {42}, 1));
+  const auto lines = test::lines_of(explanation_text(drawn, index(Parameter::k2c), {42}, 1));
   EXPECT_EQ(lines[0], "Run 42: error of K2c/K1c² 1.5 s²/m, rank 1 of 1000");
   EXPECT_THAT(lines[4], StartsWith(drawn_names()[7]));
   EXPECT_THAT(lines[4], HasSubstr("      1.5       99.9"));
@@ -180,7 +173,7 @@ TEST(ExplanationText, ShowsWhatDrivesTheMagnitudeBeforeWhatDrivesTheError) {
     drawn.errors[index(Parameter::k2c)][i] =
         std::copysign(2.0 + drawn.columns[20][i], drawn.columns[7][i]);
   }
-  const auto lines = lines_of(explanation_text(drawn, index(Parameter::k2c), {42}, 1));
+  const auto lines = test::lines_of(explanation_text(drawn, index(Parameter::k2c), {42}, 1));
   EXPECT_THAT(lines[2], StartsWith("drives |error|"));
   EXPECT_THAT(lines[4], StartsWith(drawn_names()[20]));
   EXPECT_THAT(lines[6], StartsWith("drives error"));

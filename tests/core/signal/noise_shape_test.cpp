@@ -17,7 +17,7 @@
 namespace proofmass {
 namespace {
 
-constexpr double period_s = 0.25;
+constexpr double sample_period_s = 0.25;
 
 struct NamedNoise {
   std::string name;
@@ -43,9 +43,9 @@ std::vector<double> frequencies_up_to(double highest_hz) {
 double decibels(double ratio) { return 10.0 * std::log10(ratio); }
 
 void expect_shape_follows(const SensorNoise& noise, double tolerance_db, const std::string& name) {
-  const NoiseShape shape = shape_noise(noise, period_s);
+  const NoiseShape shape = shape_noise(noise, sample_period_s);
   for (const double f : frequencies_up_to(1.0)) {
-    EXPECT_NEAR(decibels(shape.psd(f, period_s) / nominal_psd(noise, f)), 0.0, tolerance_db)
+    EXPECT_NEAR(decibels(shape.psd(f, sample_period_s) / nominal_psd(noise, f)), 0.0, tolerance_db)
         << name << " at " << f << " Hz";
   }
 }
@@ -106,15 +106,15 @@ TEST(NoiseShape, FollowsTheRiseAlone) {
 
 // One-sided density A² over [0, 1/2T]: variance A²/2T, no state.
 TEST(NoiseShape, OfWhiteNoiseIsOneGain) {
-  const NoiseShape shape = shape_noise({3.0, 0.0, 0.0, 0.03, 0.0}, period_s);
+  const NoiseShape shape = shape_noise({3.0, 0.0, 0.0, 0.03, 0.0}, sample_period_s);
   EXPECT_EQ(shape.num_states(), 0U);
   EXPECT_NEAR(shape.gain, 3.0 * std::sqrt(2.0), 1e-15);
-  EXPECT_NEAR(shape.psd(0.1, period_s), 9.0, 1e-14);
+  EXPECT_NEAR(shape.psd(0.1, sample_period_s), 9.0, 1e-14);
 }
 
 TEST(NoiseShape, HasAllPolesInsideTheUnitCircle) {
   for (const auto& [name, noise] : preset_channels()) {
-    const NoiseShape shape = shape_noise(noise, period_s);
+    const NoiseShape shape = shape_noise(noise, sample_period_s);
     EXPECT_GT(shape.num_states(), 0U) << name;
     for (std::size_t i = 0; i < shape.num_real; ++i)
       EXPECT_LT(std::abs(shape.pole[i]), 1.0) << name;
@@ -156,7 +156,7 @@ Eigen::MatrixXd start_covariance(const NoiseShape& shape) {
 // 5e4, whose rounding is 1e-11 of the drive's unit variance.
 TEST(NoiseShape, StartIsStationary) {
   for (const auto& [name, noise] : preset_channels()) {
-    const NoiseShape shape = shape_noise(noise, period_s);
+    const NoiseShape shape = shape_noise(noise, sample_period_s);
     const StateSpace system = state_space(shape);
     const Eigen::MatrixXd start = start_covariance(shape);
     const Eigen::MatrixXd next = system.transition * start * system.transition.transpose() +
@@ -169,22 +169,22 @@ TEST(NoiseShape, StartIsStationary) {
 /// constant.
 double integrated_psd(const NoiseShape& shape) {
   constexpr double lowest_hz = 1e-9;
-  const double nyquist_hz = 0.5 / period_s;
+  const double nyquist_hz = 0.5 / sample_period_s;
   constexpr int num_steps = 40'000;
   const double step = std::log(nyquist_hz / lowest_hz) / num_steps;
   double sum = 0.0;
   for (int i = 0; i <= num_steps; ++i) {
     const double f = lowest_hz * std::exp(step * i);
     const double weight = (i == 0 || i == num_steps) ? 1.0 : (i % 2 == 1 ? 4.0 : 2.0);
-    sum += weight * f * shape.psd(f, period_s);
+    sum += weight * f * shape.psd(f, sample_period_s);
   }
-  return sum * step / 3.0 + lowest_hz * shape.psd(lowest_hz, period_s);
+  return sum * step / 3.0 + lowest_hz * shape.psd(lowest_hz, sample_period_s);
 }
 
 // The variance of the first output, from the start's covariance, is the integral of the spectrum.
 TEST(NoiseShape, FirstOutputHasTheVarianceOfTheSpectrum) {
   for (const auto& [name, noise] : preset_channels()) {
-    const NoiseShape shape = shape_noise(noise, period_s);
+    const NoiseShape shape = shape_noise(noise, sample_period_s);
     const Eigen::VectorXd output = state_space(shape).output;
     const double variance = shape.gain * shape.gain + output.dot(start_covariance(shape) * output);
     EXPECT_NEAR(variance / integrated_psd(shape), 1.0, 1e-8) << name;
@@ -194,10 +194,10 @@ TEST(NoiseShape, FirstOutputHasTheVarianceOfTheSpectrum) {
 // The spectrum of the state space, solved as a linear system, is that of the parallel form.
 TEST(NoiseShape, PsdIsThatOfItsStates) {
   for (const auto& [name, noise] : preset_channels()) {
-    const NoiseShape shape = shape_noise(noise, period_s);
+    const NoiseShape shape = shape_noise(noise, sample_period_s);
     const StateSpace system = state_space(shape);
     for (const double f : frequencies_up_to(2.0)) {
-      const std::complex<double> z = std::polar(1.0, 2.0 * std::numbers::pi * f * period_s);
+      const std::complex<double> z = std::polar(1.0, 2.0 * std::numbers::pi * f * sample_period_s);
       const Eigen::MatrixXcd resolvent =
           z * Eigen::MatrixXcd::Identity(system.transition.rows(), system.transition.cols()) -
           system.transition.cast<std::complex<double>>();
@@ -205,7 +205,8 @@ TEST(NoiseShape, PsdIsThatOfItsStates) {
           resolvent.partialPivLu().solve(system.input.cast<std::complex<double>>());
       const std::complex<double> response =
           shape.gain + (system.output.cast<std::complex<double>>().transpose() * states)(0);
-      EXPECT_NEAR(std::norm(response) * 2.0 * period_s / shape.psd(f, period_s), 1.0, 1e-8)
+      EXPECT_NEAR(std::norm(response) * 2.0 * sample_period_s / shape.psd(f, sample_period_s), 1.0,
+                  1e-8)
           << name << " at " << f << " Hz";
     }
   }

@@ -17,7 +17,7 @@
 namespace proofmass {
 namespace {
 
-std::string refusal(std::string_view text) {
+std::string refusal_of_rule(std::string_view text) {
   return test::message_of<ConfigError>([&] { (void)parse_stop_rule(text); });
 }
 
@@ -34,7 +34,7 @@ TEST(ParseStopRule, ReadsEveryStatistic) {
 
 TEST(ParseStopRule, RefusesAnUnknownStatistic) {
   for (const std::string name : {"max", "p0", "p100", "p9x", "p"}) {
-    EXPECT_EQ(refusal(name + "(k2c) within 5%"),
+    EXPECT_EQ(refusal_of_rule(name + "(k2c) within 5%"),
               "until = " + name + "(k2c) within 5% (" + name +
                   " is no statistic; they are mean, std and p1 to p99)");
   }
@@ -45,7 +45,7 @@ TEST(ParseStopRule, RefusesAnotherForm) {
        {"", "std a_c13 within 5%", "std(a_c13) in 5%", "std(a_c13) within 5",
         "std(a_c13) within 5% or less", "a_c12 < 1 for 9% decided", "all within 5%", "< decided",
         "a_c12 < 1 for 9% with 9% soon decided"}) {
-    EXPECT_EQ(refusal(text),
+    EXPECT_EQ(refusal_of_rule(text),
               "until = " + text +
                   " (must read \"STATISTIC(PARAMETER) within PERCENT%\", \"all objectives within "
                   "PERCENT%\" or \"REQUIREMENT decided\")");
@@ -72,7 +72,7 @@ TEST(StatisticOf, NamesWhatTheRuleIsAbout) {
 }
 
 TEST(ParseStopRule, RefusesAWidthOutsideItsRange) {
-  EXPECT_EQ(refusal("std(a_c13) within 0%"),
+  EXPECT_EQ(refusal_of_rule("std(a_c13) within 0%"),
             "until = std(a_c13) within 0% (0% must be above 0% and below 100%)");
 }
 

@@ -21,12 +21,12 @@ using Clock = std::chrono::steady_clock;
 using test::RawPeer;
 
 // More than any limit in messages that a connection had.
-constexpr int num_messages = 20000;
+constexpr int num_sent = 20000;
 
 /// Messages, some of them interspersed with PINGs if the peer sends any.
 std::string many_messages(bool has_pings) {
   std::string bytes;
-  for (int i = 0; i < num_messages; ++i) {
+  for (int i = 0; i < num_sent; ++i) {
     bytes += RawPeer::frame(0, "x");
     if (has_pings && i % 10 == 9) bytes += RawPeer::ping();
   }
