@@ -1,7 +1,8 @@
 #!/bin/bash
-# Installs the Debian 12 packages that Proofmass is built, run and tested with; with --all, also
-# those for fuzzing and for benchmarks beside other systems. Does nothing if all are there. Uses
-# sudo unless run as root.
+# Installs the Debian 12 packages that Proofmass is built, run and tested with; with --build, only
+# those that it is built and run with; with --all, also those for fuzzing, for benchmarks beside
+# other systems and for container images. Does nothing if all are there. Uses sudo unless run as
+# root.
 set -euo pipefail
 
 packages=(
@@ -11,21 +12,24 @@ packages=(
   libsqlite3-dev sqlite3 libhdf5-dev
   libspdlog-dev libfmt-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev
   libutfcpp-dev
-  # Tests only.
+)
+test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev qemu-user clang-format
   iproute2 iptables faketime python3-scipy python3-mpmath python3-h5py
   sshfs openssh-sftp-server busybox-static
   slurmctld slurmd slurm-client slurm-wlm-basic-plugins munge
   groff-base zsh fish
+  systemd systemd-container mmdebstrap dpkg-dev python3-yaml
 )
-# The fuzzer, and the systems that the dispatch is measured beside.
-more_packages=(clang libclang-rt-14-dev parallel python3-distributed python3-ipyparallel)
+# The fuzzer, the systems that the dispatch is measured beside, and what builds images.
+more_packages=(clang libclang-rt-14-dev parallel python3-distributed python3-ipyparallel buildah)
 
 case "${1:-}" in
-  '') ;;
-  --all) packages+=("${more_packages[@]}") ;;
+  '') packages+=("${test_packages[@]}") ;;
+  --build) ;;
+  --all) packages+=("${test_packages[@]}" "${more_packages[@]}") ;;
   *)
-    echo "install-deps: error: argument = $1 (must be --all or none)" >&2
+    echo "install-deps: error: argument = $1 (must be --build, --all or none)" >&2
     exit 2
     ;;
 esac
