@@ -35,8 +35,10 @@
 namespace {
 
 using namespace proofmass;
+using test::seconds;
 using test::SwarmCount;
 using test::SwarmWorker;
+using test::time_now;
 using TimePoint = SwarmWorker::TimePoint;
 
 constexpr std::chrono::milliseconds tick_interval(100);

@@ -8,6 +8,8 @@ The cluster is Debian's Slurm with one slurmd a node, all in one directory, on l
   killed, all in one job;
 - a job is ended early, the workers of another one leave as it is about to end, and a third one goes
   on until all is computed;
+- a coordinator beside the cluster gets workers by `proofmass factory`, of which one loses its node and
+  one is queued again; the workers end when there is no more work;
 - a campaign file that is not valid, and a directory into which another job computes, are refused.
 
 Each database must have the digest of `proofmass run`. Needs root, slurmctld, slurmd and munged.
@@ -15,6 +17,8 @@ Exit code 0 if all holds, 1 if not; 77 without these, but 1 if the environment h
 """
 
 import argparse
+import contextlib
+import json
 import os
 import re
 import shutil
@@ -276,6 +280,19 @@ class Site:
     def wait_for_runs(self, count):
         wait_until(f"{count} runs", lambda: self.num_stored() >= count)
 
+    @contextlib.contextmanager
+    def started(self, log, *command):
+        """A program beside the cluster, which is killed if it does not end before."""
+        with open(self.directory / log, "w") as errors:
+            process = subprocess.Popen(
+                command, cwd=self.directory, env=self.environment, stderr=errors
+            )
+            try:
+                yield process
+            finally:
+                process.kill()
+                process.wait()
+
     def kill_coordinator(self):
         for process in self.cluster.processes_of():
             if Path(f"/proc/{process}/comm").read_text().startswith("proofmass-coord"):
@@ -335,6 +352,50 @@ def run_in_three_jobs(site, expected):
     check(lost == "0", f"{lost} leases were lost (must be 0)")
 
 
+def run_by_factory(site, expected):
+    port = free_ports(2)
+    clients = ("--connect", f"tcp://127.0.0.1:{port + 1}")
+    (site.directory / "served").mkdir()
+    coordinator = (
+        *("proofmass-coordinator", "--directory", "served", "short.toml"),
+        *("--bind", f"tcp://127.0.0.1:{port}", "--bind-clients", clients[1]),
+    )
+    factory = (
+        *("proofmass", "factory", "--batch-system", "slurm", "--name", "fleet", *clients),
+        *("--worker-connect", f"tcp://127.0.0.1:{port}", "--processors", "1", "--interval", "1"),
+        *("--walltime", "20", "--utilisation-min", "0.001", "--idle-timeout", "5"),
+        *("--workers-max", str(NUM_NODES), "--backlog", str(NUM_NODES), "--exit-when-done"),
+        "--submit-option=--output=%j.out",
+    )
+
+    def num_done():
+        process = site.answer("proofmass", "status", "--json", *clients)
+        return json.loads(process.stdout)["campaigns"][0]["num_done"] if process.stdout else 0
+
+    def jobs(state):
+        listing = ("squeue", "--noheader", "--name=fleet", f"--states={state}", "--format=%i %N")
+        return [line.split() for line in site.answer(*listing).stdout.splitlines()]
+
+    with (
+        site.started("served.log", *coordinator) as service,
+        site.started("factory.log", *factory) as keeper,
+    ):
+        wait_until("the first worker's runs", lambda: num_done() > 0)
+        wait_until("three workers", lambda: len(jobs("RUNNING")) == NUM_NODES)
+        job, node = jobs("RUNNING")[-1]
+        site.cluster.kill_node(node)
+        wait_until("runs after the loss of a node", lambda: num_done() >= 1500)
+        job = next(running for running, other in jobs("RUNNING") if other != node)
+        site.cluster.run("scontrol", "requeue", job)
+        wait_until("the end of the factory", lambda: keeper.poll() is not None)
+        check(keeper.returncode == 0, (site.directory / "factory.log").read_text())
+        site.cluster.start_node(node)
+        wait_until("the end of the workers", lambda: not jobs("PENDING,RUNNING,COMPLETING"))
+        service.terminate()
+        check(service.wait() == 0, "the coordinator does not end in order")
+    check(site.digest("served/hardy2013.db") == expected, "another digest by the factory")
+
+
 def refuse(site, _):
     (site.directory / "wrong.toml").write_text("[campaign]\nname = 3\n")
     job = site.submit("--nodes=1", site.script, "wrong.toml")
@@ -368,7 +429,7 @@ def main():
             cluster.start()
             site = Site(cluster, Path(name) / "site", arguments.programs.resolve())
             expected = site.reference()
-            for scenario in (run_undisturbed, run_with_failures, run_in_three_jobs, refuse):
+            for scenario in (run_undisturbed, run_with_failures, run_in_three_jobs, run_by_factory, refuse):
                 begin = time.monotonic()
                 scenario(site, expected)
                 print(f"{scenario.__name__}: {time.monotonic() - begin:.1f} s", flush=True)

@@ -22,7 +22,7 @@ wire::CampaignStatus campaign(const std::string& name, std::uint64_t num_done) {
   return status;
 }
 
-wire::StatusReply status_of(const std::vector<wire::CampaignStatus>& campaigns) {
+wire::StatusReply status_with(const std::vector<wire::CampaignStatus>& campaigns) {
   return {.version = "0.1.0",
           .model_version = "hardy2013-2",
           .uptime_s = 12000.0,
@@ -50,7 +50,7 @@ void expect_width_at_most(const std::string& text, std::size_t width) {
 }
 
 TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {
-  wire::StatusReply status = status_of({campaign("a", 1)});
+  wire::StatusReply status = status_with({campaign("a", 1)});
   status.num_campaigns = 3;
   status.unserved_files = {{.file = "d/b.db", .reason = "campaign database = d/b.db (is locked)"}};
   status.num_unserved_files = 2;
@@ -68,7 +68,7 @@ TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {
 
 // A file that somebody made may have any name of a campaign in it, and the reason may quote it.
 TEST(StatusTable, ShowsAReasonInOneLine) {
-  wire::StatusReply status = status_of({campaign("a", 1)});
+  wire::StatusReply status = status_with({campaign("a", 1)});
   status.campaigns[0].storage_failure = "full\nb: all is well";
   status.unserved_files = {{.file = "d/b.db", .reason = "d/b.db: campaign b\nc \x1b[2J"}};
   const std::string text = status_table(status, 79);
@@ -90,7 +90,7 @@ TEST(StatusTable, ShowsCampaignsAndWhatIsOutOfTheOrdinary) {
   second.num_without_estimate = 2;
   second.num_audited = 10;
   second.num_mismatches = 3;
-  EXPECT_EQ(status_table(status_of({first, second}), 79),
+  EXPECT_EQ(status_table(status_with({first, second}), 79),
             R"(Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min
 12 workers with 48 slots, 16 runs lent
 
@@ -105,7 +105,7 @@ second-order: 10 results compared with a second computation: 3 differ (none may)
 }
 
 TEST(StatusTable, SaysThatThereIsNoCampaign) {
-  EXPECT_EQ(status_table(status_of({}), 79),
+  EXPECT_EQ(status_table(status_with({}), 79),
             "Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min\n"
             "12 workers with 48 slots, 0 runs lent\n\nno campaigns\n");
 }
@@ -114,7 +114,7 @@ TEST(StatusTable, SaysWhyNothingCanBeStored) {
   wire::CampaignStatus status = campaign("a", 0);
   status.storage_failure = "a.db: disk full";
   EXPECT_NE(
-      status_table(status_of({status}), 79).find("\na: nothing can be stored: a.db: disk full\n"),
+      status_table(status_with({status}), 79).find("\na: nothing can be stored: a.db: disk full\n"),
       std::string::npos);
 }
 
@@ -122,18 +122,18 @@ TEST(StatusTable, ShowsNoTimeLeftOfACampaignThatIsOver) {
   wire::CampaignStatus status = campaign("a", 100);
   status.phase = wire::CampaignPhase::finished;
   status.remaining_s = 0.0;
-  EXPECT_NE(status_table(status_of({status}), 79).find("100  100       -           -\n"),
+  EXPECT_NE(status_table(status_with({status}), 79).find("100  100       -           -\n"),
             std::string::npos);
 }
 
 TEST(StatusTable, KeepsALongNameApartFromTheNextColumn) {
-  const std::string text = status_table(status_of({campaign(std::string(128, 'x'), 1)}), 79);
+  const std::string text = status_table(status_with({campaign(std::string(128, 'x'), 1)}), 79);
   EXPECT_NE(text.find("\nxxxxxxxxxxxxxxx… active "), std::string::npos) << text;
 }
 
 TEST(StatusTable, GivesALongNameTheRoomThatTheLineHas) {
   const std::string name(30, 'x');
-  const wire::StatusReply status = status_of({campaign(name, 1), campaign("b", 1)});
+  const wire::StatusReply status = status_with({campaign(name, 1), campaign("b", 1)});
   const std::string text = status_table(status, 200);
   EXPECT_NE(text.find("\n" + name + " active "), std::string::npos) << text;
   EXPECT_NE(text.find("\nb" + std::string(30, ' ') + "active "), std::string::npos) << text;
@@ -149,7 +149,7 @@ TEST(StatusTable, HasAtMost79Columns) {
   for (const double number : {1e-12, 1.0, 59.0 * 60.0 + 59.0, 1e300}) {
     wide.rate_hz = number;
     wide.remaining_s = number;
-    wire::StatusReply status = status_of({wide});
+    wire::StatusReply status = status_with({wide});
     status.version = std::string(128, 'v');
     status.num_slots = std::numeric_limits<std::uint64_t>::max();
     expect_width_at_most(status_table(status, 79), 79);
@@ -157,7 +157,7 @@ TEST(StatusTable, HasAtMost79Columns) {
 }
 
 TEST(StatusTable, CutsNothingInAFile) {
-  wire::StatusReply status = status_of({campaign(std::string(128, 'x'), 1)});
+  wire::StatusReply status = status_with({campaign(std::string(128, 'x'), 1)});
   status.model_version = std::string(128, 'm');
   const std::string table = status_table(status, std::numeric_limits<std::size_t>::max());
   EXPECT_NE(table.find(std::string(128, 'x') + " "), std::string::npos) << table;
