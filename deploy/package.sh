@@ -9,36 +9,8 @@
 # goes to the one of --output (the current directory by default).
 set -euo pipefail
 
-root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-build=$root/build/release
-output=$PWD
+. "$(dirname "${BASH_SOURCE[0]}")/packaging.sh"
 
-fail() {
-  echo "package: error: $1" >&2
-  exit "${2:-1}"
-}
-
-while [[ $# -gt 0 ]]; do
-  [[ $# -gt 1 ]] || fail "$1 needs a directory" 2
-  case $1 in
-    --build) build=$2 ;;
-    --output) output=$2 ;;
-    *) fail "option = $1 (must be --build or --output)" 2 ;;
-  esac
-  shift 2
-done
-[[ -d $output ]] || fail "--output = $output (must be a directory)" 2
-
-if [[ ! -d $build ]]; then
-  [[ $build == "$root/build/release" ]] || fail "--build = $build (must be a build tree)" 2
-  (cd "$root" && cmake --preset release && cmake --build --preset programs)
-fi
-for program in proofmass proofmass-coordinator proofmass-worker; do
-  [[ -x $build/bin/$program ]] || fail "--build = $build (lacks bin/$program)"
-done
-
-stage=$(mktemp --directory)
-trap 'rm -rf "$stage"' EXIT
 version=$("$build/bin/proofmass" --version | cut -d' ' -f2)
 name=proofmass-$version-linux-x86_64
 tree=$stage/$name
@@ -81,8 +53,7 @@ ln -s proofmass "$tree/bin/proofmass-worker"
 # `proofmass run` looks for the worker beside the program that runs, which is the loader.
 ln -s ../bin/proofmass-worker "$tree/lib/proofmass-worker"
 
-date=$(git -C "$root" log -1 --format=%ct 2>/dev/null || echo 0)
-tar --directory "$stage" --create --sort=name --mtime="@${SOURCE_DATE_EPOCH:-$date}" \
+tar --directory "$stage" --create --sort=name --mtime="@$SOURCE_DATE_EPOCH" \
   --owner=0 --group=0 --numeric-owner --mode=u=rwX,go=rX "$name" |
   gzip --no-name >"$stage/$name.tar.gz"
 mv "$stage/$name.tar.gz" "$output/"
