@@ -1,6 +1,7 @@
 # Sourced by package.sh and debian-packages.sh. Reads their options and sets `root` (of the clone),
-# `build` (a build tree, made if it is the default one and not there), `output`, `stage` (a temporary
-# directory) and SOURCE_DATE_EPOCH (the time of the commit, so that the same bytes come out again).
+# `build` (a build tree, made if it is the default one and not there), `output`, `stage` (a
+# temporary directory) and SOURCE_DATE_EPOCH (the time of the commit, so that the same commit gives
+# the same bytes).
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 build=$root/build/release

@@ -198,10 +198,13 @@ class FactoryLoop {
 int keep_workers(const FactoryOptions& options) {
   (void)checked(options);
   if (options.is_dry_run) return show_submission(options.system, allocation_config(options));
+  const bool is_json = options.client.format == OutputFormat::json;
   const wire::Log log =
-      wire::make_log("proofmass-factory", wire::LogFormat::text, wire::LogLevel::info);
+      wire::make_log("proofmass-factory", is_json ? wire::LogFormat::json : wire::LogFormat::text,
+                     wire::LogLevel::info);
   const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
+  (void)ClientConnection(options.client.connection);  // Wrong addresses and keys end it at once.
   warn_if_plain(options.client);
   FactoryLoop loop(options, log);
   while (stop == StopRequest::none) {

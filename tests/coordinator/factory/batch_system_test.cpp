@@ -62,7 +62,7 @@ TEST(BatchSystem, HandsTheIdentifierToTheWorkersCommand) {
   }
 }
 
-TEST(BatchSystem, AsksSlurmForANodeOrForProcessors) {
+TEST(BatchSystem, AsksSlurmForAMachineOrForProcessors) {
   AllocationConfig config = example();
   config.options = {"--partition=long"};
   EXPECT_THAT(system_of("slurm").submission(config).arguments,
@@ -84,7 +84,7 @@ TEST(BatchSystem, ReadsWhatSlurmAnswers) {
   EXPECT_THAT(slurm.cancellation("17").arguments, ElementsAre("scancel", "17"));
 }
 
-TEST(BatchSystem, AsksPbsForANodeOrForProcessors) {
+TEST(BatchSystem, AsksPbsForAMachineOrForProcessors) {
   AllocationConfig config = example();
   EXPECT_THAT(system_of("pbs").submission(config).arguments,
               ElementsAre("qsub", "-N", "fleet", "-l", "walltime=2:05:07", "-l", "select=1", "-l",

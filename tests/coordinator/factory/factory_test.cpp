@@ -101,6 +101,21 @@ TEST_F(FactoryTest, CountsWorkersThatOthersStarted) {
   EXPECT_EQ(look().num_submissions, 0u);
 }
 
+// The coordinator has lost them, but the batch system says that they run: they may come back.
+TEST_F(FactoryTest, CountsAllocationsWhoseWorkersAreLostAgainstItsNumber) {
+  state_.rate_per_worker_hz = 1e-3;
+  config_.workers_max = 2;
+  for (const std::string id : {"1", "2"}) {
+    submit(id);
+    enter(id);
+  }
+  (void)look();
+  view_.workers.clear();
+  EXPECT_EQ(look().num_submissions, 0u);
+  config_.workers_max = 3;
+  EXPECT_EQ(look().num_submissions, 1u);
+}
+
 TEST_F(FactoryTest, CancelsWhatWaitsWhenThereIsNoWorkLeft) {
   config_.backlog = 3;
   state_.rate_per_worker_hz = 1e-3;
