@@ -47,7 +47,9 @@ TEST(ResidentMemory, GrowsWithWhatIsUsed) {
   const std::size_t before = memory.size();
   const std::vector<char> used(64 * mebibyte, 'x');
   EXPECT_GE(memory.size(), before + 60 * mebibyte);
+#ifndef __SANITIZE_THREAD__  // It keeps several bytes for each of ours.
   EXPECT_LE(memory.size(), before + 80 * mebibyte);
+#endif
 }
 
 /// Sockets that hold so much of this process's memory.

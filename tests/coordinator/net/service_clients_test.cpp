@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
+
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "tests/coordinator/net/playing_client.hpp"
@@ -339,19 +341,17 @@ TEST_F(ServiceClients, GetAnErrorForPartsThatAreNoRequest) {
 
 // What a caller's code throws, other than our own errors, ends the request and not the service.
 TEST_F(ServiceClients, OutliveAFileSystemThatThrows) {
-  files.before_open = [] { throw std::filesystem::filesystem_error("rename", std::error_code()); };
+  std::atomic<int> num_calls = 0;
+  files.before_open = [&num_calls] {
+    const int call = num_calls++;
+    if (call == 0) throw std::filesystem::filesystem_error("rename", std::error_code());
+    if (call == 1) throw std::bad_alloc();
+  };
   start_with({});
-  EXPECT_THAT(
-      client->error(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 2))}),
-      StartsWith("filesystem error: rename"));
-  files.before_open = [] { throw std::bad_alloc(); };
-  EXPECT_EQ(
-      client->error(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 2))}),
-      "std::bad_alloc");
-  files.before_open = [] {};
-  EXPECT_THAT(
-      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 2))}),
-      StartsWith("campaign a: active"));
+  const wire::SubmitRequest request{.definition = definition_of(test::campaign_of("a", 2))};
+  EXPECT_THAT(client->error(request), StartsWith("filesystem error: rename"));
+  EXPECT_EQ(client->error(request), "std::bad_alloc");
+  EXPECT_THAT(client->done(request), StartsWith("campaign a: active"));
 }
 
 TEST_F(ServiceClients, SeeAllCampaignsInPages) {
