@@ -165,12 +165,21 @@ class FactoryLoop {
 
  private:
   void carry_out(const FactoryActions& actions) {
-    for (const std::string& id : actions.cancelled) {
-      (void)output_of(options_.system.cancellation(id));
-      log_({.kind = "allocation_cancelled", .fields = {{"allocation", id}}});
-    }
+    for (const std::string& id : actions.cancelled) cancel(id);
     for (std::uint64_t i = 0; i < actions.num_submissions; ++i) {
       if (!submit()) return;
+    }
+  }
+
+  /// One that cannot be cancelled has ended already, or its worker leaves when it finds no work.
+  void cancel(const std::string& id) {
+    try {
+      (void)output_of(options_.system.cancellation(id));
+      log_({.kind = "allocation_cancelled", .fields = {{"allocation", id}}});
+    } catch (const Error& error) {
+      log_({.severity = wire::Severity::warning,
+            .kind = "cancellation_failed",
+            .fields = {{"allocation", id}, wire::Field::reason(error.what())}});
     }
   }
 
