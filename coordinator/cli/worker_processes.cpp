@@ -2,43 +2,21 @@
 
 #include <fmt/format.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <chrono>
-#include <cstring>
-#include <system_error>
 #include <thread>
 #include <utility>
 
-#include "coordinator/query/child_process.hpp"
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
-
-extern char** environ;
+#include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 constexpr int grace_ms = 3000;  // A worker looks at signals between two orbits, some 20 ms apart.
-
-/// Starts a program that can be ended with these signals, also if they are blocked here.
-/// @return An error number, or 0.
-int spawn(const std::filesystem::path& program, char* const* arguments, pid_t& process_id) {
-  sigset_t mask;
-  pthread_sigmask(SIG_SETMASK, nullptr, &mask);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigdelset(&mask, signal);
-  posix_spawnattr_t attributes;
-  if (const int error = posix_spawnattr_init(&attributes); error != 0) return error;
-  posix_spawnattr_setsigmask(&attributes, &mask);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
-  const int error =
-      posix_spawn(&process_id, program.c_str(), nullptr, &attributes, arguments, environ);
-  posix_spawnattr_destroy(&attributes);
-  return error;
-}
 
 constexpr int failures_in_a_row_max = 3;
 
@@ -49,16 +27,6 @@ std::uint64_t num_done(const Service& service) {
 }
 
 }  // namespace
-
-std::filesystem::path worker_executable() {
-  std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::filesystem::path worker = self.parent_path() / "proofmass-worker";
-  if (error || access(worker.c_str(), X_OK) != 0) {
-    throw Error(fmt::format("worker program = {} (must be beside proofmass)", worker.string()));
-  }
-  return worker;
-}
 
 WorkerProcesses::WorkerProcesses(std::filesystem::path executable, std::string endpoint)
     : executable_(std::move(executable)),
@@ -76,17 +44,9 @@ WorkerProcesses::~WorkerProcesses() {
 }
 
 void WorkerProcesses::start(const std::string& name) {
-  std::vector<std::string> arguments{
-      executable_.string(),    "--connect", endpoint_, "--name", name, "--threads", "1", "--parent",
-      std::to_string(getpid())};
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  pid_t process_id = 0;
-  const int error = spawn(executable_, argv.data(), process_id);
-  if (error != 0) {
-    throw Error(fmt::format("worker program = {} ({})", executable_.string(), strerror(error)));
-  }
+  const pid_t process_id = wire::start_program(
+      {.arguments = {executable_.string(), "--connect", endpoint_, "--name", name, "--threads", "1",
+                     "--parent", std::to_string(getpid())}});
   processes_.push_back({.name = name, .process_id = process_id});
 }
 
@@ -97,7 +57,7 @@ std::vector<WorkerProcesses::Exit> WorkerProcesses::take_exits() {
     if (waitpid(process.process_id, &status, WNOHANG) != process.process_id) return false;
     exits.push_back({.name = process.name,
                      .process_id = process.process_id,
-                     .text = end_text(status),
+                     .text = wire::end_text(status),
                      .reason = reason_of(status)});
     return true;
   });
@@ -122,7 +82,7 @@ void WorkerProcesses::wait_until_ended(int milliseconds_max) {
 LocalWorkers::LocalWorkers(Service& service, ProgressDisplay& display)
     : service_(service),
       display_(display),
-      processes_(worker_executable(), service.workers_endpoint()),
+      processes_(wire::program_beside_this("proofmass-worker"), service.workers_endpoint()),
       host_(wire::host_name()) {}
 
 void LocalWorkers::start(std::uint64_t num_workers) {

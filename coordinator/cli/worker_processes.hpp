@@ -14,10 +14,6 @@
 
 namespace proofmass::coordinator {
 
-/// The worker program that belongs to this one: the file `proofmass-worker` beside it.
-/// @throws Error if it is not there.
-[[nodiscard]] std::filesystem::path worker_executable();
-
 /// Worker processes of this machine, of one thread each: what kills one costs the runs of that
 /// thread only. They end with this process, however it ends.
 class WorkerProcesses {

@@ -105,12 +105,6 @@ int ChildProcess::wait() {
   return status;
 }
 
-std::string end_text(int status) {
-  if (!WIFSIGNALED(status)) return fmt::format("exit code {}", WEXITSTATUS(status));
-  const int number = WTERMSIG(status);
-  return fmt::format("killed by signal {} ({})", number, strsignal(number));
-}
-
 PartWriter::PartWriter(int pipe) : pipe_(pipe), thread_([this] { write_late(); }) {}
 
 PartWriter::~PartWriter() {

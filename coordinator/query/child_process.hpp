@@ -45,9 +45,6 @@ class ChildProcess {
   int pipe_ = 0;
 };
 
-/// How a process ended, for people: `exit code 1`, `killed by signal 9 (Killed)`.
-[[nodiscard]] std::string end_text(int status);
-
 /// What a child process that runs a query tells its parent, in parts of text.
 enum class PartKind : std::uint8_t {
   rows = 1,     ///< Whole rows.

@@ -17,6 +17,7 @@
 
 #include "coordinator/query/child_process.hpp"
 #include "coordinator/store/store_error.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -141,7 +142,7 @@ class Follower {
     if (is_interrupted_) return QueryEnd::interrupted;
     const bool is_out_of_time = WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU;
     if (is_killed_ || is_out_of_time) throw TimeLimitError(time_limit_text(limits_));
-    throw Error(fmt::format("query: its process ended: {}", end_text(status)));
+    throw Error(fmt::format("query: its process ended: {}", wire::end_text(status)));
   }
 
   ChildProcess& child_;

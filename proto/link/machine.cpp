@@ -1,11 +1,13 @@
 #include "proto/link/machine.hpp"
 
+#include <fmt/format.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <charconv>
 #include <csignal>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <string>
@@ -33,6 +35,12 @@ std::uint64_t oom_kills_in(std::string_view vmstat) {
   std::uint64_t count = 0;
   std::from_chars(digits, vmstat.data() + vmstat.size(), count);
   return count;
+}
+
+std::string end_text(int status) {
+  if (!WIFSIGNALED(status)) return fmt::format("exit code {}", WEXITSTATUS(status));
+  const int number = WTERMSIG(status);
+  return fmt::format("killed by signal {} ({})", number, strsignal(number));
 }
 
 LossReason reason_of_end(int status, bool is_memory_short) {

@@ -19,6 +19,10 @@ namespace proofmass::wire {
 /// The same number, from the text of /proc/vmstat; 0 if the text does not have it.
 [[nodiscard]] std::uint64_t oom_kills_in(std::string_view vmstat);
 
+/// How a process ended, for people: `exit code 1`, `killed by signal 9 (Killed)`.
+/// @param status  From waitpid().
+[[nodiscard]] std::string end_text(int status);
+
 /// Why the runs of a worker process that has ended are lost: `failed` if it exited by itself,
 /// `crashed` if a signal ended it. SIGKILL means `out_of_memory` if the kernel ended a process for
 /// lack of memory meanwhile, and `preempted` otherwise: somebody ended it, and no run is blamed.

@@ -60,7 +60,7 @@ TEST(WorkerProcesses, SayThatAProgramCannotBeStarted) {
     processes.start("local-1");
     FAIL();
   } catch (const Error& error) {
-    EXPECT_STREQ(error.what(), "worker program = /nowhere/worker (No such file or directory)");
+    EXPECT_STREQ(error.what(), "/nowhere/worker: cannot be started: No such file or directory");
   }
 }
 

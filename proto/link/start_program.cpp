@@ -1,0 +1,63 @@
+#include "proto/link/start_program.hpp"
+
+#include <fmt/format.h>
+#include <signal.h>
+#include <spawn.h>
+#include <unistd.h>
+
+#include <system_error>
+
+#include "core/error.hpp"
+
+extern char** environ;
+
+namespace proofmass::wire {
+namespace {
+
+/// As posix_spawn() takes them; it does not write to them.
+std::vector<char*> pointers_to(const std::vector<std::string>& texts) {
+  std::vector<char*> pointers;
+  pointers.reserve(texts.size() + 1);
+  for (const std::string& text : texts) pointers.push_back(const_cast<char*>(text.c_str()));
+  pointers.push_back(nullptr);
+  return pointers;
+}
+
+}  // namespace
+
+pid_t start_program(const ProgramStart& start) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  for (int i = 0; i < 3; ++i) {
+    posix_spawn_file_actions_adddup2(&actions, start.descriptors[static_cast<std::size_t>(i)], i);
+  }
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none;
+  sigemptyset(&none);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+  const std::vector<char*> arguments = pointers_to(start.arguments);
+  std::vector<char*> environment;
+  if (start.environment) environment = pointers_to(*start.environment);
+  pid_t process_id = 0;
+  const int error =
+      posix_spawnp(&process_id, arguments.front(), &actions, &attributes, arguments.data(),
+                   start.environment ? environment.data() : environ);
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error == 0) return process_id;
+  throw Error(fmt::format("{}: cannot be started: {}", start.arguments.front(),
+                          std::generic_category().message(error)));
+}
+
+std::filesystem::path program_beside_this(std::string_view name) {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  std::filesystem::path program = self.parent_path() / name;
+  if (!error && access(program.c_str(), X_OK) == 0) return program;
+  throw Error(
+      fmt::format("program = {} (must be beside {})", program.string(), self.filename().string()));
+}
+
+}  // namespace proofmass::wire

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace proofmass::wire {
+
+/// A program to be started as a process of its own.
+struct ProgramStart {
+  /// The program first: a path, or a name that is looked for in PATH.
+  std::vector<std::string> arguments;
+  /// That become its standard input, output and error.
+  std::array<int, 3> descriptors{0, 1, 2};
+  /// `NAME=value` each; that of this process by default.
+  std::optional<std::vector<std::string>> environment = {};
+};
+
+/// Starts the program with no signal blocked, whatever is blocked here.
+/// @returns Its process id; the caller waits for its end.
+/// @throws Error reading `PROGRAM: cannot be started: reason`.
+[[nodiscard]] pid_t start_program(const ProgramStart& start);
+
+/// Another program of Proofmass: the file of that name beside the program that runs.
+/// @throws Error reading `program = PATH (rule)` if it is not there or cannot be executed.
+[[nodiscard]] std::filesystem::path program_beside_this(std::string_view name);
+
+}  // namespace proofmass::wire
