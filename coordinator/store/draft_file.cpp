@@ -51,10 +51,15 @@ DraftFile::~DraftFile() {
 }
 
 int DraftFile::publish(IfThere if_there) {
-  int error_number = synchronise(draft_);
-  if (error_number == 0) error_number = rename_to(draft_, path_, if_there);
+  const int error_number = publish_file(draft_, path_, if_there);
   is_published_ = error_number == 0;
   return error_number;
+}
+
+int publish_file(const std::filesystem::path& draft, const std::filesystem::path& path,
+                 IfThere if_there) {
+  const int error_number = synchronise(draft);
+  return error_number == 0 ? rename_to(draft, path, if_there) : error_number;
 }
 
 std::filesystem::path directory_of(const std::filesystem::path& path) {

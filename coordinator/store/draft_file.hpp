@@ -36,6 +36,12 @@ class DraftFile {
   bool is_published_ = false;
 };
 
+/// Makes a finished file durable and gives it its name, which is durable after
+/// synchronise_directory_of().
+/// @returns 0 or an errno.
+[[nodiscard]] int publish_file(const std::filesystem::path& draft,
+                               const std::filesystem::path& path, IfThere if_there);
+
 /// Directory of a path; the working directory for a mere name.
 [[nodiscard]] std::filesystem::path directory_of(const std::filesystem::path& path);
 
