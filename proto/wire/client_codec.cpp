@@ -50,6 +50,21 @@ void write(const ControlRequest& control, proto::RequestEnvelope& envelope) {
   message.set_priority(control.priority);
 }
 
+void write(const AnswerRequest& answer, proto::RequestEnvelope& envelope) {
+  proto::AnswerRequest& message = *envelope.mutable_answer();
+  message.set_campaign(answer.campaign);
+  message.set_question(static_cast<proto::Question>(answer.question));
+  for (const std::string& option : answer.options) message.add_options(option);
+  message.set_statement(answer.statement);
+  message.set_known_size(answer.known_size);
+  message.set_known_sha256(answer.known_sha256);
+}
+
+void write(const AnswerPartRequest& part, proto::RequestEnvelope& envelope) {
+  envelope.mutable_answer_part()->set_answer_id(part.answer_id);
+  envelope.mutable_answer_part()->set_offset(part.offset);
+}
+
 /// The text, cut to what may be sent, with `?` for what may not.
 std::string sendable(std::string_view text) {
   std::string result(text.substr(0, reply_text_size_max));
@@ -129,6 +144,20 @@ void write(const PartReply& part, proto::ReplyEnvelope& envelope) {
 
 void write(const WaitReply&, proto::ReplyEnvelope& envelope) { envelope.mutable_wait(); }
 
+void write(const AnswerReply& answer, proto::ReplyEnvelope& envelope) {
+  proto::AnswerReply& message = *envelope.mutable_answer();
+  message.set_answer_id(answer.answer_id);
+  message.set_size(answer.size);
+  message.set_sha256(answer.sha256);
+  message.set_offset(answer.offset);
+  message.set_exit_code(static_cast<std::uint32_t>(answer.exit_code));
+  message.set_error_text(sendable(answer.error_text));
+}
+
+void write(const AnswerPartReply& part, proto::ReplyEnvelope& envelope) {
+  envelope.mutable_answer_part()->set_content(part.content);
+}
+
 std::size_t size_max_of(const ClientRequest& request) {
   if (std::holds_alternative<SubmitRequest>(request)) return submit_size_max;
   if (std::holds_alternative<RequestPart>(request)) return request_message_size_max;
@@ -192,7 +221,7 @@ ClientRequest read(const proto::SubmitRequest& message) {
 }
 
 ClientRequest read(const proto::ControlRequest& message) {
-  return ControlRequest{.action = enumerator<ControlAction>(message.action(), 5, "action"),
+  return ControlRequest{.action = enumerator<ControlAction>(message.action(), 6, "action"),
                         .campaign = checked_name(message.campaign(), "campaign"),
                         .priority = checked_priority(message.priority())};
 }
@@ -204,6 +233,43 @@ ClientRequest read(const proto::RequestPart& message) {
   require_in(message.slice().size(), 1, message.total_size() - message.offset(), "slice size");
   return RequestPart{
       .total_size = message.total_size(), .offset = message.offset(), .slice = message.slice()};
+}
+
+std::string checked_sha256(const std::string& text, std::string_view field) {
+  const bool is_one = text.size() == 64 && text.find_first_not_of("0123456789abcdef") == text.npos;
+  require(is_one, field, fmt::format("{} bytes", text.size()), "must be 64 hexadecimal digits");
+  return text;
+}
+
+/// It becomes an argument of a program, which ends at a zero byte.
+std::string checked_argument(const std::string& text, std::size_t size_max,
+                             std::string_view field) {
+  require_in(text.size(), 1, size_max, field);
+  require(text.find('\0') == text.npos, field, fmt::format("{} bytes", text.size()),
+          "must not have a zero byte");
+  return text;
+}
+
+ClientRequest read(const proto::AnswerRequest& message) {
+  AnswerRequest answer{.campaign = checked_name(message.campaign(), "campaign"),
+                       .question = enumerator<Question>(message.question(), 4, "question"),
+                       .known_size = message.known_size()};
+  require_count(message.options_size(), 0, answer_options_max, "options");
+  for (const std::string& option : message.options()) {
+    answer.options.push_back(checked_argument(option, answer_option_size_max, "option size"));
+  }
+  if (answer.question == Question::query) {
+    answer.statement = checked_argument(message.statement(), statement_size_max, "statement size");
+  }
+  if (answer.known_size > 0) {
+    answer.known_sha256 = checked_sha256(message.known_sha256(), "known_sha256");
+  }
+  return answer;
+}
+
+ClientRequest read(const proto::AnswerPartRequest& message) {
+  return AnswerPartRequest{.answer_id = detail::checked_id(message.answer_id(), "answer_id"),
+                           .offset = message.offset()};
 }
 
 bool may_be_in_text(char c) { return c == '\n' || (c >= ' ' && c <= '~'); }
@@ -293,6 +359,22 @@ ClientReply read(const proto::WorkersReply& message) {
   return reply;
 }
 
+ClientReply read(const proto::AnswerReply& message) {
+  require_in(message.offset(), 0, message.size(), "offset");
+  require_in(message.exit_code(), 0, 255, "exit_code");
+  return AnswerReply{.answer_id = detail::checked_id(message.answer_id(), "answer_id"),
+                     .size = message.size(),
+                     .sha256 = checked_sha256(message.sha256(), "sha256"),
+                     .offset = message.offset(),
+                     .exit_code = static_cast<int>(message.exit_code()),
+                     .error_text = checked_text(message.error_text(), "error_text")};
+}
+
+ClientReply read(const proto::AnswerPartReply& message) {
+  require_in(message.content().size(), 0, answer_part_size_max, "content size");
+  return AnswerPartReply{.content = message.content()};
+}
+
 ClientRequest read_content(const proto::RequestEnvelope& envelope) {
   switch (envelope.request_case()) {
     case proto::RequestEnvelope::kSubmit:
@@ -307,6 +389,10 @@ ClientRequest read_content(const proto::RequestEnvelope& envelope) {
       return read(envelope.part());
     case proto::RequestEnvelope::kReleaseHost:
       return ReleaseHostRequest{checked_name(envelope.release_host().host(), "host")};
+    case proto::RequestEnvelope::kAnswer:
+      return read(envelope.answer());
+    case proto::RequestEnvelope::kAnswerPart:
+      return read(envelope.answer_part());
     case proto::RequestEnvelope::REQUEST_NOT_SET:
       break;
   }
@@ -327,6 +413,10 @@ ClientReply read_content(const proto::ReplyEnvelope& envelope) {
       return PartReply{envelope.part().next_offset()};
     case proto::ReplyEnvelope::kWait:
       return WaitReply{};
+    case proto::ReplyEnvelope::kAnswer:
+      return read(envelope.answer());
+    case proto::ReplyEnvelope::kAnswerPart:
+      return read(envelope.answer_part());
     case proto::ReplyEnvelope::REPLY_NOT_SET:
       break;
   }

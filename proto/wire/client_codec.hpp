@@ -29,6 +29,10 @@ inline constexpr std::size_t quarantined_hosts_per_reply_max = 256;
 inline constexpr std::size_t reply_text_size_max = 4096;  ///< Of any text in a reply, bytes.
 inline constexpr std::size_t stop_rule_size_max = 200;    ///< Bytes.
 inline constexpr int priority_max = 100;                  ///< And its negative.
+inline constexpr std::size_t answer_options_max = 64;
+inline constexpr std::size_t answer_option_size_max = 4096;               ///< Bytes.
+inline constexpr std::size_t statement_size_max = std::size_t{32} << 10;  ///< Bytes.
+inline constexpr std::size_t answer_part_size_max = std::size_t{1} << 20;
 
 /// A request as it travels.
 struct RequestPacket {

@@ -39,7 +39,8 @@ enum class ControlAction : std::uint8_t {
   resume = 2,
   cancel = 3,
   set_priority = 4,
-  retry = 5,  ///< The runs that were given up are lent again.
+  retry = 5,    ///< The runs that were given up are lent again.
+  archive = 6,  ///< It is no longer served; its file moves to `archived`.
 };
 
 struct ControlRequest {
@@ -60,8 +61,36 @@ struct RequestPart {
   std::string slice;             ///< 1 byte to request_part_size_max; ends at most at total_size.
 };
 
-using ClientRequest = std::variant<SubmitRequest, StatusRequest, WorkersRequest, ControlRequest,
-                                   ReleaseHostRequest, RequestPart>;
+/// What a client asks about a campaign's results. The values are sent: never renumber.
+enum class Question : std::uint8_t {
+  report = 1,
+  sensitivity = 2,
+  query = 3,
+  database = 4,  ///< A copy of the campaign database.
+};
+
+/// A question that the coordinator answers with the command of that name.
+struct AnswerRequest {
+  std::string campaign;  ///< Name; is_name() holds.
+  Question question = Question::report;
+  std::vector<std::string> options = {};  ///< Of the command: `--json`, `--run=13`.
+  std::string statement = {};             ///< SQL of a query; else empty.
+  /// Bytes that the client has of an earlier copy of the database. If the new copy begins with
+  /// them, only the rest is sent.
+  std::uint64_t known_size = 0;
+  std::string known_sha256 =
+      {};  ///< Of those bytes, 64 hexadecimal digits; empty if there are none.
+};
+
+/// Asks for the bytes of an answer from here on; at its end, the coordinator drops the answer.
+struct AnswerPartRequest {
+  std::uint64_t answer_id = 0;  ///< Not 0.
+  std::uint64_t offset = 0;
+};
+
+using ClientRequest =
+    std::variant<SubmitRequest, StatusRequest, WorkersRequest, ControlRequest, ReleaseHostRequest,
+                 RequestPart, AnswerRequest, AnswerPartRequest>;
 
 /// Whether a campaign's runs are lent. The values are sent: never renumber.
 enum class CampaignPhase : std::uint8_t {
@@ -147,7 +176,23 @@ struct PartReply {
 /// The request is being carried out, and its reply will follow.
 struct WaitReply {};
 
-using ClientReply =
-    std::variant<StatusReply, WorkersReply, DoneReply, ErrorReply, PartReply, WaitReply>;
+/// The answer to an AnswerRequest is ready to be read. It is kept for a minute after it was last
+/// read.
+struct AnswerReply {
+  std::uint64_t answer_id = 0;  ///< Not 0.
+  std::uint64_t size = 0;       ///< Bytes.
+  std::string sha256;           ///< Of all of them; 64 hexadecimal digits.
+  std::uint64_t offset = 0;     ///< Where to begin: AnswerRequest::known_size or 0.
+  int exit_code = 0;            ///< Of the command; 0 to 255.
+  std::string error_text;       ///< What it wrote to standard error.
+};
+
+/// Bytes of an answer, at most answer_part_size_max; none at its end.
+struct AnswerPartReply {
+  std::string content;
+};
+
+using ClientReply = std::variant<StatusReply, WorkersReply, DoneReply, ErrorReply, PartReply,
+                                 WaitReply, AnswerReply, AnswerPartReply>;
 
 }  // namespace proofmass::wire

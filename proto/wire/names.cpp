@@ -40,6 +40,8 @@ std::string_view name_of(ControlAction action) {
       return "cancel";
     case ControlAction::set_priority:
       return "set-priority";
+    case ControlAction::archive:
+      return "archive";
     case ControlAction::retry:
       return "retry";
   }

@@ -21,6 +21,7 @@
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/remote_answer.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/query/query_process.hpp"
@@ -32,6 +33,7 @@ namespace {
 
 constexpr double timeout_s_max = 86'400.0;
 constexpr std::size_t table_rows_max = 1'000'000;
+constexpr std::size_t table_columns_max = 100'000;
 
 struct QueryOptions {
   std::filesystem::path database;
@@ -39,7 +41,9 @@ struct QueryOptions {
   std::string sql;                    ///< `-`: to be read from standard input.
   RowFormat format = RowFormat::table;
   double timeout_s = 60.0;
-  std::size_t num_rows_max = 1000;  ///< Of a table.
+  std::size_t num_rows_max = 1000;         ///< Of a table.
+  std::optional<std::size_t> num_columns;  ///< Of a table; those of the terminal by default.
+  ClientConnectionConfig connection;       ///< Of a coordinator, if it is to be asked.
 };
 
 std::string read_standard_input() {
@@ -99,8 +103,41 @@ void require_not_swapped(const QueryOptions& options) {
       fmt::format("SQL = {} (is a database: the database goes before the question)", options.sql));
 }
 
+const std::map<std::string, RowFormat>& formats() {
+  static const std::map<std::string, RowFormat> formats{{"table", RowFormat::table},
+                                                        {"csv", RowFormat::csv},
+                                                        {"json", RowFormat::json},
+                                                        {"markdown", RowFormat::markdown}};
+  return formats;
+}
+
+/// Columns of a table; nothing if any number.
+std::optional<std::size_t> table_columns(const QueryOptions& options) {
+  return options.num_columns ? options.num_columns : terminal_columns();
+}
+
+int query_remotely(const QueryOptions& options) {
+  if (!options.attached.empty()) {
+    throw UsageError("--attach = a file (is not possible with --connect)");
+  }
+  const auto format = std::ranges::find(formats(), options.format,
+                                        &std::map<std::string, RowFormat>::value_type::second);
+  wire::AnswerRequest question{
+      .campaign = checked_campaign_name(options.database),
+      .question = wire::Question::query,
+      .options = {"--format=" + format->first, fmt::format("--timeout={}", options.timeout_s),
+                  fmt::format("--rows-max={}", options.num_rows_max)},
+      .statement = options.sql == "-" ? read_standard_input() : options.sql};
+  const std::optional<std::size_t> columns = table_columns(options);
+  if (columns) question.options.push_back(fmt::format("--columns={}", *columns));
+  const bool is_for_people = options.format == RowFormat::table;
+  return print_answer(options.connection, question,
+                      is_for_people ? AnswerText::lines : AnswerText::bytes);
+}
+
 // SIGINT and SIGTERM end it in order.
 int query_database(const QueryOptions& options) {
+  if (is_remote(options.connection)) return query_remotely(options);
   require_not_swapped(options);
   const QueryFiles files(options.database, attached_files_of(options.attached));
   // While it waits for input, a signal ends the process at once.
@@ -108,7 +145,8 @@ int query_database(const QueryOptions& options) {
   const auto& stop = catch_stop_signals(OnTerminate::stop_now);
   const QueryLimits limits{.time_limit = std::chrono::duration<double>(options.timeout_s),
                            .is_interrupted = [&] { return stop != StopRequest::none; }};
-  const TableLimits table{.num_rows_max = options.num_rows_max, .num_columns = terminal_columns()};
+  const TableLimits table{.num_rows_max = options.num_rows_max,
+                          .num_columns = table_columns(options)};
   const QueryOutput output{.format = options.format,
                            .table = table,
                            .sink = write_standard_output,
@@ -121,10 +159,6 @@ int query_database(const QueryOptions& options) {
 }  // namespace
 
 void add_query(CLI::App& app, Command& chosen) {
-  static const std::map<std::string, RowFormat> formats{{"table", RowFormat::table},
-                                                        {"csv", RowFormat::csv},
-                                                        {"json", RowFormat::json},
-                                                        {"markdown", RowFormat::markdown}};
   auto [command, options] = add_command<QueryOptions>(
       app, chosen, "query", "Ask a database a question in SQL", query_database);
   command.footer(exit_codes_text({exit_interrupted}));
@@ -136,13 +170,18 @@ void add_query(CLI::App& app, Command& chosen) {
                   "NAME=FILE: another campaign, whose tables are\n"
                   "NAME.run_result and so on; may be repeated")
       ->allow_extra_args(false);
-  wire::add_choice(command, "--format", options.format, formats, "table by default");
+  wire::add_choice(command, "--format", options.format, formats(), "table by default");
   command.add_option("--timeout", options.timeout_s, "Seconds that the answer may take")
       ->check(wire::in_range(0.001, timeout_s_max))
       ->capture_default_str();
   command.add_option("--rows-max", options.num_rows_max, "Rows that a table shows")
       ->check(wire::in_range(std::size_t{1}, table_rows_max))
       ->capture_default_str();
+  command
+      .add_option("--columns", options.num_columns,
+                  "Characters that a line of a table may take; as\nthe terminal has by default")
+      ->check(wire::in_range(std::size_t{20}, table_columns_max));
+  add_optional_connection(command, options.connection);
 }
 
 }  // namespace proofmass::coordinator

@@ -8,6 +8,7 @@
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/remote_answer.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/report/report_json.hpp"
 #include "coordinator/report/requirements.hpp"
@@ -20,6 +21,7 @@ struct ReportOptions {
   std::filesystem::path database;
   std::vector<std::string> requirements;  ///< See parse_requirement().
   OutputFormat format = OutputFormat::text;
+  ClientConnectionConfig connection;  ///< Of a coordinator, if it is to be asked.
 };
 
 std::vector<RequirementAnswer> answers_of(const Store& store, const Campaign& campaign,
@@ -39,9 +41,20 @@ std::string answers_text(const std::vector<RequirementAnswer>& answers) {
   return text;
 }
 
+int print_remote_report(const ReportOptions& options) {
+  wire::AnswerRequest question{.campaign = checked_campaign_name(options.database),
+                               .question = wire::Question::report};
+  for (const std::string& requirement : options.requirements) {
+    question.options.push_back("--requirement=" + requirement);
+  }
+  if (options.format == OutputFormat::json) question.options.emplace_back("--json");
+  return print_answer(options.connection, question, AnswerText::lines);
+}
+
 /// Prints the tables of a campaign, finished or not; of requirements, if there are any, the answers
 /// instead. JSON holds both.
 int print_report(const ReportOptions& options) {
+  if (is_remote(options.connection)) return print_remote_report(options);
   const Store store = Store::open_read_only(options.database);
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
   const std::vector<RequirementAnswer> answers = answers_of(store, *campaign, options.requirements);
@@ -68,6 +81,7 @@ void add_report(CLI::App& app, Command& chosen) {
                      "\"a_c12 < 9e-4 for 99% with 95%\" or\n"
                      "\"all objectives for 95% with 90%\"; may be repeated");
   add_json_flag(command, options.format);
+  add_optional_connection(command, options.connection);
 }
 
 }  // namespace proofmass::coordinator

@@ -11,6 +11,7 @@
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/remote_answer.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/report/sensitivity.hpp"
 #include "coordinator/store/store.hpp"
@@ -28,6 +29,7 @@ struct SensitivityOptions {
   std::optional<std::uint64_t> run;      ///< To be explained.
   std::size_t num_rows = 5;              ///< Drawn quantities that are named for each error.
   OutputFormat format = OutputFormat::text;
+  ClientConnectionConfig connection;  ///< Of a coordinator, if it is to be asked.
 };
 
 std::size_t quantity_named(std::string_view name) {
@@ -37,7 +39,18 @@ std::size_t quantity_named(std::string_view name) {
                                fmt::join(quantity_names(schema), " ")));
 }
 
+int print_remote_sensitivity(const SensitivityOptions& options) {
+  wire::AnswerRequest question{.campaign = checked_campaign_name(options.database),
+                               .question = wire::Question::sensitivity,
+                               .options = {fmt::format("--rows={}", options.num_rows)}};
+  if (options.parameter) question.options.push_back("--parameter=" + *options.parameter);
+  if (options.run) question.options.push_back(fmt::format("--run={}", *options.run));
+  if (options.format == OutputFormat::json) question.options.emplace_back("--json");
+  return print_answer(options.connection, question, AnswerText::lines);
+}
+
 int print_sensitivity(const SensitivityOptions& options) {
+  if (is_remote(options.connection)) return print_remote_sensitivity(options);
   std::vector<std::size_t> quantities;
   if (options.parameter) quantities.push_back(quantity_named(*options.parameter));
   const Store store = Store::open_read_only(options.database);
@@ -92,6 +105,7 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
                              model().drawn().size() + model().results().quantities.size()))
       ->capture_default_str();
   add_json_flag(command, options.format);
+  add_optional_connection(command, options.connection);
 }
 
 }  // namespace proofmass::coordinator

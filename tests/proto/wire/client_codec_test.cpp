@@ -74,8 +74,9 @@ TEST(QuestionRequests, AreTold) {
 }
 
 TEST(ControlRequest, KeepsActionAndCampaign) {
-  for (const auto action : {ControlAction::pause, ControlAction::resume, ControlAction::cancel,
-                            ControlAction::set_priority, ControlAction::retry}) {
+  for (const auto action :
+       {ControlAction::pause, ControlAction::resume, ControlAction::cancel,
+        ControlAction::set_priority, ControlAction::retry, ControlAction::archive}) {
     const auto control = round_trip_request(
         ControlRequest{.action = action, .campaign = "hardy2013", .priority = -7});
     EXPECT_EQ(control.priority, -7);
@@ -119,6 +120,42 @@ StatusReply reply_with(const std::vector<CampaignStatus>& campaigns) {
 TEST(QuestionRequests, SayWhereToBegin) {
   EXPECT_EQ(round_trip_request(StatusRequest{.first_campaign = 512}).first_campaign, 512U);
   EXPECT_EQ(round_trip_request(WorkersRequest{.after_worker_id = 9}).after_worker_id, 9U);
+}
+
+TEST(AnswerRequest, KeepsTheQuestion) {
+  const auto query = round_trip_request(AnswerRequest{.campaign = "a",
+                                                      .question = Question::query,
+                                                      .options = {"--format=csv", "--rows-max=3"},
+                                                      .statement = "SELECT 'Δ'"});
+  EXPECT_EQ(query.campaign, "a");
+  EXPECT_EQ(query.question, Question::query);
+  EXPECT_EQ(query.options, (std::vector<std::string>{"--format=csv", "--rows-max=3"}));
+  EXPECT_EQ(query.statement, "SELECT 'Δ'");
+  const std::string sha256 = std::string(63, '0') + "f";
+  const auto database = round_trip_request(AnswerRequest{
+      .campaign = "a", .question = Question::database, .known_size = 17, .known_sha256 = sha256});
+  EXPECT_EQ(database.known_size, 17U);
+  EXPECT_EQ(database.known_sha256, sha256);
+  const auto part = round_trip_request(AnswerPartRequest{.answer_id = some_id, .offset = 5});
+  EXPECT_EQ(part.answer_id, some_id);
+  EXPECT_EQ(part.offset, 5U);
+}
+
+TEST(AnswerReply, KeepsWhatIsToBeRead) {
+  const auto answer = round_trip_reply(AnswerReply{.answer_id = some_id,
+                                                   .size = 17,
+                                                   .sha256 = std::string(64, 'a'),
+                                                   .offset = 5,
+                                                   .exit_code = 3,
+                                                   .error_text = "wrong\n"});
+  EXPECT_EQ(answer.answer_id, some_id);
+  EXPECT_EQ(answer.size, 17U);
+  EXPECT_EQ(answer.sha256, std::string(64, 'a'));
+  EXPECT_EQ(answer.offset, 5U);
+  EXPECT_EQ(answer.exit_code, 3);
+  EXPECT_EQ(answer.error_text, "wrong\n");
+  EXPECT_EQ(round_trip_reply(AnswerPartReply{std::string("\0\xff", 2)}).content,
+            std::string("\0\xff", 2));
 }
 
 TEST(ReleaseHostRequest, KeepsTheHost) {

@@ -112,6 +112,39 @@ std::string refusal_of_part(const std::function<void(proto::RequestPart&)>& chan
                  [&](auto& envelope) { change(*envelope.mutable_part()); });
 }
 
+std::string refusal_of_question(const std::function<void(proto::AnswerRequest&)>& change) {
+  return refusal(AnswerRequest{.campaign = "a", .question = Question::query, .statement = "x"},
+                 [&](auto& envelope) { change(*envelope.mutable_answer()); });
+}
+
+TEST(MalformedQuestion, HasLimits) {
+  EXPECT_EQ(refusal_of_question([](auto& question) { question.set_campaign("../a"); }),
+            "campaign = 4 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal_of_question(
+                [](auto& question) { question.set_question(static_cast<proto::Question>(5)); }),
+            "question = 5 (must be in [1, 4])");
+  EXPECT_EQ(refusal_of_question([](auto& question) { question.clear_statement(); }),
+            "statement size = 0 (must be in [1, 32768])");
+  EXPECT_EQ(refusal_of_question([](auto& question) {
+              question.set_statement(std::string(statement_size_max + 1, 'x'));
+            }),
+            "statement size = 32769 (must be in [1, 32768])");
+  EXPECT_EQ(
+      refusal_of_question([](auto& question) { question.set_statement(std::string("a\0b", 3)); }),
+      "statement size = 3 bytes (must not have a zero byte)");
+  EXPECT_EQ(refusal_of_question([](auto& question) { question.add_options(""); }),
+            "option size = 0 (must be in [1, 4096])");
+  EXPECT_EQ(refusal_of_question([](auto& question) {
+              for (int i = 0; i < 65; ++i) question.add_options("--json");
+            }),
+            "options = 65 (must be in [0, 64])");
+  EXPECT_EQ(refusal_of_question([](auto& question) {
+              question.set_known_size(1);
+              question.set_known_sha256(std::string(64, 'g'));
+            }),
+            "known_sha256 = 64 bytes (must be 64 hexadecimal digits)");
+}
+
 TEST(MalformedPart, MustLieWithinItsRequest) {
   EXPECT_EQ(refusal_of_part([](auto& part) { part.set_total_size(0); }),
             "total_size = 0 (must be in [1, 67108864])");

@@ -1,0 +1,150 @@
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "coordinator/cli/client.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/remote_answer.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/report/digest.hpp"
+#include "coordinator/store/draft_file.hpp"
+#include "coordinator/store/sha256.hpp"
+#include "coordinator/store/store.hpp"
+#include "proto/command_line/option_checks.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+struct FetchOptions {
+  ClientOptions client;
+  std::string campaign;
+  std::optional<std::filesystem::path> file;  ///< By default NAME.db.
+};
+
+/// What has arrived of a database, in a file that outlives this process: a later one goes on.
+class ArrivedPart {
+ public:
+  /// @throws Error if the file cannot be opened, or read if it is there.
+  explicit ArrivedPart(std::filesystem::path path) : path_(std::move(path)) {
+    descriptor_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    if (descriptor_ < 0) fail();
+    std::vector<char> block(std::size_t{1} << 20);
+    Sha256 hash;
+    ssize_t num_read = 0;
+    while ((num_read = read(descriptor_, block.data(), block.size())) > 0) {
+      add_to(hash, {block.data(), static_cast<std::size_t>(num_read)});
+      size_ += static_cast<std::uint64_t>(num_read);
+    }
+    if (num_read < 0) fail();
+    sha256_ = hash.finish();
+  }
+  ~ArrivedPart() { close(descriptor_); }
+  ArrivedPart(const ArrivedPart&) = delete;
+  ArrivedPart& operator=(const ArrivedPart&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  [[nodiscard]] const std::string& sha256() const { return sha256_; }
+
+  void clear() {
+    if (ftruncate(descriptor_, 0) != 0 || lseek(descriptor_, 0, SEEK_SET) != 0) fail();
+    size_ = 0;
+  }
+
+  void append(std::string_view bytes) {
+    while (!bytes.empty()) {
+      const ssize_t num_written = write(descriptor_, bytes.data(), bytes.size());
+      if (num_written < 0 && errno == EINTR) continue;
+      if (num_written < 0) fail();
+      size_ += static_cast<std::uint64_t>(num_written);
+      bytes.remove_prefix(static_cast<std::size_t>(num_written));
+    }
+  }
+
+ private:
+  static void add_to(Sha256& hash, std::string_view bytes) {
+    hash.add(std::span(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
+  }
+
+  [[noreturn]] void fail() const {
+    throw Error(fmt::format("file = {} ({})", path_.string(), std::strerror(errno)));
+  }
+
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+  std::uint64_t size_ = 0;
+  std::string sha256_;  ///< As it was found.
+};
+
+/// Completes the part. @throws Error if it is not what the coordinator announced; then it is gone.
+void complete(ArrivedPart& part, const Ask& ask, const wire::AnswerReply& answer) {
+  if (answer.offset != part.size()) part.clear();
+  read_answer(ask, answer, [&](std::string_view bytes) { part.append(bytes); });
+  if (ArrivedPart(part.path()).sha256() == answer.sha256) return;
+  std::error_code ignored;
+  std::filesystem::remove(part.path(), ignored);
+  throw Error("database = another one than was announced (fetch it again)");
+}
+
+/// What was fetched, after its results were held against the digest that came with them.
+std::string summary_of(const std::filesystem::path& file, OutputFormat format) {
+  const WalkedResults walked = walk_checked(Store::open_read_only(file), [](const RunResult&) {});
+  const bool is_checked = walked.check == DigestCheck::holds;
+  if (format == OutputFormat::json) {
+    const nlohmann::ordered_json summary{{"file", file.string()},
+                                         {"num_results", walked.num_results},
+                                         {"digest", walked.digest},
+                                         {"is_digest_checked", is_checked}};
+    return summary.dump(2, ' ', true) + "\n";
+  }
+  return fmt::format("wrote {}: {} results, digest {}{}\n", file.string(), walked.num_results,
+                     walked.digest,
+                     is_checked ? "" : " (not checked: the campaign is not finished)");
+}
+
+int fetch_database(const FetchOptions& options) {
+  const std::string name = checked_campaign_name(options.campaign);
+  const std::filesystem::path file = options.file.value_or(name + ".db");
+  std::error_code ignored;
+  if (std::filesystem::exists(file, ignored)) {
+    throw UsageError(fmt::format("file = {} (exists already)", file.string()));
+  }
+  return with_connection(options.client, [&](const Ask& ask) {
+    ArrivedPart part(std::filesystem::path(file).concat(".part"));
+    const auto answer = reply_of<wire::AnswerReply>(
+        ask, wire::AnswerRequest{.campaign = name,
+                                 .question = wire::Question::database,
+                                 .known_size = part.size(),
+                                 .known_sha256 = part.size() > 0 ? part.sha256() : ""});
+    complete(part, ask, answer);
+    if (const int error = publish_file(part.path(), file, IfThere::keep); error != 0) {
+      throw Error(fmt::format("file = {} ({})", file.string(), std::strerror(error)));
+    }
+    print_lines(summary_of(file, options.client.format));
+    return exit_done;
+  });
+}
+
+}  // namespace
+
+void add_fetch(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<FetchOptions>(
+      app, chosen, "fetch", "Copy a campaign's database from a coordinator", fetch_database);
+  command.add_option("NAME", options.campaign, "Campaign")->required();
+  command.add_option("FILE", options.file, "File to make; NAME.db by default")
+      ->type_name(database_type);
+  add_client_options(command, options.client);
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,53 @@
+#include "coordinator/cli/remote_answer.hpp"
+
+#include <fmt/format.h>
+
+#include <span>
+
+#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/store/sha256.hpp"
+#include "core/error.hpp"
+#include "proto/command_line/standard_error.hpp"
+#include "proto/text/visible_text.hpp"
+
+namespace proofmass::coordinator {
+
+void add_optional_connection(CLI::App& command, ClientConnectionConfig& connection) {
+  command.add_option("--connect", connection.endpoint,
+                     "Ask the coordinator with this address for\nclients; DB is a campaign's name");
+  add_key_options(command, connection);
+}
+
+void read_answer(const Ask& ask, const wire::AnswerReply& answer,
+                 const std::function<void(std::string_view)>& take) {
+  wire::AnswerPartRequest request{.answer_id = answer.answer_id, .offset = answer.offset};
+  for (;;) {
+    const auto part = reply_of<wire::AnswerPartReply>(ask, request);
+    if (part.content.empty()) return;
+    take(part.content);
+    request.offset += part.content.size();
+    if (request.offset > answer.size) throw Error("answer = longer than it was (ask again)");
+  }
+}
+
+int print_answer(const ClientConnectionConfig& connection, const wire::AnswerRequest& question,
+                 AnswerText text) {
+  return with_connection({.connection = connection}, [&](const Ask& ask) {
+    const auto answer = reply_of<wire::AnswerReply>(ask, question);
+    std::string bytes;
+    read_answer(ask, answer, [&](std::string_view part) { bytes += part; });
+    Sha256 hash;
+    hash.add(std::span(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
+    if (hash.finish() != answer.sha256) throw Error("answer = another one than was announced");
+    if (text == AnswerText::lines) {
+      print_lines(bytes);
+    } else {
+      write_standard_output(bytes);
+    }
+    flush_standard_output();
+    if (!answer.error_text.empty()) wire::say(wire::visible_lines(answer.error_text));
+    return answer.exit_code;
+  });
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,389 @@
+#include "coordinator/net/answers.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "coordinator/store/sha256.hpp"
+#include "core/error.hpp"
+#include "proto/link/machine.hpp"
+#include "proto/link/start_program.hpp"
+#include "proto/wire/client_codec.hpp"
+
+extern char** environ;
+
+namespace proofmass::coordinator {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::uint64_t memory_size_max = std::uint64_t{4} << 30;  // Of address space, bytes.
+constexpr std::size_t block_size = std::size_t{1} << 20;
+constexpr int look_interval_ms = 100;
+constexpr int niceness = 10;
+
+// Sanitizers reserve terabytes of address space.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool has_memory_limit = false;
+#else
+constexpr bool has_memory_limit = true;
+#endif
+
+/// A command that answers a question, and those of its options that only concern the answer.
+struct AnswerCommand {
+  wire::Question question;
+  std::string_view name;
+  std::vector<std::string_view> options;
+};
+
+const AnswerCommand& command_for(wire::Question question) {
+  static const std::array<AnswerCommand, 4> commands{
+      AnswerCommand{wire::Question::report, "report", {"--requirement", "--json"}},
+      AnswerCommand{
+          wire::Question::sensitivity, "sensitivity", {"--parameter", "--run", "--rows", "--json"}},
+      AnswerCommand{
+          wire::Question::query, "query", {"--format", "--timeout", "--rows-max", "--columns"}},
+      AnswerCommand{wire::Question::database, "backup", {}}};
+  const auto* const found = std::ranges::find(commands, question, &AnswerCommand::question);
+  PROOFMASS_EXPECT(found != commands.end());
+  return *found;
+}
+
+/// An option with its value is one argument, so that the value cannot be another option.
+void require_option(const AnswerCommand& command, std::string_view option) {
+  const std::string_view name = option.substr(0, option.find('='));
+  if (std::ranges::find(command.options, name) != command.options.end()) return;
+  throw Error(fmt::format("option = {} (must be one of those of {} that a coordinator knows: {})",
+                          name, command.name, fmt::join(command.options, " ")));
+}
+
+/// What a process is to do, and what it may need.
+struct Order {
+  std::vector<std::string> arguments;
+  std::filesystem::path directory;  ///< For its output.
+  std::optional<std::filesystem::path>
+      copy;  ///< That it makes; otherwise its output is the answer.
+  Clock::duration duration_max;
+  std::uint64_t known_size = 0;
+  std::string known_sha256;
+};
+
+Order order_for(const wire::AnswerRequest& request, const ServiceConfig& config,
+                const std::filesystem::path& database, std::uint64_t id) {
+  const AnswerCommand& command = command_for(request.question);
+  Order order{.arguments = {config.answer_program.string(), std::string(command.name)},
+              .directory = config.answer_directory,
+              .copy = {},
+              .duration_max = Answers::duration_max,
+              .known_size = request.known_size,
+              .known_sha256 = request.known_sha256};
+  for (const std::string& option : request.options) {
+    require_option(command, option);
+    order.arguments.push_back(option);
+  }
+  order.arguments.insert(order.arguments.end(),
+                         {"--", std::filesystem::absolute(database).string()});
+  if (request.question == wire::Question::query) order.arguments.push_back(request.statement);
+  if (request.question == wire::Question::database) {
+    order.copy = config.answer_directory / fmt::format("copy-{:016x}.db", id);
+    order.duration_max = Answers::copy_duration_max;
+    order.arguments.push_back(order.copy->string());
+  }
+  return order;
+}
+
+/// So that no copy takes the space that results need.
+void require_space(const Order& order, const std::filesystem::path& database) {
+  std::error_code ignored;
+  const std::uintmax_t size = std::filesystem::file_size(database, ignored);
+  const std::filesystem::space_info space = std::filesystem::space(order.directory, ignored);
+  if (ignored || space.available >= 2 * size) return;
+  throw Error(fmt::format("disk = {} bytes available (must be {}, twice the size of the database)",
+                          space.available, 2 * size));
+}
+
+[[noreturn]] void fail(std::string_view what) {
+  throw Error(fmt::format("answer: {}: {}", what, std::strerror(errno)));
+}
+
+std::unique_ptr<UnnamedFile> make_unnamed_file(const std::filesystem::path& directory) {
+  std::string name = (directory / "output-XXXXXX").string();
+  const int descriptor = mkostemp(name.data(), O_CLOEXEC);
+  if (descriptor < 0) fail(name);
+  unlink(name.c_str());
+  return std::make_unique<UnnamedFile>(descriptor);
+}
+
+/// Settings of this process are none of the commands'.
+std::vector<std::string> environment_of_command() {
+  std::vector<std::string> variables;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    const std::string_view text = *variable;
+    if (!text.starts_with("PROOFMASS_") && !text.starts_with("NOTIFY_SOCKET=")) {
+      variables.emplace_back(text);
+    }
+  }
+  return variables;
+}
+
+void limit(pid_t process_id, __rlimit_resource resource, std::uint64_t maximum) {
+  const rlimit wanted{.rlim_cur = maximum, .rlim_max = maximum};
+  if (prlimit(process_id, resource, &wanted, nullptr) != 0 && errno != ESRCH) fail("limits");
+}
+
+/// A process that answers a question, from its start to its end.
+class AnswerProcess {
+ public:
+  AnswerProcess(const Order& order, int output) {
+    std::array<int, 2> ends{};
+    if (pipe2(ends.data(), O_CLOEXEC) != 0) fail("pipe");
+    const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    errors_ = ends[0];
+    try {
+      process_id_ = wire::start_program({.arguments = order.arguments,
+                                         .descriptors = {nothing, output, ends[1]},
+                                         .environment = environment_of_command()});
+    } catch (const Error&) {
+      close(nothing);
+      close(ends[1]);
+      close(errors_);
+      throw;
+    }
+    close(nothing);
+    close(ends[1]);
+  }
+  ~AnswerProcess() {
+    if (process_id_ != 0) {
+      kill(process_id_, SIGKILL);
+      (void)wait();
+    }
+    close(errors_);
+  }
+  AnswerProcess(const AnswerProcess&) = delete;
+  AnswerProcess& operator=(const AnswerProcess&) = delete;
+
+  void set_limits(bool is_copy) const {
+    limit(process_id_, RLIMIT_CORE, 0);
+    if (has_memory_limit) limit(process_id_, RLIMIT_AS, memory_size_max);
+    if (!is_copy) limit(process_id_, RLIMIT_FSIZE, Answers::size_max);
+    setpriority(PRIO_PROCESS, static_cast<id_t>(process_id_), niceness);
+  }
+
+  /// Waits for the end. @returns What waitpid() says of it; nothing if it was ended before.
+  std::optional<int> follow(Clock::time_point deadline, const std::atomic<bool>& is_cancelled) {
+    while (!is_silent_) {
+      if (is_cancelled || Clock::now() > deadline) return std::nullopt;
+      pollfd item{.fd = errors_, .events = POLLIN, .revents = 0};
+      if (poll(&item, 1, look_interval_ms) > 0) read_errors();
+    }
+    return wait();
+  }
+
+  [[nodiscard]] const std::string& error_text() const { return error_text_; }
+
+ private:
+  void read_errors() {
+    std::array<char, 4096> bytes{};
+    const ssize_t size = ::read(errors_, bytes.data(), bytes.size());
+    if (size < 0 && errno == EINTR) return;
+    is_silent_ = size <= 0;
+    if (size <= 0) return;
+    error_text_.append(bytes.data(), static_cast<std::size_t>(size));
+    error_text_.resize(std::min(error_text_.size(), wire::reply_text_size_max));
+  }
+
+  int wait() {
+    int status = 0;
+    while (waitpid(process_id_, &status, 0) < 0 && errno == EINTR) {
+    }
+    process_id_ = 0;
+    return status;
+  }
+
+  pid_t process_id_ = 0;
+  int errors_ = -1;         ///< What it writes to standard error.
+  bool is_silent_ = false;  ///< It has closed its standard error: it has ended.
+  std::string error_text_;
+};
+
+/// @throws Error unless the process ended by itself.
+int exit_code_of(const std::optional<int>& status, const Order& order) {
+  if (!status) {
+    throw Error(
+        fmt::format("answer = not there after {} s (must be faster; ask for less)",
+                    std::chrono::duration_cast<std::chrono::seconds>(order.duration_max).count()));
+  }
+  if (WIFSIGNALED(*status) && WTERMSIG(*status) == SIGXFSZ) {
+    throw Error(fmt::format("answer = more than {} bytes (ask for less, or fetch the database)",
+                            Answers::size_max));
+  }
+  if (!WIFEXITED(*status)) {
+    throw Error(fmt::format("answer: the process was {}", wire::end_text(*status)));
+  }
+  return WEXITSTATUS(*status);
+}
+
+/// SHA-256 of the first bytes of a file.
+std::string sha256_of(const UnnamedFile& file, std::uint64_t size) {
+  Sha256 hash;
+  for (std::uint64_t offset = 0; offset < size;) {
+    const std::string block = file.read(offset, std::min<std::uint64_t>(block_size, size - offset));
+    if (block.empty()) break;
+    hash.add(std::span(reinterpret_cast<const unsigned char*>(block.data()), block.size()));
+    offset += block.size();
+  }
+  return hash.finish();
+}
+
+wire::AnswerReply reply_about(const UnnamedFile& file, const Order& order, int exit_code,
+                              const std::string& error_text) {
+  const std::uint64_t size = file.size();
+  const bool is_known = order.known_size > 0 && order.known_size <= size &&
+                        sha256_of(file, order.known_size) == order.known_sha256;
+  return {.size = size,
+          .sha256 = sha256_of(file, size),
+          .offset = is_known ? order.known_size : 0,
+          .exit_code = exit_code,
+          .error_text = error_text};
+}
+
+/// Removes the copy at the end, whatever happens.
+struct CopyRemover {
+  const std::optional<std::filesystem::path>& copy;
+  ~CopyRemover() {
+    std::error_code ignored;
+    if (copy) std::filesystem::remove(*copy, ignored);
+  }
+};
+
+}  // namespace
+
+UnnamedFile::~UnnamedFile() { close(descriptor_); }
+
+std::uint64_t UnnamedFile::size() const {
+  struct stat status {};
+  if (fstat(descriptor_, &status) != 0) fail("size");
+  return static_cast<std::uint64_t>(status.st_size);
+}
+
+std::string UnnamedFile::read(std::uint64_t offset, std::size_t size_max) const {
+  std::string bytes(size_max, '\0');
+  std::size_t size = 0;
+  while (size < size_max) {
+    const ssize_t num_read =
+        pread(descriptor_, bytes.data() + size, size_max - size, static_cast<off_t>(offset + size));
+    if (num_read < 0 && errno == EINTR) continue;
+    if (num_read < 0) fail("read");
+    if (num_read == 0) break;
+    size += static_cast<std::size_t>(num_read);
+  }
+  bytes.resize(size);
+  return bytes;
+}
+
+Answers::~Answers() {
+  for (const Computing& computing : computing_) *computing.is_cancelled = true;
+}
+
+void Answers::require_room(const std::string& owner) const {
+  const auto num_own =
+      static_cast<std::size_t>(std::ranges::count(computing_, owner, &Computing::owner));
+  const bool is_full = computing_.size() >= num_computing_max ||
+                       kept_.size() + computing_.size() >= num_kept_max ||
+                       (!owner.empty() && num_own >= num_computing_per_key);
+  if (!is_full) return;
+  throw Error(fmt::format("questions = {} (are being answered, as many as may be; try again later)",
+                          computing_.size() + kept_.size()));
+}
+
+void Answers::ask(const wire::AnswerRequest& request, const std::filesystem::path& database,
+                  const Asker& asker, Respond respond) {
+  if (context_.config.answer_program.empty()) {
+    throw Error("question = one about results (this coordinator answers none)");
+  }
+  require_room(asker.name);
+  const std::uint64_t id = std::max<std::uint64_t>(1, context_.start.epoch.value + num_answers_++);
+  const Order order = order_for(request, context_.config, database, id);
+  if (order.copy) require_space(order, database);
+  const auto is_cancelled = std::make_shared<std::atomic<bool>>(false);
+  const auto compute = [order, id, is_cancelled]() -> Computed {
+    try {
+      const CopyRemover remover{order.copy};
+      std::unique_ptr<UnnamedFile> file = make_unnamed_file(order.directory);
+      AnswerProcess process(order, file->descriptor());
+      process.set_limits(order.copy.has_value());
+      const std::optional<int> status =
+          process.follow(Clock::now() + order.duration_max, *is_cancelled);
+      const int exit_code = exit_code_of(status, order);
+      if (order.copy && exit_code != 0) throw Error(process.error_text());
+      if (order.copy) {
+        const int descriptor = open(order.copy->c_str(), O_RDONLY | O_CLOEXEC);
+        if (descriptor < 0) fail(order.copy->string());
+        file = std::make_unique<UnnamedFile>(descriptor);
+      }
+      wire::AnswerReply reply = reply_about(*file, order, exit_code, process.error_text());
+      reply.answer_id = id;
+      return {.failure = {}, .file = std::move(file), .reply = std::move(reply)};
+    } catch (const std::exception& error) {
+      return {.failure = error.what(), .file = nullptr, .reply = {}};
+    }
+  };
+  computing_.push_back({.owner = asker.name,
+                        .respond = std::move(respond),
+                        .is_cancelled = is_cancelled,
+                        .result = std::async(std::launch::async, compute)});
+}
+
+wire::AnswerPartReply Answers::part(const wire::AnswerPartRequest& request, const Asker& asker) {
+  const auto found = kept_.find(request.answer_id);
+  if (found == kept_.end() || found->second.owner != asker.name) {
+    throw Error(
+        fmt::format("answer = {:016x} (is not kept any more; ask again)", request.answer_id));
+  }
+  Kept& kept = found->second;
+  kept.read_at = context_.now();
+  wire::AnswerPartReply reply{.content =
+                                  kept.file->read(request.offset, wire::answer_part_size_max)};
+  if (reply.content.empty()) kept_.erase(found);
+  return reply;
+}
+
+void Answers::review() {
+  for (auto item = computing_.begin(); item != computing_.end();) {
+    const bool is_there =
+        item->result.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    if (is_there) finish(*item);
+    item = is_there ? computing_.erase(item) : std::next(item);
+  }
+  const TimePoint now = context_.now();
+  std::erase_if(kept_, [&](const auto& item) { return now - item.second.read_at > kept_for; });
+}
+
+void Answers::finish(Computing& computing) {
+  Computed computed = computing.result.get();
+  if (!computed.failure.empty()) return computing.respond(wire::ErrorReply{computed.failure});
+  kept_.emplace(
+      computed.reply.answer_id,
+      Kept{.owner = computing.owner, .file = std::move(computed.file), .read_at = context_.now()});
+  computing.respond(std::move(computed.reply));
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <future>
+#include <list>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "coordinator/net/authentication/rights.hpp"
+#include "coordinator/net/client_gateway.hpp"
+#include "coordinator/net/service_context.hpp"
+#include "proto/wire/client_messages.hpp"
+
+namespace proofmass::coordinator {
+
+/// A file without a name: it is gone when its descriptor is closed.
+class UnnamedFile {
+ public:
+  explicit UnnamedFile(int descriptor) : descriptor_(descriptor) {}
+  ~UnnamedFile();
+  UnnamedFile(const UnnamedFile&) = delete;
+  UnnamedFile& operator=(const UnnamedFile&) = delete;
+
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+  [[nodiscard]] std::uint64_t size() const;  ///< Bytes.
+  /// At most so many bytes from the offset on; fewer only at the end of the file.
+  /// @throws Error if it cannot be read.
+  [[nodiscard]] std::string read(std::uint64_t offset, std::size_t size_max) const;
+
+ private:
+  int descriptor_;
+};
+
+/// Answers clients' questions about results. Each is answered by the program `proofmass` in a
+/// process of its own, with the command that a user would type on this machine: what a question
+/// needs of time and memory never holds up the service. Its output is kept until the client has
+/// read it, in parts.
+class Answers {
+ public:
+  static constexpr std::size_t num_computing_max = 4;       ///< Processes at a time.
+  static constexpr std::size_t num_computing_per_key = 2;   ///< Of those.
+  static constexpr std::size_t num_kept_max = 16;           ///< Answers that are being read.
+  static constexpr std::chrono::seconds kept_for{60};       ///< After it was last read.
+  static constexpr std::chrono::seconds duration_max{120};  ///< Of a process; copies have longer.
+  static constexpr std::chrono::minutes copy_duration_max{60};
+  /// Of an answer, bytes, unless it is a copy of the database.
+  static constexpr std::uint64_t size_max = std::uint64_t{64} << 20;
+
+  explicit Answers(const ServiceContext& context) : context_(context) {}
+  ~Answers();  ///< Ends the processes.
+  Answers(const Answers&) = delete;
+  Answers& operator=(const Answers&) = delete;
+
+  /// Begins to answer, and responds when the answer can be read.
+  /// @param database  Of the campaign.
+  /// @throws Error if the question has an option that its command does not have, or too many
+  ///         questions are being answered.
+  void ask(const wire::AnswerRequest& request, const std::filesystem::path& database,
+           const Asker& asker, Respond respond);
+
+  /// @throws Error if there is no such answer, or it was given to another key.
+  [[nodiscard]] wire::AnswerPartReply part(const wire::AnswerPartRequest& request,
+                                           const Asker& asker);
+
+  /// Responds to questions whose answers are there, and drops answers that nobody reads. To be
+  /// called several times a second.
+  void review();
+
+ private:
+  /// What came of a question.
+  struct Computed {
+    std::string failure;  ///< Why there is no answer; else empty.
+    std::unique_ptr<UnnamedFile> file;
+    wire::AnswerReply reply;
+  };
+  struct Computing {
+    std::string owner;
+    Respond respond;
+    std::shared_ptr<std::atomic<bool>> is_cancelled;
+    std::future<Computed> result;
+  };
+  struct Kept {
+    std::string owner;
+    std::unique_ptr<UnnamedFile> file;
+    TimePoint read_at;
+  };
+
+  void require_room(const std::string& owner) const;
+  void finish(Computing& computing);
+
+  const ServiceContext& context_;
+  std::list<Computing> computing_;
+  std::map<std::uint64_t, Kept> kept_;  ///< By number.
+  std::uint64_t num_answers_ = 0;
+};
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,263 @@
+// Questions about results that a coordinator answers. A script takes the place of the program that
+// it asks: what that program answers is tested in tests/system/remote_results_test.cpp.
+
+#include "coordinator/cli/remote_answer.hpp"
+
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "coordinator/net/answers.hpp"
+#include "proto/wire/client_codec.hpp"
+#include "tests/coordinator/cli/program.hpp"
+#include "tests/coordinator/net/playing_client.hpp"
+#include "tests/coordinator/net/service_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using wire::AnswerPartReply;
+using wire::AnswerPartRequest;
+using wire::AnswerReply;
+using wire::AnswerRequest;
+using wire::Question;
+
+// Of "hello\n", by sha256sum.
+constexpr const char* sha256_of_hello =
+    "5891b5b522d5df086d0ff0b110fbd9d21bb4fc7163af34d08286a2e846f6be03";
+
+class Answering : public test::ServiceTest {
+ protected:
+  Answering() {
+    config.clients_endpoint = "tcp://127.0.0.1:*";
+    config.answer_program = directory / "program";
+    config.answer_directory = directory / "answers";
+    std::filesystem::create_directory(config.answer_directory);
+  }
+
+  /// A coordinator with a campaign `a` that asks this program.
+  void start_with(const std::string& script) {
+    std::ofstream(config.answer_program) << "#!/bin/sh\n" << script << "\n";
+    chmod(config.answer_program.c_str(), 0700);
+    start({test::campaign_of("a", 5)});
+    client.emplace(service->clients_endpoint());
+  }
+
+  [[nodiscard]] AnswerReply answer_to(const AnswerRequest& request) {
+    return std::get<AnswerReply>(client->ask(request));
+  }
+  [[nodiscard]] std::string part(const AnswerReply& answer, std::uint64_t offset) {
+    const AnswerPartRequest request{.answer_id = answer.answer_id, .offset = offset};
+    return std::get<AnswerPartReply>(client->ask(request)).content;
+  }
+
+  std::optional<test::PlayingClient> client;
+};
+
+TEST_F(Answering, GivesOutputErrorsAndExitCodeOfTheCommand) {
+  start_with("echo hello; echo wrong >&2; exit 3");
+  const AnswerReply answer = answer_to({.campaign = "a", .question = Question::report});
+  EXPECT_EQ(answer.size, 6U);
+  EXPECT_EQ(answer.sha256, sha256_of_hello);
+  EXPECT_EQ(answer.offset, 0U);
+  EXPECT_EQ(answer.exit_code, 3);
+  EXPECT_EQ(answer.error_text, "wrong\n");
+  EXPECT_EQ(part(answer, 0), "hello\n");
+  EXPECT_EQ(part(answer, 4), "o\n");
+  EXPECT_EQ(part(answer, 6), "");
+  EXPECT_TRUE(std::filesystem::is_empty(config.answer_directory));
+}
+
+TEST_F(Answering, TellsTheCommandFileOptionsAndStatement) {
+  start_with("printf '<%s>' \"$@\"");
+  const std::string file = (directory / "a.db").string();
+  const auto command = [&](const AnswerRequest& request) { return part(answer_to(request), 0); };
+  EXPECT_EQ(command({.campaign = "a",
+                     .question = Question::report,
+                     .options = {"--json", "--requirement=a b; \"$(c)\""}}),
+            "<report><--json><--requirement=a b; \"$(c)\"><--><" + file + ">");
+  EXPECT_EQ(
+      command({.campaign = "a", .question = Question::query, .statement = "--json SELECT 'x'"}),
+      "<query><--><" + file + "><--json SELECT 'x'>");
+  EXPECT_EQ(command({.campaign = "a", .question = Question::sensitivity, .options = {"--run=3"}}),
+            "<sensitivity><--run=3><--><" + file + ">");
+}
+
+TEST_F(Answering, HasNoSettingsOfTheCoordinator) {
+  setenv("PROOFMASS_CONFIG", "/somewhere", 1);
+  start_with("env");
+  unsetenv("PROOFMASS_CONFIG");
+  const std::string environment = part(answer_to({.campaign = "a"}), 0);
+  EXPECT_THAT(environment, HasSubstr("PATH="));
+  EXPECT_THAT(environment, Not(HasSubstr("PROOFMASS")));
+}
+
+TEST_F(Answering, RefusesOptionsThatReadOrWriteOtherFiles) {
+  start_with("echo never");
+  const auto error_of = [&](Question question, const std::string& option) {
+    return client->error(AnswerRequest{.campaign = "a",
+                                       .question = question,
+                                       .options = {option},
+                                       .statement = question == Question::query ? "x" : ""});
+  };
+  EXPECT_EQ(error_of(Question::query, "--attach=b=/etc/shadow"),
+            "option = --attach (must be one of those of query that a coordinator knows: --format "
+            "--timeout --rows-max --columns)");
+  EXPECT_THAT(error_of(Question::query, "--json"), StartsWith("option = --json (must be"));
+  EXPECT_THAT(error_of(Question::report, "--html=/tmp/x"), StartsWith("option = --html (must be"));
+  EXPECT_THAT(error_of(Question::report, "/etc/shadow"), StartsWith("option = /etc/shadow (must"));
+  EXPECT_THAT(error_of(Question::report, "--jso"), StartsWith("option = --jso (must be"));
+  EXPECT_THAT(error_of(Question::database, "--json"), StartsWith("option = --json (must be"));
+}
+
+TEST_F(Answering, NeedsACampaignThatIsServed) {
+  start_with("echo never");
+  EXPECT_EQ(client->error(AnswerRequest{.campaign = "b"}), "campaign = b (is not served)");
+}
+
+TEST_F(Answering, IsRefusedWhereThereIsNoProgram) {
+  config.answer_program.clear();
+  start({test::campaign_of("a", 5)});
+  client.emplace(service->clients_endpoint());
+  EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
+            "question = one about results (this coordinator answers none)");
+}
+
+TEST_F(Answering, SaysWhyAProgramCannotBeStarted) {
+  start_with("echo never");
+  std::filesystem::remove(config.answer_program);
+  EXPECT_THAT(client->error(AnswerRequest{.campaign = "a"}),
+              HasSubstr("program: cannot be started: No such file or directory"));
+}
+
+TEST_F(Answering, EndsAnOutputThatIsTooLarge) {
+  start_with("exec head -c 70000000 /dev/zero");
+  EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
+            "answer = more than 67108864 bytes (ask for less, or fetch the database)");
+}
+
+TEST_F(Answering, SaysThatAProgramCrashed) {
+  start_with("kill -TERM $$");
+  EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
+            "answer: the process was killed by signal 15 (Terminated)");
+}
+
+// The programs wait until the service ends, which ends them.
+TEST_F(Answering, AnswersSoManyQuestionsAtATime) {
+  start_with("exec sleep 1000");
+  for (std::size_t i = 0; i < Answers::num_computing_max; ++i) {
+    client->send(100 + i, AnswerRequest{.campaign = "a",
+                                        .question = Question::sensitivity,
+                                        .options = {"--run=" + std::to_string(i)}});
+  }
+  client->send(200, AnswerRequest{.campaign = "a"});
+  const wire::ReplyPacket reply = client->receive_final();
+  EXPECT_EQ(reply.id, 200U);
+  EXPECT_EQ(std::get<wire::ErrorReply>(reply.reply).text,
+            "questions = 4 (are being answered, as many as may be; try again later)");
+}
+
+// Others do not wait for one that takes long.
+TEST_F(Answering, LeavesTheServiceToOthers) {
+  start_with("exec sleep 1000");
+  client->send(1, AnswerRequest{.campaign = "a"});
+  test::PlayingClient other(service->clients_endpoint());
+  EXPECT_EQ(other.status().campaigns.at(0).name, "a");
+}
+
+TEST_F(Answering, KeepsNoMoreAnswersThanItMay) {
+  start_with("echo $2");
+  for (std::size_t i = 0; i < Answers::num_kept_max; ++i) {
+    EXPECT_EQ(answer_to({.campaign = "a", .options = {"--json"}}).size, 7U) << i;
+  }
+  EXPECT_THAT(client->error(AnswerRequest{.campaign = "a"}), StartsWith("questions = 16 (are"));
+}
+
+TEST_F(Answering, DropsAnAnswerThatWasReadToItsEnd) {
+  start_with("echo hello");
+  const AnswerReply answer = answer_to({.campaign = "a"});
+  EXPECT_EQ(part(answer, answer.size), "");
+  const AnswerPartRequest again{.answer_id = answer.answer_id, .offset = 0};
+  EXPECT_THAT(client->error(again), HasSubstr("(is not kept any more; ask again)"));
+  EXPECT_THAT(client->error(AnswerPartRequest{.answer_id = 1}), HasSubstr("(is not kept"));
+}
+
+// The script copies the file that it is to back up.
+TEST_F(Answering, SendsOfADatabaseOnlyWhatTheClientLacks) {
+  start_with("[ \"$1 $2\" = 'backup --' ] && printf 'hello\\nworld' >\"$4\"");
+  const AnswerRequest all{.campaign = "a", .question = Question::database};
+  EXPECT_EQ(answer_to(all).offset, 0U);
+  const AnswerRequest rest{.campaign = "a",
+                           .question = Question::database,
+                           .known_size = 6,
+                           .known_sha256 = sha256_of_hello};
+  const AnswerReply answer = answer_to(rest);
+  EXPECT_EQ(answer.offset, 6U);
+  EXPECT_EQ(part(answer, 6), "world");
+  for (const std::uint64_t other_size : {5U, 7U, 1000U}) {
+    AnswerRequest other = rest;
+    other.known_size = other_size;
+    EXPECT_EQ(answer_to(other).offset, 0U) << other_size;
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(config.answer_directory));
+}
+
+TEST_F(Answering, SaysWhyThereIsNoCopy) {
+  start_with("echo 'database = x (is damaged)' >&2; exit 1");
+  EXPECT_EQ(client->error(AnswerRequest{.campaign = "a", .question = Question::database}),
+            "database = x (is damaged)\n");
+}
+
+TEST_F(Answering, GivesAnAnswerToTheKeyThatAskedOnly) {
+  ASSERT_EQ(test::answer_of({"keygen", directory / "keys"}).exit_code, exit_done);
+  ASSERT_EQ(test::answer_of({"keygen", directory / "keys", "--client", "eve"}).exit_code,
+            exit_done);
+  std::filesystem::create_directory(directory / "eve");
+  std::filesystem::rename(directory / "keys" / "eve.key", directory / "eve" / "client.key");
+  std::filesystem::copy(directory / "keys" / "coordinator.pub", directory / "eve");
+  config.keys = directory / "keys";
+  std::ofstream(config.answer_program) << "#!/bin/sh\necho hello\n";
+  chmod(config.answer_program.c_str(), 0700);
+  start({test::campaign_of("a", 5)});
+  ClientConnection owner({.endpoint = service->clients_endpoint(), .keys = directory / "keys"});
+  ClientConnection other({.endpoint = service->clients_endpoint(), .keys = directory / "eve"});
+  const auto answer = std::get<AnswerReply>(owner.ask(AnswerRequest{.campaign = "a"}));
+  const AnswerPartRequest request{.answer_id = answer.answer_id};
+  EXPECT_THAT(std::get<wire::ErrorReply>(other.ask(request)).text, HasSubstr("(is not kept"));
+  EXPECT_EQ(std::get<AnswerPartReply>(owner.ask(request)).content, "hello\n");
+}
+
+/// A coordinator of which a test makes up the replies.
+class MadeUpAnswer : public testing::Test {
+ protected:
+  /// What read_answer() takes of these parts.
+  [[nodiscard]] std::string read(std::vector<std::string> parts, std::uint64_t size) {
+    std::string taken;
+    std::size_t next = 0;
+    const Ask ask = [&](const wire::ClientRequest& request) -> wire::ClientReply {
+      EXPECT_EQ(std::get<AnswerPartRequest>(request).offset, taken.size());
+      return AnswerPartReply{next < parts.size() ? parts[next++] : ""};
+    };
+    AnswerReply answer;
+    answer.answer_id = 1;
+    answer.size = size;
+    read_answer(ask, answer, [&](std::string_view text) { taken += text; });
+    return taken;
+  }
+};
+
+TEST_F(MadeUpAnswer, IsReadToItsEnd) { EXPECT_EQ(read({"ab", "c", "def"}, 6), "abcdef"); }
+
+TEST_F(MadeUpAnswer, HasAnEnd) {
+  EXPECT_THROW((void)read(std::vector<std::string>(100, "ab"), 6), Error);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
