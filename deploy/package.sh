@@ -50,8 +50,8 @@ START
 chmod 755 "$tree/bin/proofmass"
 ln -s proofmass "$tree/bin/proofmass-coordinator"
 ln -s proofmass "$tree/bin/proofmass-worker"
-# `proofmass run` looks for the worker beside the program that runs, which is the loader.
-ln -s ../bin/proofmass-worker "$tree/lib/proofmass-worker"
+# Programs look for each other beside the program that runs, which is the loader.
+ln -s ../bin/proofmass ../bin/proofmass-worker "$tree/lib/"
 
 tar --directory "$stage" --create --sort=name --mtime="@$SOURCE_DATE_EPOCH" \
   --owner=0 --group=0 --numeric-owner --mode=u=rwX,go=rX "$name" |

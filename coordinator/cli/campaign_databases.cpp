@@ -15,6 +15,7 @@
 
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "coordinator/store/draft_file.hpp"
 #include "core/campaign/model.hpp"
 #include "core/error.hpp"
 #include "proto/text/visible_text.hpp"
@@ -122,6 +123,10 @@ ServedCampaign load_file(const std::filesystem::path& file) {
 CampaignFolder::CampaignFolder(std::filesystem::path directory) : directory_(std::move(directory)) {
   make_directory(directory_);
   lock_ = lock(directory_);
+  // What a process left that was killed.
+  std::error_code ignored;
+  std::filesystem::remove_all(answers(), ignored);
+  make_directory(answers());
 }
 
 CampaignFolder::~CampaignFolder() { close(lock_); }
@@ -140,6 +145,19 @@ std::vector<std::filesystem::path> CampaignFolder::list() const {
 
 ServedCampaign CampaignFolder::load(const std::filesystem::path& file) const {
   return load_file(file);
+}
+
+std::filesystem::path CampaignFolder::archive(const std::filesystem::path& file) const {
+  const std::filesystem::path archived = directory_ / "archived";
+  make_directory(archived);
+  std::filesystem::path place = archived / file.filename();
+  if (renameat2(AT_FDCWD, file.c_str(), AT_FDCWD, place.c_str(), RENAME_NOREPLACE) != 0) {
+    throw Error(fmt::format("archived file = {} ({})", place.string(), std::strerror(errno)));
+  }
+  for (const std::filesystem::path& changed : {place, file}) {
+    (void)synchronise_directory_of(changed);  // The file has a name, old or new, in any case.
+  }
+  return place;
 }
 
 ServedCampaign CampaignFolder::open(const Campaign& wanted, const StopPlan& plan,

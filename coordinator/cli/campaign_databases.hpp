@@ -52,6 +52,10 @@ class CampaignFolder final : public CampaignFiles, public CampaignDirectory {
   /// All files NAME.db, by name.
   [[nodiscard]] std::vector<std::filesystem::path> list() const override;
   [[nodiscard]] ServedCampaign load(const std::filesystem::path& file) const override;
+  /// To the directory `archived` below this one.
+  [[nodiscard]] std::filesystem::path archive(const std::filesystem::path& file) const override;
+  /// A directory for files that last no longer than this process; empty when it begins.
+  [[nodiscard]] std::filesystem::path answers() const { return directory_ / ".answers"; }
 
   [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan& plan,
                                     const Asker& asker) override;

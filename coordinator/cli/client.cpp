@@ -28,6 +28,14 @@ void append(std::vector<Row>& rows, std::vector<Row>& further) {
 
 }  // namespace
 
+void add_key_options(CLI::App& command, ClientConnectionConfig& connection) {
+  command.add_option("--keys", connection.keys, "Directory with client.key and coordinator.pub")
+      ->type_name(wire::directory_type)
+      ->envname("PROOFMASS_KEYS");
+  command.add_flag("--insecure-plain", connection.is_plain_waived,
+                   "Allow an address beyond this machine without keys");
+}
+
 void add_client_options(CLI::App& command, ClientOptions& options) {
   ClientConnectionConfig& connection = options.connection;
   command
@@ -35,11 +43,7 @@ void add_client_options(CLI::App& command, ClientOptions& options) {
                   "The coordinator's address for clients,\ne.g. tcp://127.0.0.1:5556")
       ->envname("PROOFMASS_CLIENT_CONNECT")
       ->required();
-  command.add_option("--keys", connection.keys, "Directory with client.key and coordinator.pub")
-      ->type_name(wire::directory_type)
-      ->envname("PROOFMASS_KEYS");
-  command.add_flag("--insecure-plain", connection.is_plain_waived,
-                   "Allow an address beyond this machine without keys");
+  add_key_options(command, connection);
   command
       .add_option_function<double>(
           "--timeout",

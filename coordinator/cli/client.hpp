@@ -18,6 +18,10 @@ struct ClientOptions {
   OutputFormat format = OutputFormat::text;
 };
 
+/// Declares --keys and --insecure-plain.
+/// @param connection  Lives as long as the command.
+void add_key_options(CLI::App& command, ClientConnectionConfig& connection);
+
 /// Declares --connect, --keys, --insecure-plain, --timeout and --json.
 /// @param options  Lives as long as the command.
 void add_client_options(CLI::App& command, ClientOptions& options);

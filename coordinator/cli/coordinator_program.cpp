@@ -15,6 +15,7 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/notice_commands.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/net/authentication/rights.hpp"
@@ -26,11 +27,13 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/init_system.hpp"
 #include "proto/link/log.hpp"
+#include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 constexpr double drain_time_s_max = 366.0 * 86400.0;
+constexpr std::chrono::seconds command_wait_max(60);
 constexpr std::uint64_t memory_mib_min = 64;
 constexpr std::uint64_t memory_mib_max = std::uint64_t{1} << 24;
 constexpr std::size_t campaigns_per_key_max = 1'000'000;
@@ -47,6 +50,7 @@ struct ServeOptions {
   double drain_time_s = 120.0;          ///< ≥ 0.
   std::uint64_t memory_mib_max = 2048;  ///< ≥ 64; of the process.
   SubmissionLimits limits;              ///< Of each client's key.
+  NoticeCommands::Config commands;
   wire::LogFormat log_format = wire::LogFormat::text;
   std::string faults;       ///< As FaultPlan::parse() reads them.
   double time_scale = 1.0;  ///< > 0; of all that is waited for. Below 1 in tests of this program.
@@ -80,6 +84,16 @@ void scale_times(ServiceConfig& config, double factor) {
   }
 }
 
+/// The program that answers questions about results; nothing where only the coordinator is
+/// installed.
+std::filesystem::path answer_program() {
+  try {
+    return wire::program_beside_this("proofmass");
+  } catch (const Error&) {
+    return {};
+  }
+}
+
 ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
   ServiceConfig config;
   config.workers_endpoint = options.endpoint;
@@ -94,6 +108,8 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
   config.files = &folder;
   config.directory = &folder;
   config.limits = options.limits;
+  config.answer_program = answer_program();
+  config.answer_directory = folder.answers();
   config.version = PROOFMASS_VERSION;
   config.dispatch.reference_digest = model().reference_digest(best_instruction_set());
   if (!options.faults.empty()) config.faults = wire::FaultPlan::parse(options.faults);
@@ -144,7 +160,9 @@ int serve_campaigns(const ServeOptions& options) {
   const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::drain);
   CampaignFolder folder(options.directory);
-  const ServiceConfig config = config_of(options, folder);
+  ServiceConfig config = config_of(options, folder);
+  NoticeCommands commands(options.commands, log);
+  config.on_notice = [&](const CampaignNotice& notice) { commands.take(notice); };
   if (config.faults && config.faults->kill) {
     wire::arm_kill_point(config.faults->kill->point, config.faults->kill->passage);
   }
@@ -154,8 +172,10 @@ int serve_campaigns(const ServeOptions& options) {
   notices.ready();
   service.run(stop, [&] {
     if (stop != StopRequest::none) notices.stopping();
+    commands.review();
     notices.on_tick(std::chrono::steady_clock::now(), [&] { return status_of(service); });
   });
+  commands.wait(command_wait_max);  // Before the files are closed, which they may be reading.
   const bool is_done = service.is_done();
   const bool has_given_up = has_given_up_runs(service);
   const std::size_t num_campaigns = service.campaigns().size();
@@ -209,6 +229,12 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
                  "Bytes of the definitions of these campaigns,\nat most")
       ->check(wire::in_range(std::uint64_t{1}, bytes_per_key_max))
       ->capture_default_str();
+  app.add_option("--on-finish", options.commands.on_finish,
+                 "Command for `sh` when a campaign is finished;\n$PROOFMASS_DATABASE is its file")
+      ->type_name("COMMAND");
+  app.add_option("--on-failure", options.commands.on_failure,
+                 "The same when one has failed; $PROOFMASS_REASON\nsays why")
+      ->type_name("COMMAND");
   static const std::map<std::string, wire::LogFormat> formats{{"json", wire::LogFormat::json},
                                                               {"text", wire::LogFormat::text}};
   wire::add_choice(app, "--log-format", options.log_format, formats,

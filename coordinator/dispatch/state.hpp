@@ -128,6 +128,11 @@ struct Lease {
 /// Whether a campaign's runs are lent.
 using Phase = wire::CampaignPhase;
 
+/// True if no run of such a campaign is lent.
+[[nodiscard]] constexpr bool has_ended(Phase phase) {
+  return phase == Phase::finished || phase == Phase::cancelled;
+}
+
 /// What speaks against a run.
 struct Suspicion {
   /// Crashes on one host, and those among them in which the worker computed nothing else.

@@ -86,6 +86,11 @@ class CampaignDirectory {
   /// Opens one of them.
   /// @throws Error, std::exception if it cannot be served.
   [[nodiscard]] virtual ServedCampaign load(const std::filesystem::path& file) const = 0;
+
+  /// Moves one of them, which is closed, to where it is not served.
+  /// @return Where it is now.
+  /// @throws Error if that is impossible or a file is there already.
+  [[nodiscard]] virtual std::filesystem::path archive(const std::filesystem::path& file) const = 0;
 };
 
 }  // namespace proofmass::coordinator

@@ -19,8 +19,6 @@ std::optional<double> remaining_s(const CampaignState& campaign, double rate_hz)
   return static_cast<double>(campaign.definition->num_runs - num_settled(campaign)) / rate_hz;
 }
 
-bool is_over(Phase phase) { return phase == Phase::finished || phase == Phase::cancelled; }
-
 }  // namespace
 
 CampaignService::CampaignService(const ServiceContext& context, WorkerHistory& history)
@@ -52,6 +50,7 @@ void CampaignService::serve(PreparedCampaign prepared) {
                              .plan = prepared.plan,
                              .is_decided = prepared.control.phase == Phase::finished,
                              .num_failures_before = prepared.num_failures,
+                             .is_end_told = prepared.control.phase == Phase::finished,
                              .summary = {}});
   if (is_again) {
     ended_.erase(id);
@@ -120,7 +119,7 @@ bool CampaignService::unlist(const EndedFile& changed) {
 CampaignService::Holdings CampaignService::holdings_of(std::string_view owner) const {
   Holdings holdings;
   for (const auto& [id, served] : served_) {
-    if (served.owner != owner || is_over(phase_of(id))) continue;
+    if (served.owner != owner || coordinator::has_ended(phase_of(id))) continue;
     ++holdings.num_campaigns;
     holdings.size += definition_size(*state_.campaigns.at(id).definition);
   }
@@ -180,6 +179,8 @@ wire::ClientReply CampaignService::control(CampaignId id, const wire::ControlReq
     case wire::ControlAction::set_priority:
       on_control(state_, id, request.priority, campaign.audit_fraction);
       break;
+    case wire::ControlAction::archive:
+      PROOFMASS_EXPECT(false);  // See archive().
     case wire::ControlAction::retry:
       writer_.retry_given_up(id);
       on_retry(state_, id, context_.now(), outbox_);
@@ -251,6 +252,7 @@ void CampaignService::review() {
     review_summary(id, served);
     review_control(id, served);
     review_rest(id, served);
+    review_notices(id, served);
     if (!has_ended(id, served)) {
       served.ended_at.reset();
     } else {
@@ -269,6 +271,9 @@ void CampaignService::review_failures(CampaignId id, const Served& served) {
       served.num_failures_before + campaign.num_without_estimate + campaign.given_up.size();
   if (num_failures <= *served.plan.failures_max) return;
   on_cancel(state_, id, outbox_);
+  tell(served, CampaignNotice::Kind::failed,
+       fmt::format("{} runs have no estimate (at most {} may be)", num_failures,
+                   *served.plan.failures_max));
   outbox_.log(
       {.severity = Severity::error,
        .kind = "too_many_failures",
@@ -366,124 +371,6 @@ void CampaignService::begin_summary(CampaignId id, Served& served) {
           return Summarised{.failure = error.what(), .num_runs = {}};
         }
       });
-}
-
-bool CampaignService::has_ended(CampaignId id, const Served& served) const {
-  const CampaignState& campaign = state_.campaigns.at(id);
-  const bool has_statistics = !served.is_summary_due && !served.summary.valid();
-  const bool is_quiet =
-      campaign.delivered.empty() && campaign.num_comparing == 0 && campaign.storage_failure.empty();
-  return served.written.phase == Phase::finished && phase_of(id) == Phase::finished &&
-         has_statistics && is_quiet && !served.is_held && is_finished(campaign);
-}
-
-// A file that is open can be restored if somebody removes it. So the last ones stay open.
-void CampaignService::close_surplus(std::vector<CampaignId> ended, TimePoint now) {
-  const std::size_t count_max = context_.config.finished_open_max;
-  // Without a directory, a file that was closed could not be opened again.
-  if (context_.config.directory == nullptr || ended.size() <= count_max) return;
-  const auto ended_at = [this](CampaignId id) { return served_.at(id).ended_at; };
-  std::ranges::stable_sort(ended, {}, ended_at);
-  ended.resize(ended.size() - count_max);
-  for (const CampaignId id : ended) {
-    const std::optional<TimePoint> tried_at = served_.at(id).closing_at;
-    if (!tried_at || now - *tried_at >= context_.config.writer.retry_after) begin_closing(id);
-  }
-}
-
-void CampaignService::review_rest(CampaignId id, Served& served) {
-  const CampaignState& campaign = state_.campaigns.at(id);
-  const bool is_quiet = campaign.lent.empty() && campaign.audits.empty() &&
-                        campaign.delivered.empty() && campaign.num_comparing == 0;
-  const bool is_at_rest = is_quiet && phase_of(id) != Phase::active && !served.is_summary_due &&
-                          !served.summary.valid() && !served.is_held;
-  if (is_at_rest && !served.is_at_rest) writer_.rest(id);
-  served.is_at_rest = is_at_rest;
-}
-
-// Nobody must be reading an old state of the file: then it is closed later.
-void CampaignService::begin_closing(CampaignId id) {
-  served_.at(id).is_held = true;
-  context_.background.post_next([this, id]() -> Background::Finish {
-    bool is_folded = false;
-    try {
-      writer_.access(id, [&](Store& store) { is_folded = !store.rest(); });
-    } catch (const std::exception&) {
-      // The writer says why it cannot write.
-    }
-    return [this, id, is_folded] {
-      Served& served = served_.at(id);
-      served.is_held = false;
-      served.closing_at = context_.now();
-      if (is_folded && has_ended(id, served)) close_ended(id);
-    };
-  });
-}
-
-// The dispatch forgets the campaign first: nothing is written any more when the file is closed.
-void CampaignService::close_ended(CampaignId id) {
-  const std::filesystem::path file = served_.at(id).file;
-  EndedCampaign ended{.id = id, .file = file, .status = status_of_served(id), .stamp = {}};
-  ended.status.rate_hz = 0.0;
-  ended.status.remaining_s.reset();
-  history_.note_closed(id);
-  on_removed(state_, id, outbox_);
-  on_ended(state_, id, ended.status.num_runs);
-  served_.erase(id);
-  ended_.emplace(id, std::move(ended));
-  context_.background.post_next([this, id, file,
-                                 epoch = context_.start.epoch]() -> Background::Finish {
-    try {
-      Store store = writer_.close(id);
-      std::vector<coordinator::Entry> entries;
-      for (const SessionId session : store.attached_sessions()) {
-        entries.emplace_back(WorkerEnded{.session = session, .reason = LossReason::drained});
-      }
-      if (!entries.empty()) (void)store.write(entries);
-      store.end_coordinator(epoch);
-    } catch (const std::exception& error) {
-      return [this, reason = std::string(error.what())] { say_not_closed(reason); };
-    }
-    return [this, id, stamp = stamp_of(file)] {
-      const auto found = ended_.find(id);
-      if (found == ended_.end()) return;
-      found->second.stamp = stamp;
-      outbox_.log({.kind = "campaign_closed", .fields = {{"campaign", found->second.status.name}}});
-    };
-  });
-}
-
-void CampaignService::say_not_closed(std::string_view reason) {
-  outbox_.log({.severity = Severity::warning,
-               .kind = "campaign_not_closed",
-               .fields = {Field::reason(reason)}});
-}
-
-bool CampaignService::is_all_done() const {
-  return std::all_of(state_.campaigns.begin(), state_.campaigns.end(), [&](const auto& item) {
-    const auto& [id, campaign] = item;
-    return campaign.phase == Phase::cancelled || (is_finished(campaign) && !is_undecided(id));
-  });
-}
-
-std::vector<ServedCampaign> CampaignService::close() {
-  std::vector<ServedCampaign> campaigns;
-  for (const CampaignId id : order_) {
-    if (!served_.contains(id)) continue;
-    Served& served = served_.at(id);
-    if (served.summary.valid()) served.summary.wait();
-    Store store = writer_.close(id);
-    try {
-      store.end_coordinator(context_.start.epoch);
-    } catch (const std::exception& error) {
-      say_not_closed(error.what());
-    }
-    const CampaignState& campaign = state_.campaigns.at(id);
-    campaigns.push_back(
-        {.file = served.file, .store = std::move(store), .definition = campaign.definition});
-  }
-  served_.clear();
-  return campaigns;
 }
 
 wire::DoneReply CampaignService::done_reply(CampaignId id) const {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <future>
 #include <map>
 #include <memory>
@@ -89,6 +90,13 @@ class CampaignService {
   [[nodiscard]] wire::ClientReply control(CampaignId id, const wire::ControlRequest& request);
   [[nodiscard]] wire::DoneReply done_reply(CampaignId id) const;
 
+  /// Takes a campaign that is finished or cancelled from the list and moves its file to where it is
+  /// not served.
+  /// @param respond  Called when that is done, or with the reason why it is not.
+  /// @throws Error if results are still to be stored, statistics to be computed, or another request
+  ///         is changing it.
+  void archive(CampaignId id, const std::function<void(wire::ClientReply)>& respond);
+
   /// Follows what the dispatch did: measures rates, stores phases, brings the statistics of
   /// finished campaigns up to date. To be called several times a second.
   void review();
@@ -98,6 +106,9 @@ class CampaignService {
                                                            std::size_t count_max) const;
   [[nodiscard]] std::size_t num_campaigns() const { return order_.size(); }
   [[nodiscard]] wire::CampaignStatus status_of(CampaignId id) const;
+
+  /// True if nobody waits to be told of the end of a campaign, see ServiceConfig::on_notice.
+  [[nodiscard]] bool is_all_told() const;
 
   /// True if every campaign is finished or cancelled.
   [[nodiscard]] bool is_all_done() const;
@@ -122,9 +133,12 @@ class CampaignService {
     std::uint64_t num_committed_seen = 0;
     CampaignControl written;  ///< As the file has it.
     StopPlan plan;
-    bool is_decided = false;                   ///< The stop rule was checked with the runs of now.
-    std::uint64_t num_failures_before = 0;     ///< Runs without an estimate, when it came.
-    bool is_at_rest = false;                   ///< Nothing is expected: the log is folded in.
+    bool is_decided = false;                ///< The stop rule was checked with the runs of now.
+    std::uint64_t num_failures_before = 0;  ///< Runs without an estimate, when it came.
+    bool is_at_rest = false;                ///< Nothing is expected: the log is folded in.
+    bool is_end_told = false;               ///< See ServiceConfig::on_notice; as the next two.
+    bool is_storage_failure_told = false;
+    std::uint64_t num_mismatches_told = 0;
     std::optional<TimePoint> ended_at = {};    ///< Nothing is left to do since then.
     std::optional<TimePoint> closing_at = {};  ///< When closing was tried last, in vain.
     bool is_held = false;                      ///< See take_hold().
@@ -144,15 +158,22 @@ class CampaignService {
   void resume(CampaignId id);
   void review_failures(CampaignId id, const Served& served);
   void review_control(CampaignId id, Served& served);
+  void review_notices(CampaignId id, Served& served);
+  void tell(const Served& served, CampaignNotice::Kind kind, std::string reason) const;
   void review_summary(CampaignId id, Served& served);
   void take_summary(CampaignId id, Served& served);
   void go_on_to(CampaignId id, std::uint64_t num_runs);
   void begin_summary(CampaignId id, Served& served);
+  /// True if nothing of the campaign is to be stored or computed, and nobody changes it.
+  [[nodiscard]] bool is_settled(CampaignId id, const Served& served) const;
   /// True if the campaign is finished, its statistics are there, and nothing is under way.
   [[nodiscard]] bool has_ended(CampaignId id, const Served& served) const;
   void close_surplus(std::vector<CampaignId> ended, TimePoint now);
   void review_rest(CampaignId id, Served& served);
-  void begin_closing(CampaignId id);
+  /// Closes the file if it is still settled when its log is folded in, and nobody reads it.
+  /// @param then  Called with true when the closing is under way, with false if it is not.
+  void begin_closing(CampaignId id, std::function<void(bool is_closing)> then);
+  void move_to_archive(CampaignId id, const std::function<void(wire::ClientReply)>& respond);
   void close_ended(CampaignId id);
   void say_not_closed(std::string_view reason);
 

@@ -25,15 +25,19 @@ std::set<std::string> quarantined_hosts(const State& state) {
   return names;
 }
 
-/// @throws Error if the action can have no effect. A finished campaign can only be retried, and
-/// only if runs were given up; a cancelled one must be resumed before it is retried or gets a
-/// priority.
+/// @throws Error if the action can have no effect. A finished campaign can only be archived or
+/// retried, the latter only if runs were given up; a cancelled one must be resumed before it is
+/// retried or gets a priority; one that is neither cannot be archived.
 void require_possible(const wire::CampaignStatus& campaign, wire::ControlAction action) {
   const auto refuse = [&](std::string_view why) {
     throw Error(fmt::format("campaign = {} ({})", campaign.name, why));
   };
   const bool is_retry = action == wire::ControlAction::retry;
   const bool needs_resume = is_retry || action == wire::ControlAction::set_priority;
+  if (action == wire::ControlAction::archive) {
+    if (!has_ended(campaign.phase)) refuse("is not finished; cancel it first");
+    return;
+  }
   if (campaign.phase == Phase::finished && !is_retry) refuse("is finished");
   if (campaign.phase == Phase::cancelled && needs_resume) refuse("is cancelled; resume it first");
   if (is_retry && campaign.num_given_up == 0) refuse("has no run that was given up");
@@ -48,6 +52,11 @@ StopPlan plan_of(const Submission& request) {
 
 void write(Store& store, const Entry& entry) { (void)store.write({&entry, 1}); }
 
+[[noreturn]] void refuse_as_under_way(const std::string& campaign) {
+  throw Error(
+      fmt::format("campaign = {} (another request for it is under way; try again)", campaign));
+}
+
 [[noreturn]] void refuse_as_too_many() {
   throw Error(fmt::format("requests = {} (are under way, as many as may be; try again later)",
                           Background::num_pending_max));
@@ -57,7 +66,11 @@ void write(Store& store, const Entry& entry) { (void)store.write({&entry, 1}); }
 
 RequestService::RequestService(const ServiceContext& context, CampaignService& campaigns,
                                const DirectoryService& directory)
-    : context_(context), campaigns_(campaigns), directory_(directory), began_at_(context.now()) {}
+    : context_(context),
+      campaigns_(campaigns),
+      directory_(directory),
+      began_at_(context.now()),
+      answers_(context) {}
 
 template <>
 void RequestService::take(Submission&& submission, const Asker& asker, const Respond& respond) {
@@ -74,6 +87,10 @@ void RequestService::take(wire::ControlRequest&& request, const Asker& asker,
   }
   require_control(asker, request.campaign, campaign->owner);
   require_possible(campaigns_.status_of(campaign->id), request.action);
+  if (request.action == wire::ControlAction::archive) {
+    if (under_way_.contains(request.campaign)) refuse_as_under_way(request.campaign);
+    return campaigns_.archive(campaign->id, respond);
+  }
   if (campaign->has_ended) return control_ended(*campaign, request.action, respond);
   respond(campaigns_.control(campaign->id, request));
 }
@@ -147,6 +164,22 @@ void RequestService::take(wire::ReleaseHostRequest&& request, const Asker& asker
 }
 
 template <>
+void RequestService::take(wire::AnswerRequest&& request, const Asker& asker,
+                          const Respond& respond) {
+  require_right(asker, Right::observe);
+  const auto campaign = campaigns_.find(request.campaign);
+  if (!campaign) throw Error(fmt::format("campaign = {} (is not served)", request.campaign));
+  answers_.ask(request, campaign->file, asker, respond);
+}
+
+template <>
+void RequestService::take(wire::AnswerPartRequest&& request, const Asker& asker,
+                          const Respond& respond) {
+  require_right(asker, Right::observe);
+  respond(answers_.part(request, asker));
+}
+
+template <>
 void RequestService::take(wire::RequestPart&&, const Asker&, const Respond&) {
   throw Error("request = a part (must be a request when its parts are together)");
 }
@@ -190,6 +223,7 @@ bool RequestService::is_busy(const std::string& name) const {
 }
 
 void RequestService::review() {
+  answers_.review();
   for (const Deferred& waiting : std::exchange(deferred_, {})) {
     try {
       submit(waiting.request, waiting.asker, waiting.respond);
@@ -241,10 +275,7 @@ void RequestService::open_file(const Submitted& request, const Asker& asker,
 void RequestService::reopen(const CampaignService::Entry& campaign, wire::ControlAction action,
                             Respond respond) {
   const wire::CampaignStatus status = campaigns_.status_of(campaign.id);
-  if (under_way_.contains(status.name)) {
-    throw Error(
-        fmt::format("campaign = {} (another request for it is under way; try again)", status.name));
-  }
+  if (under_way_.contains(status.name)) refuse_as_under_way(status.name);
   const CampaignDirectory& directory = *context_.config.directory;
   serve_opened(
       status.name, {.owner = campaign.owner},

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/net/answers.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/campaign_service.hpp"
@@ -31,7 +32,8 @@ class RequestService {
   ///         not ask for it, has submitted too much, or too many requests are under way.
   void carry_out(Request request, const Asker& asker, Respond respond);
 
-  /// Carries out submissions that had to wait. To be called several times a second.
+  /// Carries out submissions that had to wait, and responds to questions whose answers are there.
+  /// To be called several times a second.
   void review();
 
  private:
@@ -76,6 +78,7 @@ class RequestService {
   TimePoint began_at_;
   std::map<std::string, UnderWay> under_way_;  ///< By the campaign's name.
   std::vector<Deferred> deferred_;
+  Answers answers_;
 };
 
 }  // namespace proofmass::coordinator

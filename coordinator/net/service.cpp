@@ -212,7 +212,7 @@ class Service::Impl final : public Outbox {
     }
     if (drained_until_) return is_quiet(state_) || now() > *drained_until_;
     return config_.end == ServiceEnd::when_done && is_done() && background_.is_idle() &&
-           !is_followed();
+           campaign_service_.is_all_told() && !is_followed();
   }
 
   /// True if a client that was told of a campaign's progress may not know yet that it is over.

@@ -37,6 +37,19 @@ enum class ServiceEnd : std::uint8_t {
   when_done,
 };
 
+/// What a coordinator's operator may want to be told about a campaign.
+struct CampaignNotice {
+  enum class Kind : std::uint8_t {
+    finished,  ///< All runs are stored or given up, and the statistics are in the file.
+    failed,    ///< It was cancelled by its own limit, its storage failed, or two computations of a
+               ///< run differ.
+  };
+  Kind kind = Kind::finished;
+  std::string campaign;        ///< Name.
+  std::filesystem::path file;  ///< Its database.
+  std::string reason = {};     ///< Of a failure.
+};
+
 /// Settings of a service.
 struct ServiceConfig {
   std::string workers_endpoint;                 ///< Where workers connect; the port may be `*`.
@@ -58,7 +71,14 @@ struct ServiceConfig {
   /// opened again when somebody asks for more runs.
   std::size_t finished_open_max = 16;
   SubmissionLimits limits;  ///< Hold for each client's key.
-  std::string version;      ///< Of the program, for people.
+  /// The program `proofmass`, whose commands answer questions about results; empty if there is
+  /// none. Its output is kept in the directory, which is nobody else's.
+  std::filesystem::path answer_program;
+  std::filesystem::path answer_directory;
+  /// Told of the ends and failures of campaigns while it serves them, each once; may be empty. A
+  /// service that ends when all is done tells of the end of each campaign first.
+  std::function<void(const CampaignNotice&)> on_notice;
+  std::string version;  ///< Of the program, for people.
   DispatchConfig dispatch;
   WriterConfig writer;
   std::optional<wire::FaultPlan> faults;  ///< Of workers' messages; for tests of this program.

@@ -86,5 +86,6 @@ void add_control(CLI::App& app, Command& chosen);  ///< `pause`, `resume`, `canc
 void add_workers(CLI::App& app, Command& chosen);
 void add_release(CLI::App& app, Command& chosen);
 void add_factory(CLI::App& app, Command& chosen);
+void add_fetch(CLI::App& app, Command& chosen);
 
 }  // namespace proofmass::coordinator

@@ -76,6 +76,8 @@ void add_control(CLI::App& app, Command& chosen) {
   add_action(app, chosen, ControlAction::cancel, "Drop a campaign's open runs; results stay");
   add_action(app, chosen, ControlAction::set_priority, "Compute a campaign earlier or later");
   add_action(app, chosen, ControlAction::retry, "Compute the given-up runs of a campaign again");
+  add_action(app, chosen, ControlAction::archive,
+             "Serve a finished or cancelled campaign no longer");
 }
 
 void add_release(CLI::App& app, Command& chosen) {

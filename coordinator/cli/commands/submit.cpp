@@ -7,6 +7,7 @@
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/commands/watch.hpp"
 #include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "core/error.hpp"
@@ -25,6 +26,7 @@ struct SubmitOptions {
   std::optional<int> priority;           ///< -100 to 100; as it is without one.
   std::optional<double> audit_fraction;  ///< 0 to 1; likewise.
   StopOptions stop;
+  bool waits = false;
 };
 
 /// The campaign that the arguments name.
@@ -57,7 +59,9 @@ int submit_campaign(const SubmitOptions& options) {
     const auto done = reply_of<wire::DoneReply>(ask, request);
     const bool is_json = options.client.format == OutputFormat::json;
     print_lines(is_json ? done_json("submit", campaign->name, done) : done.text + "\n");
-    return exit_done;
+    if (!options.waits) return static_cast<int>(exit_done);
+    flush_standard_output();
+    return watch_on_standard_output(ask, campaign->name, options.client.format);
   });
 }
 
@@ -76,6 +80,8 @@ void add_submit(CLI::App& app, Command& chosen) {
   add_audit_option(command, options.audit_fraction);
   add_stop_options(command, options.stop);
   add_override_options(command, options.overrides);
+  command.add_flag("--wait", options.waits,
+                   "Show the progress until the campaign is\nfinished, as `watch` does");
   add_client_options(command, options.client);
 }
 

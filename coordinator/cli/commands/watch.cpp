@@ -133,6 +133,13 @@ int watch_until_over(const Ask& ask, const std::optional<std::string>& campaign,
   }
 }
 
+int watch_on_standard_output(const Ask& ask, const std::optional<std::string>& campaign,
+                             OutputFormat format) {
+  WatchDisplay display(mode_for(format), stdout);
+  return watch_until_over(ask, campaign, display,
+                          [] { std::this_thread::sleep_for(std::chrono::seconds(1)); });
+}
+
 namespace {
 
 struct WatchOptions {
@@ -142,10 +149,8 @@ struct WatchOptions {
 
 int watch_campaigns(const WatchOptions& options) {
   if (options.campaign) (void)checked_campaign_name(*options.campaign);
-  WatchDisplay display(mode_for(options.client.format), stdout);
   return with_connection(options.client, [&](const Ask& ask) {
-    return watch_until_over(ask, options.campaign, display,
-                            [] { std::this_thread::sleep_for(std::chrono::seconds(1)); });
+    return watch_on_standard_output(ask, options.campaign, options.client.format);
   });
 }
 
