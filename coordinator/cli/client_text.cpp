@@ -151,6 +151,20 @@ std::string quarantine_note(const std::string& host) {
       "host {0} is in quarantine: too many workers crashed there; `proofmass release {0}`\n", host);
 }
 
+std::string factory_note(const wire::FactoryStatus& factory) {
+  const wire::FactoryReport& report = factory.report;
+  std::string note =
+      fmt::format("factory {} ({}) {}: {} wanted, {} registered, {} in the queue", report.name,
+                  report.batch_system, wire::name_of(report.phase),
+                  counted(report.num_wanted, "worker"), report.num_registered, report.num_queued);
+  if (report.phase == wire::FactoryPhase::waiting) {
+    const double left_s = std::max(0.0, report.wait_s - factory.silent_s);
+    note += fmt::format("; tries again in {}", duration_text(left_s));
+  }
+  if (!report.reason.empty()) note += "; " + wire::visible_text(report.reason);
+  return note + "\n";
+}
+
 /// What concerns the coordinator, and no campaign that it serves.
 std::string service_notes(const wire::StatusReply& status) {
   std::string text;
@@ -160,6 +174,7 @@ std::string service_notes(const wire::StatusReply& status) {
   text += further(status.num_unserved_files, status.unserved_files.size(), "more such file");
   for (const std::string& host : status.quarantined_hosts) text += quarantine_note(host);
   text += further(status.num_quarantined_hosts, status.quarantined_hosts.size(), "more such host");
+  for (const wire::FactoryStatus& factory : status.factories) text += factory_note(factory);
   return text;
 }
 
@@ -249,6 +264,25 @@ Json json_of(const wire::WorkerStatus& worker) {
           {"is_quarantined", worker.is_quarantined}};
 }
 
+Json json_of(const wire::FactoryStatus& factory) {
+  const wire::FactoryReport& report = factory.report;
+  Json json{{"name", report.name},
+            {"batch_system", report.batch_system},
+            {"phase", wire::name_of(report.phase)},
+            {"num_wanted", report.num_wanted},
+            {"num_registered", report.num_registered},
+            {"num_queued", report.num_queued},
+            {"wait_s", nullptr},
+            {"reason", nullptr},
+            {"interval_s", report.interval_s},
+            {"silent_s", factory.silent_s},
+            {"owner", nullptr}};
+  if (report.phase == wire::FactoryPhase::waiting) json["wait_s"] = report.wait_s;
+  if (!report.reason.empty()) json["reason"] = report.reason;
+  if (!factory.owner.empty()) json["owner"] = factory.owner;
+  return json;
+}
+
 }  // namespace
 
 std::string status_json(const wire::StatusReply& status, JsonLayout layout) {
@@ -263,6 +297,8 @@ std::string status_json(const wire::StatusReply& status, JsonLayout layout) {
   json["num_unserved_files"] = status.num_unserved_files;
   json["quarantined_hosts"] = status.quarantined_hosts;
   json["num_quarantined_hosts"] = status.num_quarantined_hosts;
+  json["factories"] = Json::array();
+  for (const auto& factory : status.factories) json["factories"].push_back(json_of(factory));
   return dumped(json, layout);
 }
 

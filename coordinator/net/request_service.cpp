@@ -118,7 +118,8 @@ void RequestService::take(wire::StatusRequest&& request, const Asker& asker,
       .campaigns = campaigns_.statuses(request.first_campaign, wire::campaigns_per_reply_max),
       .num_campaigns = campaigns_.num_campaigns(),
       .unserved_files = directory_.unserved(wire::unserved_files_per_reply_max),
-      .num_unserved_files = directory_.num_unserved()};
+      .num_unserved_files = directory_.num_unserved(),
+      .factories = factories_.current(context_.now())};
   const std::set<std::string> hosts = quarantined_hosts(state);
   reply.num_quarantined_hosts = hosts.size();
   for (const std::string& host : hosts) {
@@ -177,6 +178,14 @@ void RequestService::take(wire::AnswerPartRequest&& request, const Asker& asker,
                           const Respond& respond) {
   require_right(asker, Right::observe);
   respond(answers_.part(request, asker));
+}
+
+template <>
+void RequestService::take(wire::FactoryReport&& report, const Asker& asker,
+                          const Respond& respond) {
+  require_right(asker, Right::observe);
+  factories_.take(report, asker.name, context_.now());
+  respond(wire::DoneReply{fmt::format("factory {}: noted", report.name)});
 }
 
 template <>

@@ -13,6 +13,7 @@
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
 #include "coordinator/net/directory_service.hpp"
+#include "coordinator/net/factory_reports.hpp"
 #include "coordinator/net/service_context.hpp"
 #include "proto/wire/client_messages.hpp"
 
@@ -75,6 +76,7 @@ class RequestService {
   const ServiceContext& context_;
   CampaignService& campaigns_;
   const DirectoryService& directory_;
+  FactoryReports factories_;
   TimePoint began_at_;
   std::map<std::string, UnderWay> under_way_;  ///< By the campaign's name.
   std::vector<Deferred> deferred_;

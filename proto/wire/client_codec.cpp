@@ -73,6 +73,28 @@ std::string sendable(std::string_view text) {
   return result;
 }
 
+void write_report(const FactoryReport& report, proto::FactoryReport& message) {
+  message.set_name(report.name);
+  message.set_batch_system(report.batch_system);
+  message.set_phase(static_cast<proto::FactoryPhase>(report.phase));
+  message.set_num_wanted(report.num_wanted);
+  message.set_num_registered(report.num_registered);
+  message.set_num_queued(report.num_queued);
+  message.set_wait_s(report.wait_s);
+  message.set_reason(sendable(report.reason));
+  message.set_interval_s(report.interval_s);
+}
+
+void write(const FactoryReport& report, proto::RequestEnvelope& envelope) {
+  write_report(report, *envelope.mutable_factory_report());
+}
+
+void write_factory(const FactoryStatus& factory, proto::FactoryStatus& message) {
+  write_report(factory.report, *message.mutable_report());
+  message.set_owner(factory.owner);
+  message.set_silent_s(factory.silent_s);
+}
+
 void write_campaign(const CampaignStatus& campaign, proto::CampaignStatus& message) {
   message.set_name(campaign.name);
   message.set_phase(static_cast<proto::CampaignPhase>(campaign.phase));
@@ -110,6 +132,9 @@ void write(const StatusReply& status, proto::ReplyEnvelope& envelope) {
   message.set_num_unserved_files(status.num_unserved_files);
   for (const std::string& host : status.quarantined_hosts) message.add_quarantined_hosts(host);
   message.set_num_quarantined_hosts(status.num_quarantined_hosts);
+  for (const FactoryStatus& factory : status.factories) {
+    write_factory(factory, *message.add_factories());
+  }
 }
 
 void write_worker(const WorkerStatus& worker, proto::WorkerStatus& message) {
@@ -283,6 +308,29 @@ std::string checked_text(const std::string& text, std::string_view field) {
   return text;
 }
 
+std::string checked_owner(const std::string& owner) {
+  return owner.empty() ? "" : checked_name(owner, "owner");
+}
+
+FactoryReport read_report(const proto::FactoryReport& message) {
+  require_in(message.interval_s(), 1, factory_interval_s_max, "interval_s");
+  return {.name = checked_name(message.name(), "name"),
+          .batch_system = checked_name(message.batch_system(), "batch_system"),
+          .phase = enumerator<FactoryPhase>(message.phase(), 3, "phase"),
+          .num_wanted = message.num_wanted(),
+          .num_registered = message.num_registered(),
+          .num_queued = message.num_queued(),
+          .wait_s = checked_magnitude(message.wait_s(), "wait_s"),
+          .reason = checked_text(message.reason(), "reason"),
+          .interval_s = message.interval_s()};
+}
+
+FactoryStatus read_factory(const proto::FactoryStatus& message) {
+  return {.report = read_report(message.report()),
+          .owner = checked_owner(message.owner()),
+          .silent_s = checked_magnitude(message.silent_s(), "silent_s")};
+}
+
 std::optional<double> remaining_time(const proto::CampaignStatus& message) {
   if (!message.has_remaining_s()) return std::nullopt;
   return checked_magnitude(message.remaining_s(), "remaining_s");
@@ -306,10 +354,10 @@ CampaignStatus read_campaign(const proto::CampaignStatus& message) {
           .rate_hz = checked_magnitude(message.rate_hz(), "rate_hz"),
           .remaining_s = remaining_time(message),
           .storage_failure = checked_text(message.storage_failure(), "storage_failure"),
-          .owner = message.owner().empty() ? "" : checked_name(message.owner(), "owner")};
+          .owner = checked_owner(message.owner())};
 }
 
-void read_what_is_amiss(const proto::StatusReply& message, StatusReply& status) {
+void read_lists(const proto::StatusReply& message, StatusReply& status) {
   require_count(message.unserved_files_size(), 0, unserved_files_per_reply_max, "unserved_files");
   require_count(message.quarantined_hosts_size(), 0, quarantined_hosts_per_reply_max,
                 "quarantined_hosts");
@@ -319,6 +367,10 @@ void read_what_is_amiss(const proto::StatusReply& message, StatusReply& status) 
   }
   for (const std::string& host : message.quarantined_hosts()) {
     status.quarantined_hosts.push_back(checked_name(host, "quarantined_hosts"));
+  }
+  require_count(message.factories_size(), 0, factories_max, "factories");
+  for (const auto& factory : message.factories()) {
+    status.factories.push_back(read_factory(factory));
   }
 }
 
@@ -336,7 +388,7 @@ ClientReply read(const proto::StatusReply& message) {
   for (const auto& campaign : message.campaigns()) {
     status.campaigns.push_back(read_campaign(campaign));
   }
-  read_what_is_amiss(message, status);
+  read_lists(message, status);
   return status;
 }
 
@@ -393,6 +445,8 @@ ClientRequest read_content(const proto::RequestEnvelope& envelope) {
       return read(envelope.answer());
     case proto::RequestEnvelope::kAnswerPart:
       return read(envelope.answer_part());
+    case proto::RequestEnvelope::kFactoryReport:
+      return read_report(envelope.factory_report());
     case proto::RequestEnvelope::REQUEST_NOT_SET:
       break;
   }

@@ -26,6 +26,8 @@ inline constexpr std::size_t campaigns_per_reply_max = 512;
 inline constexpr std::size_t workers_per_reply_max = 4096;
 inline constexpr std::size_t unserved_files_per_reply_max = 64;
 inline constexpr std::size_t quarantined_hosts_per_reply_max = 256;
+inline constexpr std::size_t factories_max = 64;  ///< That a coordinator knows and a reply names.
+inline constexpr std::uint64_t factory_interval_s_max = 3600;
 inline constexpr std::size_t reply_text_size_max = 4096;  ///< Of any text in a reply, bytes.
 inline constexpr std::size_t stop_rule_size_max = 200;    ///< Bytes.
 inline constexpr int priority_max = 100;                  ///< And its negative.
@@ -46,8 +48,8 @@ struct ReplyPacket {
   ClientReply reply;
 };
 
-/// The bytes of a request or reply. Texts of a reply are cut to reply_text_size_max; what is not
-/// printable ASCII or the end of a line becomes `?` in them, since they go to terminals.
+/// The bytes of a request or reply. Texts of a reply or report are cut to reply_text_size_max; what
+/// is not printable ASCII or the end of a line becomes `?` in them, since they go to terminals.
 /// @throws InvalidArgument if they are more than the message may have.
 [[nodiscard]] std::string encode(const RequestPacket& packet);
 [[nodiscard]] std::string encode(const ReplyPacket& packet);

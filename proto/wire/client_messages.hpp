@@ -75,11 +75,10 @@ struct AnswerRequest {
   Question question = Question::report;
   std::vector<std::string> options = {};  ///< Of the command: `--json`, `--run=13`.
   std::string statement = {};             ///< SQL of a query; else empty.
-  /// Bytes that the client has of an earlier copy of the database. If the new copy begins with
-  /// them, only the rest is sent.
+  /// Bytes that the client has of an earlier copy of the database, and their SHA-256 (64
+  /// hexadecimal digits). If the new copy begins with them, only the rest is sent.
   std::uint64_t known_size = 0;
-  std::string known_sha256 =
-      {};  ///< Of those bytes, 64 hexadecimal digits; empty if there are none.
+  std::string known_sha256 = {};
 };
 
 /// Asks for the bytes of an answer from here on; at its end, the coordinator drops the answer.
@@ -88,9 +87,30 @@ struct AnswerPartRequest {
   std::uint64_t offset = 0;
 };
 
+/// Whether a factory submits. The values are sent: never renumber.
+enum class FactoryPhase : std::uint8_t {
+  active = 1,
+  waiting = 2,  ///< Tries again after a time.
+  paused = 3,   ///< Submits nothing until it is started again.
+};
+
+/// How a factory that keeps workers in a batch system's queue stands. It repeats this with each of
+/// its looks; the coordinator forgets it after three intervals without another one.
+struct FactoryReport {
+  std::string name;          ///< is_name() holds.
+  std::string batch_system;  ///< is_name() holds.
+  FactoryPhase phase = FactoryPhase::active;
+  std::uint64_t num_wanted = 0;      ///< Workers that the open runs are worth, of any origin.
+  std::uint64_t num_registered = 0;  ///< Of its own.
+  std::uint64_t num_queued = 0;      ///< Its allocations without a registered worker.
+  double wait_s = 0.0;               ///< Until the next attempt; 0 unless it waits.
+  std::string reason = {};           ///< Why it is not active.
+  std::uint64_t interval_s = 1;      ///< Between two reports; 1 to factory_interval_s_max.
+};
+
 using ClientRequest =
     std::variant<SubmitRequest, StatusRequest, WorkersRequest, ControlRequest, ReleaseHostRequest,
-                 RequestPart, AnswerRequest, AnswerPartRequest>;
+                 RequestPart, AnswerRequest, AnswerPartRequest, FactoryReport>;
 
 /// Whether a campaign's runs are lent. The values are sent: never renumber.
 enum class CampaignPhase : std::uint8_t {
@@ -125,6 +145,13 @@ struct UnservedFile {
   std::string reason;
 };
 
+/// A factory as the coordinator knows it.
+struct FactoryStatus {
+  FactoryReport report;    ///< The last one.
+  std::string owner = {};  ///< Name of the key that reported; empty if there are no keys.
+  double silent_s = 0.0;   ///< Since then.
+};
+
 struct StatusReply {
   std::string version;  ///< Of the coordinator's program.
   std::string model_version;
@@ -137,7 +164,8 @@ struct StatusReply {
   std::vector<UnservedFile> unserved_files = {};
   std::uint64_t num_unserved_files = 0;  ///< Of all, in this reply or not.
   std::vector<std::string> quarantined_hosts = {};
-  std::uint64_t num_quarantined_hosts = 0;  ///< Of all, in this reply or not.
+  std::uint64_t num_quarantined_hosts = 0;    ///< Of all, in this reply or not.
+  std::vector<FactoryStatus> factories = {};  ///< All.
 };
 
 /// A registered worker.

@@ -62,6 +62,18 @@ std::string_view name_of(CampaignPhase phase) {
   PROOFMASS_EXPECT(false);
 }
 
+std::string_view name_of(FactoryPhase phase) {
+  switch (phase) {
+    case FactoryPhase::active:
+      return "active";
+    case FactoryPhase::waiting:
+      return "waiting";
+    case FactoryPhase::paused:
+      return "paused";
+  }
+  PROOFMASS_EXPECT(false);
+}
+
 std::string_view name_of(LossReason reason) {
   switch (reason) {
     case LossReason::silent:

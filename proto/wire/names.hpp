@@ -19,6 +19,7 @@ namespace proofmass::wire {
 /// Names of values for people, logs, JSON and the database: `pause`, `active`, `out_of_memory`.
 [[nodiscard]] std::string_view name_of(ControlAction action);
 [[nodiscard]] std::string_view name_of(CampaignPhase phase);
+[[nodiscard]] std::string_view name_of(FactoryPhase phase);
 [[nodiscard]] std::string_view name_of(LossReason reason);
 
 }  // namespace proofmass::wire

@@ -3,12 +3,14 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <string>
 #include <utility>
 #include <variant>
 
 #include "coordinator/dispatch/campaigns.hpp"
 #include "coordinator/dispatch/results.hpp"
 #include "coordinator/dispatch/workers.hpp"
+#include "coordinator/net/factory_reports.hpp"
 #include "coordinator/net/worker_gateway.hpp"
 #include "core/error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
@@ -178,6 +180,9 @@ class World final : public coordinator::Outbox {
     if (const auto* const submit = std::get_if<wire::SubmitRequest>(&packet->request)) {
       return read_definition(submit->definition);
     }
+    if (const auto* const report = std::get_if<wire::FactoryReport>(&packet->request)) {
+      return take_report(*report);
+    }
     const auto* const control = std::get_if<wire::ControlRequest>(&packet->request);
     if (control == nullptr) return;
     control_campaign(control->campaign == "table" ? fuzz_table_campaign : fuzz_campaign,
@@ -191,6 +196,19 @@ class World final : public coordinator::Outbox {
       PROOFMASS_EXPECT(definition_of(campaign_of(definition)) == definition);
     } catch (const DefinitionError&) {
     }
+  }
+
+  void take_report(const wire::FactoryReport& report) {
+    try {
+      factories_.take(report, "anna", now_);
+    } catch (const Error&) {
+    }
+    const wire::StatusReply status{.version = "0",
+                                   .model_version = "m",
+                                   .campaigns = {},
+                                   .factories = factories_.current(now_)};
+    const std::string sent = wire::encode(wire::ReplyPacket{.id = 1, .reply = status});
+    PROOFMASS_EXPECT(std::holds_alternative<wire::ReplyPacket>(wire::decode_reply(sent)));
   }
 
   void control_campaign(CampaignId id, wire::ControlAction action) {
@@ -244,6 +262,7 @@ class World final : public coordinator::Outbox {
   TimePoint now_{};
   coordinator::State state_;
   coordinator::WorkerGateway gateway_;
+  coordinator::FactoryReports factories_;
   std::set<std::pair<CampaignId, RunIndex>> handed_over_;
   std::deque<wire::LeasedResult> to_commit_;
   std::deque<std::pair<wire::WorkerId, wire::LeasedResult>> to_compare_;

@@ -293,17 +293,26 @@ std::string client_messages() {
   campaign.num_runs = 10;
   campaign.remaining_s = 1.5;
   campaign.storage_failure = "disk full";
+  const wire::FactoryReport report{.name = "fleet",
+                                   .batch_system = "pbs",
+                                   .phase = wire::FactoryPhase::waiting,
+                                   .num_wanted = 3,
+                                   .wait_s = 60.0,
+                                   .reason = "queue full",
+                                   .interval_s = 30};
   const wire::StatusReply status{.version = "0",
                                  .model_version = "m",
                                  .uptime_s = 1.0,
                                  .num_workers = 1,
                                  .num_slots = 2,
-                                 .campaigns = {campaign}};
+                                 .campaigns = {campaign},
+                                 .factories = {{.report = report, .owner = "anna"}}};
   wire::WorkerStatus worker;
   worker.id = {1};
   worker.name = worker.host = "w";
   return to_bytes({from_client(wire::StatusRequest{}), from_client(wire::WorkersRequest{}),
-                   to_client(status), to_client(wire::WorkersReply{.workers = {worker}}),
+                   from_client(report), to_client(status),
+                   to_client(wire::WorkersReply{.workers = {worker}}),
                    to_client(wire::DoneReply{"done"}), to_client(wire::ErrorReply{"a = b (c)"})});
 }
 

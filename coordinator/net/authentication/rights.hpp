@@ -10,7 +10,7 @@ namespace proofmass::coordinator {
 
 /// What a client may do.
 enum class Right : std::uint8_t {
-  observe = 1,  ///< See campaigns and workers.
+  observe = 1,  ///< See campaigns, workers and factories; report how a factory stands.
   submit = 2,   ///< Submit campaigns, and control those that the same name submitted.
   control = 4,  ///< Control the campaigns of everybody; release hosts.
 };

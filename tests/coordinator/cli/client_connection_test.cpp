@@ -11,47 +11,17 @@
 #include <string>
 #include <utility>
 #include <variant>
-#include <zmq.hpp>
 
 #include "coordinator/net/private_endpoint.hpp"
 #include "core/error.hpp"
-#include "proto/link/socket.hpp"
 #include "proto/wire/client_codec.hpp"
+#include "tests/coordinator/net/played_coordinator.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
+using test::PlayedCoordinator;
 using ::testing::StartsWith;
-
-/// A coordinator's socket; every receive has a deadline.
-class PlayedCoordinator {
- public:
-  explicit PlayedCoordinator(const std::string& endpoint)
-      : socket_(wire::make_router(context_, "bind", endpoint, {})) {
-    socket_.set(zmq::sockopt::linger, 0);
-    socket_.set(zmq::sockopt::rcvtimeo, 20'000);
-  }
-
-  /// The next request; whoever sent it is answered from now on.
-  wire::RequestPacket receive() {
-    zmq::message_t bytes;
-    if (!socket_.recv(client_) || !socket_.recv(bytes)) throw Error("no request");
-    return std::get<wire::RequestPacket>(wire::decode_request(bytes.to_string_view()));
-  }
-
-  void answer(const std::string& bytes) {
-    (void)socket_.send(zmq::buffer(client_.to_string()), zmq::send_flags::sndmore);
-    (void)socket_.send(zmq::buffer(bytes), zmq::send_flags::none);
-  }
-  void answer(std::uint64_t id, const std::string& text) {
-    answer(wire::encode(wire::ReplyPacket{id, wire::DoneReply{text}}));
-  }
-
- private:
-  zmq::context_t context_;
-  zmq::socket_t socket_;
-  zmq::message_t client_;
-};
 
 class ClientOfAPlayedCoordinator : public testing::Test {
  protected:

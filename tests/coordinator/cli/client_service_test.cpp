@@ -5,6 +5,7 @@
 #include <chrono>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <vector>
@@ -170,6 +171,34 @@ TEST_F(ClientCommands, AreRefusedWithAKeyThatIsNotOnTheList) {
   }
   EXPECT_THAT(error, HasSubstr("refused"));
   EXPECT_THAT(error, HasSubstr("authorized_clients"));
+}
+
+TEST_F(ClientCommands, ReportOfAFactoryWithTheRightToObserve) {
+  use_keys();
+  const auto list = directory / "keys" / "authorized_clients";
+  const std::string all_rights = "observe,submit,control\n";
+  std::string keys{std::istreambuf_iterator<char>(std::ifstream(list).rdbuf()), {}};
+  ASSERT_TRUE(keys.ends_with(all_rights));
+  keys.erase(keys.size() - all_rights.size());
+  const auto reported_with = [&](const std::string& right) {
+    std::ofstream(list) << keys << right << "\n";
+    start({});
+    std::string owner;
+    const std::string error = error_of([&] {
+      (void)with_connection(options(), [&](const Ask& ask) {
+        (void)reply_of<wire::DoneReply>(
+            ask, wire::FactoryReport{.name = "fleet", .batch_system = "pbs"});
+        owner = reply_of<wire::StatusReply>(ask, wire::StatusRequest{}).factories.at(0).owner;
+        return exit_done;
+      });
+    });
+    end(StopRequest::now);
+    return owner.empty() ? error : "reported by " + owner;
+  };
+  EXPECT_EQ(reported_with("observe"), "reported by client");
+  EXPECT_EQ(
+      reported_with("submit"),
+      "key = client (must have the right `observe` in authorized_clients of the coordinator)");
 }
 
 TEST_F(ClientCommands, AreToldThatAnAddressIsForWorkers) {

@@ -78,6 +78,40 @@ TEST(StatusTable, ShowsAReasonInOneLine) {
       << text;
 }
 
+wire::FactoryStatus factory(wire::FactoryPhase phase, double wait_s, const std::string& reason) {
+  return {.report = {.name = "fleet",
+                     .batch_system = "pbs",
+                     .phase = phase,
+                     .num_wanted = 3,
+                     .num_registered = 2,
+                     .num_queued = 1,
+                     .wait_s = wait_s,
+                     .reason = reason,
+                     .interval_s = 30},
+          .owner = "anna",
+          .silent_s = 12.0};
+}
+
+TEST(StatusTable, ShowsFactoriesAndWhyTheyDoNotSubmit) {
+  using wire::FactoryPhase;
+  wire::StatusReply status = status_with({});
+  status.factories = {factory(FactoryPhase::active, 0.0, ""),
+                      factory(FactoryPhase::waiting, 60.0, "submission: qsub: queue\nfull"),
+                      factory(FactoryPhase::waiting, 5.0, "late"),
+                      factory(FactoryPhase::paused, 0.0, "3 workers in a row did not start")};
+  const std::string counts = ": 3 workers wanted, 2 registered, 1 in the queue";
+  const std::string text = status_table(status, 79);
+  EXPECT_TRUE(
+      text.ends_with("no campaigns\n"
+                     "factory fleet (pbs) active" +
+                     counts + "\nfactory fleet (pbs) waiting" + counts +
+                     "; tries again in 48 s; submission: qsub: queue\\nfull\n"
+                     "factory fleet (pbs) waiting" +
+                     counts + "; tries again in 0 s; late\nfactory fleet (pbs) paused" + counts +
+                     "; 3 workers in a row did not start\n"))
+      << text;
+}
+
 TEST(StatusTable, ShowsCampaignsAndWhatIsOutOfTheOrdinary) {
   wire::CampaignStatus first = campaign("hardy2013", 42);
   first.rate_hz = 12.34;
@@ -243,6 +277,17 @@ wire::StatusReply some_status() {
   status.num_unserved_files = 2;
   status.quarantined_hosts = {"n7"};
   status.num_quarantined_hosts = 1;
+  status.factories = {{.report = {.name = "fleet",
+                                  .batch_system = "pbs",
+                                  .phase = wire::FactoryPhase::waiting,
+                                  .num_wanted = 3,
+                                  .num_registered = 2,
+                                  .num_queued = 1,
+                                  .wait_s = 60.5,
+                                  .reason = "qsub: queue full",
+                                  .interval_s = 30},
+                       .owner = "anna",
+                       .silent_s = 1.5}};
   return status;
 }
 
@@ -271,7 +316,19 @@ TEST(StatusJson, HoldsEverythingUnderStableKeys) {
                       {"unserved_files", {{{"file", "d/a.db"}, {"reason", "is locked"}}}},
                       {"num_unserved_files", 2},
                       {"quarantined_hosts", {"n7"}},
-                      {"num_quarantined_hosts", 1}};
+                      {"num_quarantined_hosts", 1},
+                      {"factories",
+                       {{{"name", "fleet"},
+                         {"batch_system", "pbs"},
+                         {"phase", "waiting"},
+                         {"num_wanted", 3},
+                         {"num_registered", 2},
+                         {"num_queued", 1},
+                         {"wait_s", 60.5},
+                         {"reason", "qsub: queue full"},
+                         {"interval_s", 30},
+                         {"silent_s", 1.5},
+                         {"owner", "anna"}}}}};
   EXPECT_EQ(Json::parse(status_json(some_status(), JsonLayout::indented)), expected);
   EXPECT_EQ(Json::parse(status_json(some_status(), JsonLayout::one_line)), expected);
 }
@@ -280,13 +337,18 @@ TEST(StatusJson, HasNullForWhatIsNotKnownOrDidNotHappen) {
   wire::StatusReply status = some_status();
   status.campaigns[0].remaining_s.reset();
   status.campaigns[0].storage_failure.clear();
+  status.factories = {{.report = {.name = "fleet", .batch_system = "pbs"}}};
   const Json json = Json::parse(status_json(status, JsonLayout::indented));
   EXPECT_TRUE(json["campaigns"][0]["remaining_s"].is_null());
   EXPECT_TRUE(json["campaigns"][0]["storage_failure"].is_null());
+  for (const std::string key : {"wait_s", "reason", "owner"}) {
+    EXPECT_TRUE(json["factories"][0][key].is_null()) << key;
+  }
 }
 
 TEST(StatusJson, HasAListAlsoWithoutCampaigns) {
   EXPECT_TRUE(Json::parse(status_json({}, JsonLayout::indented))["campaigns"].is_array());
+  EXPECT_TRUE(Json::parse(status_json({}, JsonLayout::indented))["factories"].is_array());
 }
 
 TEST(StatusJson, MayStandOnOneLine) {

@@ -376,6 +376,22 @@ TEST_F(ServiceClients, AreToldThatAHostIsInNoQuarantine) {
             "host = n7 (is not in quarantine)");
 }
 
+TEST_F(ServiceClients, SeeWhatFactoriesReport) {
+  start_with({});
+  EXPECT_EQ(client->done(wire::FactoryReport{.name = "fleet",
+                                             .batch_system = "pbs",
+                                             .phase = wire::FactoryPhase::paused,
+                                             .reason = "qsub: queue full",
+                                             .interval_s = 3600}),
+            "factory fleet: noted");
+  const wire::StatusReply status = client->status();
+  ASSERT_EQ(status.factories.size(), 1U);
+  EXPECT_EQ(status.factories[0].report.name, "fleet");
+  EXPECT_EQ(status.factories[0].report.phase, wire::FactoryPhase::paused);
+  EXPECT_EQ(status.factories[0].report.reason, "qsub: queue full");
+  EXPECT_EQ(status.factories[0].owner, "");
+}
+
 TEST_F(ServiceClients, GetAnErrorForWhatIsNoRequest) {
   start_with({});
   const wire::ReplyPacket garbage = client->ask_bytes({"garbage"});

@@ -162,6 +162,39 @@ TEST(ReleaseHostRequest, KeepsTheHost) {
   EXPECT_EQ(round_trip_request(ReleaseHostRequest{.host = "n7"}).host, "n7");
 }
 
+FactoryReport some_report() {
+  return {.name = "fleet",
+          .batch_system = "pbs",
+          .phase = FactoryPhase::waiting,
+          .num_wanted = 4,
+          .num_registered = 3,
+          .num_queued = 2,
+          .wait_s = 59.5,
+          .reason = "qsub: queue full",
+          .interval_s = 30};
+}
+
+void expect_some_report(const FactoryReport& report) {
+  EXPECT_EQ(report.name, "fleet");
+  EXPECT_EQ(report.batch_system, "pbs");
+  EXPECT_EQ(report.phase, FactoryPhase::waiting);
+  EXPECT_EQ(report.num_wanted, 4U);
+  EXPECT_EQ(report.num_registered, 3U);
+  EXPECT_EQ(report.num_queued, 2U);
+  EXPECT_EQ(report.wait_s, 59.5);
+  EXPECT_EQ(report.reason, "qsub: queue full");
+  EXPECT_EQ(report.interval_s, 30U);
+}
+
+TEST(FactoryReport, KeepsEverything) { expect_some_report(round_trip_request(some_report())); }
+
+// The words of a batch system may be in any language and of any length.
+TEST(FactoryReport, IsSentWithoutWhatATerminalWouldObey) {
+  FactoryReport report = some_report();
+  report.reason = "\x1b[2J" + std::string(5000, 'x');
+  EXPECT_EQ(round_trip_request(report).reason, "?[2J" + std::string(4092, 'x'));
+}
+
 TEST(RequestPart, KeepsItsBytes) {
   const std::string slice("\0\xff x", 4);
   const auto part =
@@ -200,6 +233,18 @@ TEST(StatusReply, SaysWhatIsAmissAndHowMuchThereIs) {
   EXPECT_EQ(status.num_unserved_files, 70U);
   EXPECT_EQ(status.quarantined_hosts, std::vector<std::string>{"n7"});
   EXPECT_EQ(status.num_quarantined_hosts, 300U);
+}
+
+TEST(StatusReply, KeepsFactories) {
+  StatusReply sent = reply_with({});
+  sent.factories = {{.report = some_report(), .owner = "anna", .silent_s = 1.5},
+                    {.report = some_report()}};
+  const StatusReply status = round_trip_reply(sent);
+  ASSERT_EQ(status.factories.size(), 2U);
+  expect_some_report(status.factories[0].report);
+  EXPECT_EQ(status.factories[0].owner, "anna");
+  EXPECT_EQ(status.factories[0].silent_s, 1.5);
+  EXPECT_EQ(status.factories[1].owner, "");
 }
 
 TEST(StatusReply, KeepsEverything) {
@@ -242,6 +287,22 @@ TEST(StatusReply, KeepsACampaign) {
 TEST(StatusReply, MayNameAsManyCampaignsAsAreServed) {
   const std::vector<CampaignStatus> campaigns(campaigns_per_reply_max, some_status());
   EXPECT_EQ(round_trip_reply(reply_with(campaigns)).campaigns.size(), campaigns_per_reply_max);
+}
+
+TEST(StatusReply, HasRoomForAllThatItMayName) {
+  const std::string name(128, 'x');
+  const std::string text(reply_text_size_max, 'x');
+  CampaignStatus campaign = some_status();
+  campaign.name = campaign.owner = name;
+  campaign.storage_failure = text;
+  StatusReply full = reply_with(std::vector<CampaignStatus>(campaigns_per_reply_max, campaign));
+  full.unserved_files.assign(unserved_files_per_reply_max, {.file = text, .reason = text});
+  full.quarantined_hosts.assign(quarantined_hosts_per_reply_max, name);
+  FactoryReport report = some_report();
+  report.name = report.batch_system = name;
+  report.reason = text;
+  full.factories.assign(factories_max, {.report = report, .owner = name});
+  EXPECT_EQ(round_trip_reply(full).factories.size(), factories_max);
 }
 
 TEST(WorkersReply, KeepsEverything) {
@@ -315,6 +376,9 @@ TEST(ClientNames, AreThoseOfTheEnumerators) {
   EXPECT_EQ(name_of(CampaignPhase::paused), "paused");
   EXPECT_EQ(name_of(CampaignPhase::finished), "finished");
   EXPECT_EQ(name_of(CampaignPhase::cancelled), "cancelled");
+  EXPECT_EQ(name_of(FactoryPhase::active), "active");
+  EXPECT_EQ(name_of(FactoryPhase::waiting), "waiting");
+  EXPECT_EQ(name_of(FactoryPhase::paused), "paused");
 }
 
 }  // namespace

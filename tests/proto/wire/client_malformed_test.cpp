@@ -173,6 +173,58 @@ TEST(MalformedRelease, MustNameAHost) {
             "host = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
 }
 
+std::string refusal_of_report(const std::function<void(proto::FactoryReport&)>& change) {
+  return refusal(FactoryReport{.name = "fleet", .batch_system = "pbs", .interval_s = 30},
+                 [&](auto& envelope) { change(*envelope.mutable_factory_report()); });
+}
+
+TEST(MalformedFactoryReport, HasNamesAPhaseTimesAndAText) {
+  EXPECT_EQ(refusal_of_report([](auto& report) { report.set_name("a b"); }),
+            "name = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal_of_report([](auto& report) { report.clear_batch_system(); }),
+            "batch_system = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal_of_report([](auto& report) { report.clear_phase(); }),
+            "phase = 0 (must be in [1, 3])");
+  EXPECT_EQ(refusal_of_report(
+                [](auto& report) { report.set_phase(static_cast<proto::FactoryPhase>(4)); }),
+            "phase = 4 (must be in [1, 3])");
+  EXPECT_EQ(refusal_of_report([](auto& report) { report.set_wait_s(nan); }),
+            "wait_s = nan (must be >= 0)");
+  EXPECT_EQ(refusal_of_report([](auto& report) { report.clear_interval_s(); }),
+            "interval_s = 0 (must be in [1, 3600])");
+  EXPECT_EQ(refusal_of_report([](auto& report) { report.set_interval_s(3601); }),
+            "interval_s = 3601 (must be in [1, 3600])");
+  EXPECT_EQ(refusal_of_report([](auto& report) { report.set_reason(std::string(4097, 'x')); }),
+            "reason = 4097 bytes (must be at most 4096)");
+  EXPECT_EQ(refusal_of_report([](auto& report) { report.set_reason("\x1b[2J"); }),
+            "reason = 4 bytes (must be printable ASCII and line ends)");
+}
+
+std::string refusal_of_factory(const std::function<void(proto::FactoryStatus&)>& change) {
+  StatusReply good;
+  good.version = "v";
+  good.model_version = "m";
+  good.factories = {{.report = {.name = "fleet", .batch_system = "pbs", .interval_s = 30}}};
+  return refusal(good,
+                 [&](auto& envelope) { change(*envelope.mutable_status()->mutable_factories(0)); });
+}
+
+TEST(MalformedFactoryStatus, HasAReportAnOwnerAndATime) {
+  EXPECT_EQ(refusal_of_factory([](auto& factory) { factory.clear_report(); }),
+            "interval_s = 0 (must be in [1, 3600])");
+  EXPECT_EQ(refusal_of_factory([](auto& factory) { factory.set_owner("a b"); }),
+            "owner = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal_of_factory([](auto& factory) { factory.set_silent_s(-1.0); }),
+            "silent_s = -1 (must be >= 0)");
+}
+
+TEST(MalformedStatus, NamesABoundedNumberOfFactories) {
+  EXPECT_EQ(refusal_of_status([](auto& status) {
+              for (std::size_t i = 0; i <= factories_max; ++i) status.add_factories();
+            }),
+            "factories = 65 entries (must be in [0, 64])");
+}
+
 TEST(MalformedStatus, MustNameFilesAndHostsInPrintableCharacters) {
   EXPECT_EQ(refusal_of_status([](auto& status) {
               auto& file = *status.add_unserved_files();
