@@ -136,7 +136,7 @@ std::string pbs_id(std::string_view output) { return first_word("qsub", output);
 BatchCommand pbs_listing(const AllocationConfig& config) {
   return {{"sh", "-c",
            "running=$(qselect -u \"$(id -un)\" -N \"$1\" -s R) || exit\n"
-           "others=$(qselect -u \"$(id -un)\" -N \"$1\" -s HQTW) || exit\n"
+           "others=$(qselect -u \"$(id -un)\" -N \"$1\" -s HQSTUW) || exit\n"
            "for id in $others; do echo \"$id Q\"; done\n"
            "for id in $running; do echo \"$id R\"; done\n",
            "sh", config.name}};
@@ -180,10 +180,14 @@ BatchCommand condor_submission(const AllocationConfig& config) {
 // `12.0 - 12.0`: the first and the last.
 std::string condor_id(std::string_view output) { return first_word("condor_submit", output); }
 
+// States: 1 waits, 2 runs, 5 is held, 7 is suspended; in the others it has ended or is about to.
 BatchCommand condor_listing(const AllocationConfig& config) {
   return {{"condor_q", "-constraint",
-           fmt::format("JobBatchName == \"{}\" && JobStatus <= 2", config.name), "-format", "%d.",
-           "ClusterId", "-format", "%d ", "ProcId", "-format", "%d\n", "JobStatus"}};
+           fmt::format("JobBatchName == \"{}\" && (JobStatus <= 2 || JobStatus == 5 || "
+                       "JobStatus == 7)",
+                       config.name),
+           "-format", "%d.", "ClusterId", "-format", "%d ", "ProcId", "-format", "%d\n",
+           "JobStatus"}};
 }
 
 std::vector<Allocation> condor_allocations(const AllocationConfig&, std::string_view output) {

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <string>
 
 #include "core/error.hpp"
@@ -99,6 +101,45 @@ TEST(BatchSystem, ReadsWhatPbsAnswers) {
   EXPECT_EQ(pbs.id_of("17.head\n"), "17.head");
   EXPECT_THAT(ids_and_states(pbs.allocations_of(example(), "18.head Q\n17.head R\n")),
               ElementsAre("18.head waits", "17.head runs"));
+}
+
+/// A `qselect` that knows an allocation of each state, called as its state.
+std::string folder_of_qselect() {
+  std::string folder = testing::TempDir() + "/qselect-of-test";
+  std::filesystem::create_directories(folder);
+  const std::string file = folder + "/qselect";
+  std::ofstream(file) << "#!/bin/sh\n"
+                         "[ \"$1 $3 $4 $5\" = '-u -N fleet -s' ] || exit 2\n"
+                         "for state in B E F H M Q R S T U W X; do\n"
+                         "  case $6 in *$state*) echo $state.head ;; esac\n"
+                         "done\n";
+  std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+  return folder;
+}
+
+// B, E, F, M and X: arrays, and those that are about to end, have ended or were moved away.
+TEST(BatchSystem, ListsWhatPbsHasNotEnded) {
+  const BatchSystem& pbs = system_of("pbs");
+  BatchCommand listing = pbs.listing(example());
+  listing.arguments.insert(listing.arguments.begin(),
+                           {"env", "PATH=" + folder_of_qselect() + ":/usr/bin:/bin"});
+  EXPECT_THAT(ids_and_states(pbs.allocations_of(example(), output_of(listing))),
+              ElementsAre("H.head waits", "Q.head waits", "S.head waits", "T.head waits",
+                          "U.head waits", "W.head waits", "R.head runs"));
+}
+
+// The constraint is also an expression of awk. States: 1 idle, 2 running, 3 removed, 4 completed,
+// 5 held, 6 transferring output, 7 suspended.
+TEST(BatchSystem, ListsWhatCondorHasNotEnded) {
+  const BatchCommand listing = system_of("condor").listing(example());
+  ASSERT_EQ(listing.arguments.at(1), "-constraint");
+  const auto listed = [&](const std::string& name) {
+    return output_of({{"awk", "BEGIN { JobBatchName = \"" + name +
+                                  "\"; for (JobStatus = 1; JobStatus <= 7; ++JobStatus) if (" +
+                                  listing.arguments.at(2) + ") print JobStatus }"}});
+  };
+  EXPECT_EQ(listed("fleet"), "1\n2\n5\n7\n");
+  EXPECT_EQ(listed("other"), "");
 }
 
 // What HTCondor does with `arguments` in its new syntax: the outer double quotes go, two double
