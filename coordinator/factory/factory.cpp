@@ -38,6 +38,11 @@ bool is_coming(const FactoryState::Known& known) {
   return !known.has_registered && !known.is_cancelled;
 }
 
+std::uint64_t num_coming(const FactoryState& state) {
+  return static_cast<std::uint64_t>(std::ranges::count_if(
+      state.allocations, [](const auto& entry) { return is_coming(entry.second); }));
+}
+
 /// Takes up which allocations run and which workers have registered.
 void look_at_allocations(FactoryState& state, const FactoryConfig& config, const FactoryView& view,
                          FactoryTime now) {
@@ -47,7 +52,7 @@ void look_at_allocations(FactoryState& state, const FactoryConfig& config, const
     if (allocation.is_running && !known.running_since) known.running_since = now;
     if (!known.has_registered && view.workers.contains(worker_name(config, allocation.id))) {
       known.has_registered = true;
-      state.num_failed_starts = 0;
+      if (!reason_to_pause(state)) state.num_failed_starts = 0;
     }
   }
 }
@@ -117,16 +122,15 @@ FactoryActions on_view(FactoryState& state, const FactoryConfig& config, const F
     state.rate_per_worker_hz = view.rate_hz / static_cast<double>(view.workers.size());
   }
   const std::uint64_t num_wanted = wanted_workers(config, view, state.rate_per_worker_hz);
-  const auto num_coming = static_cast<std::uint64_t>(std::ranges::count_if(
-      state.allocations, [](const auto& entry) { return is_coming(entry.second); }));
-  const std::uint64_t num_expected = view.workers.size() + num_coming;
+  const std::uint64_t num_awaited = num_coming(state);
+  const std::uint64_t num_expected = view.workers.size() + num_awaited;
   if (num_expected > num_wanted) {
     cancel_waiting(state, view, num_expected - num_wanted, actions);
     return actions;
   }
-  if (now < state.next_submission || reason_to_end(state)) return actions;
+  if (now < state.next_submission || reason_to_pause(state)) return actions;
   const auto room = [](std::uint64_t max, std::uint64_t num) { return max - std::min(max, num); };
-  actions.num_submissions = std::min({num_wanted - num_expected, room(config.backlog, num_coming),
+  actions.num_submissions = std::min({num_wanted - num_expected, room(config.backlog, num_awaited),
                                       room(config.workers_max, state.allocations.size())});
   return actions;
 }
@@ -149,7 +153,7 @@ void on_submission_failed(FactoryState& state, const std::string& reason, Factor
                   Field::reason(reason)}});
 }
 
-std::optional<std::string> reason_to_end(const FactoryState& state) {
+std::optional<std::string> reason_to_pause(const FactoryState& state) {
   if (state.num_failed_submissions >= failed_submissions_max) {
     return fmt::format("{} submissions failed in a row; {}", state.num_failed_submissions,
                        state.failure);
@@ -159,6 +163,26 @@ std::optional<std::string> reason_to_end(const FactoryState& state) {
                        state.failure);
   }
   return std::nullopt;
+}
+
+wire::FactoryReport report_of(const FactoryState& state, const FactoryConfig& config,
+                              const FactoryView& view, FactoryTime now) {
+  wire::FactoryReport report{.name = config.name, .batch_system = {}};
+  report.num_wanted = wanted_workers(config, view, state.rate_per_worker_hz);
+  report.num_registered =
+      static_cast<std::uint64_t>(std::ranges::count_if(state.allocations, [&](const auto& entry) {
+        return view.workers.contains(worker_name(config, entry.first));
+      }));
+  report.num_queued = num_coming(state);
+  if (const auto reason = reason_to_pause(state)) {
+    report.phase = wire::FactoryPhase::paused;
+    report.reason = *reason;
+  } else if (now < state.next_submission) {
+    report.phase = wire::FactoryPhase::waiting;
+    report.wait_s = std::chrono::duration<double>(state.next_submission - now).count();
+    report.reason = state.failure;
+  }
+  return report;
 }
 
 }  // namespace proofmass::coordinator

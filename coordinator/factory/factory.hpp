@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "proto/text/event.hpp"
+#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
@@ -88,8 +89,12 @@ void on_submitted(FactoryState& state, const std::string& id, FactoryTime now);
 void on_submission_failed(FactoryState& state, const std::string& reason, FactoryTime now,
                           const wire::Log& log);
 
-/// Why the factory must not go on by itself: ten submissions or three starts have failed in a row.
-/// Nothing if all is well.
-[[nodiscard]] std::optional<std::string> reason_to_end(const FactoryState& state);
+/// Why the factory submits nothing more: ten submissions or three starts have failed in a row.
+/// Nothing if all is well. Once there is a reason, there is one as long as the state lives.
+[[nodiscard]] std::optional<std::string> reason_to_pause(const FactoryState& state);
+
+/// What the factory tells the coordinator after a look; without batch system and interval.
+[[nodiscard]] wire::FactoryReport report_of(const FactoryState& state, const FactoryConfig& config,
+                                            const FactoryView& view, FactoryTime now);
 
 }  // namespace proofmass::coordinator

@@ -10,6 +10,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "coordinator/cli/client.hpp"
@@ -19,9 +20,11 @@
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/factory/batch_system.hpp"
+#include "coordinator/factory/carry_out.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/log.hpp"
+#include "proto/wire/client_codec.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
@@ -30,7 +33,6 @@ namespace {
 constexpr std::uint64_t workers_max_max = 10'000;
 constexpr std::uint64_t walltime_min_min = 10;
 constexpr std::uint64_t walltime_min_max = 366 * 24 * 60;
-constexpr std::uint64_t interval_s_max = 3600;
 
 /// The worker leaves this long before its allocation ends: what comes before it starts takes time.
 constexpr std::chrono::seconds start_margin{60};
@@ -134,7 +136,8 @@ class FactoryLoop {
       : options_(options),
         config_(checked(options)),
         allocation_(allocation_config(options)),
-        log_(log) {}
+        log_(log),
+        report_(with_constants({.name = config_.name, .batch_system = {}})) {}
 
   /// One look at coordinator and queue, and what follows from it. What fails is tried again at the
   /// next look.
@@ -144,57 +147,75 @@ class FactoryLoop {
       ClientConnection connection(options_.client.connection);
       const Ask ask = [&](const wire::ClientRequest& request) { return connection.ask(request); };
       const wire::StatusReply status = whole_status(ask);
-      FactoryView view = view_of(status, all_workers(ask));
-      view.allocations = options_.system.allocations_of(
-          allocation_, output_of(options_.system.listing(allocation_)));
-      carry_out(on_view(state_, config_, view, std::chrono::steady_clock::now(), log_));
-      return !status.campaigns.empty() && std::ranges::all_of(status.campaigns, is_over);
+      const bool has_looked = look_at_queue(view_of(status, all_workers(ask)));
+      report(ask);
+      return has_looked && !status.campaigns.empty() &&
+             std::ranges::all_of(status.campaigns, is_over);
     } catch (const InvalidArgument&) {
       throw;  // The address is wrong.
     } catch (const Error& error) {
-      log_({.severity = wire::Severity::warning,
-            .kind = "factory_waits",
-            .fields = {wire::Field::reason(error.what())}});
+      log_waiting(error.what());
       return false;
     }
   }
 
-  [[nodiscard]] std::optional<std::string> reason_to_end() const {
-    return coordinator::reason_to_end(state_);
+  [[nodiscard]] std::optional<std::string> reason_to_pause() const {
+    return coordinator::reason_to_pause(state_);
   }
 
  private:
-  void carry_out(const FactoryActions& actions) {
-    for (const std::string& id : actions.cancelled) cancel(id);
-    for (std::uint64_t i = 0; i < actions.num_submissions; ++i) {
-      if (!submit()) return;
-    }
+  [[nodiscard]] wire::FactoryReport with_constants(wire::FactoryReport report) const {
+    report.batch_system = options_.system.name;
+    report.interval_s = options_.interval_s;
+    return report;
   }
 
-  /// One that cannot be cancelled has ended already, or its worker leaves when it finds no work.
-  void cancel(const std::string& id) {
-    try {
-      (void)output_of(options_.system.cancellation(id));
-      log_({.kind = "allocation_cancelled", .fields = {{"allocation", id}}});
-    } catch (const Error& error) {
-      log_({.severity = wire::Severity::warning,
-            .kind = "cancellation_failed",
-            .fields = {{"allocation", id}, wire::Field::reason(error.what())}});
-    }
+  void log_waiting(const std::string& reason) const {
+    log_({.severity = wire::Severity::warning,
+          .kind = "factory_waits",
+          .fields = {wire::Field::reason(reason)}});
   }
 
-  bool submit() {
-    const auto now = std::chrono::steady_clock::now();
+  /// @return Whether the queue could be listed.
+  bool look_at_queue(FactoryView view) {
     try {
-      const std::string id =
-          options_.system.id_of(output_of(options_.system.submission(allocation_)));
-      on_submitted(state_, id, now);
-      log_({.kind = "worker_requested", .fields = {{"allocation", id}}});
-      return true;
+      view.allocations = options_.system.allocations_of(
+          allocation_, output_of(options_.system.listing(allocation_)));
     } catch (const Error& error) {
-      on_submission_failed(state_, error.what(), now, log_);
+      note_unlisted(error.what());
       return false;
     }
+    carry_out(on_view(state_, config_, view, std::chrono::steady_clock::now(), log_), state_,
+              options_.system, allocation_, log_);
+    const bool was_paused = report_.phase == wire::FactoryPhase::paused;
+    report_ = with_constants(report_of(state_, config_, view, std::chrono::steady_clock::now()));
+    if (report_.phase == wire::FactoryPhase::paused && !was_paused) {
+      log_({.severity = wire::Severity::error,
+            .kind = "factory_paused",
+            .fields = {wire::Field::reason(report_.reason)}});
+    }
+    return true;
+  }
+
+  void note_unlisted(const std::string& reason) {
+    log_waiting(reason);
+    if (report_.phase == wire::FactoryPhase::paused) return;
+    report_.phase = wire::FactoryPhase::waiting;
+    report_.wait_s = static_cast<double>(options_.interval_s);
+    report_.reason = reason;
+  }
+
+  /// Nothing depends on the report, which an older coordinator does not know.
+  void report(const Ask& ask) {
+    const wire::ClientReply reply = ask(report_);
+    const auto* const refusal = std::get_if<wire::ErrorReply>(&reply);
+    const std::string reason = refusal == nullptr ? "" : refusal->text;
+    if (!reason.empty() && reason != refused_because_) {
+      log_({.severity = wire::Severity::warning,
+            .kind = "report_refused",
+            .fields = {wire::Field::reason(reason)}});
+    }
+    refused_because_ = reason;
   }
 
   const FactoryOptions& options_;
@@ -202,6 +223,8 @@ class FactoryLoop {
   AllocationConfig allocation_;
   const wire::Log& log_;
   FactoryState state_;
+  wire::FactoryReport report_;   ///< After the last look.
+  std::string refused_because_;  ///< The last report; empty if it was taken.
 };
 
 int keep_workers(const FactoryOptions& options) {
@@ -218,8 +241,9 @@ int keep_workers(const FactoryOptions& options) {
   FactoryLoop loop(options, log);
   while (stop == StopRequest::none) {
     const bool are_all_over = loop.advance();
-    if (const auto reason = loop.reason_to_end()) throw Error("factory: " + *reason);
     if (are_all_over && options.ends_when_done) return exit_done;
+    const auto reason = loop.reason_to_pause();
+    if (reason && options.ends_when_done) throw Error("factory: " + *reason);
     const auto next = std::chrono::steady_clock::now() + std::chrono::seconds(options.interval_s);
     while (stop == StopRequest::none && std::chrono::steady_clock::now() < next) {
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
@@ -248,10 +272,10 @@ void add_sizing(CLI::App& command, FactoryOptions& options) {
       ->check(wire::in_range(0.001, 1.0))
       ->capture_default_str();
   command.add_option("--interval", options.interval_s, "Seconds between two looks")
-      ->check(wire::in_range(std::uint64_t{1}, interval_s_max))
+      ->check(wire::in_range(std::uint64_t{1}, wire::factory_interval_s_max))
       ->capture_default_str();
   command.add_flag("--exit-when-done", options.ends_when_done,
-                   "End when every campaign is finished");
+                   "End when every campaign is finished; end with\nan error instead of pausing");
 }
 
 void add_workers_of(CLI::App& command, FactoryOptions& options) {

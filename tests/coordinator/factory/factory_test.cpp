@@ -149,9 +149,9 @@ TEST_F(FactoryTest, GivesUpAWorkerThatRunsAndDoesNotRegister) {
                                    "reason=\"its worker did not register within 5 minutes\""));
 }
 
-TEST_F(FactoryTest, EndsWhenThreeWorkersInARowDoNotStart) {
+TEST_F(FactoryTest, PausesWhenThreeWorkersInARowDoNotStart) {
   for (int i = 1; i <= 3; ++i) {
-    EXPECT_EQ(reason_to_end(state_), std::nullopt);
+    EXPECT_EQ(reason_to_pause(state_), std::nullopt);
     submit(std::to_string(i));
     (void)look();
     view_.allocations.clear();
@@ -160,8 +160,8 @@ TEST_F(FactoryTest, EndsWhenThreeWorkersInARowDoNotStart) {
     now_ += minutes(1);
     (void)look();
   }
-  ASSERT_TRUE(reason_to_end(state_));
-  EXPECT_EQ(*reason_to_end(state_),
+  ASSERT_TRUE(reason_to_pause(state_));
+  EXPECT_EQ(*reason_to_pause(state_),
             "3 workers in a row did not start; allocation 3: it ended before its worker "
             "registered");
 }
@@ -181,18 +181,18 @@ TEST_F(FactoryTest, ForgetsFailedStartsWhenAWorkerRegisters) {
   EXPECT_EQ(state_.num_failed_starts, 0);
 }
 
-TEST_F(FactoryTest, WaitsLongerAfterEachFailedSubmissionAndEndsAfterTen) {
+TEST_F(FactoryTest, WaitsLongerAfterEachFailedSubmissionAndPausesAfterTen) {
   const std::vector<int> waits_min{1, 15, 30, 60, 60, 60, 60, 60, 60, 60};
   for (std::size_t i = 0; i < waits_min.size(); ++i) {
-    EXPECT_EQ(reason_to_end(state_), std::nullopt);
+    EXPECT_EQ(reason_to_pause(state_), std::nullopt);
     EXPECT_EQ(look().num_submissions, 1u) << i;
     fail_submission();
     now_ += minutes(waits_min[i]) - seconds(1);
     EXPECT_EQ(look().num_submissions, 0u) << i;
     now_ += seconds(1);
   }
-  ASSERT_TRUE(reason_to_end(state_));
-  EXPECT_EQ(*reason_to_end(state_),
+  ASSERT_TRUE(reason_to_pause(state_));
+  EXPECT_EQ(*reason_to_pause(state_),
             "10 submissions failed in a row; submission: sbatch: no such partition");
   EXPECT_EQ(look().num_submissions, 0u);
 }
@@ -201,6 +201,62 @@ TEST_F(FactoryTest, ForgetsFailedSubmissionsWhenOneIsTaken) {
   fail_submission();
   on_submitted(state_, "1", now_);
   EXPECT_EQ(state_.num_failed_submissions, 0);
+}
+
+TEST_F(FactoryTest, StaysPausedThoughAWorkerRegistersLate) {
+  submit("1");
+  state_.num_failed_starts = 3;
+  run(0);
+  enter("1");
+  view_.num_open_runs = 1'000'000;
+  view_.rate_hz = 1e-3;
+  EXPECT_EQ(look().num_submissions, 0u);
+  EXPECT_TRUE(reason_to_pause(state_));
+}
+
+TEST_F(FactoryTest, CancelsWhatWaitsAlsoWhenItIsPaused) {
+  submit("1");
+  state_.num_failed_starts = 3;
+  view_.num_open_runs = 0;
+  EXPECT_THAT(look().cancelled, ElementsAre("1"));
+}
+
+TEST_F(FactoryTest, ReportsHowManyWorkersItWantsAndHas) {
+  config_.backlog = 2;
+  config_.workers_max = 3;
+  state_.rate_per_worker_hz = 1e-3;
+  submit("1");
+  submit("2");
+  run(0);
+  enter("1");
+  view_.workers.insert("stranger");
+  (void)look();
+  const wire::FactoryReport report = report_of(state_, config_, view_, now_);
+  EXPECT_EQ(report.name, "proofmass");
+  EXPECT_EQ(report.phase, wire::FactoryPhase::active);
+  EXPECT_EQ(report.num_wanted, 3u);
+  EXPECT_EQ(report.num_registered, 1u);
+  EXPECT_EQ(report.num_queued, 1u);
+  EXPECT_EQ(report.reason, "");
+}
+
+TEST_F(FactoryTest, ReportsWhyAndHowLongItWaits) {
+  fail_submission();
+  now_ += seconds(20);
+  const wire::FactoryReport report = report_of(state_, config_, view_, now_);
+  EXPECT_EQ(report.phase, wire::FactoryPhase::waiting);
+  EXPECT_EQ(report.wait_s, 40.0);
+  EXPECT_EQ(report.reason, "submission: sbatch: no such partition");
+  now_ += seconds(40);
+  EXPECT_EQ(report_of(state_, config_, view_, now_).phase, wire::FactoryPhase::active);
+}
+
+TEST_F(FactoryTest, ReportsWhyItIsPaused) {
+  for (int i = 0; i < 10; ++i) fail_submission();
+  const wire::FactoryReport report = report_of(state_, config_, view_, now_);
+  EXPECT_EQ(report.phase, wire::FactoryPhase::paused);
+  EXPECT_EQ(report.wait_s, 0.0);
+  EXPECT_EQ(report.reason, *reason_to_pause(state_));
 }
 
 }  // namespace

@@ -1,0 +1,72 @@
+// `proofmass factory` against a coordinator that the test plays.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <future>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/program.hpp"
+#include "coordinator/net/private_endpoint.hpp"
+#include "proto/wire/client_codec.hpp"
+#include "tests/coordinator/net/played_coordinator.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using testing::HasSubstr;
+
+/// Runs the command against the endpoint; its exit code.
+int exit_code_of_factory(const std::string& endpoint) {
+  std::vector<std::string> arguments{
+      "factory",      "--batch-system", "local", "--connect", endpoint, "--worker-connect",
+      "tcp://head:2", "--interval",     "1",     "--name",    "lone",   "--exit-when-done"};
+  std::ranges::reverse(arguments);  // As CLI11 takes them.
+  CLI::App app("", "proofmass");
+  Command chosen;
+  add_factory(app, chosen);
+  app.parse(arguments);
+  return chosen();
+}
+
+wire::StatusReply status_with(wire::CampaignPhase phase) {
+  wire::CampaignStatus campaign;
+  campaign.name = "a";
+  campaign.phase = phase;
+  campaign.num_runs = 1;
+  return {.version = "0", .model_version = "m", .campaigns = {campaign}, .num_campaigns = 1};
+}
+
+/// Answers one look as a coordinator does that does not know reports.
+void answer_look(test::PlayedCoordinator& coordinator, wire::CampaignPhase phase) {
+  const auto answer = [&](std::uint64_t id, const wire::ClientReply& reply) {
+    coordinator.answer(wire::encode(wire::ReplyPacket{id, reply}));
+  };
+  answer(coordinator.receive().id, status_with(phase));
+  answer(coordinator.receive().id, wire::WorkersReply{});
+  EXPECT_TRUE(std::holds_alternative<wire::FactoryReport>(coordinator.receive().request));
+  answer(0, wire::ErrorReply{"request = none (must be of a known kind)"});
+}
+
+TEST(FactoryLoop, GoesOnWithACoordinatorThatDoesNotKnowReports) {
+  const PrivateEndpoint endpoint;
+  test::PlayedCoordinator coordinator(endpoint.address());
+  testing::internal::CaptureStderr();
+  auto exit_code =
+      std::async(std::launch::async, [&] { return exit_code_of_factory(endpoint.address()); });
+  answer_look(coordinator, wire::CampaignPhase::paused);
+  answer_look(coordinator, wire::CampaignPhase::paused);
+  answer_look(coordinator, wire::CampaignPhase::finished);
+  EXPECT_EQ(exit_code.get(), exit_done);
+  const std::string log = testing::internal::GetCapturedStderr();
+  EXPECT_THAT(log, HasSubstr("report_refused reason=\"request = none (must be of a known kind)\""));
+  EXPECT_EQ(log.find("report_refused"), log.rfind("report_refused")) << log;
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
