@@ -205,20 +205,20 @@ class Cluster:
 class Site:
     """Where people of the cluster work: the programs in the PATH, a campaign file, a disk."""
 
-    def __init__(self, cluster, directory, programs):
+    def __init__(self, cluster, directory, programs, num_runs=5000):
         self.cluster = cluster
         self.directory = directory
         self.script = Path(__file__).resolve().parents[2] / "deploy/slurm/campaign.sbatch"
         (directory / "scratch").mkdir(parents=True)
         self.environment = {
             **cluster.environment,
-            "PATH": f"{programs}:{os.environ['PATH']}",
+            "PATH": f"{programs}:{cluster.environment['PATH']}",
             "TMPDIR": str(directory / "scratch"),
             "PROOFMASS_THREADS": "1",
         }
         self.proofmass("init", "paper.toml")
         text = (directory / "paper.toml").read_text()
-        for key, value in (("orbits", 2), ("sample_period_s", 1), ("runs", 5000)):
+        for key, value in (("orbits", 2), ("sample_period_s", 1), ("runs", num_runs)):
             text = re.sub(rf"^{key} = .*", f"{key} = {value}", text, flags=re.MULTILINE)
         (directory / "short.toml").write_text(text)
 
