@@ -1,7 +1,6 @@
 #include "coordinator/net/service_sockets.hpp"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <array>
 #include <cerrno>
@@ -141,14 +140,6 @@ void ServiceSockets::set_closing(bool is_closing) {
 std::vector<Event> ServiceSockets::take_notes() {
   const std::lock_guard lock(mutex_);
   return std::exchange(notes_, {});
-}
-
-void raise_descriptor_limit() {
-  rlimit limit{};
-  PROOFMASS_EXPECT(getrlimit(RLIMIT_NOFILE, &limit) == 0);
-  limit.rlim_cur = limit.rlim_max;
-  // Where even this is forbidden, the service has what it was given.
-  [[maybe_unused]] const int status = setrlimit(RLIMIT_NOFILE, &limit);
 }
 
 }  // namespace proofmass::coordinator
