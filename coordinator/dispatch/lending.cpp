@@ -49,6 +49,20 @@ std::uint64_t rounds_wanted(const State& state, CampaignId id, const CampaignSta
                                  std::min({rounds, by_share, rounds_with_room(state, campaign)}));
 }
 
+/// Runs of a campaign that a worker may hold if all of them together are not to deliver more than a
+/// coordinator can take: the part of its slots in all that.
+std::uint64_t share_of_intake(const State& state, CampaignId id, const CampaignState& campaign,
+                              const Worker& worker) {
+  const double known_s = run_time_s(campaign, id, worker);
+  const double time_s = known_s > 0.0 ? known_s : state.config.run_time_s_expected;
+  const double of_all = std::max(static_cast<double>(state.config.uncommitted_max),
+                                 2.0 * time_s * state.config.results_per_s_max);
+  const double fraction =
+      static_cast<double>(worker.num_slots) / static_cast<double>(state.num_slots);
+  const double limit = std::numeric_limits<std::uint32_t>::max();
+  return static_cast<std::uint64_t>(std::clamp(fraction * of_all, 1.0, limit));
+}
+
 /// True if the worker needs nothing yet: it would not run low before the next of its results.
 bool has_enough(const Worker& worker, std::uint64_t wanted) {
   const std::uint64_t two_rounds = 2 * static_cast<std::uint64_t>(worker.num_slots);
@@ -164,7 +178,8 @@ bool lend_of(State& state, WorkerId id, CampaignId campaign_id, TimePoint now, O
   if (!is_lent(campaign) || is_backed_up(state, campaign)) return false;
   Worker& worker = state.workers.at(id);
   const std::uint64_t wanted = std::min<std::uint64_t>(
-      worker.num_slots * rounds_wanted(state, campaign_id, campaign, worker), worker.num_runs_max);
+      {worker.num_slots * rounds_wanted(state, campaign_id, campaign, worker), worker.num_runs_max,
+       share_of_intake(state, campaign_id, campaign, worker)});
   if (has_enough(worker, wanted)) return true;
   const Borrower borrower{state, id, worker, campaign_id, campaign, wanted, now, outbox};
   lend_pending(borrower);

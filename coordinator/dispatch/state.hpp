@@ -52,6 +52,11 @@ struct DispatchConfig {
   /// more than two rounds; with half of it on the way to the store, nothing. A disk that is slower
   /// than the workers must not fill the memory.
   std::uint64_t uncommitted_max = 100'000;
+  /// Results that all workers together may be expected to deliver. Where they are faster, they hold
+  /// less than two rounds: what two take at this rate, or `uncommitted_max`. Results that arrive
+  /// faster than they can be stored delay heartbeats, and workers send them again.
+  double results_per_s_max = 30'000.0;
+  double run_time_s_expected = 5.0;  ///< Until a campaign's first result, for the same.
   /// A batch that finishes no orbit for this many times the usual time of one, and for at least
   /// `hung_after_min`, hangs.
   double hung_after_orbits = 50.0;

@@ -68,6 +68,24 @@ TEST_F(LendingTest, GivesNothingWhileTooManyResultsWaitForTheStore) {
       << "two rounds, however small the room";
 }
 
+TEST_F(LendingTest, GivesLessThanARoundIfResultsWouldComeFasterThanTheyCanBeTaken) {
+  state.config.uncommitted_max = 8;
+  state.config.results_per_s_max = 10.0;
+  state.config.run_time_s_expected = 0.5;
+  add_campaign(one, 1'000'000);
+  add_worker(first, 64);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 10}))
+      << "two rounds' time";
+  wire::ComputedRun result = computed(0);
+  result.elapsed_s = 2.0;
+  on_results(state, first, {.campaign = one, .attempt = {1}, .results = {result}}, now, outbox);
+  (void)outbox.take_stored();
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{10}, 31}));
+  EXPECT_EQ(runs_held_text(state, first), "1..40");
+  add_worker(second, 64);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{41}, 20})) << "half of it";
+}
+
 TEST_F(LendingTest, TakesNothingFromOthersForAWorkerThatWaitsForTheStore) {
   EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), "1..150");
   add_worker(second);
