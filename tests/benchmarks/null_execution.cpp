@@ -1,55 +1,133 @@
 #include "tests/benchmarks/null_execution.hpp"
 
-#include <array>
+#include <algorithm>
+#include <limits>
 #include <utility>
 
+#include "core/math/hash.hpp"
 #include "core/runs.hpp"
 #include "tests/benchmarks/null_result.hpp"
 
 namespace proofmass::test {
+namespace {
+
+constexpr std::size_t batch_size = 16;
+constexpr int num_orbits = 140;  ///< Of a run of the paper's campaign.
+
+std::vector<RunRange> ranges_of_requests(const std::vector<RunRequest>& requests) {
+  std::vector<RunIndex> runs;
+  for (const RunRequest& request : requests) runs.push_back(request.run);
+  std::ranges::sort(runs);
+  return ranges_of(runs);
+}
+
+}  // namespace
 
 void NullExecution::define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) {
   seeds_[campaign] = definition->seed;
-  const auto waiting = waiting_.extract(campaign);
-  if (waiting.empty()) return;
-  for (const RunIndex run : waiting.mapped()) finish(campaign, run);
+  advance(now_);
 }
 
 void NullExecution::submit(wire::RunLease lease) {
-  for (const RunIndex run : indices_of(std::array{lease.runs})) {
-    if (is_defined(lease.campaign)) {
-      finish(lease.campaign, run);
-    } else {
-      waiting_[lease.campaign].insert(run);
+  waiting_.add(lease);
+  advance(now_);
+}
+
+void NullExecution::advance(TimePoint now) {
+  now_ = now;
+  std::erase_if(batches_, [&](const auto& entry) {
+    const Batch& batch = entry.second;
+    if (batch.due_at > now) return false;
+    finish(batch.assignment,
+           std::chrono::duration<double>(batch.due_at - batch.started_at).count());
+    return true;
+  });
+  begin_batches(now);
+  note_due();
+}
+
+void NullExecution::begin_batches(TimePoint now) {
+  const auto is_known = [&](wire::CampaignId campaign) { return is_defined(campaign); };
+  const bool takes_time = pace_.batch_time_s > 0.0;
+  const std::size_t size_max = takes_time ? batch_size : std::numeric_limits<std::size_t>::max();
+  while (batches_.size() < pace_.num_threads) {
+    worker::Assignment assignment = waiting_.take(size_max, is_known);
+    if (assignment.requests.empty()) return;
+    if (!takes_time) {
+      finish(assignment, pace_.elapsed_s);
+      continue;
     }
+    const std::uint64_t number = ++num_batches_;
+    batches_[number] = {.assignment = std::move(assignment),
+                        .started_at = now,
+                        .due_at = now + time_of_batch(number)};
+  }
+}
+
+worker::Duration NullExecution::time_of_batch(std::uint64_t number) const {
+  const double factor = 0.9 + 0.2 * fraction_of(mixed(number));
+  return std::chrono::duration_cast<worker::Duration>(
+      std::chrono::duration<double>(factor * pace_.batch_time_s));
+}
+
+void NullExecution::note_due() {
+  due_at_.reset();
+  for (const auto& [number, batch] : batches_) {
+    due_at_ = std::min(due_at_.value_or(batch.due_at), batch.due_at);
   }
 }
 
 std::vector<RunIndex> NullExecution::drop_waiting(wire::CampaignId campaign,
                                                   std::span<const RunRange> ranges) {
-  std::vector<RunIndex> dropped;
-  const auto waiting = waiting_.find(campaign);
-  if (waiting == waiting_.end()) return dropped;
-  for (const RunIndex run : indices_of(ranges)) {
-    if (waiting->second.erase(run) > 0) dropped.push_back(run);
-  }
-  return dropped;
+  return waiting_.drop(campaign, ranges);
 }
 
+bool NullExecution::drop_batch(std::uint64_t number) { return batches_.erase(number) > 0; }
+
 void NullExecution::forget(wire::CampaignId campaign) {
-  waiting_.erase(campaign);
+  waiting_.drop(campaign);
   seeds_.erase(campaign);
+  std::erase_if(batches_,
+                [&](const auto& entry) { return entry.second.assignment.campaign == campaign; });
   std::erase_if(finished_, [&](const auto& run) { return run.campaign == campaign; });
+}
+
+void NullExecution::abandon() {
+  waiting_.clear();
+  batches_.clear();
 }
 
 std::vector<worker::FinishedRun> NullExecution::take_finished() {
   return std::exchange(finished_, {});
 }
 
-void NullExecution::finish(wire::CampaignId campaign, RunIndex run) {
-  finished_.push_back(
-      {.campaign = campaign,
-       .computed = {.result = null_result(seeds_.at(campaign), run), .elapsed_s = elapsed_s_}});
+std::vector<worker::RunningBatch> NullExecution::computing() const {
+  std::vector<worker::RunningBatch> running;
+  for (const auto& [number, batch] : batches_) {
+    running.push_back(
+        {.number = number,
+         .progress = {.campaign = batch.assignment.campaign,
+                      .ranges = ranges_of_requests(batch.assignment.requests),
+                      .num_orbits_done = static_cast<std::uint32_t>(num_orbits_done(batch))},
+         .time_left = std::max(worker::Duration::zero(), batch.due_at - now_)});
+  }
+  return running;
+}
+
+int NullExecution::num_orbits_done(const Batch& batch) const {
+  const double fraction = std::chrono::duration<double>(now_ - batch.started_at) /
+                          std::chrono::duration<double>(batch.due_at - batch.started_at);
+  return static_cast<int>(num_orbits * std::clamp(fraction, 0.0, 1.0));
+}
+
+void NullExecution::finish(const worker::Assignment& assignment, double elapsed_s) {
+  const std::uint64_t seed = seeds_.at(assignment.campaign);
+  for (const RunRequest& request : assignment.requests) {
+    finished_.push_back(
+        {.campaign = assignment.campaign,
+         .computed = {.result = null_result(seed, request.run), .elapsed_s = elapsed_s}});
+  }
+  num_orbits_done_ += assignment.requests.size() * num_orbits;
 }
 
 }  // namespace proofmass::test

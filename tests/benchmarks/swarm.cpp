@@ -1,4 +1,5 @@
-// Many workers in one process, whose runs cost nothing: what a coordinator has to bear.
+// Many workers in one process, whose runs compute nothing: what a coordinator has to bear. With
+// --batch-time-s runs take the time of real ones.
 //
 // Prints a line of JSON once all workers are registered, and one each second from then on; ends
 // when the coordinator has told all of them to. With --idle there are connections beside them of
@@ -18,10 +19,12 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
+#include <string>
 #include <system_error>
 #include <vector>
 #include <zmq.hpp>
@@ -48,6 +51,7 @@ struct SwarmOptions {
   test::SwarmWorkerConfig worker;
   std::optional<std::filesystem::path> keys;
   int num_workers = 1000;
+  int first_number = 0;  ///< Of the names; each of several swarms has its own.
   int num_idle = 0;
   int num_replaced = 0;  ///< Of the idle ones, each second.
 };
@@ -87,6 +91,15 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// How many there are of each whole number of milliseconds.
+std::map<std::string, std::uint64_t> by_ms(const std::vector<double>& values_s) {
+  std::map<std::string, std::uint64_t> counts;
+  for (const double value_s : values_s) {
+    ++counts[std::to_string(std::max(0L, static_cast<long>(1e3 * value_s)))];
+  }
+  return counts;
 }
 
 /// Connections that say nothing.
@@ -137,7 +150,9 @@ class Swarm {
         context_(context_for(options)),
         idle_(context_, options) {
     if (epoll_ < 0) throw std::system_error(errno, std::generic_category(), "epoll_create1");
-    for (int i = 0; i < options.num_workers; ++i) add_worker(options.worker, i);
+    for (int i = 0; i < options.num_workers; ++i) {
+      add_worker(options.worker, options.first_number + i);
+    }
   }
 
   ~Swarm() { close(epoll_); }
@@ -148,6 +163,7 @@ class Swarm {
     while (!is_over()) {
       wait();
       const TimePoint now = time_now();
+      finish_runs(now);
       if (now >= tick_at_) tick(now);
       if (report_at_ && now >= *report_at_) report(now);
     }
@@ -185,6 +201,12 @@ class Swarm {
     }
   }
 
+  void finish_runs(TimePoint now) {
+    for (const auto& worker : workers_) {
+      if (!worker->has_ended() && worker->is_due(now)) worker->on_due(now);
+    }
+  }
+
   void tick(TimePoint now) {
     tick_at_ = now + tick_interval;
     for (const auto& worker : workers_) {
@@ -206,8 +228,10 @@ class Swarm {
                                 {"num_results", count_.num_results},
                                 {"num_acknowledged", count_.num_acknowledged},
                                 {"num_rejects", count_.num_rejects},
+                                {"num_retracts", count_.num_retracts},
                                 {"num_unsent", count_.num_unsent},
                                 {"num_heartbeats_answered", count_.heartbeat_answers_s.size()},
+                                {"heartbeat_answers_by_ms", by_ms(count_.heartbeat_answers_s)},
                                 {"heartbeat_answer_s_max", largest(count_.heartbeat_answers_s)},
                                 {"heartbeat_unanswered_s_max", unanswered_s_max(now)},
                                 {"acknowledgement_s_median", median(count_.acknowledgements_s)},
@@ -241,7 +265,7 @@ class Swarm {
 };
 
 int run(int argc, char** argv) {
-  CLI::App app("Many workers in one process, whose runs cost nothing.", "proofmass-swarm");
+  CLI::App app("Many workers in one process, whose runs compute nothing.", "proofmass-swarm");
   SwarmOptions options;
   app.add_option("--connect", options.worker.endpoint, "Address of the coordinator")->required();
   app.add_option("--workers", options.num_workers, "How many")->check(CLI::Range(0, 4096));
@@ -253,7 +277,14 @@ int run(int argc, char** argv) {
   app.add_option("--slots", options.worker.num_slots, "Of each")->check(CLI::Range(1, 4096));
   app.add_option("--runs-held", options.worker.runs_held_max, "Most runs that each has at a time")
       ->check(CLI::Range(1, 4096));
-  app.add_option("--elapsed-s", options.worker.elapsed_s, "What they say that a run takes")
+  app.add_option("--elapsed-s", options.worker.elapsed_s,
+                 "What they say that a run takes that takes no time")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option(
+         "--batch-time-s", options.worker.batch_time_s,
+         "Time of a batch of 16 runs, of which each has one for 16 slots; 0: runs take none")
+      ->check(CLI::Range(0.0, 3600.0));
+  app.add_option("--first-number", options.first_number, "Of the workers' names")
       ->check(CLI::NonNegativeNumber);
   CLI11_PARSE(app, argc, argv);
   raise_descriptor_limit();

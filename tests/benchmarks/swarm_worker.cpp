@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 #include <variant>
 
 #include "proto/link/socket.hpp"
@@ -13,6 +14,13 @@ namespace {
 
 /// One run in so many is timed: enough, and cheap.
 constexpr std::uint64_t timed_run_step = 16;
+constexpr std::size_t runs_per_batch = 16;
+
+NullPace pace_of(const SwarmWorkerConfig& config) {
+  return {.batch_time_s = config.batch_time_s,
+          .num_threads = (config.num_slots + runs_per_batch - 1) / runs_per_batch,
+          .elapsed_s = config.elapsed_s};
+}
 
 zmq::socket_t connected_dealer(zmq::context_t& context, const SwarmWorkerConfig& config) {
   zmq::socket_t socket = wire::make_dealer(context, config.security);
@@ -27,7 +35,7 @@ SwarmWorker::SwarmWorker(zmq::context_t& context, const SwarmWorkerConfig& confi
                          TimePoint now)
     : runs_held_max_(config.runs_held_max),
       count_(count),
-      execution_(config.elapsed_s),
+      execution_(pace_of(config)),
       socket_(connected_dealer(context, config)),
       conversation_(
           session, std::move(hello), execution_,
@@ -36,12 +44,8 @@ SwarmWorker::SwarmWorker(zmq::context_t& context, const SwarmWorkerConfig& confi
 int SwarmWorker::descriptor() { return socket_.get(zmq::sockopt::fd); }
 
 void SwarmWorker::serve(TimePoint now) {
-  // Reading the events takes in what the descriptor has announced; it announces each thing once.
-  const int events = socket_.get(zmq::sockopt::events);
-  if (!is_connected_ && (events & ZMQ_POLLOUT) != 0) {
-    is_connected_ = true;
-    conversation_.on_connected(now);
-  }
+  execution_.advance(now);
+  note_connection(now);
   zmq::message_t frame;
   while (!has_ended() && socket_.recv(frame, zmq::recv_flags::dontwait)) {
     receive(frame.to_string_view(), now);
@@ -54,6 +58,20 @@ void SwarmWorker::on_tick(TimePoint now) {
   serve(now);
 }
 
+void SwarmWorker::on_due(TimePoint now) {
+  execution_.advance(now);
+  if (execution_.has_finished()) conversation_.on_progress(now);
+}
+
+/// Reading the events takes in what the descriptor has announced; it announces each thing once. A
+/// socket that cannot be written to has lost its connection: no queue of a swarm is ever full.
+void SwarmWorker::note_connection(TimePoint now) {
+  const bool is_connected = (socket_.get(zmq::sockopt::events) & ZMQ_POLLOUT) != 0;
+  if (is_connected == std::exchange(is_connected_, is_connected)) return;
+  heartbeats_.clear();  // Nobody will answer those.
+  if (is_connected) conversation_.on_connected(now);
+}
+
 std::optional<worker::Duration> SwarmWorker::unanswered_for(TimePoint now) const {
   if (heartbeats_.empty()) return std::nullopt;
   return now - heartbeats_.front();
@@ -63,13 +81,15 @@ void SwarmWorker::send(wire::Packet packet) {
   const TimePoint now = time_now();
   if (auto* const heartbeat = std::get_if<wire::Heartbeat>(&packet.message)) {
     heartbeat->num_runs_max = std::min(heartbeat->num_runs_max, runs_held_max_);
-    heartbeats_.push_back(now);
   }
+  const bool is_heartbeat = std::holds_alternative<wire::Heartbeat>(packet.message);
   if (const auto* const batch = std::get_if<wire::ResultBatch>(&packet.message)) {
     note_sent(*batch, now);
   }
   if (!socket_.send(zmq::buffer(wire::encode(packet)), zmq::send_flags::dontwait)) {
     ++count_.num_unsent;
+  } else if (is_heartbeat) {
+    heartbeats_.push_back(now);
   }
 }
 
@@ -80,7 +100,11 @@ void SwarmWorker::receive(std::string_view bytes, TimePoint now) {
   }
   const auto& packet = std::get<wire::Packet>(decoded);
   if (std::holds_alternative<wire::RunLease>(packet.message)) ++count_.num_leases;
-  if (std::holds_alternative<wire::Reject>(packet.message)) ++count_.num_rejects;
+  if (std::holds_alternative<wire::Retract>(packet.message)) ++count_.num_retracts;
+  if (std::holds_alternative<wire::Reject>(packet.message)) {
+    ++count_.num_rejects;
+    heartbeats_.clear();  // The answer to one of them.
+  }
   if (const auto* const ack = std::get_if<wire::ResultAck>(&packet.message)) {
     note_acknowledged(*ack, now);
   }

@@ -29,6 +29,7 @@ struct SwarmCount {
   std::uint64_t num_results = 0;       ///< Runs, repetitions included.
   std::uint64_t num_acknowledged = 0;  ///< Runs.
   std::uint64_t num_rejects = 0;
+  std::uint64_t num_retracts = 0;           ///< Messages that ask runs back.
   std::uint64_t num_unsent = 0;             ///< Messages for which there was no room.
   std::vector<double> heartbeat_answers_s;  ///< From each heartbeat to its answer.
   /// From a result to its acknowledgement; of one in sixteen.
@@ -41,11 +42,12 @@ struct SwarmWorkerConfig {
   wire::ClientSecurity security;
   std::uint32_t num_slots = 1;
   std::uint32_t runs_held_max = wire::runs_per_lease_max;  ///< It wants no more at a time.
-  double elapsed_s = 0.0;  ///< What it says that a run takes. It takes no time.
+  double elapsed_s = 0.0;     ///< What it says that a run takes that takes no time.
+  double batch_time_s = 0.0;  ///< Time of 16 runs, one thread for each 16 slots; 0: no time.
 };
 
-/// A worker whose runs cost nothing and that shares its process and thread with many: the product's
-/// side of the protocol on a socket of its own.
+/// A worker whose runs compute nothing and that shares its process and thread with many: the
+/// product's side of the protocol on a socket of its own.
 class SwarmWorker {
  public:
   using TimePoint = worker::TimePoint;
@@ -62,6 +64,11 @@ class SwarmWorker {
   void serve(TimePoint now);
   /// To be called some times a second.
   void on_tick(TimePoint now);
+  /// True if runs are to be finished by then: on_due() is to be called.
+  [[nodiscard]] bool is_due(TimePoint now) const {
+    return execution_.due_at() && *execution_.due_at() <= now;
+  }
+  void on_due(TimePoint now);
 
   [[nodiscard]] bool is_registered() const { return conversation_.is_registered(); }
   [[nodiscard]] bool has_ended() const { return conversation_.ending().has_value(); }
@@ -71,6 +78,7 @@ class SwarmWorker {
  private:
   using RunKey = std::pair<wire::CampaignId, RunIndex>;
 
+  void note_connection(TimePoint now);
   void send(wire::Packet packet);
   void receive(std::string_view bytes, TimePoint now);
   void note_sent(const wire::ResultBatch& batch, TimePoint now);
