@@ -1,0 +1,198 @@
+#!/usr/bin/env python3
+"""Computes a campaign in two ways that deploy/README.md describes, each of which must end with the
+digest of `proofmass run`:
+
+- all connections, with keys, pass through forwarders of TCP, as ssh -L makes them;
+- the workers are started by deploy/dask_workers.py on the two workers of a Dask cluster.
+
+Needs Debian's python3-distributed. Exit code 0 if all holds, 1 if not; 77 if it cannot run, but 1 if
+the environment has CI.
+"""
+
+import argparse
+import json
+import os
+import re
+import socket
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
+PYTHON = "/usr/bin/python3"  # Debian's, for which its packages are.
+NUM_RUNS = 64
+SHORTEN = {"orbits": 1, "sample_period_s": 1, "runs": NUM_RUNS}
+PATIENCE_S = 120
+
+
+def wait_until(what, holds):
+    end = time.monotonic() + PATIENCE_S
+    while not holds():
+        if time.monotonic() > end:
+            raise AssertionError(f"{what} did not come in {PATIENCE_S} s")
+        time.sleep(0.05)
+
+
+class Forwarder:
+    """Passes on what comes to a port of its own, in both directions."""
+
+    def __init__(self, port):
+        self.target = ("127.0.0.1", port)
+        self.num_connections = 0
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self.listener.getsockname()[1]
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def accept(self):
+        while True:
+            near = self.listener.accept()[0]
+            try:
+                far = socket.create_connection(self.target)
+            except OSError:
+                near.close()
+                continue
+            self.num_connections += 1
+            for source, sink in ((near, far), (far, near)):
+                threading.Thread(target=self.copy, args=(source, sink), daemon=True).start()
+
+    @staticmethod
+    def copy(source, sink):
+        try:
+            while data := source.recv(65536):
+                sink.sendall(data)
+        except OSError:
+            pass
+        for end in (source, sink):
+            try:
+                end.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass  # The other direction has ended it.
+
+
+class Campaign:
+    """A coordinator with keys on loopback, without any campaign yet."""
+
+    def __init__(self, programs, directory):
+        self.directory = directory
+        self.environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}"}
+        self.processes = []
+        self.command("proofmass", "keygen", "keys")
+        self.command("proofmass", "init", "paper.toml")
+        text = (directory / "paper.toml").read_text()
+        for key, value in SHORTEN.items():
+            text = re.sub(rf"\n{key} = .*", f"\n{key} = {value}", text)
+        (directory / "short.toml").write_text(text)
+        self.start("coordinator", "proofmass-coordinator", "--directory", "served", "--keys", "keys",
+                   "--bind", "tcp://127.0.0.1:*", "--bind-clients", "tcp://127.0.0.1:*")
+        log = directory / "coordinator.log"
+        wait_until("coordinator", lambda: "coordinator_started" in log.read_text())
+        self.worker_port, self.client_port = map(int, re.search(
+            r"bind=\S+:(\d+) bind_clients=\S+:(\d+)", log.read_text()).groups())
+
+    def command(self, *words):
+        done = subprocess.run(words, cwd=self.directory, env=self.environment, text=True,
+                              capture_output=True, check=False)
+        if done.returncode != 0:
+            raise AssertionError(f"{' '.join(words)}: {done.returncode}: {done.stderr}")
+        return done.stdout
+
+    def start(self, name, *words):
+        with open(self.directory / f"{name}.log", "wb") as log:
+            self.processes.append(subprocess.Popen(words, cwd=self.directory, stdout=log,
+                                                   stderr=log, env=self.environment))
+        return self.processes[-1]
+
+    def ask(self, port, *words):
+        return self.command("proofmass", *words, "--keys", "keys", "--connect",
+                            f"tcp://127.0.0.1:{port}")
+
+    def submit(self, port, name):
+        self.ask(port, "submit", "short.toml", "--name", name)
+
+    def wait_for_end(self, port, name):
+        def is_finished():
+            campaigns = json.loads(self.ask(port, "status", "--json"))["campaigns"]
+            return any(one["name"] == name and one["phase"] == "finished" for one in campaigns)
+        wait_until(f"end of {name}", is_finished)
+
+    def digest(self, file):
+        return json.loads(self.command("proofmass", "report", file, "--json"))["digest"]
+
+    def num_workers(self, name):
+        """Those that delivered results of a campaign."""
+        with sqlite3.connect(self.directory / "served" / f"{name}.db") as database:
+            return database.execute(
+                "SELECT count(*) FROM worker WHERE num_results > 0").fetchone()[0]
+
+    def close(self):
+        for process in reversed(self.processes):
+            process.terminate()
+            process.wait(PATIENCE_S)
+
+
+def check_tunnel(campaign):
+    workers, clients = Forwarder(campaign.worker_port), Forwarder(campaign.client_port)
+    worker = campaign.start("tunnel-worker", "proofmass-worker", "--threads", "1", "--keys", "keys",
+                            "--connect", f"tcp://127.0.0.1:{workers.port}", "--idle-timeout", "2")
+    campaign.submit(clients.port, "tunnel")
+    campaign.wait_for_end(clients.port, "tunnel")
+    assert worker.wait(PATIENCE_S) == 0, "the worker's exit code"
+    assert workers.num_connections == 1 and clients.num_connections >= 2, "the forwarders were used"
+
+
+def check_dask(campaign):
+    port = socket.create_server(("127.0.0.1", 0)).getsockname()[1]
+    campaign.start("scheduler", "dask-scheduler", "--host", "127.0.0.1", "--port", str(port),
+                   "--no-dashboard")
+    for number in (1, 2):
+        campaign.start(f"dask-{number}", "dask-worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1",
+                       "--no-dashboard", "--local-directory", str(campaign.directory))
+    for number in (1, 2):
+        log = campaign.directory / f"dask-{number}.log"
+        wait_until("dask-worker", lambda log=log: "Registered to" in log.read_text())
+    recipe = campaign.start("recipe", PYTHON, str(DEPLOY / "dask_workers.py"),
+                            f"tcp://127.0.0.1:{port}", "--connect",
+                            f"tcp://127.0.0.1:{campaign.worker_port}", "--keys",
+                            str(campaign.directory / "keys"), "--threads", "1", "--idle-timeout", "5")
+    log = campaign.directory / "coordinator.log"
+    before = 1  # The worker behind the tunnel.
+    wait_until("workers", lambda: log.read_text().count("worker_registered") == before + 2)
+    campaign.submit(campaign.client_port, "dask")
+    campaign.wait_for_end(campaign.client_port, "dask")
+    assert recipe.wait(PATIENCE_S) == 0, "the exit code of dask_workers.py"
+    assert campaign.num_workers("dask") == 2, "both workers delivered"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--programs", type=Path, required=True, help="directory of the programs")
+    programs = parser.parse_args().programs.resolve()
+    if subprocess.run([PYTHON, "-c", "import distributed"], capture_output=True,
+                      check=False).returncode != 0:
+        print("no python3-distributed (deploy/install-deps.sh installs it)", file=sys.stderr)
+        return 1 if "CI" in os.environ else 77
+    with tempfile.TemporaryDirectory(prefix="cluster_check.") as directory:
+        campaign = Campaign(programs, Path(directory))
+        try:
+            check_tunnel(campaign)
+            check_dask(campaign)
+            campaign.command("proofmass", "run", "short.toml", "--db", "alone.db")
+            alone = campaign.digest("alone.db")
+            for name in ("tunnel", "dask"):
+                assert campaign.digest(f"served/{name}.db") == alone, f"the digest of {name}"
+        except AssertionError:
+            for log in sorted(Path(directory).glob("*.log")):
+                print(f"{log.name}:\n{log.read_text()[-3000:]}", file=sys.stderr)
+            raise
+        finally:
+            campaign.close()
+    print("tunnel and Dask: the digest of `proofmass run`")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
