@@ -142,9 +142,11 @@ void settle_foreign(State& state, WorkerId id, CampaignId campaign_id, HeldByAtt
   state.workers.at(id).unleased[campaign_id] = std::move(foreign);
 }
 
-/// Runs that the worker was lent long ago and does not hold have not arrived.
+/// Runs that the worker was lent long ago and does not hold have not arrived, unless its heartbeat
+/// has waited here to be read and is older than the lease.
 void settle_missing(State& state, WorkerId id, const std::map<CampaignId, RunSet>& held,
                     TimePoint now, Outbox& outbox) {
+  if (state.is_behind) return;
   const std::set<LeaseId> leases = state.workers.at(id).leases;
   for (const LeaseId lease_id : leases) {
     const auto lease_found = state.leases.find(lease_id);

@@ -44,6 +44,8 @@ struct DispatchConfig {
   Duration heartbeat_interval = std::chrono::seconds(5);  ///< Asked of every worker.
   Duration suspect_after = std::chrono::seconds(15);  ///< Of silence; then nothing more is lent.
   Duration lost_after = std::chrono::seconds(60);     ///< Of silence; then runs are lent again.
+  /// The same while the coordinator is behind with reading: what seems silent may wait to be heard.
+  Duration lost_after_if_behind = std::chrono::minutes(10);
   /// Runs that a heartbeat does not list, this long after they were lent, did not arrive. Longer
   /// than a message and its answer ever take while the worker is not suspect.
   Duration arrival_max = std::chrono::seconds(12);
@@ -250,6 +252,9 @@ struct State {
   TimePoint awaited_until{};
   bool is_lending = true;   ///< False once the service ends, ...
   bool is_stopped = false;  ///< ... and this is true if it does not even wait for results.
+  /// Messages of workers have arrived that have not been handled. Set by the caller: then silence,
+  /// and what heartbeats do not say, proves little.
+  bool is_behind = false;
   double hello_allowance = 0.0;
   TimePoint hello_allowance_at{};
 };

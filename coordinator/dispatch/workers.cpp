@@ -325,14 +325,17 @@ void on_gone(State& state, WorkerId id, LossReason reason, TimePoint now, Outbox
 
 void on_tick(State& state, TimePoint now, Outbox& outbox) {
   if (!state.awaited.empty() && now >= state.awaited_until) state.awaited.clear();
+  const Duration lost_after =
+      state.is_behind ? state.config.lost_after_if_behind : state.config.lost_after;
   std::vector<WorkerId> silent;
   std::vector<std::pair<WorkerId, wire::ComputedBatch>> hung;
   for (const auto& [id, worker] : state.workers) {
-    if (now - worker.heard_at >= state.config.lost_after) {
+    if (now - worker.heard_at >= lost_after) {
       silent.push_back(id);
-    } else if (const auto* const batch = detail::hung_batch(state, worker, now)) {
-      hung.emplace_back(id, *batch);
+      continue;
     }
+    const auto* const batch = state.is_behind ? nullptr : detail::hung_batch(state, worker, now);
+    if (batch != nullptr) hung.emplace_back(id, *batch);
   }
   // All of them go before anything is lent again, or one would be lent what another lost.
   for (const WorkerId id : silent) part_with(state, id, LossReason::silent, outbox);

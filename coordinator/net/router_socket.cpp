@@ -62,9 +62,10 @@ std::optional<wire::SocketEvent> RouterSocket::take_event() {
   return events_ == nullptr ? std::nullopt : events_->take();
 }
 
-void RouterSocket::receive(int count_max, TimePoint now,
-                           const std::function<void(const Incoming&)>& handle) {
-  for (int i = 0; i < count_max; ++i) {
+int RouterSocket::receive(int count_max, TimePoint now,
+                          const std::function<void(const Incoming&)>& handle) {
+  int count = 0;
+  for (; count < count_max; ++count) {
     const std::optional<Received> received = next();
     if (!received) break;
     if (!faults_ || received->frames.size() != 1) {
@@ -75,6 +76,7 @@ void RouterSocket::receive(int count_max, TimePoint now,
     faults_->receiving.pass(received->from.routing_id, received->frames.front().to_string(), now);
   }
   if (faults_) pass_due(now, handle);
+  return count;
 }
 
 bool RouterSocket::send(const std::string& routing_id, const std::string& bytes, TimePoint now) {

@@ -50,7 +50,8 @@ class RouterSocket {
   [[nodiscard]] std::optional<wire::SocketEvent> take_event();
 
   /// Hands the next messages to `handle`, as many as there are and at most `count_max`.
-  void receive(int count_max, TimePoint now, const std::function<void(const Incoming&)>& handle);
+  /// @return Their number.
+  int receive(int count_max, TimePoint now, const std::function<void(const Incoming&)>& handle);
 
   /// False if the peer is gone or its queue is full, or the socket is closed.
   bool send(const std::string& routing_id, const std::string& bytes, TimePoint now);

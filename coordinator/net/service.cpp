@@ -279,10 +279,11 @@ class Service::Impl final : public Outbox {
   }
 
   void receive_from_workers() {
-    sockets_.receive_from_workers(
+    const int count = sockets_.receive_from_workers(
         worker_messages_per_turn_max, now(), [this](const Incoming& message) {
           guarded("worker", [&] { worker_gateway_.receive(message, now(), *this); });
         });
+    state_.is_behind = count == worker_messages_per_turn_max;
   }
 
   void receive_from_clients() {

@@ -89,12 +89,12 @@ void ServiceSockets::serve(TimePoint now) {
   for (const Event& event : take_notes()) log_(event);
 }
 
-void ServiceSockets::receive_from_workers(int count_max, TimePoint now, const Handle& handle) {
-  workers_->receive(count_max, now, handle);
+int ServiceSockets::receive_from_workers(int count_max, TimePoint now, const Handle& handle) {
+  return workers_->receive(count_max, now, handle);
 }
 
 void ServiceSockets::receive_from_clients(int count_max, TimePoint now, const Handle& handle) {
-  if (clients_ != nullptr) clients_->receive(count_max, now, handle);
+  if (clients_ != nullptr) (void)clients_->receive(count_max, now, handle);
 }
 
 bool ServiceSockets::send_to_worker(const std::string& routing_id, const std::string& bytes,

@@ -52,7 +52,8 @@ class ServiceSockets {
   void serve(TimePoint now);
 
   /// Hands the next messages to `handle`, as many as there are and at most `count_max`.
-  void receive_from_workers(int count_max, TimePoint now, const Handle& handle);
+  /// @return Their number.
+  int receive_from_workers(int count_max, TimePoint now, const Handle& handle);
   void receive_from_clients(int count_max, TimePoint now, const Handle& handle);
 
   /// False if the peer is gone, its queue is full, or the sockets are closed at the moment.

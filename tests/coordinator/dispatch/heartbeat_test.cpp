@@ -35,6 +35,15 @@ TEST_F(HeartbeatTest, ALeaseThatNeverArrivedIsLentAgain) {
   EXPECT_EQ(again.attempt, Attempt{2});
 }
 
+TEST_F(HeartbeatTest, ALeaseIsNotMissedInAHeartbeatThatHasWaited) {
+  lend_one();
+  state.is_behind = true;
+  now += 12s;
+  heartbeat(first);
+  EXPECT_EQ(state.leases.size(), 1U);
+  outbox.expect_nothing_more();
+}
+
 TEST_F(HeartbeatTest, ALeaseThatIsHeldStays) {
   lend_one();
   now += 1h;

@@ -168,6 +168,34 @@ TEST_F(WorkerTest, ThatIsSilentLosesItsRunsWhichAreLentAgainUnderAHigherAttempt)
   EXPECT_EQ(lease.attempt, Attempt{2});
 }
 
+TEST_F(WorkerTest, ThatSeemsSilentMayWaitToBeHeard) {
+  begin();
+  add_campaign(one, 1);
+  add_worker(first);
+  (void)outbox.take_sent<wire::RunLease>(first);
+  state.is_behind = true;
+  now += 599s;
+  on_tick(state, now, outbox);
+  outbox.expect_nothing_more();
+  now += 1s;
+  on_tick(state, now, outbox);
+  EXPECT_FALSE(state.workers.contains(first)) << "others that never stop talking change nothing";
+  outbox.forget();
+}
+
+TEST_F(WorkerTest, ThatSeemsSilentIsLostOnceAllIsHeard) {
+  begin();
+  add_worker(first);
+  state.is_behind = true;
+  now += 60s;
+  on_tick(state, now, outbox);
+  EXPECT_TRUE(state.workers.contains(first));
+  state.is_behind = false;
+  on_tick(state, now, outbox);
+  EXPECT_FALSE(state.workers.contains(first));
+  outbox.forget();
+}
+
 TEST_F(WorkerTest, ALossIsRecordedAndLogged) {
   begin();
   add_campaign(one, 1);
