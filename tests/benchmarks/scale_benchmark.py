@@ -5,8 +5,8 @@ coordinator that is killed while all of them are connected.
 Usage: scale_benchmark.py BIN_DIRECTORY [options]
 
 The workers are those of proofmass-swarm, whose runs take the time of real ones and compute nothing.
-They have keys and connect over TCP. Prints a line of JSON for each phase. Exit code 1 if a limit is
-missed. The campaign database is written below --directory, which should be on a disk.
+They have keys, unless told otherwise, and connect over TCP. Prints a line of JSON for each phase. Exit
+code 1 if a limit is missed. The campaign database is written below --directory, on a disk.
 """
 
 import argparse
@@ -55,6 +55,7 @@ class Fleet:
         self.port = free_port()
         self.clients = f"ipc://{directory}/clients"
         self.agents, self.idle = [], []
+        self.keys = [] if options.without_keys else ["--keys", directory / "keys"]
         self.proofmass("keygen", "keys")
         self.coordinator = self.start_coordinator()
 
@@ -63,21 +64,19 @@ class Fleet:
                               cwd=self.directory, capture_output=True, text=True, check=False)
 
     def ask(self, *command):
-        return self.proofmass(*command, "--connect", self.clients, "--keys", "keys", "--timeout", 60)
+        return self.proofmass(*command, "--connect", self.clients, *self.keys, "--timeout", 60)
 
     def start_coordinator(self):
         coordinator = Program(
             [self.binaries / "proofmass-coordinator", "--directory", self.directory / "served",
-             "--keys", self.directory / "keys", "--bind", f"tcp://127.0.0.1:{self.port}",
-             "--bind-clients", self.clients, "--log-format", "json"], "stderr")
+             "--bind", f"tcp://127.0.0.1:{self.port}", "--bind-clients", self.clients,
+             "--log-format", "json", *self.keys], "stderr")
         coordinator.wait_for(lambda line: line["event"] == "coordinator_started")
         return coordinator
 
     def start_swarm(self, *arguments):
-        # On machines of their own they would leave the coordinator's processors alone.
-        return Program(["nice", "-n", "10", self.binaries / "proofmass-swarm", "--connect",
-                        f"tcp://127.0.0.1:{self.port}", "--keys", self.directory / "keys",
-                        *map(str, arguments)], "stdout")
+        return Program([self.binaries / "proofmass-swarm", "--connect",
+                        f"tcp://127.0.0.1:{self.port}", *self.keys, *map(str, arguments)], "stdout")
 
     def add_agents(self, count):
         for first in range(0, count, AGENTS_PER_PROCESS):
@@ -289,6 +288,8 @@ def read_options():
     parser.add_argument("--idle", type=int, default=8000, help="connections beside the workers")
     parser.add_argument("--runs", type=int, default=2_000_000, help="in each of three phases")
     parser.add_argument("--rest-s", type=float, default=10.0, help="how long nothing is computed")
+    parser.add_argument("--without-keys", action="store_true",
+                        help="nothing is encrypted: a handshake with keys costs both sides time")
     parser.add_argument("--directory", type=pathlib.Path, help="for the campaign database")
     return parser.parse_args()
 
