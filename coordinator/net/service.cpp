@@ -162,7 +162,7 @@ class Service::Impl final : public Outbox {
          .kind = "few_descriptors",
          .fields = {{"limit", descriptors_max},
                     {"workers_max", num_workers_max},
-                    Field::remark("(raise the limit of open files, ulimit -n or LimitNOFILE=, to "
+                    Field::remark("(raise the limit of open files, ulimit -n or LimitNOFILE, to "
                                   "serve more)")}});
   }
 
