@@ -3,22 +3,19 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <sstream>
-#include <system_error>
 #include <thread>
 
 #include "core/error.hpp"
-
-extern char** environ;
+#include "proto/link/machine.hpp"
+#include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -275,31 +272,6 @@ std::optional<int> status_at_end(pid_t process_id) {
   return status;
 }
 
-/// @return An error number, or 0.
-int spawn(const BatchCommand& command, const std::array<int, 3>& descriptors, pid_t& process_id) {
-  std::vector<char*> arguments;
-  for (const std::string& argument : command.arguments) {
-    arguments.push_back(const_cast<char*>(argument.c_str()));  // It is not written to.
-  }
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  if (const int error = posix_spawn_file_actions_init(&actions); error != 0) return error;
-  for (int i = 0; i < 3; ++i) {
-    posix_spawn_file_actions_adddup2(&actions, descriptors[static_cast<std::size_t>(i)], i);
-  }
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none;
-  sigemptyset(&none);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
-  const int error = posix_spawnp(&process_id, arguments.front(), &actions, &attributes,
-                                 arguments.data(), environ);
-  posix_spawnattr_destroy(&attributes);
-  posix_spawn_file_actions_destroy(&actions);
-  return error;
-}
-
 }  // namespace
 
 const std::vector<BatchSystem>& batch_systems() {
@@ -330,21 +302,14 @@ std::string output_of(const BatchCommand& command) {
   const MemoryFile output("output");
   const MemoryFile errors("errors");
   input.write_from_start(command.input);
-  pid_t process_id = 0;
-  const int error =
-      spawn(command, {input.descriptor(), output.descriptor(), errors.descriptor()}, process_id);
-  if (error != 0) {
-    throw Error(
-        fmt::format("{}: cannot be started: {}", program, std::generic_category().message(error)));
-  }
+  const pid_t process_id = wire::start_program(
+      {.arguments = command.arguments,
+       .descriptors = {input.descriptor(), output.descriptor(), errors.descriptor()}});
   const std::optional<int> status = status_at_end(process_id);
   if (!status) throw Error(fmt::format("{}: did not end within a minute", program));
   if (*status == 0) return output.text();
   const std::vector<std::string> words = lines_of(errors.text());
-  throw Error(fmt::format("{}: {}{}", program,
-                          WIFEXITED(*status)
-                              ? fmt::format("exit code {}", WEXITSTATUS(*status))
-                              : fmt::format("killed by signal {}", WTERMSIG(*status)),
+  throw Error(fmt::format("{}: {}{}", program, wire::end_text(*status),
                           words.empty() ? "" : ": " + words.back()));
 }
 

@@ -21,8 +21,8 @@ SHORTEN = ";".join(
     f"s/^{key} = .*/{key} = {value}/"
     for key, value in (("orbits", 2), ("sample_period_s", 1), ("runs", 40))
 )
-# Shell that writes the digests of a campaign by `run`, which starts the worker itself, and of the
-# same campaign by a coordinator and a worker.
+# Shell that writes the digests of a campaign by `run`, which starts the worker itself, of the same
+# campaign by a coordinator and a worker, and again as a coordinator answers, which starts `report`.
 CAMPAIGN = f"""set -e
 proofmass init paper.toml
 sed -E '{SHORTEN}' paper.toml > short.toml
@@ -33,6 +33,10 @@ proofmass-worker --connect ipc://$PWD/socket 2> worker.log
 wait
 proofmass report run.db | grep Digest
 proofmass report served/hardy2013.db | grep Digest
+proofmass-coordinator --directory served --bind ipc://$PWD/socket 2>> coordinator.log &
+proofmass report hardy2013 --connect ipc://$PWD/served/clients | grep Digest
+kill $!
+wait
 """
 
 
@@ -97,7 +101,7 @@ def main():
         here.mkdir()
         expected = digests([], arguments.build.resolve() / "bin", here)
         print("\n".join(packaged + expected))
-        check(len(packaged) == 2 and packaged == expected, "the packaged programs have another digest")
+        check(len(packaged) == 3 and packaged == expected, "the packaged programs have another digest")
         shutil.rmtree(place)
 
 
