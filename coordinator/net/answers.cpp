@@ -14,6 +14,7 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <optional>
 #include <span>
@@ -39,6 +40,7 @@ constexpr std::uint64_t memory_size_max = std::uint64_t{4} << 30;  // Of address
 constexpr std::size_t block_size = std::size_t{1} << 20;
 constexpr int look_interval_ms = 100;
 constexpr int niceness = 10;
+constexpr int copy_duration_factor = 30;
 
 // Sanitizers reserve terabytes of address space.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -86,13 +88,17 @@ struct Order {
   std::string known_sha256;
 };
 
+double seconds_of(const Order& order) {
+  return std::chrono::duration<double>(order.duration_max).count();
+}
+
 Order order_for(const wire::AnswerRequest& request, const ServiceConfig& config,
                 const std::filesystem::path& database, std::uint64_t id) {
   const AnswerCommand& command = command_for(request.question);
   Order order{.arguments = {config.answer_program.string(), std::string(command.name)},
               .directory = config.answer_directory,
               .copy = {},
-              .duration_max = Answers::duration_max,
+              .duration_max = config.answer_duration_max,
               .known_size = request.known_size,
               .known_sha256 = request.known_sha256};
   for (const std::string& option : request.options) {
@@ -104,7 +110,7 @@ Order order_for(const wire::AnswerRequest& request, const ServiceConfig& config,
   if (request.question == wire::Question::query) order.arguments.push_back(request.statement);
   if (request.question == wire::Question::database) {
     order.copy = config.answer_directory / fmt::format("copy-{:016x}.db", id);
-    order.duration_max = Answers::copy_duration_max;
+    order.duration_max = copy_duration_factor * config.answer_duration_max;
     order.arguments.push_back(order.copy->string());
   }
   return order;
@@ -180,10 +186,12 @@ class AnswerProcess {
   AnswerProcess(const AnswerProcess&) = delete;
   AnswerProcess& operator=(const AnswerProcess&) = delete;
 
-  void set_limits(bool is_copy) const {
+  /// The kernel keeps them if this process ends first.
+  void set_limits(const Order& order) const {
     limit(process_id_, RLIMIT_CORE, 0);
+    limit(process_id_, RLIMIT_CPU, static_cast<std::uint64_t>(std::ceil(seconds_of(order))));
     if (has_memory_limit) limit(process_id_, RLIMIT_AS, memory_size_max);
-    if (!is_copy) limit(process_id_, RLIMIT_FSIZE, Answers::size_max);
+    if (!order.copy) limit(process_id_, RLIMIT_FSIZE, Answers::size_max);
     setpriority(PRIO_PROCESS, static_cast<id_t>(process_id_), niceness);
   }
 
@@ -226,10 +234,9 @@ class AnswerProcess {
 
 /// @throws Error unless the process ended by itself.
 int exit_code_of(const std::optional<int>& status, const Order& order) {
-  if (!status) {
-    throw Error(
-        fmt::format("answer = not there after {} s (must be faster; ask for less)",
-                    std::chrono::duration_cast<std::chrono::seconds>(order.duration_max).count()));
+  const bool is_out_of_time = !status || (WIFSIGNALED(*status) && WTERMSIG(*status) == SIGXCPU);
+  if (is_out_of_time) {
+    throw Error(fmt::format("answer = not there after {:.3g} s (ask for less)", seconds_of(order)));
   }
   if (WIFSIGNALED(*status) && WTERMSIG(*status) == SIGXFSZ) {
     throw Error(fmt::format("answer = more than {} bytes (ask for less, or fetch the database)",
@@ -329,7 +336,7 @@ void Answers::ask(const wire::AnswerRequest& request, const std::filesystem::pat
       const CopyRemover remover{order.copy};
       std::unique_ptr<UnnamedFile> file = make_unnamed_file(order.directory);
       AnswerProcess process(order, file->descriptor());
-      process.set_limits(order.copy.has_value());
+      process.set_limits(order);
       const std::optional<int> status =
           process.follow(Clock::now() + order.duration_max, *is_cancelled);
       const int exit_code = exit_code_of(status, order);

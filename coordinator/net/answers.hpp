@@ -41,12 +41,10 @@ class UnnamedFile {
 /// read it, in parts.
 class Answers {
  public:
-  static constexpr std::size_t num_computing_max = 4;       ///< Processes at a time.
-  static constexpr std::size_t num_computing_per_key = 2;   ///< Of those.
-  static constexpr std::size_t num_kept_max = 16;           ///< Answers that are being read.
-  static constexpr std::chrono::seconds kept_for{60};       ///< After it was last read.
-  static constexpr std::chrono::seconds duration_max{120};  ///< Of a process; copies have longer.
-  static constexpr std::chrono::minutes copy_duration_max{60};
+  static constexpr std::size_t num_computing_max = 4;      ///< Processes at a time.
+  static constexpr std::size_t num_computing_per_key = 2;  ///< Of those.
+  static constexpr std::size_t num_kept_max = 16;          ///< Answers that are being read.
+  static constexpr std::chrono::seconds kept_for{60};      ///< After it was last read.
   /// Of an answer, bytes, unless it is a copy of the database.
   static constexpr std::uint64_t size_max = std::uint64_t{64} << 20;
 

@@ -75,6 +75,7 @@ struct ServiceConfig {
   /// none. Its output is kept in the directory, which is nobody else's.
   std::filesystem::path answer_program;
   std::filesystem::path answer_directory;
+  Duration answer_duration_max = std::chrono::seconds(120);  ///< A copy may take thirty times that.
   /// Told of the ends and failures of campaigns while it serves them, each once; may be empty. A
   /// service that ends when all is done tells of the end of each campaign first.
   std::function<void(const CampaignNotice&)> on_notice;

@@ -143,6 +143,13 @@ TEST_F(Answering, EndsAnOutputThatIsTooLarge) {
             "answer = more than 67108864 bytes (ask for less, or fetch the database)");
 }
 
+TEST_F(Answering, EndsAProgramThatTakesTooLong) {
+  config.answer_duration_max = std::chrono::milliseconds(300);
+  start_with("exec sleep 1000");
+  EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
+            "answer = not there after 0.3 s (ask for less)");
+}
+
 TEST_F(Answering, SaysThatAProgramCrashed) {
   start_with("kill -TERM $$");
   EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),

@@ -56,6 +56,12 @@ class PlainDirectory final : public CampaignDirectory {
     return {.file = file, .store = std::move(store), .definition = std::move(campaign)};
   }
 
+  [[nodiscard]] fs::path archive(const fs::path& file) const override {
+    fs::path place = fs::path(file).replace_extension(".archived");
+    fs::rename(file, place);
+    return place;
+  }
+
   /// May throw.
   void set_before_load(std::function<void(const fs::path&)> before_load) {
     const std::lock_guard lock(mutex_);
