@@ -92,7 +92,8 @@ void CampaignService::begin_closing(CampaignId id, std::function<void(bool is_cl
       Served& served = served_.at(id);
       served.is_held = false;
       served.closing_at = context_.now();
-      const bool is_closing = is_folded && is_settled(id, served) && coordinator::has_ended(phase_of(id));
+      const bool is_closing =
+          is_folded && is_settled(id, served) && coordinator::has_ended(phase_of(id));
       if (is_closing) close_ended(id);
       then(is_closing);
     };

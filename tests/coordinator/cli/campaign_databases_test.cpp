@@ -140,6 +140,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAre;
 using ::testing::StartsWith;
 
 MicroscopeCampaign campaign_of(const std::string& name, std::uint64_t num_runs = 10) {
@@ -206,7 +207,7 @@ TEST_F(CampaignFolderTest, KeepsEachCampaignInAFileOfItsName) {
   CampaignFolder folder(directory / "served");
   EXPECT_EQ(folder.open(campaign_of("b"), {}, {}).file, directory / "served/b.db");
   (void)folder.open(campaign_of("a"), {}, {});
-  EXPECT_THAT(loaded(folder), ElementsAre("a", "b"));
+  EXPECT_THAT(loaded(folder), UnorderedElementsAre("a", "b"));
   EXPECT_THAT(warnings, IsEmpty());
 }
 

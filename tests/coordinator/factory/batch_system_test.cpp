@@ -199,7 +199,7 @@ TEST(BatchSystem, SaysWhyACommandFailed) {
   EXPECT_EQ(test::message_of<Error>([] {
               (void)output_of({{"sh", "-c", "kill -9 $$"}});
             }),
-            "sh: killed by signal 9");
+            "sh: killed by signal 9 (Killed)");
   EXPECT_EQ(test::message_of<Error>([] { (void)output_of({{"no-such-program"}}); }),
             "no-such-program: cannot be started: No such file or directory");
 }

@@ -137,7 +137,7 @@ TEST(MalformedQuestion, HasLimits) {
   EXPECT_EQ(refusal_of_question([](auto& question) {
               for (int i = 0; i < 65; ++i) question.add_options("--json");
             }),
-            "options = 65 (must be in [0, 64])");
+            "options = 65 entries (must be in [0, 64])");
   EXPECT_EQ(refusal_of_question([](auto& question) {
               question.set_known_size(1);
               question.set_known_sha256(std::string(64, 'g'));
@@ -346,10 +346,10 @@ TEST(MalformedSubmitRequest, HasADefinition) {
 
 TEST(MalformedControlRequest, HasAnActionAndACampaign) {
   EXPECT_EQ(refusal_of_control([](auto& control) { control.clear_action(); }),
-            "action = 0 (must be in [1, 5])");
+            "action = 0 (must be in [1, 6])");
   EXPECT_EQ(refusal_of_control(
-                [](auto& control) { control.set_action(static_cast<proto::ControlAction>(6)); }),
-            "action = 6 (must be in [1, 5])");
+                [](auto& control) { control.set_action(static_cast<proto::ControlAction>(7)); }),
+            "action = 7 (must be in [1, 6])");
   EXPECT_EQ(refusal_of_control([](auto& control) { control.set_priority(101); }),
             "priority = 101 (must be in [-100, 100])");
   EXPECT_EQ(refusal_of_control([](auto& control) { control.set_campaign("a b"); }),
