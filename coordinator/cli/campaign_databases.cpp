@@ -126,7 +126,6 @@ CampaignFolder::CampaignFolder(std::filesystem::path directory) : directory_(std
   // What a process left that was killed.
   std::error_code ignored;
   std::filesystem::remove_all(answers(), ignored);
-  make_directory(answers());
 }
 
 CampaignFolder::~CampaignFolder() { close(lock_); }

@@ -130,10 +130,12 @@ void require_space(const Order& order, const std::filesystem::path& database) {
   throw Error(fmt::format("answer: {}: {}", what, std::strerror(errno)));
 }
 
+/// @param directory  Is made if it is not there.
 std::unique_ptr<UnnamedFile> make_unnamed_file(const std::filesystem::path& directory) {
+  mkdir(directory.c_str(), S_IRWXU);  // If that fails, so does what follows.
   std::string name = (directory / "output-XXXXXX").string();
   const int descriptor = mkostemp(name.data(), O_CLOEXEC);
-  if (descriptor < 0) fail(name);
+  if (descriptor < 0) fail(directory.string());
   unlink(name.c_str());
   return std::make_unique<UnnamedFile>(descriptor);
 }

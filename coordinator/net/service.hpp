@@ -72,7 +72,7 @@ struct ServiceConfig {
   std::size_t finished_open_max = 16;
   SubmissionLimits limits;  ///< Hold for each client's key.
   /// The program `proofmass`, whose commands answer questions about results; empty if there is
-  /// none. Its output is kept in the directory, which is nobody else's.
+  /// none. Its output is kept in the directory, which is made when it is needed.
   std::filesystem::path answer_program;
   std::filesystem::path answer_directory;
   Duration answer_duration_max = std::chrono::seconds(120);  ///< A copy may take thirty times that.

@@ -140,8 +140,8 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::UnorderedElementsAre;
 using ::testing::StartsWith;
+using ::testing::UnorderedElementsAre;
 
 MicroscopeCampaign campaign_of(const std::string& name, std::uint64_t num_runs = 10) {
   MicroscopeCampaign campaign;

@@ -39,7 +39,6 @@ class Answering : public test::ServiceTest {
     config.clients_endpoint = "tcp://127.0.0.1:*";
     config.answer_program = directory / "program";
     config.answer_directory = directory / "answers";
-    std::filesystem::create_directory(config.answer_directory);
   }
 
   /// A coordinator with a campaign `a` that asks this program.
@@ -135,6 +134,13 @@ TEST_F(Answering, SaysWhyAProgramCannotBeStarted) {
   std::filesystem::remove(config.answer_program);
   EXPECT_THAT(client->error(AnswerRequest{.campaign = "a"}),
               HasSubstr("program: cannot be started: No such file or directory"));
+}
+
+TEST_F(Answering, SaysThatItsOutputHasNoPlace) {
+  config.answer_directory = directory / "missing" / "answers";
+  start_with("echo never");
+  EXPECT_THAT(client->error(AnswerRequest{.campaign = "a"}),
+              HasSubstr("missing/answers: No such file or directory"));
 }
 
 TEST_F(Answering, EndsAnOutputThatIsTooLarge) {

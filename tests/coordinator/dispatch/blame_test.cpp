@@ -291,6 +291,10 @@ TEST_F(BlameTest, ABatchThatComesNoFurtherIsHung) {
     on_tick(state, now, outbox);
     ASSERT_TRUE(state.workers.contains(first)) << i;
   }
+  state.is_behind = true;
+  on_tick(state, now, outbox);
+  EXPECT_TRUE(state.workers.contains(first)) << "its last heartbeats may wait to be read";
+  state.is_behind = false;
   on_tick(state, now, outbox);  // A minute without an orbit.
   (void)outbox.take_sent<wire::Stop>(first);
   EXPECT_EQ(suspects(), (Runs{{0}, {1}}));
