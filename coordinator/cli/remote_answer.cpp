@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <span>
-
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "core/error.hpp"
@@ -37,7 +35,7 @@ int print_answer(const ClientConnectionConfig& connection, const wire::AnswerReq
     std::string bytes;
     read_answer(ask, answer, [&](std::string_view part) { bytes += part; });
     Sha256 hash;
-    hash.add(std::span(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
+    hash.add_bytes(bytes);
     if (hash.finish() != answer.sha256) throw Error("answer = another one than was announced");
     if (text == AnswerText::lines) {
       print_lines(bytes);

@@ -17,7 +17,6 @@
 #include <cmath>
 #include <cstring>
 #include <optional>
-#include <span>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -41,13 +40,6 @@ constexpr std::size_t block_size = std::size_t{1} << 20;
 constexpr int look_interval_ms = 100;
 constexpr int niceness = 10;
 constexpr int copy_duration_factor = 30;
-
-// Sanitizers reserve terabytes of address space.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool has_memory_limit = false;
-#else
-constexpr bool has_memory_limit = true;
-#endif
 
 /// A command that answers a question, and those of its options that only concern the answer.
 struct AnswerCommand {
@@ -192,7 +184,7 @@ class AnswerProcess {
   void set_limits(const Order& order) const {
     limit(process_id_, RLIMIT_CORE, 0);
     limit(process_id_, RLIMIT_CPU, static_cast<std::uint64_t>(std::ceil(seconds_of(order))));
-    if (has_memory_limit) limit(process_id_, RLIMIT_AS, memory_size_max);
+    if (wire::has_address_space_limit) limit(process_id_, RLIMIT_AS, memory_size_max);
     if (!order.copy) limit(process_id_, RLIMIT_FSIZE, Answers::size_max);
     setpriority(PRIO_PROCESS, static_cast<id_t>(process_id_), niceness);
   }
@@ -256,7 +248,7 @@ std::string sha256_of(const UnnamedFile& file, std::uint64_t size) {
   for (std::uint64_t offset = 0; offset < size;) {
     const std::string block = file.read(offset, std::min<std::uint64_t>(block_size, size - offset));
     if (block.empty()) break;
-    hash.add(std::span(reinterpret_cast<const unsigned char*>(block.data()), block.size()));
+    hash.add_bytes(block);
     offset += block.size();
   }
   return hash.finish();

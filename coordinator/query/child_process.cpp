@@ -16,16 +16,10 @@
 #include <exception>
 
 #include "core/error.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-// Sanitizers reserve terabytes of address space.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool has_memory_limit = false;
-#else
-constexpr bool has_memory_limit = true;
-#endif
 
 bool lower_limit(__rlimit_resource resource, std::uint64_t soft, std::uint64_t hard) {
   rlimit limit{};
@@ -36,7 +30,8 @@ bool lower_limit(__rlimit_resource resource, std::uint64_t soft, std::uint64_t h
 }
 
 bool apply(const ChildLimits& limits) {
-  if (has_memory_limit && !lower_limit(RLIMIT_AS, limits.memory_size_max, limits.memory_size_max)) {
+  if (wire::has_address_space_limit &&
+      !lower_limit(RLIMIT_AS, limits.memory_size_max, limits.memory_size_max)) {
     return false;
   }
   return lower_limit(RLIMIT_CPU, limits.compute_s_max, limits.compute_s_max + 1);

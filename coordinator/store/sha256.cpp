@@ -32,7 +32,11 @@ void Sha256::add(double value) { add(std::bit_cast<std::uint64_t>(value + 0.0));
 
 void Sha256::add(std::string_view text) {
   add(std::uint64_t{text.size()});
-  add(std::span(reinterpret_cast<const unsigned char*>(text.data()), text.size()));
+  add_bytes(text);
+}
+
+void Sha256::add_bytes(std::string_view bytes) {
+  add(std::span(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
 std::string Sha256::finish() {

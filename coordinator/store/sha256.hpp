@@ -17,9 +17,10 @@ class Sha256 {
   Sha256& operator=(const Sha256&) = delete;
 
   void add(std::span<const unsigned char> bytes);
-  void add(std::uint64_t value);    ///< 8 bytes, lowest first.
-  void add(double value);           ///< Its bits likewise; a zero has no sign.
-  void add(std::string_view text);  ///< Its size as 64 bits, then its bytes.
+  void add_bytes(std::string_view bytes);  ///< Without their number.
+  void add(std::uint64_t value);           ///< 8 bytes, lowest first.
+  void add(double value);                  ///< Its bits likewise; a zero has no sign.
+  void add(std::string_view text);         ///< Its size as 64 bits, then its bytes.
 
   /// 64 hexadecimal digits. @pre Called once, at the end.
   [[nodiscard]] std::string finish();

@@ -10,6 +10,14 @@ namespace proofmass::wire {
 
 // What this machine says of itself and of the processes on it.
 
+/// Whether a program may be given less address space than it asks for: sanitizers reserve
+/// terabytes.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool has_address_space_limit = false;
+#else
+inline constexpr bool has_address_space_limit = true;
+#endif
+
 /// The name of this machine, with `-` for each character that is_name() does not allow.
 [[nodiscard]] std::string host_name();
 

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <span>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -21,7 +20,6 @@
 #include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
-#include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -43,7 +41,7 @@ class ArrivedPart {
     Sha256 hash;
     ssize_t num_read = 0;
     while ((num_read = read(descriptor_, block.data(), block.size())) > 0) {
-      add_to(hash, {block.data(), static_cast<std::size_t>(num_read)});
+      hash.add_bytes({block.data(), static_cast<std::size_t>(num_read)});
       size_ += static_cast<std::uint64_t>(num_read);
     }
     if (num_read < 0) fail();
@@ -73,10 +71,6 @@ class ArrivedPart {
   }
 
  private:
-  static void add_to(Sha256& hash, std::string_view bytes) {
-    hash.add(std::span(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
-  }
-
   [[noreturn]] void fail() const {
     throw Error(fmt::format("file = {} ({})", path_.string(), std::strerror(errno)));
   }
