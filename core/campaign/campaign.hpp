@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/campaign/definition.hpp"
+#include "core/campaign/recording.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/math/instruction_set.hpp"
 #include "core/runs.hpp"
@@ -72,6 +73,18 @@ class Plan {
   [[nodiscard]] virtual std::vector<RunResult> simulate_batch(
       std::span<const RunRequest> requests, InstructionSet set,
       const std::function<void(int)>& progress = {}) const = 0;
+
+  /// Simulates one run again, bit for bit, and passes all samples of its sessions on. It may take
+  /// much longer than a run of a batch.
+  ///
+  /// @param sink      Gets nothing if no draw of the run was accepted.
+  /// @param progress  As for simulate_batch(); an exception ends the replay.
+  /// @return The result that simulate_batch() has for the request.
+  [[nodiscard]] virtual RunResult replay(const RunRequest& request, const SampleSink& sink,
+                                         const std::function<void(int)>& progress = {}) const = 0;
+
+  /// What replay() passes on.
+  [[nodiscard]] virtual const Recording& recording() const = 0;
 
   /// Orbits of one run: what `progress` counts to.
   [[nodiscard]] virtual int num_orbits() const = 0;

@@ -73,6 +73,43 @@ struct Loop {
     is_any_saturated = false;
   }
 
+  // How the satellite moves at a sample, and what is seen of its attitude. They hold before
+  // advance() of that sample.
+
+  /// Γ_propu, m/s²: −[M_DF] Γ_DF + Γ_n,DF.
+  PROOFMASS_INLINE Vector3<T> thrust_S(const LoopConstants<T>& constants,
+                                       const SampleNoise<T>& noise) const {
+    return noise.thrust_S - constants.thrust_matrix * thrust_command_S;
+  }
+
+  /// With Γ_sat = Γ_propu + Γ_ext.
+  PROOFMASS_INLINE SatelliteMotion<T> motion(const LoopConstants<T>& constants,
+                                             const SharedSample& shared,
+                                             const SampleNoise<T>& noise) const {
+    return {
+        .acceleration_S = thrust_S(constants, noise) + broadcast<T>(shared.external_S.linear_m_s2),
+        .gradient_s2 = shared.gradient_s2,
+        .radial_S = to_target(attitude_IS, broadcast<T>(shared.radial_I)),
+        .omega_IS_S = omega_IS_S,
+        .omega_dot_IS_S =
+            torque_command_S + noise.torque_S + broadcast<T>(shared.external_S.angular_rad_s2)};
+  }
+
+  /// True angles from the reference to the satellite, rad.
+  PROOFMASS_INLINE Vector3<T> angle_RS_S(const SharedSample& shared) const {
+    const Quaternion<T> reference_IR{T(shared.attitude_IR.scalar),
+                                     broadcast<T>(shared.attitude_IR.vector)};
+    return error_angles(conjugate(reference_IR) * attitude_IS);
+  }
+
+  /// The fused angles that the star tracker reports, with what the session adds to them, rad.
+  PROOFMASS_INLINE Vector3<T> star_tracker_RS_S(const LoopConstants<T>& constants,
+                                                const SharedSample& shared,
+                                                const SampleNoise<T>& noise) const {
+    return angle_RS_S(shared) + constants.star_tracker_bias_S_rad + noise.star_tracker_S +
+           broadcast<T>(shared.attitude_command_S_rad);
+  }
+
   /// Advances by one sample.
   ///
   /// @param shared  Of this sample; what all runs have in common.
@@ -83,16 +120,7 @@ struct Loop {
                                           const AttitudeGains& attitude_gains,
                                           const SharedSample& shared, const SampleNoise<T>& noise,
                                           Watch watch = Watch::yes) {
-    // Γ_sat = Γ_propu + Γ_ext, Γ_propu = −[M_DF] Γ_DF + Γ_n,DF
-    const Vector3<T> thrust_S = noise.thrust_S - constants.thrust_matrix * thrust_command_S;
-    const Vector3<T> omega_dot_IS_S =
-        torque_command_S + noise.torque_S + broadcast<T>(shared.external_S.angular_rad_s2);
-    const SatelliteMotion<T> satellite{
-        .acceleration_S = thrust_S + broadcast<T>(shared.external_S.linear_m_s2),
-        .gradient_s2 = shared.gradient_s2,
-        .radial_S = to_target(attitude_IS, broadcast<T>(shared.radial_I)),
-        .omega_IS_S = omega_IS_S,
-        .omega_dot_IS_S = omega_dot_IS_S};
+    const SatelliteMotion<T> satellite = motion(constants, shared, noise);
 
     Observation<T> observation;
     for (std::size_t k = 0; k < 2; ++k) {
@@ -112,13 +140,9 @@ struct Loop {
       for (Vector3<T>& measured : observation.measured_K) measured = clamped(measured, limit);
     }
     observation.measured_omega_dot_IS_S =
-        omega_dot_IS_S + constants.angular_bias_S_rad_s2 + noise.angular_S;
+        satellite.omega_dot_IS_S + constants.angular_bias_S_rad_s2 + noise.angular_S;
 
-    const Quaternion<T> reference_IR{T(shared.attitude_IR.scalar),
-                                     broadcast<T>(shared.attitude_IR.vector)};
-    estimator.correct(attitude_gains, error_angles(conjugate(reference_IR) * attitude_IS) +
-                                          constants.star_tracker_bias_S_rad + noise.star_tracker_S +
-                                          broadcast<T>(shared.attitude_command_S_rad));
+    estimator.correct(attitude_gains, star_tracker_RS_S(constants, shared, noise));
     observation.attitude = estimator;
     if (watch == Watch::yes) largest_angle = largest_magnitude(estimator.angle_RS_S, largest_angle);
     torque_command_S = controller.advance(attitude_gains, estimator);
@@ -130,7 +154,7 @@ struct Loop {
                              constants.drag_free_weight[1] * observation.measured_K[1] -
                              constants.subtracted_bias_S_m_s2 +
                              broadcast<T>(shared.drag_free_command_S_m_s2));
-    rotate(omega_dot_IS_S, attitude_gains.sample_period_s);
+    rotate(satellite.omega_dot_IS_S, attitude_gains.sample_period_s);
     return observation;
   }
 

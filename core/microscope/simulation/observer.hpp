@@ -4,10 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <utility>
 
 #include "core/microscope/session/session.hpp"
 #include "core/microscope/session/session_signals.hpp"
 #include "core/microscope/simulation/loop.hpp"
+#include "core/microscope/simulation/sample_noise.hpp"
 
 namespace proofmass {
 
@@ -20,6 +22,10 @@ struct ObservedSample {
   const Observation<double>& observation;  ///< What instrument and estimator report.
   /// The ground's signals, by index(Signal); all of them, whatever is recorded.
   const std::array<double, num_signals>& signals;
+  /// The loop as the sample found it: the true motion, and the commands that act in the sample.
+  const Loop<double>& loop;
+  const LoopConstants<double>& constants;
+  const SampleNoise<double>& noise;  ///< Of this sample.
 };
 
 /// Called with every sample of a run, in the order of sessions and times.
@@ -31,6 +37,19 @@ struct NoObserver {
   static constexpr bool is_active = false;
 };
 
+/// The noise of a session, which keeps each sample until the next for an observer.
+class ObservedNoise {
+ public:
+  explicit ObservedNoise(SessionNoise noise) : noise_(std::move(noise)) {}
+
+  const SampleNoise<double>& next() { return last_ = noise_.next(); }
+  [[nodiscard]] const SampleNoise<double>& last() const { return last_; }
+
+ private:
+  SessionNoise noise_;
+  SampleNoise<double> last_;
+};
+
 /// Passes the samples of one session on.
 struct SessionObserver {
   static constexpr bool is_active = true;
@@ -39,6 +58,12 @@ struct SessionObserver {
   std::size_t session;
   std::int64_t next;  ///< Index of the sample that passes next.
   double sample_period_s;
+  const LoopConstants<double>& constants;
+  const ObservedNoise& noise;
+  Loop<double> loop{};  ///< Before the sample.
+
+  /// Tells it the loop that a sample is about to advance.
+  void begin_sample(const Loop<double>& before) { loop = before; }
 
   void operator()(const SharedSample& shared, const Observation<double>& observation,
                   const std::array<double, num_signals>& signals) {
@@ -47,7 +72,10 @@ struct SessionObserver {
              .time_s = static_cast<double>(next) * sample_period_s,
              .shared = shared,
              .observation = observation,
-             .signals = signals});
+             .signals = signals,
+             .loop = loop,
+             .constants = constants,
+             .noise = noise.last()});
     ++next;
   }
 };

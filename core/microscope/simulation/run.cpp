@@ -9,6 +9,7 @@
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/simulation/batch_kernel.hpp"
+#include "core/microscope/simulation/recorded_signals.hpp"
 #include "core/microscope/simulation/run_health.hpp"
 #include "core/microscope/simulation/session_record.hpp"
 
@@ -61,7 +62,8 @@ void append_lines(const SignalSums<double>& sums, std::size_t num_lines, Session
   phasors.num_lines += num_lines;
 }
 
-SessionHealth to_health(const LaneGroup<double, SessionNoise>& run) {
+template <typename Noise>
+SessionHealth to_health(const LaneGroup<double, Noise>& run) {
   const LoopMonitor<double>& monitor = run.monitor;
   return {.acceleration_m_s2 = run.loop.largest_acceleration,
           .attitude_rad = run.loop.largest_angle,
@@ -127,7 +129,8 @@ struct RunPlan::Impl {
                     c.scenario.orbit.period_s),
         noise(make_noise_model(c.scenario.noise, c.scenario.simulation.sample_period_s)),
         drag_free(drag_free_gains(c.scenario.drag_free, c.scenario.simulation.sample_period_s)),
-        attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)) {
+        attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)),
+        recording(recording_of(c.scenario)) {
     weights.reserve(campaign.scenario.sessions.size());
     known_weights.resize(campaign.scenario.sessions.size());
     residual_weights.resize(campaign.scenario.sessions.size());
@@ -190,22 +193,32 @@ struct RunPlan::Impl {
     const Scenario& scenario = campaign.scenario;
     const Session& session = scenario.sessions[i];
     SessionSignals signals(scenario, session, orbit, environment);
-    LaneGroup<double, SessionNoise> alone{
-        .constants = make_loop_constants(instrument, scenario, session),
-        .noise = SessionNoise(noise, campaign.seed, record.run, session.name)};
-    Readers readers(*this, i);
-    const auto record_with = [&](const auto& session_observer) {
-      record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
-                     session_observer);
-    };
+    const LoopConstants<double> constants = make_loop_constants(instrument, scenario, session);
+    SessionNoise session_noise(noise, campaign.seed, record.run, session.name);
     if (observer == nullptr) {
-      record_with(NoObserver{});
-    } else {
-      record_with(SessionObserver{.observe = *observer,
-                                  .session = i,
-                                  .next = -signals.num_settling(),
-                                  .sample_period_s = scenario.simulation.sample_period_s});
+      LaneGroup<double, SessionNoise> alone{.constants = constants, .noise = session_noise};
+      record_session_alone(i, signals, alone, NoObserver{}, progress, record);
+      return;
     }
+    LaneGroup<double, ObservedNoise> alone{.constants = constants,
+                                           .noise = ObservedNoise(std::move(session_noise))};
+    const double period_s = scenario.simulation.sample_period_s;
+    const SessionObserver session_observer{.observe = *observer,
+                                           .session = i,
+                                           .next = -signals.num_settling(),
+                                           .sample_period_s = period_s,
+                                           .constants = alone.constants,
+                                           .noise = alone.noise};
+    record_session_alone(i, signals, alone, session_observer, progress, record);
+  }
+
+  template <typename Noise, typename Observer>
+  void record_session_alone(std::size_t i, SessionSignals& signals, LaneGroup<double, Noise>& alone,
+                            const Observer& observer, const SessionProgress& progress,
+                            RunRecord& record) const {
+    Readers readers(*this, i);
+    record_session(signals, setup(i, readers), std::span(&alone, 1), readers.buffer, progress,
+                   observer);
     keep(i, {alone.sums, to_health(alone), alone.known_sums}, record);
   }
 
@@ -256,6 +269,7 @@ struct RunPlan::Impl {
   NoiseModel noise;
   DragFreeGains drag_free;
   AttitudeGains attitude;
+  Recording recording;
   std::vector<LineWeights> weights;                     ///< Of each session.
   std::vector<std::vector<LineWeights>> known_weights;  ///< Empty unless the method wants them.
   std::vector<std::optional<LineWeights>> residual_weights;  ///< Of those that are monitored.
@@ -300,6 +314,20 @@ RunRecord RunPlan::record_alone(RunIndex run, std::span<const double> table_valu
   }
   return recorded;
 }
+
+RunResult RunPlan::replay(const RunRequest& request, const SampleSink& sink,
+                          const std::function<void(int)>& progress) const {
+  std::vector<double> values;
+  const auto pass_on = [&](const ObservedSample& sample) {
+    if (sample.index < 0) return;  // The loops settle.
+    values.clear();
+    append_recorded_values(sample, values);
+    sink({.session = sample.session, .time_s = sample.time_s, .values = values});
+  };
+  return estimate(observe(request.run, request.table_values, pass_on, progress));
+}
+
+const Recording& RunPlan::recording() const { return impl_->recording; }
 
 std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> requests,
                                                InstructionSet set,

@@ -88,6 +88,11 @@ class RunPlan final : public Plan {
       std::span<const RunRequest> requests, InstructionSet set,
       const std::function<void(int)>& progress = {}) const override;
 
+  /// observe(), then estimate(), of the records without what the loops do while they settle.
+  [[nodiscard]] RunResult replay(const RunRequest& request, const SampleSink& sink,
+                                 const std::function<void(int)>& progress = {}) const override;
+  [[nodiscard]] const Recording& recording() const override;
+
   /// Of all sessions together.
   [[nodiscard]] int num_orbits() const override;
 

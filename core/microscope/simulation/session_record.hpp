@@ -171,6 +171,7 @@ __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSet
   for (std::size_t k = 0; k < num_samples; ++k) {
     const SharedSample& shared = signals.next();
     for (auto& [constants, noise, loop, sums, monitor, known_sums] : groups) {
+      if constexpr (Observer::is_active) observer.begin_sample(loop);
       const auto observation = loop.advance(constants, setup.drag_free, setup.attitude, shared,
                                             noise.next(), k % 4 == 0 ? Watch::yes : Watch::no);
       if constexpr (Observer::is_active) {

@@ -155,38 +155,58 @@ class OscillatorCampaign final : public Campaign {
 
 class OscillatorPlan final : public Plan {
  public:
-  explicit OscillatorPlan(const OscillatorCampaign& campaign) : campaign_(campaign) {}
+  explicit OscillatorPlan(const OscillatorCampaign& campaign) : campaign_(campaign) {
+    const double drive_hz = campaign.oscillator.drive_hz;
+    recording_.groups = {{"sensor", "what the accelerometer reads", {{"reading", "m/s²", "", "y"}}},
+                         {"motion", "what the mass does", {{"acceleration", "m/s²", "", "S x''"}}}};
+    recording_.sessions = {{.name = "steady_state",
+                            .sample_period_s = 1.0 / (samples_per_period * drive_hz),
+                            .num_samples = num_samples()}};
+  }
 
   [[nodiscard]] std::vector<RunResult> simulate_batch(
       std::span<const RunRequest> requests, InstructionSet,
       const std::function<void(int)>& progress) const override {
     std::vector<RunResult> results;
-    for (const RunRequest& request : requests) results.push_back(simulate(request.run));
+    for (const RunRequest& request : requests) results.push_back(simulate(request.run, {}));
     if (progress) progress(num_orbits());
     return results;
   }
+  [[nodiscard]] RunResult replay(const RunRequest& request, const SampleSink& sink,
+                                 const std::function<void(int)>& progress) const override {
+    RunResult result = simulate(request.run, sink);
+    if (progress) progress(num_orbits());
+    return result;
+  }
+  [[nodiscard]] const Recording& recording() const override { return recording_; }
   [[nodiscard]] int num_orbits() const override {
     return static_cast<int>(campaign_.oscillator.num_periods);
   }
 
  private:
-  [[nodiscard]] RunResult simulate(RunIndex run) const {
+  [[nodiscard]] std::uint32_t num_samples() const {
+    return static_cast<std::uint32_t>(num_orbits()) * samples_per_period;
+  }
+
+  /// @param sink  Gets each sample if there is one.
+  [[nodiscard]] RunResult simulate(RunIndex run, const SampleSink& sink) const {
     const double sigma = campaign_.oscillator.noise_m_s2;
     const RunDraw draw = campaign_.draw(run);
     const RandomStream noise(campaign_.seed, run, stream_id("accelerometer"));
-    const std::uint32_t num_samples = static_cast<std::uint32_t>(num_orbits()) * samples_per_period;
     double in_phase = 0.0, quadrature = 0.0, peak = 0.0;
     std::array<float, 4> deviates{};
-    for (std::uint32_t k = 0; k < num_samples; ++k) {
+    for (std::uint32_t k = 0; k < num_samples(); ++k) {
       if (k % 4 == 0) deviates = normal_deviates(noise.block(k / 4));
       const SineCosine drive = sincos_turns((k % samples_per_period) / double{samples_per_period});
-      const double reading = draw.truth[0] * drive.cosine + draw.truth[1] * drive.sine +
-                             sigma * static_cast<double>(deviates[k % 4]);
+      const double acceleration = draw.truth[0] * drive.cosine + draw.truth[1] * drive.sine;
+      const double reading = acceleration + sigma * static_cast<double>(deviates[k % 4]);
+      const std::array values{reading, acceleration};
+      if (sink) sink({.time_s = k * recording_.sessions[0].sample_period_s, .values = values});
       in_phase += reading * drive.cosine;
       quadrature += reading * drive.sine;
       peak = std::max(peak, std::abs(reading));
     }
-    const double weight = 2.0 / num_samples;
+    const double weight = 2.0 / num_samples();
     RunResult result{.run = run, .num_draws = 1, .truth = draw.truth, .health = {peak}};
     if (peak > campaign_.oscillator.range_m_s2) {
       result.status = RunStatus::lost;
@@ -200,6 +220,7 @@ class OscillatorPlan final : public Plan {
   }
 
   OscillatorCampaign campaign_;
+  Recording recording_;
 };
 
 std::unique_ptr<const Plan> OscillatorCampaign::prepare() const {

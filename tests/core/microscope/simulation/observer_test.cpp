@@ -5,17 +5,14 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <complex>
 #include <cstdint>
-#include <numbers>
 #include <vector>
 
 #include "core/microscope/simulation/run.hpp"
-#include "core/signal/band_pass.hpp"
+#include "tests/support/fitted_lines.hpp"
 
 namespace proofmass {
 namespace {
@@ -44,51 +41,11 @@ constexpr EstimationMethodInfo recording_method{"recording", all_lines_and_signa
 /// The record of one session: [sample][signal].
 using Series = std::vector<std::array<double, num_signals>>;
 
-/// [Hardy2013] section 5.2 as it reads: remove the mean, band-pass, drop the transient, least
-/// squares on cosine and sine of all lines.
-std::vector<Complex> fitted_lines(const Series& series, Signal signal, const Scenario& scenario,
-                                  const Session& session) {
-  const double period_s = scenario.simulation.sample_period_s;
-  std::vector<double> lines_hz;
-  for (const auto* const lines : {&session.fit_lines, &session.known_lines}) {
-    for (const LineMultiple& line : *lines) {
-      lines_hz.push_back(line_frequency_hz(session, line, scenario.orbit.period_s));
-    }
-  }
-  double centre_hz = 0.0;
-  for (std::size_t i = 0; i < session.fit_lines.size(); ++i) centre_hz += lines_hz[i];
-  centre_hz /= static_cast<double>(session.fit_lines.size());
-  const double ratio = scenario.estimation.band_ratio;
-  const BandPass filter = band_pass(centre_hz / ratio, centre_hz * ratio, period_s);
-
-  double mean = 0.0;
-  for (const auto& sample : series) mean += sample[index(signal)];
-  mean /= static_cast<double>(series.size());
-  const auto num_dropped =
-      static_cast<std::size_t>(std::ceil(scenario.estimation.transient_s / period_s));
-  const auto num_kept = static_cast<Eigen::Index>(series.size() - num_dropped);
-  const auto num_lines = static_cast<Eigen::Index>(lines_hz.size());
-  Eigen::VectorXd kept(num_kept);
-  Eigen::MatrixXd design(num_kept, 2 * num_lines);
-  BandPassState state;
-  for (std::size_t k = 0; k < series.size(); ++k) {
-    const double value = state.advance(filter, series[k][index(signal)] - mean);
-    if (k < num_dropped) continue;
-    const auto row = static_cast<Eigen::Index>(k - num_dropped);
-    kept(row) = value;
-    for (Eigen::Index i = 0; i < num_lines; ++i) {
-      const double phase = 2.0 * std::numbers::pi * lines_hz[static_cast<std::size_t>(i)] *
-                           static_cast<double>(k) * period_s;
-      design(row, 2 * i) = std::cos(phase);
-      design(row, 2 * i + 1) = std::sin(phase);
-    }
-  }
-  const Eigen::VectorXd amplitudes = design.householderQr().solve(kept);
-  std::vector<Complex> lines;
-  for (Eigen::Index i = 0; i < num_lines; ++i) {
-    lines.emplace_back(amplitudes(2 * i), amplitudes(2 * i + 1));
-  }
-  return lines;
+/// One signal of a record.
+std::vector<double> column(const Series& series, Signal signal) {
+  std::vector<double> values;
+  for (const auto& sample : series) values.push_back(sample[index(signal)]);
+  return values;
 }
 
 /// Largest distance from the mean: what rounding is relative to.
@@ -165,7 +122,7 @@ TEST(SampleObserver, RecordsTheSeriesWhosePhasorsTheRunHas) {
     for (const Signal signal : {Signal::differential_x, Signal::gradient_xy, Signal::product,
                                 Signal::gradient_yy, Signal::gradient_zz}) {
       const std::vector<Complex> lines =
-          fitted_lines(observed.records[i], signal, scenario, session);
+          test::fitted_lines(column(observed.records[i], signal), scenario, session);
       const double tolerance = 1e-9 * size_of(observed.records[i], signal);
       for (std::size_t line = 0; line < lines.size(); ++line) {
         EXPECT_LE(std::abs(phasors.amplitude[index(signal)][line] - lines[line]), tolerance)

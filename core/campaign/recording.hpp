@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace proofmass {
+
+// The time series of a run. No simulation keeps them: Plan::replay() computes a run again and
+// passes each sample on, and a Recording says what its numbers are.
+
+/// A signal of a simulation: a number in each sample.
+struct RecordedSignal {
+  std::string name;     ///< In files, unique in its group: `mass_1_K_x`; [A-Za-z0-9_]+.
+  std::string unit;     ///< For people, SI: `m/s²`, `rad` or `1`.
+  std::string frame;    ///< Of the component, one of Recording::frames; empty if it has none.
+  std::string meaning;  ///< A phrase for people.
+};
+
+/// Signals that are read together, with the same times.
+struct SignalGroup {
+  std::string name;     ///< In files, unique: `measured`; [A-Za-z0-9_]+.
+  std::string meaning;  ///< A phrase for people.
+  std::vector<RecordedSignal> signals;
+};
+
+/// A part of a run with equally spaced samples.
+struct RecordedSession {
+  std::string name;  ///< In files, unique: `a_c13`; [A-Za-z0-9_]+.
+  double sample_period_s = 1.0;
+  std::uint64_t num_samples = 0;
+};
+
+/// A frame that components of vectors are in.
+struct RecordedFrame {
+  std::string name;     ///< `S`.
+  std::string meaning;  ///< A phrase for people.
+};
+
+/// What a replay of any run of a campaign passes on.
+struct Recording {
+  std::vector<RecordedFrame> frames;
+  std::vector<SignalGroup> groups;        ///< The order of the values of a sample is theirs.
+  std::vector<RecordedSession> sessions;  ///< In the order in which they are simulated.
+};
+
+/// One sample of a replay. The values live during the call only.
+struct RecordedSample {
+  std::size_t session = 0;         ///< Index in Recording::sessions.
+  double time_s = 0.0;             ///< From the session's start; the first is 0.
+  std::span<const double> values;  ///< Of all signals of all groups, in their order.
+};
+
+/// Takes the samples of a run, in the order of sessions and times. What it throws ends the replay.
+using SampleSink = std::function<void(const RecordedSample&)>;
+
+}  // namespace proofmass

@@ -1,0 +1,222 @@
+#include "core/microscope/simulation/recorded_signals.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace proofmass {
+namespace {
+
+using Sample = ObservedSample;
+using Vector = Vector3<double>;
+
+/// A row of the tables below: one signal, or three for the axes of a vector.
+struct SignalRow {
+  std::string_view name;  ///< Of a vector what comes before the letter of the axis.
+  std::string_view unit;
+  std::string_view frame;
+  std::string_view meaning;
+  double (*number)(const Sample&) = nullptr;
+  Vector (*vector)(const Sample&) = nullptr;  ///< If `number` is null.
+};
+
+struct GroupRows {
+  std::string_view name;
+  std::string_view meaning;
+  std::span<const SignalRow> rows;
+};
+
+constexpr std::string_view m_s2 = "m/s²", rad = "rad", rad_s = "rad/s", rad_s2 = "rad/s²";
+
+constexpr SignalRow vector_row(std::string_view name, std::string_view unit, std::string_view frame,
+                               std::string_view meaning, Vector (*vector)(const Sample&)) {
+  return {name, unit, frame, meaning, nullptr, vector};
+}
+
+template <Signal signal>
+double ground(const Sample& sample) {
+  return sample.signals[index(signal)];
+}
+
+/// Γ_App,k + p_k of sensor k − 1: Observation keeps only the X component.
+template <std::size_t k>
+Vector kinematic(const Sample& sample) {
+  return kinematic_acceleration(sample.constants.sensors[k],
+                                sample.loop.motion(sample.constants, sample.shared, sample.noise),
+                                sample.shared.mass_motion);
+}
+
+constexpr std::array measured{
+    vector_row("mass_1_K_", m_s2, "K1", "Γ_mes,1 of the inner mass",
+               [](const Sample& s) { return s.observation.measured_K[0]; }),
+    vector_row("mass_2_K_", m_s2, "K2", "Γ_mes,2 of the outer mass",
+               [](const Sample& s) { return s.observation.measured_K[1]; }),
+};
+
+// Components of two frames are added here, as the ground does: these numbers are of no frame.
+constexpr std::array modes{
+    SignalRow{"differential_x", m_s2, "", "Γ_mes,dx = ½(Γ_mes,1x − Γ_mes,2x)",
+              ground<Signal::differential_x>},
+    SignalRow{"common_x", m_s2, "", "Γ_mes,cx = ½(Γ_mes,1x + Γ_mes,2x)", ground<Signal::common_x>},
+    SignalRow{"common_y", m_s2, "", "Γ_mes,cy = ½(Γ_mes,1y + Γ_mes,2y)", ground<Signal::common_y>},
+    SignalRow{"common_z", m_s2, "", "Γ_mes,cz = ½(Γ_mes,1z + Γ_mes,2z)", ground<Signal::common_z>},
+};
+
+constexpr std::array applied{
+    vector_row("mass_1_S_", m_s2, "S", "Γ_App,1 + p_1: applied acceleration less the parasitic one",
+               kinematic<0>),
+    vector_row("mass_2_S_", m_s2, "S", "Γ_App,2 + p_2: applied acceleration less the parasitic one",
+               kinematic<1>),
+};
+
+constexpr std::array gradient{
+    SignalRow{"gravity", "1/s²", "", "μ/r³", [](const Sample& s) { return s.shared.gradient_s2; }},
+    vector_row("radial_R_", "1", "R", "û: unit vector from the Earth's centre to the satellite",
+               [](const Sample& s) { return s.shared.radial_R; }),
+    vector_row("estimated_S_x", "1/s²", "S", "row X of [T] − [In] from the estimated attitude",
+               [](const Sample& s) {
+                 return Vector{ground<Signal::gradient_xx>(s), ground<Signal::gradient_xy>(s),
+                               ground<Signal::gradient_xz>(s)};
+               }),
+    vector_row("estimated_S_y", "1/s²", "S", "row Y of [T] − [In] from the estimated attitude",
+               [](const Sample& s) {
+                 return Vector{ground<Signal::gradient_yx>(s), ground<Signal::gradient_yy>(s),
+                               ground<Signal::gradient_yz>(s)};
+               }),
+    vector_row("estimated_S_z", "1/s²", "S", "row Z of [T] − [In] from the estimated attitude",
+               [](const Sample& s) {
+                 return Vector{ground<Signal::gradient_zx>(s), ground<Signal::gradient_zy>(s),
+                               ground<Signal::gradient_zz>(s)};
+               }),
+};
+
+constexpr std::array thrust{
+    vector_row("acceleration_S_", m_s2, "S", "Γ_propu = −[M_DF] Γ_DF + Γ_n,DF",
+               [](const Sample& s) { return s.loop.thrust_S(s.constants, s.noise); }),
+    vector_row("command_S_", m_s2, "S",
+               "Γ_DF of the sample before, which acts now: the acceleration to be cancelled",
+               [](const Sample& s) { return s.loop.thrust_command_S; }),
+};
+
+constexpr std::array attitude{
+    vector_row("angle_RS_S_", rad, "S", "true angles from the reference R to the satellite S",
+               [](const Sample& s) { return s.loop.angle_RS_S(s.shared); }),
+    vector_row("omega_IS_S_", rad_s, "S", "Ω: true angular velocity against I",
+               [](const Sample& s) { return s.loop.omega_IS_S; }),
+    vector_row("omega_dot_IS_S_", rad_s2, "S", "true angular acceleration against I",
+               [](const Sample& s) {
+                 return s.loop.motion(s.constants, s.shared, s.noise).omega_dot_IS_S;
+               }),
+    vector_row("estimated_angle_RS_S_", rad, "S",
+               "angles as estimated on board, with the commanded ones in them",
+               [](const Sample& s) { return s.observation.attitude.angle_RS_S; }),
+    vector_row("estimated_omega_RS_S_", rad_s, "S",
+               "angular velocity against R as estimated on board, with the commanded one in it",
+               [](const Sample& s) { return s.observation.attitude.omega_RS_S; }),
+    vector_row("measured_omega_dot_IS_S_", rad_s2, "S", "angular acceleration as measured",
+               [](const Sample& s) { return s.observation.measured_omega_dot_IS_S; }),
+    vector_row("torque_command_S_", rad_s2, "S",
+               "angular acceleration that the attitude loop commands, which acts now",
+               [](const Sample& s) { return s.loop.torque_command_S; }),
+};
+
+constexpr std::array star_tracker{
+    vector_row(
+        "angle_RS_S_", rad, "S", "fused angles as reported, with the commanded ones added",
+        [](const Sample& s) { return s.loop.star_tracker_RS_S(s.constants, s.shared, s.noise); }),
+};
+
+constexpr std::array environment{
+    vector_row("linear_S_", m_s2, "S", "Γ_ext: drag and other external accelerations",
+               [](const Sample& s) { return s.shared.external_S.linear_m_s2; }),
+    vector_row("angular_S_", rad_s2, "S", "angular acceleration by external torques",
+               [](const Sample& s) { return s.shared.external_S.angular_rad_s2; }),
+};
+
+constexpr std::array excitation{
+    vector_row("drag_free_S_", m_s2, "S", "C_cal, added to the input of the drag-free loop",
+               [](const Sample& s) { return s.shared.drag_free_command_S_m_s2; }),
+    vector_row("attitude_S_", rad, "S", "angles added to the output of the star tracker",
+               [](const Sample& s) { return s.shared.attitude_command_S_rad; }),
+    SignalRow{"mass_position", "m", "", "motion of the test masses, Δ_TM sin(2π f t)",
+              [](const Sample& s) { return s.shared.mass_motion.position_m; }},
+    SignalRow{"mass_velocity", "m/s", "", "its first derivative",
+              [](const Sample& s) { return s.shared.mass_motion.velocity_m_s; }},
+    SignalRow{"mass_acceleration", m_s2, "", "its second derivative",
+              [](const Sample& s) { return s.shared.mass_motion.acceleration_m_s2; }},
+};
+
+std::span<const GroupRows> groups() {
+  static constexpr std::array<GroupRows, 9> all{{
+      {"measured", "what the two sensors report", measured},
+      {"modes", "half difference and half sum of what the sensors report", modes},
+      {"applied", "accelerations that act on the test masses", applied},
+      {"gradient", "gravity gradient and the Earth's direction", gradient},
+      {"thrust", "acceleration by the thrusters, and its command", thrust},
+      {"attitude", "true, estimated and commanded rotation of the satellite", attitude},
+      {"star_tracker", "what the star tracker reports", star_tracker},
+      {"environment", "accelerations from outside", environment},
+      {"excitation", "what the session shakes", excitation},
+  }};
+  return all;
+}
+
+void append_signals(const SignalRow& row, std::vector<RecordedSignal>& signals) {
+  const auto append = [&](std::string name, const std::string& meaning) {
+    signals.push_back({.name = std::move(name),
+                       .unit = std::string(row.unit),
+                       .frame = std::string(row.frame),
+                       .meaning = meaning});
+  };
+  if (row.number != nullptr) {
+    append(std::string(row.name), std::string(row.meaning));
+    return;
+  }
+  for (const char axis : {'x', 'y', 'z'}) {
+    append(std::string(row.name) + axis, std::string(row.meaning) + ", component " + axis);
+  }
+}
+
+}  // namespace
+
+Recording recording_of(const Scenario& scenario) {
+  Recording recording;
+  recording.frames = {
+      {"I", "inertial: X towards perigee, Y normal to the orbital plane, Z in the plane"},
+      {"R", "reference of the attitude loop: I, turned about Y at the session's spin rate"},
+      {"S", "satellite in its true attitude; X is the sensitive axis"},
+      {"K1", "sensor of the inner mass, misaligned against S by mrad"},
+      {"K2", "sensor of the outer mass, misaligned against S by mrad"}};
+  for (const GroupRows& rows : groups()) {
+    SignalGroup& group = recording.groups.emplace_back();
+    group.name = rows.name;
+    group.meaning = rows.meaning;
+    for (const SignalRow& row : rows.rows) append_signals(row, group.signals);
+  }
+  for (const Session& session : scenario.sessions) {
+    recording.sessions.push_back(
+        {.name = session.name,
+         .sample_period_s = scenario.simulation.sample_period_s,
+         .num_samples = static_cast<std::uint64_t>(num_record_samples(scenario, session))});
+  }
+  return recording;
+}
+
+void append_recorded_values(const ObservedSample& sample, std::vector<double>& values) {
+  for (const GroupRows& group : groups()) {
+    for (const SignalRow& row : group.rows) {
+      if (row.number != nullptr) {
+        values.push_back(row.number(sample));
+        continue;
+      }
+      const Vector vector = row.vector(sample);
+      for (std::size_t axis = 0; axis < 3; ++axis) values.push_back(vector[axis]);
+    }
+  }
+}
+
+}  // namespace proofmass
