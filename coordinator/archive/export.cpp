@@ -167,12 +167,15 @@ void TextOutput::write(std::string_view text) {
 }
 
 void TextOutput::finish() {
+  write_rest();
+  if (file_) publish(*file_);
+}
+
+void TextOutput::write_rest() {
   flush();
-  if (!file_) return;
-  const int descriptor = descriptor_;
-  descriptor_ = -1;
+  if (!file_ || descriptor_ < 0) return;
+  const int descriptor = std::exchange(descriptor_, -1);
   if (::close(descriptor) != 0) fail_to_write(name(), errno);
-  publish(*file_);
 }
 
 void TextOutput::flush() {

@@ -31,8 +31,10 @@ class TextOutput {
   TextOutput& operator=(const TextOutput&) = delete;
 
   void write(std::string_view text);
-  /// Writes what is left. Without it, a file does not appear.
+  /// Writes what is left and gives a file its name. Without it, a file does not appear.
   void finish();
+  /// The first half of finish(), for several files that are to appear together.
+  void write_rest();
 
  private:
   void flush();

@@ -2,24 +2,22 @@
 
 #include <array>
 #include <cmath>
-#include <complex>
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
 #include <string>
-#include <unsupported/Eigen/FFT>
 #include <vector>
 
 #include "core/microscope/campaign/scenario.hpp"
 #include "core/microscope/simulation/sample_noise.hpp"
 #include "core/signal/noise_shape.hpp"
+#include "tests/support/averaged_spectrum.hpp"
 
 namespace proofmass {
 namespace {
 
 constexpr double period_s = 0.25;
 constexpr std::size_t segment_length = 1 << 18;  // 18 hours: bins of 1.5e-5 Hz.
-constexpr double bin_hz = 1.0 / (period_s * segment_length);
 constexpr std::size_t num_runs = 8;
 constexpr std::uint64_t seed = 2013;
 
@@ -50,32 +48,11 @@ constexpr std::array<Group, num_noise_channels> group_of{
     angular,  angular,   angular,   star_tracker_x, star_tracker_yz, star_tracker_yz,
     thrust,   thrust,    thrust,    torque,         torque,          torque};
 
-struct GroupSpectrum {
-  std::vector<double> psd = std::vector<double>(segment_length / 2, 0.0);  ///< unit²/Hz
-  int num_segments = 0;
-};
-
-/// One-sided periodogram of a record under a Hann window, Σw² = 3n/8, added to the group's.
-void add_periodogram(std::vector<double>& record, GroupSpectrum& spectrum) {
-  for (std::size_t k = 0; k < segment_length; ++k) {
-    const double turns = static_cast<double>(k) / segment_length;
-    record[k] *= 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * turns);
-  }
-  Eigen::FFT<double> fft;
-  std::vector<std::complex<double>> transform;
-  fft.fwd(transform, record);
-  constexpr double density = 2.0 * period_s / (0.375 * segment_length);
-  for (std::size_t m = 0; m < spectrum.psd.size(); ++m) {
-    spectrum.psd[m] += density * std::norm(transform[m]);
-  }
-  ++spectrum.num_segments;
-}
-
-using Spectra = std::array<GroupSpectrum, num_groups>;
+using Spectra = std::vector<test::AveragedSpectrum>;
 
 Spectra measured_spectra(NoisePreset preset) {
   const NoiseModel model = make_noise_model(noise_preset(preset), period_s);
-  Spectra spectra;
+  Spectra spectra(num_groups, test::AveragedSpectrum(segment_length, period_s));
   std::vector<std::vector<double>> records(num_noise_channels, std::vector<double>(segment_length));
   for (std::uint64_t run = 0; run < num_runs; ++run) {
     SessionNoise noise(model, seed, RunIndex{run}, "spectrum");
@@ -84,62 +61,24 @@ Spectra measured_spectra(NoisePreset preset) {
       for (std::size_t i = 0; i < samples.size(); ++i) records[i][k] = samples[i];
     }
     for (std::size_t i = 0; i < records.size(); ++i) {
-      add_periodogram(records[i], spectra[group_of[i]]);
+      spectra[group_of[i]].add(records[i]);
     }
-  }
-  for (GroupSpectrum& spectrum : spectra) {
-    for (double& value : spectrum.psd) value /= spectrum.num_segments;
   }
   return spectra;
 }
 
-/// What a Hann window makes of a density: its neighbours count one sixth each.
-template <typename Density>
-double windowed(Density density, std::size_t bin) {
-  const double f = bin_hz * static_cast<double>(bin);
-  return (density(f - bin_hz) + 4.0 * density(f) + density(f + bin_hz)) / 6.0;
-}
-
-/// Compares half-octave bands from 6e-5 Hz to `highest_hz` with a density.
-///
-/// A periodogram's bin has the relative deviation 1; neighbours correlate by (2/3)² and the next by
-/// (1/6)² under the Hann window. The mean of K bins of M segments therefore has the standard error
-/// √((1 + 2·(4/9 + 1/36))/(K·M)). Five of them are allowed, and `model_tolerance` besides.
-template <typename Density>
-void expect_spectrum(const GroupSpectrum& spectrum, Density density, double highest_hz,
-                     double model_tolerance, const std::string& name) {
-  double first = 4.0;
-  while (first * std::numbers::sqrt2 * bin_hz < highest_hz) {
-    const double last = first * std::numbers::sqrt2;
-    const auto begin = static_cast<std::size_t>(std::ceil(first));
-    const auto end = static_cast<std::size_t>(std::ceil(last));
-    first = last;
-    const auto count = static_cast<double>(end - begin);
-    double ratio = 0.0;
-    for (std::size_t m = begin; m < end; ++m) {
-      ratio += spectrum.psd[m] / windowed(density, m) / count;
-    }
-    const double error = std::sqrt((1.0 + 17.0 / 18.0) / (count * spectrum.num_segments));
-    EXPECT_NEAR(ratio, 1.0, 5.0 * error + model_tolerance)
-        << name << " from " << bin_hz * static_cast<double>(begin) << " Hz";
-  }
-}
-
 // Against the filter's own response nothing but chance is allowed, up to the Nyquist frequency;
 // against the nominal curve half a decibel more, up to 1 Hz.
-void expect_coloured(const GroupSpectrum& spectrum, const SensorNoise& noise,
+void expect_coloured(const test::AveragedSpectrum& spectrum, const SensorNoise& noise,
                      const std::string& name) {
   const NoiseShape shape = shape_noise(noise, period_s);
-  expect_spectrum(
-      spectrum, [&](double f) { return shape.psd(f, period_s); }, 2.0, 0.0, name + " (filter)");
-  expect_spectrum(
-      spectrum, [&](double f) { return nominal_psd(noise, f); }, 1.0, std::pow(10.0, 0.05) - 1.0,
-      name);
+  spectrum.expect([&](double f) { return shape.psd(f, period_s); }, 2.0, 0.0, name + " (filter)");
+  spectrum.expect([&](double f) { return nominal_psd(noise, f); }, 1.0, std::pow(10.0, 0.05) - 1.0,
+                  name);
 }
 
-void expect_white(const GroupSpectrum& spectrum, double asd, const std::string& name) {
-  expect_spectrum(
-      spectrum, [asd](double) { return asd * asd; }, 2.0, 0.0, name);
+void expect_white(const test::AveragedSpectrum& spectrum, double asd, const std::string& name) {
+  spectrum.expect([asd](double) { return asd * asd; }, 2.0, 0.0, name);
 }
 
 // The fused star tracker: two heads, a = 7e-6 across and b = 3.5e-5 about boresights at ±45° in the
