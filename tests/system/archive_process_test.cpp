@@ -152,6 +152,29 @@ TEST_F(ArchiveProcess, EndsInOrderWhenItIsInterrupted) {
   EXPECT_EQ(errors_of("verify"), "proofmass: interrupted\n");
 }
 
+// The signal comes early in the 140 orbits of a run, of which 2 GB would be written.
+TEST_F(ArchiveProcess, AReplayThatIsInterruptedWritesNothing) {
+  ASSERT_EQ(proofmass("part", {"run", "paper.toml", "--db", "part.db", "--runs", "1"}).wait(), 0);
+  for (const std::string format : {"hdf5", "csv"}) {
+    Process replay = proofmass(format, {"replay", "part.db", "--run", "0", "--format", format,
+                                        "--output", "out." + format});
+    const auto begins = [&] {
+      const std::filesystem::path place = format == "csv" ? path("out.csv") : directory / "";
+      if (!std::filesystem::exists(place)) return false;
+      for (const auto& entry : std::filesystem::directory_iterator(place)) {
+        if (contains(entry.path(), ".new") && entry.file_size() > 1'000'000) return true;
+      }
+      return false;
+    };
+    wait_until("samples of " + format, begins);
+    replay.signal(SIGINT);
+    EXPECT_EQ(replay.wait(), 130) << errors_of(format);
+    EXPECT_EQ(errors_of(format), "proofmass: interrupted\n");
+    EXPECT_FALSE(std::filesystem::exists(path("out." + format)));
+  }
+  EXPECT_EQ(shell("ls | grep -c new"), 1);
+}
+
 TEST_F(ArchiveProcess, AMergeThatIsInterruptedWritesNoDatabase) {
   // Its sessions are so long that their simulation is not over before the signal comes.
   ASSERT_EQ(proofmass("part", {"run", "paper.toml", "--db", "part.db", "--runs", "16"}).wait(), 0);

@@ -81,6 +81,7 @@ TEST_F(HostileFile, IsRefusedByEveryCommand) {
                                         {"report", "hostile.db"},
                                         {"verify", "hostile.db"},
                                         {"export", "hostile.db"},
+                                        {"replay", "hostile.db", "--run", "0"},
                                         {"backup", "hostile.db", "copy.db"},
                                         {"compare", "hostile.db", "good.db"},
                                         {"compare", "good.db", "hostile.db"},

@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "core/math/elementary.hpp"
+#include "tests/coordinator/archive/series_reading.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/system/process.hpp"
 #include "tests/system/stored_runs.hpp"
@@ -186,6 +188,38 @@ TEST_F(SecondModel, IsReportedAndAnswersQueries) {
   ASSERT_EQ(proofmass("sensitivity", {"sensitivity", "a.db"}), 0) << errors_of("sensitivity");
   EXPECT_THAT(output_of("sensitivity"), HasSubstr("scale_factor"));
   EXPECT_THAT(output_of("sensitivity"), HasSubstr("natural_frequency_hz"));
+}
+
+// P = (2/N) Σ y cos ωt, added up in the order of the samples: the replayed readings have the bits
+// of the stored estimate.
+TEST_F(SecondModel, IsReplayedToTheBit) {
+  run("a");
+  ASSERT_EQ(proofmass("replay", {"replay", "a.db", "--run", "42", "--output", "run42.h5"}), 0)
+      << errors_of("replay");
+  EXPECT_EQ(output_of("replay"),
+            "run 42 completed: all values equal the stored ones\nwrote run42.h5\n");
+  const auto read = description_of_series(path("run42.h5"));
+  EXPECT_EQ(read["attributes"]["name"], "oscillator");
+  EXPECT_EQ(read["sessions"]["steady_state"]["datasets"].size(), 2U);
+  const std::string sensor = "steady_state/sensor";
+  const std::vector<double> time_s = series_in(path("run42.h5"), sensor, "time");
+  const std::vector<double> reading = series_in(path("run42.h5"), sensor, "reading");
+  ASSERT_EQ(reading.size(), 16000U);
+  EXPECT_EQ(time_s.at(3), 3 * 6.25);  // 16 samples a period of 100 s.
+  double in_phase = 0.0;
+  for (std::size_t k = 0; k < reading.size(); ++k) {
+    in_phase += reading[k] * sincos_turns(static_cast<double>(k % 16) / 16.0).cosine;
+  }
+  EXPECT_EQ(2.0 / 16000.0 * in_phase,
+            number("a", "SELECT estimate_in_phase_m_s2 FROM run_result WHERE run_index = 42"));
+  EXPECT_EQ(proofmass("worst", {"replay", "a.db", "--worst", "2", "--output", "worst"}), 0)
+      << errors_of("worst");
+  const std::string rows = answer(
+      "SELECT 'run' || run_index || '.h5' AS file FROM worst_runs WHERE parameter = 'in_phase' "
+      "AND place = 1");
+  const std::string heading = "file\n";
+  const std::string worst = rows.substr(heading.size(), rows.size() - heading.size() - 1);
+  EXPECT_TRUE(std::filesystem::exists(path("worst") / worst)) << rows;
 }
 
 TEST_F(SecondModel, IsComparedAndExported) {

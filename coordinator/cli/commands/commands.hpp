@@ -7,6 +7,7 @@
 #include <string>
 
 #include "coordinator/cli/program.hpp"
+#include "coordinator/store/draft_file.hpp"
 
 namespace proofmass::coordinator {
 
@@ -36,6 +37,13 @@ Declared<Options> add_command(CLI::App& app, Command& chosen, const std::string&
 inline void add_json_flag(CLI::App& command, OutputFormat& format) {
   command.add_flag_callback(
       "--json", [&format] { format = OutputFormat::json; }, "Print JSON");
+}
+
+/// Declares --force.
+/// @param if_there  Lives as long as the command.
+inline void add_force_flag(CLI::App& command, IfThere& if_there) {
+  command.add_flag_callback(
+      "--force", [&if_there] { if_there = IfThere::replace; }, "Replace an existing file");
 }
 
 /// Type names of campaign databases and campaign files, see described_program().
@@ -71,6 +79,7 @@ void add_sensitivity(CLI::App& app, Command& chosen);
 void add_query(CLI::App& app, Command& chosen);
 void add_verify(CLI::App& app, Command& chosen);
 void add_export(CLI::App& app, Command& chosen);
+void add_replay(CLI::App& app, Command& chosen);
 void add_backup(CLI::App& app, Command& chosen);
 void add_compare(CLI::App& app, Command& chosen);
 void add_merge(CLI::App& app, Command& chosen);

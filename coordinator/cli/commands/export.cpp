@@ -1,18 +1,14 @@
 #include "coordinator/archive/export.hpp"
 
-#include <fmt/format.h>
-
 #include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
-#include <string_view>
-#include <system_error>
 
 #include "coordinator/archive/result_columns.hpp"
-#include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/output_file.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/store/store.hpp"
 #include "proto/command_line/described_program.hpp"
@@ -27,7 +23,7 @@ struct ExportOptions {
   std::filesystem::path database;
   ExportFormat format = ExportFormat::csv;
   std::filesystem::path output;  ///< Empty or `-` for standard output.
-  bool is_forced = false;        ///< Replaces an existing file.
+  IfThere if_there = IfThere::keep;
   DrawColumns draws = DrawColumns::left_out;
 };
 
@@ -35,24 +31,13 @@ bool is_standard_output(const std::filesystem::path& output) {
   return output.empty() || output == "-";
 }
 
-[[noreturn]] void refuse(const std::filesystem::path& output, std::string_view why) {
-  throw UsageError(fmt::format("output = {} ({})", output.string(), why));
-}
-
-// The output takes the place of what has its name: a device or a campaign would be lost.
 void check(const ExportOptions& options) {
-  const std::filesystem::path& output = options.output;
-  if (is_standard_output(output)) {
-    if (options.format != ExportFormat::hdf5) return;
-    refuse("-", "must be a file for hdf5: name it with --output");
+  if (!is_standard_output(options.output)) {
+    check_output_file(options.output, options.if_there,
+                      "leave --output out to write to a pipe or device");
+  } else if (options.format == ExportFormat::hdf5) {
+    refuse_output("-", "must be a file for hdf5: name it with --output");
   }
-  std::error_code ignored;
-  if (!std::filesystem::exists(output, ignored)) return;
-  if (!options.is_forced) refuse(output, "exists already; replace it with --force");
-  if (!std::filesystem::is_regular_file(output)) {
-    refuse(output, "is no file; leave --output out to write to a pipe or device");
-  }
-  if (has_campaign_mark(output)) refuse(output, "is a campaign, which --force does not replace");
 }
 
 void write_text(const ExportOptions& options, const Store& store, TextOutput& output,
@@ -98,7 +83,7 @@ void add_export(CLI::App& app, Command& chosen) {
   wire::add_choice(command, "--format", options.format, formats, "csv by default");
   command.add_option("--output", options.output, "File; standard output by default")
       ->type_name(wire::file_type);
-  command.add_flag("--force", options.is_forced, "Replace an existing file");
+  add_force_flag(command, options.if_there);
   command.add_flag_callback(
       "--draws", [&draws = options.draws] { draws = DrawColumns::included; },
       "Add columns draw_... with what each run drew");
