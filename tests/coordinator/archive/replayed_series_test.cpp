@@ -137,7 +137,8 @@ TEST_F(ReplayedSeries, MovesTheMassesAsTheGradientsSay) {
   EXPECT_GT(largest, 1e-12);  // Nine digits above the tolerance.
 }
 
-// Without noise: what the sensors, the star tracker and the thrusters have besides are constants.
+// Without noise, torques are those commanded and external, Ω is their sum, and the star tracker is
+// off by a constant bias.
 TEST_F(ReplayedSeries, IsDrivenByItsCommandsAlone) {
   MicroscopeCampaign campaign = test::quick_campaign(1);
   campaign.scenario.noise.scale = 0.0;
@@ -156,7 +157,6 @@ TEST_F(ReplayedSeries, IsDrivenByItsCommandsAlone) {
   for (std::size_t k = 0; k < omega.size(); ++k) {
     ASSERT_EQ(omega_dot[k], torque[k] + external[k]) << k;
     ASSERT_LE((reported[k] - true_angle[k] - commanded[k] - bias).norm(), 1e-17) << k;
-    // Γ_propu = −[M_DF] Γ_DF with [M_DF] within 5 % and 17 mrad of 1.
     if (k + 1 < omega.size()) {
       ASSERT_EQ(omega[k + 1], omega[k] + 1.0 * omega_dot[k]) << k;
     }
@@ -169,7 +169,7 @@ TEST_F(ReplayedSeries, ThrustsAgainstTheCommandOfTheSampleBefore) {
   replay(campaign, {"a_d12"}, {"thrust"});
   const auto thrust = vectors("a_d12/thrust", "acceleration_S_");
   const auto command = vectors("a_d12/thrust", "command_S_");
-  // [M_DF] is the same in each sample: three of them determine it.
+  // [M_DF], within 5 % and 17 mrad of 1, is the same in each sample: three of them determine it.
   const auto three = [](const std::vector<Eigen::Vector3d>& v) {
     Eigen::Matrix3d m;
     m << v[100], v[1100], v[2100];
