@@ -50,7 +50,7 @@ Vector kinematic(const Sample& sample) {
                                 sample.shared.mass_motion);
 }
 
-constexpr std::array measured{
+constexpr std::array measured_rows{
     vector_row("mass_1_K_", m_s2, "K1", "Γ_mes,1 of the inner mass",
                [](const Sample& s) { return s.observation.measured_K[0]; }),
     vector_row("mass_2_K_", m_s2, "K2", "Γ_mes,2 of the outer mass",
@@ -58,7 +58,7 @@ constexpr std::array measured{
 };
 
 // Components of two frames are added here, as the ground does: these numbers are of no frame.
-constexpr std::array modes{
+constexpr std::array modes_rows{
     SignalRow{"differential_x", m_s2, "", "Γ_mes,dx = ½(Γ_mes,1x − Γ_mes,2x)",
               ground<Signal::differential_x>},
     SignalRow{"common_x", m_s2, "", "Γ_mes,cx = ½(Γ_mes,1x + Γ_mes,2x)", ground<Signal::common_x>},
@@ -66,14 +66,14 @@ constexpr std::array modes{
     SignalRow{"common_z", m_s2, "", "Γ_mes,cz = ½(Γ_mes,1z + Γ_mes,2z)", ground<Signal::common_z>},
 };
 
-constexpr std::array applied{
+constexpr std::array applied_rows{
     vector_row("mass_1_S_", m_s2, "S", "Γ_App,1 + p_1: applied acceleration less the parasitic one",
                kinematic<0>),
     vector_row("mass_2_S_", m_s2, "S", "Γ_App,2 + p_2: applied acceleration less the parasitic one",
                kinematic<1>),
 };
 
-constexpr std::array gradient{
+constexpr std::array gradient_rows{
     SignalRow{"gravity", "1/s²", "", "μ/r³", [](const Sample& s) { return s.shared.gradient_s2; }},
     vector_row("radial_R_", "1", "R", "û: unit vector from the Earth's centre to the satellite",
                [](const Sample& s) { return s.shared.radial_R; }),
@@ -94,7 +94,7 @@ constexpr std::array gradient{
                }),
 };
 
-constexpr std::array thrust{
+constexpr std::array thrust_rows{
     vector_row("acceleration_S_", m_s2, "S", "Γ_propu = −[M_DF] Γ_DF + Γ_n,DF",
                [](const Sample& s) { return s.loop.thrust_S(s.constants, s.noise); }),
     vector_row("command_S_", m_s2, "S",
@@ -102,7 +102,7 @@ constexpr std::array thrust{
                [](const Sample& s) { return s.loop.thrust_command_S; }),
 };
 
-constexpr std::array attitude{
+constexpr std::array attitude_rows{
     vector_row("angle_RS_S_", rad, "S", "true angles from the reference R to the satellite S",
                [](const Sample& s) { return s.loop.angle_RS_S(s.shared); }),
     vector_row("omega_IS_S_", rad_s, "S", "Ω: true angular velocity against I",
@@ -124,20 +124,20 @@ constexpr std::array attitude{
                [](const Sample& s) { return s.loop.torque_command_S; }),
 };
 
-constexpr std::array star_tracker{
+constexpr std::array star_tracker_rows{
     vector_row(
         "angle_RS_S_", rad, "S", "fused angles as reported, with the commanded ones added",
         [](const Sample& s) { return s.loop.star_tracker_RS_S(s.constants, s.shared, s.noise); }),
 };
 
-constexpr std::array environment{
+constexpr std::array environment_rows{
     vector_row("linear_S_", m_s2, "S", "Γ_ext: drag and other external accelerations",
                [](const Sample& s) { return s.shared.external_S.linear_m_s2; }),
     vector_row("angular_S_", rad_s2, "S", "angular acceleration by external torques",
                [](const Sample& s) { return s.shared.external_S.angular_rad_s2; }),
 };
 
-constexpr std::array excitation{
+constexpr std::array excitation_rows{
     vector_row("drag_free_S_", m_s2, "S", "C_cal, added to the input of the drag-free loop",
                [](const Sample& s) { return s.shared.drag_free_command_S_m_s2; }),
     vector_row("attitude_S_", rad, "S", "angles added to the output of the star tracker",
@@ -152,15 +152,15 @@ constexpr std::array excitation{
 
 std::span<const GroupRows> groups() {
   static constexpr std::array<GroupRows, 9> all{{
-      {"measured", "what the two sensors report", measured},
-      {"modes", "half difference and half sum of what the sensors report", modes},
-      {"applied", "accelerations that act on the test masses", applied},
-      {"gradient", "gravity gradient and the Earth's direction", gradient},
-      {"thrust", "acceleration by the thrusters, and its command", thrust},
-      {"attitude", "true, estimated and commanded rotation of the satellite", attitude},
-      {"star_tracker", "what the star tracker reports", star_tracker},
-      {"environment", "accelerations from outside", environment},
-      {"excitation", "what the session shakes", excitation},
+      {"measured", "what the two sensors report", measured_rows},
+      {"modes", "half difference and half sum of what the sensors report", modes_rows},
+      {"applied", "accelerations that act on the test masses", applied_rows},
+      {"gradient", "gravity gradient and the Earth's direction", gradient_rows},
+      {"thrust", "acceleration by the thrusters, and its command", thrust_rows},
+      {"attitude", "true, estimated and commanded rotation of the satellite", attitude_rows},
+      {"star_tracker", "what the star tracker reports", star_tracker_rows},
+      {"environment", "accelerations from outside", environment_rows},
+      {"excitation", "what the session shakes", excitation_rows},
   }};
   return all;
 }
