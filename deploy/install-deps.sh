@@ -19,10 +19,10 @@ test_packages=(
   sshfs openssh-sftp-server busybox-static
   slurmctld slurmd slurm-client slurm-wlm-basic-plugins munge
   groff-base zsh fish
-  systemd systemd-container mmdebstrap dpkg-dev python3-yaml
+  systemd systemd-container mmdebstrap dpkg-dev python3-yaml python3-distributed
 )
 # The fuzzer, the systems that the dispatch is measured beside, and what builds images.
-more_packages=(clang libclang-rt-14-dev parallel python3-distributed python3-ipyparallel buildah)
+more_packages=(clang libclang-rt-14-dev parallel python3-ipyparallel buildah)
 
 case "${1:-}" in
   '') packages+=("${test_packages[@]}") ;;
