@@ -101,6 +101,32 @@ std::string visible_lines(std::string_view text) {
   return visible;
 }
 
+std::string markup_text(std::string_view text) {
+  std::string markup;
+  for (const char character : visible_text(text)) {
+    switch (character) {
+      case '&':
+        markup += "&amp;";
+        break;
+      case '<':
+        markup += "&lt;";
+        break;
+      case '>':
+        markup += "&gt;";
+        break;
+      case '"':
+        markup += "&quot;";
+        break;
+      case '\'':
+        markup += "&#39;";
+        break;
+      default:
+        markup += character;
+    }
+  }
+  return markup;
+}
+
 std::size_t display_width(std::string_view text) {
   std::size_t width = 0;
   while (!text.empty()) {

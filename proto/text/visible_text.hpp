@@ -24,6 +24,10 @@ struct Character {
 /// The same for text of several lines, whose ends stay.
 [[nodiscard]] std::string visible_lines(std::string_view text);
 
+/// Visible text that is safe in HTML and SVG, between tags and in an attribute's double quotes:
+/// what could begin a tag, an entity or end the quotes is written as an entity.
+[[nodiscard]] std::string markup_text(std::string_view text);
+
 /// Columns of a terminal that visible text takes: none for a combining mark, two for an East Asian
 /// character or a pictograph.
 [[nodiscard]] std::size_t display_width(std::string_view text);

@@ -26,6 +26,14 @@ TEST(VisibleText, KeepsTheEndsOfLinesOfLongerText) {
   EXPECT_EQ(visible_lines(""), "");
 }
 
+TEST(MarkupText, CannotLeaveItsPlaceInADocument) {
+  EXPECT_EQ(markup_text("<script>alert('1')</script>"),
+            "&lt;script&gt;alert(&#39;1&#39;)&lt;/script&gt;");
+  EXPECT_EQ(markup_text("\" onload=\"x"), "&quot; onload=&quot;x");
+  EXPECT_EQ(markup_text("&lt;"), "&amp;lt;");
+  EXPECT_EQ(markup_text("Δx\n\x1b[31m\xff"), "Δx\\n\\u001b[31m\\xff");
+}
+
 TEST(DisplayWidth, CountsColumnsOfATerminal) {
   EXPECT_EQ(display_width("a_c11·Δx"), 8u);
   EXPECT_EQ(display_width("│─−µ"), 4u);
