@@ -16,7 +16,7 @@ namespace proofmass::coordinator {
 void CampaignService::review_notices(CampaignId id, Served& served) {
   const CampaignState& campaign = state_.campaigns.at(id);
   if (phase_of(id) == Phase::active) served.is_end_told = false;
-  if (!served.is_end_told && has_ended(id, served)) {
+  if (!served.is_end_told && is_finished_and_settled(id, served)) {
     served.is_end_told = true;
     tell(served, CampaignNotice::Kind::finished, {});
   }
@@ -47,7 +47,7 @@ bool CampaignService::is_settled(CampaignId id, const Served& served) const {
   return has_statistics && is_quiet && !served.is_held && served.written.phase == phase_of(id);
 }
 
-bool CampaignService::has_ended(CampaignId id, const Served& served) const {
+bool CampaignService::is_finished_and_settled(CampaignId id, const Served& served) const {
   return is_settled(id, served) && phase_of(id) == Phase::finished &&
          is_finished(state_.campaigns.at(id));
 }
@@ -92,8 +92,7 @@ void CampaignService::begin_closing(CampaignId id, std::function<void(bool is_cl
       Served& served = served_.at(id);
       served.is_held = false;
       served.closing_at = context_.now();
-      const bool is_closing =
-          is_folded && is_settled(id, served) && coordinator::has_ended(phase_of(id));
+      const bool is_closing = is_folded && is_settled(id, served) && has_ended(phase_of(id));
       if (is_closing) close_ended(id);
       then(is_closing);
     };

@@ -36,7 +36,7 @@ void CampaignService::serve(PreparedCampaign prepared) {
   const CampaignId id = campaign.store.id();
   const std::string& name = campaign.definition->name;
   const std::optional<Entry> entry = find(name);
-  const bool is_again = entry && entry->has_ended && entry->id == id;
+  const bool is_again = entry && entry->is_closed && entry->id == id;
   if ((entry && !is_again) || served_.contains(id) || (ended_.contains(id) && !is_again)) {
     throw Error(fmt::format("campaign = {} in {} (is served already, from another file)", name,
                             campaign.file.string()));
@@ -78,7 +78,7 @@ std::optional<CampaignService::Entry> CampaignService::find(std::string_view nam
   }
   for (const auto& [id, ended] : ended_) {
     if (ended.status.name != name) continue;
-    return Entry{.id = id, .file = ended.file, .owner = ended.status.owner, .has_ended = true};
+    return Entry{.id = id, .file = ended.file, .owner = ended.status.owner, .is_closed = true};
   }
   return std::nullopt;
 }
@@ -119,7 +119,7 @@ bool CampaignService::unlist(const EndedFile& changed) {
 CampaignService::Holdings CampaignService::holdings_of(std::string_view owner) const {
   Holdings holdings;
   for (const auto& [id, served] : served_) {
-    if (served.owner != owner || coordinator::has_ended(phase_of(id))) continue;
+    if (served.owner != owner || has_ended(phase_of(id))) continue;
     ++holdings.num_campaigns;
     holdings.size += definition_size(*state_.campaigns.at(id).definition);
   }
@@ -253,7 +253,7 @@ void CampaignService::review() {
     review_control(id, served);
     review_rest(id, served);
     review_notices(id, served);
-    if (!has_ended(id, served)) {
+    if (!is_finished_and_settled(id, served)) {
       served.ended_at.reset();
     } else {
       if (!served.ended_at) served.ended_at = now;

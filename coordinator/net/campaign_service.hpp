@@ -32,7 +32,7 @@ class CampaignService {
     CampaignId id;
     std::filesystem::path file;
     std::string owner;
-    bool has_ended = false;  ///< Its file is closed.
+    bool is_closed = false;  ///< It has ended, and so has the service of its file.
   };
 
   /// A served campaign as it is to be from now on.
@@ -167,7 +167,7 @@ class CampaignService {
   /// True if nothing of the campaign is to be stored or computed, and nobody changes it.
   [[nodiscard]] bool is_settled(CampaignId id, const Served& served) const;
   /// True if the campaign is finished, its statistics are there, and nothing is under way.
-  [[nodiscard]] bool has_ended(CampaignId id, const Served& served) const;
+  [[nodiscard]] bool is_finished_and_settled(CampaignId id, const Served& served) const;
   void close_surplus(std::vector<CampaignId> ended, TimePoint now);
   void review_rest(CampaignId id, Served& served);
   /// Closes the file if it is still settled when its log is folded in, and nobody reads it.

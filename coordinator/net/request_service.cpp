@@ -91,7 +91,7 @@ void RequestService::take(wire::ControlRequest&& request, const Asker& asker,
     if (under_way_.contains(request.campaign)) refuse_as_under_way(request.campaign);
     return campaigns_.archive(campaign->id, respond);
   }
-  if (campaign->has_ended) return control_ended(*campaign, request.action, respond);
+  if (campaign->is_closed) return control_ended(*campaign, request.action, respond);
   respond(campaigns_.control(campaign->id, request));
 }
 
@@ -217,8 +217,8 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
     return;
   }
   const std::string& owner = entry ? entry->owner : asker.name;
-  check_limits(owner, definition_size(*request->campaign), !entry || entry->has_ended);
-  if (entry && !entry->has_ended) {
+  check_limits(owner, definition_size(*request->campaign), !entry || entry->is_closed);
+  if (entry && !entry->is_closed) {
     change_served(entry->id, request, std::move(respond));
   } else {
     open_file(request, asker, owner, std::move(respond));
@@ -228,7 +228,7 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
 bool RequestService::is_busy(const std::string& name) const {
   if (under_way_.contains(name)) return true;
   const std::optional<CampaignService::Entry> entry = campaigns_.find(name);
-  return entry && !entry->has_ended && campaigns_.is_held(entry->id);
+  return entry && !entry->is_closed && campaigns_.is_held(entry->id);
 }
 
 void RequestService::review() {
