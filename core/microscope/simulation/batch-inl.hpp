@@ -22,10 +22,11 @@ using SignedWords = hn::RebindToSigned<Floats>;
 using UnsignedWords = hn::RebindToUnsigned<Floats>;
 
 constexpr std::size_t width = HWY_LANES(double);
-constexpr std::size_t num_vectors = 2;  ///< Of doubles; one of floats holds as many.
-constexpr std::size_t num_lanes = num_vectors * width;  ///< Runs of a group.
+constexpr std::size_t num_vectors = PROOFMASS_KERNEL_VECTORS;  ///< Of doubles: 1 or 2.
+constexpr std::size_t num_lanes = num_vectors * width;         ///< Runs of a group.
 constexpr std::size_t num_groups = batch_lanes / num_lanes;
 static_assert(batch_lanes % num_lanes == 0);
+static_assert(num_vectors == 1 || num_vectors == 2);
 
 /// One double of each run of a group.
 struct Batch {

@@ -1,8 +1,8 @@
 #pragma once
 
-// The kernel of one instruction set. Included once by each batch_kernel_<set>.cpp, which is
-// compiled with that set's flags and defines PROOFMASS_KERNEL_SET, the ending of the names of the
-// functions to be made.
+// A kernel of one instruction set. Included once by each batch_kernel_<set>.cpp, which is compiled
+// with that set's flags and defines PROOFMASS_KERNEL_SET, the ending of the names of the functions
+// to be made, and PROOFMASS_KERNEL_VECTORS, the vectors that a quantity of a group of runs fills.
 //
 // Everything over `Batch` has internal linkage, because `Batch` has: no symbol of this file can be
 // taken for another translation unit's, so no code of a faster processor reaches a slower one.

@@ -4,11 +4,13 @@
 
 namespace proofmass {
 
-BatchKernel batch_kernel(InstructionSet set) {
+BatchKernel batch_kernel(InstructionSet set, std::size_t num_runs) {
   PROOFMASS_EXPECT(set != InstructionSet::scalar);
   if (set == InstructionSet::sse4) return record_batch_sse4;
-  if (set == InstructionSet::avx2) return record_batch_avx2;
-  return record_batch_avx512;
+  if (set == InstructionSet::avx2) {
+    return num_runs <= 4 ? record_batch_avx2_narrow : record_batch_avx2;
+  }
+  return num_runs <= 8 ? record_batch_avx512_narrow : record_batch_avx512;
 }
 
 BatchNoiseKernel batch_noise_kernel(InstructionSet set) {

@@ -42,9 +42,15 @@ void record_batch_avx2(const BatchSession& session,
                        std::span<SessionOutcome, batch_lanes> outcomes);
 void record_batch_avx512(const BatchSession& session,
                          std::span<SessionOutcome, batch_lanes> outcomes);
+// For groups of half as many runs: 4 and 8.
+void record_batch_avx2_narrow(const BatchSession& session,
+                              std::span<SessionOutcome, batch_lanes> outcomes);
+void record_batch_avx512_narrow(const BatchSession& session,
+                                std::span<SessionOutcome, batch_lanes> outcomes);
 
-/// @pre set is not `scalar`.
-[[nodiscard]] BatchKernel batch_kernel(InstructionSet set);
+/// The kernel that takes the least time for so many runs.
+/// @pre set is not `scalar`; 1 ≤ num_runs ≤ batch_lanes.
+[[nodiscard]] BatchKernel batch_kernel(InstructionSet set, std::size_t num_runs);
 
 /// What to make of a batch's noise, for measuring: its deviates alone, or all of it.
 enum class NoiseWork : std::uint8_t { deviates, shaped };
@@ -57,6 +63,9 @@ using BatchNoiseKernel = double (*)(const BatchSession& session, std::size_t num
 double make_noise_sse4(const BatchSession& session, std::size_t num_samples, NoiseWork work);
 double make_noise_avx2(const BatchSession& session, std::size_t num_samples, NoiseWork work);
 double make_noise_avx512(const BatchSession& session, std::size_t num_samples, NoiseWork work);
+double make_noise_avx2_narrow(const BatchSession& session, std::size_t num_samples, NoiseWork work);
+double make_noise_avx512_narrow(const BatchSession& session, std::size_t num_samples,
+                                NoiseWork work);
 
 /// @pre set is not `scalar`.
 [[nodiscard]] BatchNoiseKernel batch_noise_kernel(InstructionSet set);

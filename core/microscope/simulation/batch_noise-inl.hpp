@@ -53,13 +53,15 @@ class BatchPhilox {
     }
   }
 
-  HWY_INLINE void make(std::uint32_t stream, std::uint32_t (&words)[4][num_lanes]) const {
-    const State low = make_vector(stream, 0);
-    const State high = make_vector(stream, 1);
-    store(low.c0, high.c0, words[0]);
-    store(low.c1, high.c1, words[1]);
-    store(low.c2, high.c2, words[2]);
-    store(low.c3, high.c3, words[3]);
+  /// The words of two pairs of deviates: those that make radii, and those that make angles.
+  HWY_INLINE void make(std::uint32_t stream, std::uint32_t (&radius_words)[2][num_lanes],
+                       std::uint32_t (&angle_words)[2][num_lanes]) const {
+    State states[num_vectors];
+    for (std::size_t i = 0; i < num_vectors; ++i) states[i] = make_vector(stream, i);
+    store(states, &State::c0, radius_words[0]);
+    store(states, &State::c1, angle_words[0]);
+    store(states, &State::c2, radius_words[1]);
+    store(states, &State::c3, angle_words[1]);
   }
 
  private:
@@ -77,11 +79,13 @@ class BatchPhilox {
   }
   HWY_INLINE static W high(W product) { return hn::ShiftRight<32>(product); }
 
-  /// Packs the low halves of two vectors into one.
-  HWY_INLINE static void store(W low, W high, std::uint32_t* words) {
-    const UnsignedWords halves;
-    hn::Store(hn::ConcatEven(halves, hn::BitCast(halves, high), hn::BitCast(halves, low)), halves,
-              words);
+  /// Packs the low halves of all vectors.
+  HWY_INLINE static void store(const State (&states)[num_vectors], W State::*word,
+                               std::uint32_t (&words)[num_lanes]) {
+    const hn::Rebind<std::uint32_t, Words> packed;
+    for (std::size_t i = 0; i < num_vectors; ++i) {
+      hn::Store(hn::TruncateTo(packed, states[i].*word), packed, words + i * width);
+    }
   }
 
   HWY_INLINE State make_vector(std::uint32_t stream, std::size_t i) const {
@@ -218,37 +222,36 @@ class BatchNoise {
   }
 
   HWY_INLINE Batch deviate(std::size_t channel, std::size_t i) const {
+    const auto& deviates = (i % 2 == 0 ? cosines_ : sines_)[channel][i / 2];
     Batch white;
     for (std::size_t part = 0; part < num_vectors; ++part) {
-      white.part[part] =
-          hn::PromoteTo(Doubles(), hn::Load(HalfFloats(), deviates_[channel][i] + part * width));
+      white.part[part] = hn::PromoteTo(Doubles(), hn::Load(HalfFloats(), deviates + part * width));
     }
     return white;
   }
 
   /// Three short loops rather than a long one: the processor overlaps several turns of each.
   HWY_NOINLINE void refill() {
-    alignas(64) std::uint32_t words[num_noise_channels][samples_per_noise_block][num_lanes];
+    alignas(64) std::uint32_t radius_words[num_noise_channels][2][num_lanes];
+    alignas(64) std::uint32_t angle_words[num_noise_channels][2][num_lanes];
     philox_.begin(num_blocks_);
     for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
-      philox_.make(streams_[channel], words[channel]);
+      philox_.make(streams_[channel], radius_words[channel], angle_words[channel]);
     }
     const Floats floats;
     const UnsignedWords unsigned_words;
-    for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
-      for (const std::size_t first : {0U, 2U}) {
-        hn::Store(radius(hn::Load(unsigned_words, words[channel][first])), floats,
-                  deviates_[channel][first]);
-      }
+    constexpr std::size_t num_pairs = num_noise_channels * 2 * num_lanes;
+    static_assert(num_pairs % HWY_LANES(float) == 0);
+    for (std::size_t i = 0; i < num_pairs; i += HWY_LANES(float)) {
+      const auto word = hn::Load(unsigned_words, &radius_words[0][0][0] + i);
+      hn::Store(radius(word), floats, &cosines_[0][0][0] + i);
     }
-    for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
-      for (const std::size_t first : {0U, 2U}) {
-        F sine, cosine;
-        sincos_word(hn::Load(unsigned_words, words[channel][first + 1]), sine, cosine);
-        const F r = hn::Load(floats, deviates_[channel][first]);
-        hn::Store(hn::Mul(r, cosine), floats, deviates_[channel][first]);
-        hn::Store(hn::Mul(r, sine), floats, deviates_[channel][first + 1]);
-      }
+    for (std::size_t i = 0; i < num_pairs; i += HWY_LANES(float)) {
+      F sine, cosine;
+      sincos_word(hn::Load(unsigned_words, &angle_words[0][0][0] + i), sine, cosine);
+      const F r = hn::Load(floats, &cosines_[0][0][0] + i);
+      hn::Store(hn::Mul(r, cosine), floats, &cosines_[0][0][0] + i);
+      hn::Store(hn::Mul(r, sine), floats, &sines_[0][0][0] + i);
     }
     ++num_blocks_;
     next_in_block_ = 0;
@@ -258,7 +261,9 @@ class BatchNoise {
   const NoiseStreams& streams_;
   BatchPhilox philox_;
   NoiseStates<Batch> states_;
-  alignas(64) float deviates_[num_noise_channels][samples_per_noise_block][num_lanes];
+  /// Deviates of samples 0 and 2, and of samples 1 and 3 of a block, by channel.
+  alignas(64) float cosines_[num_noise_channels][2][num_lanes];
+  alignas(64) float sines_[num_noise_channels][2][num_lanes];
   std::uint32_t num_blocks_ = 0;
   std::size_t next_in_block_ = samples_per_noise_block;
 };

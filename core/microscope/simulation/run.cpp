@@ -360,7 +360,7 @@ std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> request
   if (lanes.empty()) return records;
   SessionProgress sessions(impl_->campaign.scenario, progress);
   for (std::size_t i = 0; i < impl_->weights.size(); ++i) {
-    impl_->record_session_batch(i, lanes, batch_kernel(set), sessions, records);
+    impl_->record_session_batch(i, lanes, batch_kernel(set, lanes.size()), sessions, records);
     sessions.end_session(i);
   }
   return records;

@@ -1,0 +1,3 @@
+#define PROOFMASS_KERNEL_SET avx2_narrow
+#define PROOFMASS_KERNEL_VECTORS 1
+#include "core/microscope/simulation/batch_kernel-inl.hpp"
