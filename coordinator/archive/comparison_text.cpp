@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "coordinator/archive/detail/comparison_json.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "core/campaign/model.hpp"
 #include "core/statistics/comparison.hpp"
@@ -226,8 +227,8 @@ std::string comparison_text(const CampaignComparison& comparison, std::string_vi
          magnitude_table(comparison);
 }
 
-std::string comparison_json(const CampaignComparison& comparison, std::string_view first,
-                            std::string_view second) {
+nlohmann::ordered_json detail::comparison_object(const CampaignComparison& comparison,
+                                                 std::string_view first, std::string_view second) {
   Json json{{"first", first},
             {"second", second},
             {"differences", Json::array()},
@@ -249,7 +250,13 @@ std::string comparison_json(const CampaignComparison& comparison, std::string_vi
       json["parameters"].push_back(json_of(quantity, comparison.parameters[i]));
     }
   }
+  return json;
+}
+
+std::string comparison_json(const CampaignComparison& comparison, std::string_view first,
+                            std::string_view second) {
   constexpr int indent = 2;
+  const Json json = detail::comparison_object(comparison, first, second);
   return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
