@@ -44,15 +44,18 @@ void require_same(const Store& store, const Campaign& wanted, const std::filesys
   throw UsageError(fmt::format("{}\n{}", text, remedy));
 }
 
+void require_no_fewer_runs(const Store& store, const Campaign& wanted,
+                           const std::filesystem::path& database) {
+  if (wanted.num_runs >= store.num_runs()) return;
+  throw UsageError(
+      fmt::format("campaign.runs = {} (must be at least {}, which {} was asked for; the number "
+                  "comes from --runs, or else from the campaign file)",
+                  wanted.num_runs, store.num_runs(), database.string()));
+}
+
 void extend_same(Store& store, const Campaign& wanted, const std::filesystem::path& database) {
-  const std::uint64_t num_runs = store.num_runs();
-  if (wanted.num_runs < num_runs) {
-    throw UsageError(
-        fmt::format("campaign.runs = {} (must be at least {}, which {} was asked for; the number "
-                    "comes from --runs, or else from the campaign file)",
-                    wanted.num_runs, num_runs, database.string()));
-  }
-  if (wanted.num_runs > num_runs) store.extend(wanted, text_of(wanted));
+  require_no_fewer_runs(store, wanted, database);
+  if (wanted.num_runs > store.num_runs()) store.extend(wanted, text_of(wanted));
 }
 
 ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,

@@ -23,6 +23,11 @@ namespace proofmass::coordinator {
 void require_same(const Store& store, const Campaign& wanted, const std::filesystem::path& database,
                   std::string_view remedy);
 
+/// Compares the number of runs that a campaign's database was asked for with what is wanted.
+/// @throws UsageError if the database holds more.
+void require_no_fewer_runs(const Store& store, const Campaign& wanted,
+                           const std::filesystem::path& database);
+
 /// Gives a campaign's database as many runs as are wanted.
 /// @pre require_same() passed.
 /// @throws UsageError if the database holds more runs than wanted.

@@ -71,7 +71,7 @@ int run_proofmass(int argc, char** argv,
       ->type_name(wire::file_type);
   app.allow_config_extras(CLI::config_extras_mode::error);
   Command chosen;
-  for (const auto add : {add_run, add_init, add_check, add_keygen}) add(app, chosen);
+  for (const auto add : {add_run, add_sweep, add_init, add_check, add_keygen}) add(app, chosen);
   add_further_commands(app, chosen);
   for (const auto add :
        {add_report, add_sensitivity, add_query,   add_verify,  add_export,  add_replay, add_backup,

@@ -69,6 +69,7 @@ inline void add_campaign_file(CLI::App& command, std::filesystem::path& file) {
 // throws becomes an exit code in run_program().
 
 void add_run(CLI::App& app, Command& chosen);
+void add_sweep(CLI::App& app, Command& chosen);
 void add_init(CLI::App& app, Command& chosen);
 void add_check(CLI::App& app, Command& chosen);
 void add_keygen(CLI::App& app, Command& chosen);

@@ -1,3 +1,5 @@
+#include "coordinator/cli/commands/run.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,8 +20,6 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
-#include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/progress_display.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
@@ -28,6 +28,7 @@
 #include "coordinator/net/private_endpoint.hpp"
 #include "coordinator/net/service.hpp"
 #include "coordinator/report/report.hpp"
+#include "coordinator/report/report_json.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/campaign/model.hpp"
@@ -40,17 +41,6 @@ namespace proofmass::coordinator {
 namespace {
 
 constexpr unsigned workers_max = 1024;
-
-struct RunOptions {
-  std::filesystem::path campaign_file;
-  std::optional<std::filesystem::path> database;  ///< By default STEM.db in the current directory.
-  Overrides overrides;
-  std::optional<unsigned> num_workers;   ///< By default one for each processor.
-  std::optional<double> audit_fraction;  ///< Of the runs that are missing, computed twice; 0 to 1.
-  std::optional<RunRange> part;          ///< Only these runs are computed.
-  StopOptions stop;
-  bool is_quiet = false;
-};
 
 std::filesystem::path database_of(const RunOptions& options) {
   return options.database.value_or(options.campaign_file.stem().string() + ".db");
@@ -83,14 +73,6 @@ std::uint64_t num_workers(const RunOptions& options, std::uint64_t num_runs_miss
   const std::uint64_t half = (model().batch_size() + 1) / 2;
   const std::uint64_t num_batches = (num_runs_missing + half - 1) / half;
   return std::min<std::uint64_t>(options.num_workers.value_or(num_processors), num_batches);
-}
-
-StopPlan plan_of(const RunOptions& options, std::uint64_t num_runs) {
-  StopPlan plan{.stop_rule = options.stop.rule,
-                .num_runs_max = {},
-                .failures_max = options.stop.failures_max};
-  if (!plan.stop_rule.empty()) plan.num_runs_max = num_runs;
-  return plan;
 }
 
 /// The file of a campaign that asks for more runs until its stop rule is reached.
@@ -287,28 +269,9 @@ void check_part(const RunOptions& options, const Campaign& campaign) {
   if (!options.stop.rule.empty()) throw UsageError(range + " (must not be with --until)");
 }
 
-/// Runs what is missing of a campaign with local workers and prints its tables. A run that crashes
-/// its workers is given up, and tried again the next time.
-/// @return An ExitCode; exit_not_met if all runs together do not reach the stop rule.
-int run_campaign(const RunOptions& options) {
-  const std::unique_ptr<Campaign> campaign =
-      read_campaign(options.campaign_file, options.overrides);
-  check_part(options, *campaign);
-  const std::filesystem::path database = database_of(options);
-  Outcome outcome =
-      compute(open_or_create(*campaign, plan_of(options, campaign->num_runs), database),
-              campaign->num_runs, options);
-  if (!outcome.is_done) return end_interrupted(outcome.store, *campaign, options);
-  update_statistics(outcome.store, *campaign);
-  require_in_place(outcome.store, database);
-  bring_to_rest(outcome.store, database);
-  print_lines(report_text(outcome.store, *campaign));
-  if (outcome.store.control().phase == wire::CampaignPhase::cancelled) {
-    return say_cancelled(outcome.store, options.stop.failures_max.value_or(0));
-  }
-  const std::vector<RunRange> given_up = outcome.store.given_up_runs();
-  if (!given_up.empty()) return say_given_up(given_up, outcome.store.num_runs());
-  return is_rule_missed(outcome.store) ? exit_not_met : exit_done;
+void print_outcome(const Store& store, const Campaign& campaign, RunOutput output) {
+  if (output == RunOutput::tables) print_lines(report_text(store, campaign));
+  if (output == RunOutput::json) print_lines(report_json(store, campaign, {}));
 }
 
 /// The runs of `50:100`, which are 50 to 99; empty if the text is none such.
@@ -337,6 +300,45 @@ void add_range_option(CLI::App& command, std::optional<RunRange>& part) {
 
 }  // namespace
 
+StopPlan stop_plan_of(const RunOptions& options, std::uint64_t num_runs) {
+  StopPlan plan{.stop_rule = options.stop.rule,
+                .num_runs_max = {},
+                .failures_max = options.stop.failures_max};
+  if (!plan.stop_rule.empty()) plan.num_runs_max = num_runs;
+  return plan;
+}
+
+int run_campaign(const RunOptions& options) {
+  const std::unique_ptr<Campaign> campaign =
+      read_campaign(options.campaign_file, options.overrides);
+  check_part(options, *campaign);
+  const std::filesystem::path database = database_of(options);
+  Outcome outcome =
+      compute(open_or_create(*campaign, stop_plan_of(options, campaign->num_runs), database),
+              campaign->num_runs, options);
+  if (!outcome.is_done) return end_interrupted(outcome.store, *campaign, options);
+  update_statistics(outcome.store, *campaign);
+  require_in_place(outcome.store, database);
+  bring_to_rest(outcome.store, database);
+  print_outcome(outcome.store, *campaign, options.output);
+  if (outcome.store.control().phase == wire::CampaignPhase::cancelled) {
+    return say_cancelled(outcome.store, options.stop.failures_max.value_or(0));
+  }
+  const std::vector<RunRange> given_up = outcome.store.given_up_runs();
+  if (!given_up.empty()) return say_given_up(given_up, outcome.store.num_runs());
+  return is_rule_missed(outcome.store) ? exit_not_met : exit_done;
+}
+
+void add_run_options(CLI::App& command, RunOptions& options) {
+  add_override_options(command, options.overrides);
+  add_audit_option(command, options.audit_fraction);
+  add_stop_options(command, options.stop);
+  command
+      .add_option("--workers", options.num_workers, "Worker processes; one a processor by default")
+      ->check(wire::in_range(1U, workers_max));
+  command.add_flag("--quiet", options.is_quiet, "Show no progress");
+}
+
 void add_run(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<RunOptions>(
       app, chosen, "run", "Run a campaign, or its missing runs", run_campaign);
@@ -344,14 +346,10 @@ void add_run(CLI::App& app, Command& chosen) {
   add_campaign_file(command, options.campaign_file);
   command.add_option("--db", options.database, "Database; by default FILE's stem with .db, here")
       ->type_name(database_type);
-  add_override_options(command, options.overrides);
   add_range_option(command, options.part);
-  add_audit_option(command, options.audit_fraction);
-  add_stop_options(command, options.stop);
-  command
-      .add_option("--workers", options.num_workers, "Worker processes; one a processor by default")
-      ->check(wire::in_range(1U, workers_max));
-  command.add_flag("--quiet", options.is_quiet, "Show no progress");
+  add_run_options(command, options);
+  command.add_flag_callback(
+      "--json", [&output = options.output] { output = RunOutput::json; }, "Print JSON");
 }
 
 }  // namespace proofmass::coordinator

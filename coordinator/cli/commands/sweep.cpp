@@ -1,0 +1,206 @@
+#include <fmt/format.h>
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "coordinator/archive/several_comparison.hpp"
+#include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/campaign_databases.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/commands/run.hpp"
+#include "coordinator/cli/cost_estimate.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/stop_signals.hpp"
+#include "coordinator/cli/sweep_plan.hpp"
+#include "coordinator/store/store.hpp"
+#include "core/runs.hpp"
+#include "proto/command_line/described_program.hpp"
+#include "proto/command_line/standard_error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+struct SweepOptions {
+  RunOptions run;  ///< Of each campaign, but for its database and the varied values.
+  std::vector<std::string> varied;
+  std::optional<std::filesystem::path> directory;  ///< By default STEM-sweep in the current one.
+  OutputFormat format = OutputFormat::text;
+};
+
+std::filesystem::path directory_of_sweep(const SweepOptions& options) {
+  return options.directory.value_or(options.run.campaign_file.stem().string() + "-sweep");
+}
+
+/// One campaign of a sweep, ready to be run.
+struct SweptCampaign {
+  SweptValues values;
+  RunOptions run;
+};
+
+/// A sweep that has been checked as a whole.
+struct Sweep {
+  std::vector<SweptCampaign> campaigns;
+  std::size_t num_unfinished = 0;
+  CostEstimate cost;  ///< Of the runs that are missing.
+};
+
+RunOptions run_options_of(const SweepOptions& options, const SweptValues& values) {
+  RunOptions run = options.run;
+  run.output = RunOutput::none;
+  run.database =
+      directory_of_sweep(options) / sweep_file_name(run.campaign_file.stem().string(), values);
+  for (const auto& [key, value] : values) run.overrides.assignments.push_back(key + "=" + value);
+  return run;
+}
+
+/// The messages of a campaign file name an assignment by the option that usually makes it.
+std::string in_words_of_sweep(const std::string& message, const SweptValues& values) {
+  for (const auto& [key, value] : values) {
+    const std::string assignment = fmt::format("--set {}=", key);
+    if (message.starts_with(assignment)) {
+      return fmt::format("--vary {}={}", key, message.substr(assignment.size()));
+    }
+  }
+  return message;
+}
+
+std::unique_ptr<Campaign> read_swept(const SweptCampaign& swept) {
+  try {
+    return read_campaign(swept.run.campaign_file, swept.run.overrides);
+  } catch (const DefinitionError& error) {
+    throw UsageError(in_words_of_sweep(error.what(), swept.values));
+  }
+}
+
+/// Runs that a campaign lacks; all if there is no database yet.
+std::uint64_t num_missing_of(const Campaign& campaign, const std::filesystem::path& database) {
+  if (!std::filesystem::exists(database)) return campaign.num_runs;
+  const Store store = Store::open_read_only(database);
+  require_same(store, campaign, database, "name another directory with --directory");
+  require_no_fewer_runs(store, campaign, database);
+  return campaign.num_runs - num_runs_in(store.finished_runs());
+}
+
+/// Reads and checks every campaign before any is run, so that a sweep does not end in the middle
+/// because of its arguments.
+Sweep plan_sweep(const SweepOptions& options) {
+  std::vector<VariedKey> keys;
+  for (const std::string& text : options.varied) keys.push_back(parse_varied(text));
+  Sweep sweep;
+  std::map<std::string, std::string> values_of_definition;
+  std::optional<double> orbit_s;  // Of a batch, measured once.
+  for (const SweptValues& values : combinations(keys)) {
+    const SweptCampaign& swept = sweep.campaigns.emplace_back(
+        SweptCampaign{.values = values, .run = run_options_of(options, values)});
+    const std::unique_ptr<Campaign> campaign = read_swept(swept);
+    const auto [same, is_new] = values_of_definition.emplace(
+        campaign->definition(TableColumns::left_out).text, text_of(values));
+    if (!is_new) {
+      throw UsageError(
+          fmt::format("vary = {} (makes the same campaign as {})", text_of(values), same->second));
+    }
+    const std::unique_ptr<const Plan> plan = campaign->prepare();
+    const std::uint64_t num_missing = num_missing_of(*campaign, *swept.run.database);
+    if (num_missing == 0) continue;
+    ++sweep.num_unfinished;
+    if (!orbit_s) orbit_s = measure_batch_s(*campaign, *plan) / plan->num_orbits();
+    sweep.cost += estimated_cost(num_missing, *orbit_s * plan->num_orbits());
+  }
+  return sweep;
+}
+
+void make_sweep_directory(const std::filesystem::path& directory) {
+  std::error_code failure;
+  std::filesystem::create_directories(directory, failure);
+  if (!failure) return;
+  throw Error(fmt::format("directory = {} ({})", directory.string(), failure.message()));
+}
+
+void say_plan(const Sweep& sweep, const SweepOptions& options) {
+  if (options.run.is_quiet) return;
+  std::string text =
+      fmt::format("proofmass: {} campaigns in {}, {} of them unfinished\n", sweep.campaigns.size(),
+                  directory_of_sweep(options).string(), sweep.num_unfinished);
+  if (sweep.num_unfinished > 0) text += cost_text(sweep.cost);
+  wire::say(text);
+}
+
+/// Runs one campaign after the other. What cannot be met or done in one keeps no other from being
+/// run.
+/// @return exit_interrupted, or the gravest ExitCode of all.
+int run_all(const Sweep& sweep, bool is_quiet) {
+  const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
+  int gravest = exit_done;
+  for (std::size_t i = 0; i < sweep.campaigns.size(); ++i) {
+    if (stop != StopRequest::none) return exit_interrupted;
+    const SweptCampaign& swept = sweep.campaigns[i];
+    if (!is_quiet) {
+      wire::say(fmt::format("proofmass: campaign {} of {}: {}\n", i + 1, sweep.campaigns.size(),
+                            text_of(swept.values)));
+    }
+    const int exit_code = run_campaign(swept.run);
+    if (exit_code == exit_interrupted) return exit_interrupted;
+    if (exit_code == exit_cannot_be_done || gravest == exit_done) gravest = exit_code;
+  }
+  return gravest;
+}
+
+std::string sweep_text(const Sweep& sweep, OutputFormat format, const IsStopped& is_stopped) {
+  std::vector<std::filesystem::path> files;
+  std::vector<SweptValues> values;
+  for (const SweptCampaign& swept : sweep.campaigns) {
+    files.push_back(*swept.run.database);
+    values.push_back(swept.values);
+  }
+  const std::vector<ComparedMember> members = compare_several(files, is_stopped);
+  return format == OutputFormat::json ? several_json(members, values)
+                                      : several_text(members, sweep_names(values));
+}
+
+int sweep_campaigns(const SweepOptions& options) {
+  const Sweep sweep = plan_sweep(options);
+  say_plan(sweep, options);
+  make_sweep_directory(directory_of_sweep(options));
+  const int exit_code = run_all(sweep, options.run.is_quiet);
+  if (exit_code == exit_interrupted) {
+    wire::say("proofmass: the same command continues the sweep\n");
+    return exit_code;
+  }
+  return run_until_stopped([&](const IsStopped& is_stopped) {
+    print_lines(sweep_text(sweep, options.format, is_stopped));
+    return exit_code;
+  });
+}
+
+}  // namespace
+
+void add_sweep(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<SweepOptions>(
+      app, chosen, "sweep", "Run a campaign for each of several values", sweep_campaigns);
+  command.footer(exit_codes_text({exit_not_met, exit_interrupted}));
+  add_campaign_file(command, options.run.campaign_file);
+  command
+      .add_option(
+          "--vary", options.varied,
+          "Values of a key, e.g. noise.scale=0.5,1,2; may\nbe repeated for all combinations")
+      ->required()
+      ->take_all()
+      ->allow_extra_args(false);
+  command
+      .add_option("--directory", options.directory,
+                  "Directory of the databases; by default FILE's\nstem with -sweep, here")
+      ->type_name(wire::directory_type);
+  add_run_options(command, options.run);
+  add_json_flag(command, options.format);
+}
+
+}  // namespace proofmass::coordinator

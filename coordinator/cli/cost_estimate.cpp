@@ -1,0 +1,91 @@
+#include "coordinator/cli/cost_estimate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <ctime>
+#include <thread>
+#include <vector>
+
+#include "coordinator/cli/progress_display.hpp"
+#include "core/campaign/model.hpp"
+#include "core/math/instruction_set.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+/// Processor time after which the time of a batch is extrapolated.
+constexpr double measured_s_max = 0.5;
+
+/// Thrown out of a simulation that has been measured for long enough.
+struct Measured {};
+
+/// Size of a campaign database. Measured with the paper's campaign: an empty database has 170 kB; a
+/// run adds 8 bytes for each of its numbers and 90 bytes for how and by whom it was computed.
+double database_mb(std::uint64_t num_runs) {
+  constexpr double empty_size = 170e3, number_size = 8.0, further_size = 90.0;
+  const ResultSchema& schema = model().results();
+  // Truth and estimate of each quantity.
+  const auto num_numbers = static_cast<double>(2 * schema.quantities.size() + schema.health.size());
+  const double run_size = number_size * num_numbers + further_size;
+  return (empty_size + run_size * static_cast<double>(num_runs)) / 1e6;
+}
+
+}  // namespace
+
+double measure_batch_s(const Campaign& campaign, const Plan& plan) {
+  const InstructionSet set = best_instruction_set();
+  // Scalar code simulates the runs of a batch one after the other.
+  const std::size_t num_at_once = set == InstructionSet::scalar ? 1 : model().batch_size();
+  std::vector<RunRequest> requests;
+  for (std::uint64_t run = 0; run < std::min<std::uint64_t>(num_at_once, campaign.num_runs);
+       ++run) {
+    requests.push_back({.run = {run}, .table_values = campaign.table_values({run})});
+  }
+  const std::clock_t start = std::clock();
+  const auto elapsed_s = [start] {
+    return static_cast<double>(std::clock() - start) / static_cast<double>(CLOCKS_PER_SEC);
+  };
+  int num_orbits = plan.num_orbits();
+  try {
+    (void)plan.simulate_batch(requests, set, [&](int num_orbits_now) {
+      if (num_orbits_now == 0 || elapsed_s() < measured_s_max) return;
+      num_orbits = num_orbits_now;
+      throw Measured{};
+    });
+  } catch (const Measured&) {
+    // The orbits so far are enough.
+  }
+  const double all_orbits = static_cast<double>(plan.num_orbits()) / num_orbits;
+  const std::size_t num_rounds = model().batch_size() / num_at_once;
+  return elapsed_s() * all_orbits * static_cast<double>(num_rounds);
+}
+
+CostEstimate& CostEstimate::operator+=(const CostEstimate& other) {
+  one_core_s += other.one_core_s;
+  all_cores_s += other.all_cores_s;
+  disk_mb += other.disk_mb;
+  return *this;
+}
+
+std::uint64_t num_cores_here() { return std::max(1U, std::thread::hardware_concurrency()); }
+
+CostEstimate estimated_cost(std::uint64_t num_runs, double batch_s) {
+  const auto time_s = [&](std::uint64_t num_at_a_time) {
+    return static_cast<double>((num_runs + num_at_a_time - 1) / num_at_a_time) * batch_s;
+  };
+  return {.one_core_s = time_s(model().batch_size()),
+          .all_cores_s = time_s(model().batch_size() * num_cores_here()),
+          .disk_mb = database_mb(num_runs)};
+}
+
+std::string cost_text(const CostEstimate& cost) {
+  return fmt::format(
+      "Time      about {} of one core; about {} with `proofmass run` on the {} cores here\n"
+      "Disk      about {:.1f} MB\n",
+      duration_text(cost.one_core_s), duration_text(cost.all_cores_s), num_cores_here(),
+      cost.disk_mb);
+}
+
+}  // namespace proofmass::coordinator

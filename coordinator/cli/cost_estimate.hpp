@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/campaign/campaign.hpp"
+
+namespace proofmass::coordinator {
+
+/// Processor time of a batch of the campaign's runs on this machine, extrapolated from the orbits
+/// that its first half second takes. The orbits of all sessions cost about the same.
+/// @param plan  The campaign's.
+[[nodiscard]] double measure_batch_s(const Campaign& campaign, const Plan& plan);
+
+/// What it costs to run campaigns on this machine.
+struct CostEstimate {
+  double one_core_s = 0.0;   ///< On one core.
+  double all_cores_s = 0.0;  ///< On all of them, with `proofmass run`.
+  double disk_mb = 0.0;      ///< Of the databases.
+
+  CostEstimate& operator+=(const CostEstimate& other);
+};
+
+/// Cores of this machine, at least one.
+[[nodiscard]] std::uint64_t num_cores_here();
+
+/// Of a campaign with so many runs, whose batches take so long. `run` gives each core one batch of
+/// runs at a time; an incomplete batch costs as much as a whole.
+[[nodiscard]] CostEstimate estimated_cost(std::uint64_t num_runs, double batch_s);
+
+/// Two lines that begin with `Time      about` and `Disk      about`.
+[[nodiscard]] std::string cost_text(const CostEstimate& cost);
+
+}  // namespace proofmass::coordinator
