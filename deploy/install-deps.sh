@@ -16,6 +16,7 @@ packages=(
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev qemu-user clang-format
   iproute2 iptables faketime python3-scipy python3-mpmath python3-h5py
+  python3-numpy python3-pandas python3-matplotlib
   sshfs openssh-sftp-server busybox-static
   slurmctld slurmd slurm-client slurm-wlm-basic-plugins munge
   groff-base zsh fish
