@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/json_output.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/store/store.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -19,13 +20,20 @@ struct TagOptions {
   std::filesystem::path database;
   TagAction action = TagAction::print;
   std::vector<std::string> tags;
+  OutputFormat format = OutputFormat::text;
 };
+
+using AnnotationJson = nlohmann::ordered_json;
+
+void print_tags(const TagOptions& options) {
+  const std::vector<std::string> tags = Store::open_read_only(options.database).tags();
+  if (options.format == OutputFormat::json) return print_json({{"tags", tags}});
+  for (const std::string& tag : tags) print_lines(tag + "\n");
+}
 
 int tag_database(const TagOptions& options) {
   if (options.action == TagAction::print) {
-    for (const std::string& tag : Store::open_read_only(options.database).tags()) {
-      print_lines(tag + "\n");
-    }
+    print_tags(options);
     return exit_done;
   }
   if (options.tags.empty()) throw UsageError("TAG = (must be given after add and remove)");
@@ -38,12 +46,14 @@ int tag_database(const TagOptions& options) {
     }
   }
   Store::annotate(options.database, annotations);
+  if (options.format == OutputFormat::json) print_tags(options);
   return exit_done;
 }
 
 struct NoteOptions {
   std::filesystem::path database;
   std::optional<std::string> text;  ///< Prints the notes if there is none.
+  OutputFormat format = OutputFormat::text;
 };
 
 std::string text_of(const Note& note) {
@@ -57,14 +67,21 @@ std::string text_of(const Note& note) {
   return text + "\n";
 }
 
-int note_database(const NoteOptions& options) {
-  if (options.text) {
-    Store::annotate(options.database, {AddNote{*options.text}});
-    return exit_done;
-  }
+void print_notes(const NoteOptions& options) {
+  AnnotationJson json{{"notes", AnnotationJson::array()}};
   for (const Note& note : Store::open_read_only(options.database).notes()) {
-    print_lines(text_of(note));
+    if (options.format == OutputFormat::json) {
+      json["notes"].push_back({{"time_utc", note.time_utc}, {"text", note.text}});
+    } else {
+      print_lines(text_of(note));
+    }
   }
+  if (options.format == OutputFormat::json) print_json(json);
+}
+
+int note_database(const NoteOptions& options) {
+  if (options.text) Store::annotate(options.database, {AddNote{*options.text}});
+  if (!options.text || options.format == OutputFormat::json) print_notes(options);
   return exit_done;
 }
 
@@ -78,6 +95,7 @@ void add_tag(CLI::App& app, Command& chosen) {
   add_database(command, options.database);
   wire::add_choice(command, "ACTION", options.action, actions, "Without it prints the tags");
   command.add_option("TAG", options.tags, "1 to 64 letters, digits, dots, _ and -");
+  add_json_flag(command, options.format);
 }
 
 void add_note(CLI::App& app, Command& chosen) {
@@ -85,6 +103,7 @@ void add_note(CLI::App& app, Command& chosen) {
       app, chosen, "note", "Add a note to a campaign, or print its notes", note_database);
   add_database(command, options.database);
   command.add_option("TEXT", options.text, "Up to 2,000 bytes; without it prints the notes");
+  add_json_flag(command, options.format);
 }
 
 }  // namespace proofmass::coordinator

@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/json_output.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/store/store.hpp"
 
@@ -13,6 +14,7 @@ namespace {
 struct BackupOptions {
   std::filesystem::path database;
   std::filesystem::path destination;
+  OutputFormat format = OutputFormat::text;
 };
 
 int back_up_database(const BackupOptions& options) {
@@ -22,7 +24,11 @@ int back_up_database(const BackupOptions& options) {
     throw UsageError(fmt::format("destination = {} (exists already)", destination));
   }
   Store::open_read_only(options.database).back_up(options.destination);
-  print_lines(fmt::format("wrote {}\n", destination));
+  if (options.format == OutputFormat::json) {
+    print_json({{"file", destination}});
+  } else {
+    print_lines(fmt::format("wrote {}\n", destination));
+  }
   return exit_done;
 }
 
@@ -35,6 +41,7 @@ void add_backup(CLI::App& app, Command& chosen) {
   command.add_option("DESTINATION", options.destination, "File to make")
       ->type_name(database_type)
       ->required();
+  add_json_flag(command, options.format);
 }
 
 }  // namespace proofmass::coordinator

@@ -9,6 +9,7 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/cost_estimate.hpp"
+#include "coordinator/cli/json_output.hpp"
 #include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "core/campaign/campaign.hpp"
@@ -37,8 +38,8 @@ std::string differences_text(const Campaign& campaign) {
 
 using CheckJson = nlohmann::ordered_json;
 
-std::string check_json(const CheckOptions& options, const Campaign& campaign, const Plan& plan,
-                       const CostEstimate& cost) {
+CheckJson check_json(const CheckOptions& options, const Campaign& campaign, const Plan& plan,
+                     const CostEstimate& cost) {
   CheckJson json{{"file", options.file.string()},         {"campaign", campaign.name},
                  {"seed", std::to_string(campaign.seed)}, {"num_runs", campaign.num_runs},
                  {"num_orbits", plan.num_orbits()},       {"one_core_s", cost.one_core_s},
@@ -47,8 +48,7 @@ std::string check_json(const CheckOptions& options, const Campaign& campaign, co
   for (const auto& [field, own, example] : campaign.differences_from(*example_campaign())) {
     json["differences"].push_back({{"field", field}, {"value", own}, {"example", example}});
   }
-  constexpr int indent = 2;
-  return json.dump(indent, ' ', false, CheckJson::error_handler_t::replace) + "\n";
+  return json;
 }
 
 std::string check_text(const CheckOptions& options, const Campaign& campaign, const Plan& plan,
@@ -62,8 +62,11 @@ int check_campaign_file(const CheckOptions& options) {
   const std::unique_ptr<const Campaign> campaign = read_campaign(options.file, options.overrides);
   const std::unique_ptr<const Plan> plan = campaign->prepare();
   const CostEstimate cost = estimated_cost(campaign->num_runs, measure_batch_s(*campaign, *plan));
-  const auto text_of = options.format == OutputFormat::json ? check_json : check_text;
-  print_lines(text_of(options, *campaign, *plan, cost));
+  if (options.format == OutputFormat::json) {
+    print_json(check_json(options, *campaign, *plan, cost));
+  } else {
+    print_lines(check_text(options, *campaign, *plan, cost));
+  }
   return exit_done;
 }
 

@@ -14,6 +14,7 @@
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/json_output.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/dispatch/run_set.hpp"
@@ -29,6 +30,7 @@ struct MergeOptions {
   std::filesystem::path whole;
   std::vector<std::filesystem::path> parts;
   double fraction = 0.01;  ///< Of each part's runs, simulated again; in [0, 1].
+  OutputFormat format = OutputFormat::text;
 };
 
 /// The campaign of the part that has the most runs, which may have been extended since the others.
@@ -79,14 +81,47 @@ std::string count_text(const MergedPart& part) {
   return fmt::format("{}, and {} equal to those of parts before it", num_new, part.num_again);
 }
 
-/// Runs without a result, and how to get them.
-std::string missing_text(const Store& store, const MergeOptions& options) {
+/// Runs without a result.
+RunSet runs_missing_in(const Store& store) {
   RunSet missing(RunRange{{0}, store.num_runs()});
   missing.remove(RunSet(store.finished_runs()));
+  return missing;
+}
+
+/// The same for people, and how to get them.
+std::string missing_text(const Store& store, const MergeOptions& options) {
+  const RunSet missing = runs_missing_in(store);
   if (missing.empty()) return {};
   return fmt::format(
       "{} of {} runs are in no part: {}\n`proofmass run FILE --db {}` computes them\n",
       missing.size(), store.num_runs(), to_text(missing), options.whole.string());
+}
+
+using MergeJson = nlohmann::ordered_json;
+
+void print_merged(const Store& whole, const std::vector<MergedPart>& parts,
+                  const MergeOptions& options) {
+  const std::string digest = whole.summary()->digests.results;
+  std::string lines;
+  MergeJson json{{"file", options.whole.string()}, {"parts", MergeJson::array()}};
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::string file = options.parts[i].string();
+    lines += fmt::format("{}: {}\n", file, count_text(parts[i]));
+    json["parts"].push_back(
+        {{"file", file}, {"num_new", parts[i].num_new}, {"num_again", parts[i].num_again}});
+  }
+  if (options.format == OutputFormat::text) {
+    return print_lines(lines + missing_text(whole, options) + fmt::format("Digest {}\n", digest));
+  }
+  const RunSet missing = runs_missing_in(whole);
+  json["num_runs"] = whole.num_runs();
+  json["num_missing"] = missing.size();
+  json["missing"] = MergeJson::array();
+  for (const RunRange& range : missing.ranges()) {
+    json["missing"].push_back({{"first_run", range.first.value}, {"num_runs", range.count}});
+  }
+  json["digest"] = digest;
+  print_json(json);
 }
 
 int merge_databases(const MergeOptions& options) {
@@ -97,16 +132,14 @@ int merge_databases(const MergeOptions& options) {
       require_sound(part, options, is_stopped);
     }
     const std::string definition = largest.campaign->definition(TableColumns::left_out).text;
-    std::string lines;
-    std::size_t next = 0;
-    Store whole = Store::merge(
-        options.whole, *largest.campaign, definition, options.parts, [&](const MergedPart& part) {
-          if (is_stopped()) throw Interrupted();
-          lines += fmt::format("{}: {}\n", options.parts[next++].string(), count_text(part));
-        });
+    std::vector<MergedPart> parts;
+    Store whole = Store::merge(options.whole, *largest.campaign, definition, options.parts,
+                               [&](const MergedPart& part) {
+                                 if (is_stopped()) throw Interrupted();
+                                 parts.push_back(part);
+                               });
     update_statistics(whole, *largest.campaign);
-    print_lines(lines + missing_text(whole, options) +
-                fmt::format("Digest {}\n", whole.summary()->digests.results));
+    print_merged(whole, parts, options);
     return exit_done;
   });
 }
@@ -127,6 +160,7 @@ void add_merge(CLI::App& app, Command& chosen) {
       .add_option("--fraction", options.fraction, "Fraction of each part's runs to simulate again")
       ->check(wire::in_range(0.0, 1.0))
       ->capture_default_str();
+  add_json_flag(command, options.format);
 }
 
 }  // namespace proofmass::coordinator

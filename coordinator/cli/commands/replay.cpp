@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/json_output.hpp"
 #include "coordinator/cli/output_file.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
@@ -37,6 +38,7 @@ struct ReplayOptions {
   SeriesFormat format = SeriesFormat::hdf5;
   std::filesystem::path output;  ///< Empty: nothing is written.
   IfThere if_there = IfThere::keep;
+  OutputFormat output_format = OutputFormat::text;  ///< Of what is printed.
 
   /// True if `output` names a directory that files are written to.
   [[nodiscard]] bool has_directory() const { return num_worst || format == SeriesFormat::csv; }
@@ -101,6 +103,8 @@ std::string text_of(const RunResult& result) {
                      name_at(schema.loss_sessions, result.loss.session));
 }
 
+using ReplayJson = nlohmann::ordered_json;
+
 /// Simulates the runs one after the other. What was written of a run stays if a later one fails.
 class ReplayCommand {
  public:
@@ -122,7 +126,20 @@ class ReplayCommand {
       }
       if (options_.has_directory()) directory.emplace(options_.output);
     }
-    for (const RunResult& result : results) replay_one(result);
+    ReplayJson json{{"runs", ReplayJson::array()}};
+    for (const RunResult& result : results) {
+      const std::vector<ResultDifference> differences = replay_one(result);
+      if (is_json()) {
+        json["runs"].push_back(json_of(result, differences));
+      } else {
+        print_replayed(result, differences);
+      }
+      if (differences.empty()) continue;
+      if (is_json()) print_json(json);
+      flush_standard_output();
+      fail(result.run, differences);
+    }
+    if (is_json()) print_json(json);
   }
 
  private:
@@ -133,12 +150,38 @@ class ReplayCommand {
     return replay_.worst_results(*options_.num_worst, is_stopped_);
   }
 
-  void replay_one(const RunResult& stored) const {
+  [[nodiscard]] bool is_json() const { return options_.output_format == OutputFormat::json; }
+
+  [[nodiscard]] std::vector<ResultDifference> replay_one(const RunResult& stored) const {
     std::unique_ptr<SeriesOutput> output;
     if (is_written()) output = output_of(stored);
-    const std::vector<ResultDifference> differences =
-        replay_.run(stored, output.get(), is_stopped_);
-    if (!differences.empty()) fail(stored.run, differences);
+    return replay_.run(stored, output.get(), is_stopped_);
+  }
+
+  [[nodiscard]] ReplayJson json_of(const RunResult& stored,
+                                   const std::vector<ResultDifference>& differences) const {
+    ReplayJson json{{"run", stored.run.value},
+                    {"status", name_of(stored.status)},
+                    {"is_equal", differences.empty()},
+                    {"differences", ReplayJson::array()},
+                    {"files", ReplayJson::array()}};
+    for (const auto& [run, column, value, computed] : differences) {
+      json["differences"].push_back({{"column", column}, {"stored", value}, {"now", computed}});
+    }
+    if (!is_written() || !differences.empty()) return json;
+    for (const auto& file : files_of(options_, stored.run, selection_)) {
+      json["files"].push_back(file.string());
+    }
+    return json;
+  }
+
+  void print_replayed(const RunResult& stored,
+                      const std::vector<ResultDifference>& differences) const {
+    for (const ResultDifference& difference : differences) {
+      print_lines(fmt::format("run {} {}: stored {}, now {}\n", stored.run.value, difference.column,
+                              difference.stored, difference.computed));
+    }
+    if (!differences.empty()) return;
     print_lines(fmt::format("run {} {}: all values equal the stored ones\n", stored.run.value,
                             text_of(stored)));
     if (is_written()) {
@@ -159,11 +202,6 @@ class ReplayCommand {
   }
 
   [[noreturn]] static void fail(RunIndex run, const std::vector<ResultDifference>& differences) {
-    for (const ResultDifference& difference : differences) {
-      print_lines(fmt::format("run {} {}: stored {}, now {}\n", run.value, difference.column,
-                              difference.stored, difference.computed));
-    }
-    flush_standard_output();
     throw ArchiveError(fmt::format("run {}: {} of its values {} not the stored {}", run.value,
                                    differences.size(), differences.size() == 1 ? "is" : "are",
                                    differences.size() == 1 ? "one" : "ones"));
@@ -210,6 +248,7 @@ void add_replay(CLI::App& app, Command& chosen) {
       .add_option("--group", options.groups, "Write this group of signals only; may be\nrepeated")
       ->allow_extra_args(false);
   add_force_flag(command, options.if_there);
+  add_json_flag(command, options.output_format);
 }
 
 }  // namespace proofmass::coordinator
