@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "coordinator/cli/painting.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/text/visible_text.hpp"
@@ -117,7 +118,8 @@ void ProgressDisplay::show_bar(const wire::CampaignStatus& status) {
 
 void ProgressDisplay::note(std::string_view text) {
   if (has_bar_) wire::say_on(stream_, "\r\033[K");
-  wire::say_on(stream_, wire::visible_lines(text) + "\n");
+  const std::string visible = wire::visible_lines(text);
+  wire::say_on(stream_, (takes_paint(stream_) ? painted(visible) : visible) + "\n");
   has_bar_ = false;
 }
 

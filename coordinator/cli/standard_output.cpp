@@ -7,7 +7,9 @@
 #include <cerrno>
 #include <cstring>
 #include <limits>
+#include <string>
 
+#include "coordinator/cli/painting.hpp"
 #include "core/error.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -33,6 +35,11 @@ std::size_t line_width_max_of(std::FILE* stream) {
 }
 
 void print_lines(std::string_view text) { write_standard_output(wire::visible_lines(text)); }
+
+void print_tables(std::string_view text) {
+  const std::string visible = wire::visible_lines(text);
+  write_standard_output(takes_paint(stdout) ? painted(visible) : visible);
+}
 
 void write_standard_output(std::string_view text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) fail_to_write();

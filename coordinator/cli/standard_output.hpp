@@ -22,6 +22,11 @@ struct ScreenSize {
 /// @throws Error `standard output: No space left on device`.
 void print_lines(std::string_view text);
 
+/// The same of tables and notes for people, painted if standard output is a terminal, see
+/// takes_paint(). To a file or a pipe it writes what print_lines() does.
+/// @throws Error as print_lines().
+void print_tables(std::string_view text);
+
 /// Writes bytes as they are.
 /// @throws Error as print_lines().
 void write_standard_output(std::string_view text);

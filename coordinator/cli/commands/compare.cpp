@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "coordinator/archive/comparison.hpp"
@@ -31,8 +32,12 @@ int compare_two(const CompareOptions& options, const IsStopped& is_stopped) {
           compare_campaigns(read_compared(first, is_stopped), read_compared(second, is_stopped));
     });
   });
-  const auto print = options.format == OutputFormat::json ? comparison_json : comparison_text;
-  print_lines(print(comparison, options.first.string(), options.second.string()));
+  const std::string first_name = options.first.string(), second_name = options.second.string();
+  if (options.format == OutputFormat::json) {
+    print_lines(comparison_json(comparison, first_name, second_name));
+  } else {
+    print_tables(comparison_text(comparison, first_name, second_name));
+  }
   return exit_done;
 }
 
@@ -46,9 +51,11 @@ int compare_databases(const CompareOptions& options) {
   return run_until_stopped([&](const IsStopped& is_stopped) {
     if (options.others.empty()) return compare_two(options, is_stopped);
     const std::vector<ComparedMember> members = compare_several(files, is_stopped);
-    print_lines(options.format == OutputFormat::json
-                    ? several_json(members)
-                    : several_text(members, lettered(members.size())));
+    if (options.format == OutputFormat::json) {
+      print_lines(several_json(members));
+    } else {
+      print_tables(several_text(members, lettered(members.size())));
+    }
     return static_cast<int>(exit_done);
   });
 }

@@ -16,9 +16,11 @@ struct ListOptions {
 int list_databases(const ListOptions& options) {
   const std::vector<std::filesystem::path> here{"."};
   const auto campaigns = list_campaigns(options.places.empty() ? here : options.places);
-  print_lines(options.format == OutputFormat::json
-                  ? listing_json(campaigns)
-                  : listing_text(campaigns, line_width_max_of(stdout)));
+  if (options.format == OutputFormat::json) {
+    print_lines(listing_json(campaigns));
+  } else {
+    print_tables(listing_text(campaigns, line_width_max_of(stdout)));
+  }
   return exit_done;
 }
 

@@ -48,7 +48,9 @@ int print_remote_report(const ReportOptions& options) {
     question.options.push_back("--requirement=" + requirement);
   }
   if (options.format == OutputFormat::json) question.options.emplace_back("--json");
-  return print_answer(options.connection, question, AnswerText::lines);
+  return print_answer(
+      options.connection, question,
+      options.format == OutputFormat::json ? AnswerText::lines : AnswerText::tables);
 }
 
 /// Prints the tables of a campaign, finished or not; of requirements, if there are any, the answers
@@ -61,7 +63,7 @@ int print_report(const ReportOptions& options) {
   if (options.format == OutputFormat::json) {
     print_lines(report_json(store, *campaign, answers));
   } else {
-    print_lines(answers.empty() ? report_text(store, *campaign) : answers_text(answers));
+    print_tables(answers.empty() ? report_text(store, *campaign) : answers_text(answers));
   }
   const bool are_met = std::ranges::all_of(answers, [](const RequirementAnswer& answer) {
     return answer.check.verdict == Verdict::met;

@@ -270,7 +270,7 @@ void check_part(const RunOptions& options, const Campaign& campaign) {
 }
 
 void print_outcome(const Store& store, const Campaign& campaign, RunOutput output) {
-  if (output == RunOutput::tables) print_lines(report_text(store, campaign));
+  if (output == RunOutput::tables) print_tables(report_text(store, campaign));
   if (output == RunOutput::json) print_lines(report_json(store, campaign, {}));
 }
 

@@ -9,9 +9,11 @@ namespace {
 int show_status(const ClientOptions& options) {
   return with_connection(options, [&](const Ask& ask) {
     const wire::StatusReply status = whole_status(ask);
-    print_lines(options.format == OutputFormat::json
-                    ? status_json(status, JsonLayout::indented)
-                    : status_table(status, line_width_max_of(stdout)));
+    if (options.format == OutputFormat::json) {
+      print_lines(status_json(status, JsonLayout::indented));
+    } else {
+      print_tables(status_table(status, line_width_max_of(stdout)));
+    }
     return exit_done;
   });
 }
@@ -19,9 +21,11 @@ int show_status(const ClientOptions& options) {
 int show_workers(const ClientOptions& options) {
   return with_connection(options, [&](const Ask& ask) {
     const wire::WorkersReply workers = all_workers(ask);
-    print_lines(options.format == OutputFormat::json
-                    ? workers_json(workers)
-                    : workers_table(workers, line_width_max_of(stdout)));
+    if (options.format == OutputFormat::json) {
+      print_lines(workers_json(workers));
+    } else {
+      print_tables(workers_table(workers, line_width_max_of(stdout)));
+    }
     return exit_done;
   });
 }

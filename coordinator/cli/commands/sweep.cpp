@@ -176,7 +176,8 @@ int sweep_campaigns(const SweepOptions& options) {
     return exit_code;
   }
   return run_until_stopped([&](const IsStopped& is_stopped) {
-    print_lines(sweep_text(sweep, options.format, is_stopped));
+    const auto print = options.format == OutputFormat::json ? print_lines : print_tables;
+    print(sweep_text(sweep, options.format, is_stopped));
     return exit_code;
   });
 }

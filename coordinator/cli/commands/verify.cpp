@@ -8,6 +8,7 @@
 
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/json_output.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -33,9 +34,7 @@ Json json_of_check(const Check& check) {
 
 void print_checks(const std::filesystem::path& database, std::size_t num_failing,
                   const Json& checks) {
-  const Json json{{"file", database.string()}, {"num_failing", num_failing}, {"checks", checks}};
-  constexpr int indent = 2;
-  print_lines(json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n");
+  print_json({{"file", database.string()}, {"num_failing", num_failing}, {"checks", checks}});
 }
 
 int verify_database(const VerifyCommandOptions& options) {
@@ -52,7 +51,7 @@ int verify_database(const VerifyCommandOptions& options) {
         checks.push_back(json_of_check(check));
         return;
       }
-      print_lines(check_text(check));
+      print_tables(check_text(check));
       flush_standard_output();  // The simulation may take long.
     };
     const bool holds = verify(options.database, how, report, is_stopped);
