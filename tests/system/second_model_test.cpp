@@ -222,6 +222,21 @@ TEST_F(SecondModel, IsReplayedToTheBit) {
   EXPECT_TRUE(std::filesystem::exists(path("worst") / worst)) << rows;
 }
 
+TEST_F(SecondModel, IsSwept) {
+  ASSERT_EQ(proofmass("sweep", {"sweep", "example.toml", "--vary", "sensor.noise_m_s2=1e-9,1e-8",
+                                "--runs", "32", "--directory", "swept"}),
+            0)
+      << errors_of("sweep");
+  const std::string text = output_of("sweep");
+  EXPECT_THAT(text, HasSubstr("\n  sensor.noise_m_s2: 1e-09 in A, 1e-08 in B\n"));
+  ASSERT_EQ(proofmass("again", {"compare", "swept/example-sensor.noise_m_s2=1e-9.db",
+                                "swept/example-sensor.noise_m_s2=1e-8.db"}),
+            0)
+      << errors_of("again");
+  // A quantity has no objective: no run is beyond it.
+  EXPECT_THAT(text, HasSubstr(" - │"));
+}
+
 TEST_F(SecondModel, IsComparedAndExported) {
   run("a");
   run("b", {"--seed", "2"});

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -73,6 +74,42 @@ TEST_F(ArchiveCommands, CopyADatabase) {
   const auto copy = directory_ / "copy.db";
   EXPECT_EQ(printed_by({"backup", database_, copy}), "wrote " + copy.string() + "\n");
   EXPECT_EQ(Store::open_read_only(copy).id(), Store::open_read_only(database_).id());
+}
+
+TEST_F(ArchiveCommands, PrintTagsAndNotesAndCopiesAsJson) {
+  using Json = nlohmann::json;
+  EXPECT_EQ(Json::parse(printed_by({"tag", database_, "--json"})), (Json{{"tags", Json::array()}}));
+  EXPECT_EQ(Json::parse(printed_by({"tag", database_, "add", "thesis", "flight", "--json"})),
+            (Json{{"tags", {"flight", "thesis"}}}));
+  const Json notes = Json::parse(printed_by({"note", database_, "first \x1b[31m", "--json"}));
+  ASSERT_EQ(notes["notes"].size(), 1U);
+  EXPECT_EQ(notes["notes"][0]["text"], "first \x1b[31m");
+  EXPECT_EQ(notes["notes"][0]["time_utc"].get<std::string>().size(), 20U);
+  EXPECT_EQ(Json::parse(printed_by({"note", database_, "--json"})), notes);
+  const auto copy = directory_ / "copy.db";
+  EXPECT_EQ(Json::parse(printed_by({"backup", database_, copy, "--json"})),
+            (Json{{"file", copy.string()}}));
+}
+
+TEST_F(ArchiveCommands, CompareMoreThanTwoWithTheFirst) {
+  const auto other = directory_ / "b.db";
+  MicroscopeCampaign campaign = hardy2013_campaign();
+  campaign.scenario.noise.scale = 2.0;
+  (void)Store::create(other, campaign, canonical_definition(campaign));
+  const std::string text = printed_by({"compare", database_, other, database_});
+  EXPECT_NE(text.find("\n  noise.scale: 1 in A C, 2 in B\n"), std::string::npos) << text;
+  const auto json =
+      nlohmann::json::parse(printed_by({"compare", database_, other, database_, "--json"}));
+  EXPECT_EQ(json["campaigns"].size(), 3U);
+}
+
+TEST_F(ArchiveCommands, CompareSixtyFourAtMost) {
+  const std::vector<std::string> most(64, database_);
+  std::vector<std::string> arguments{"compare"};
+  arguments.insert(arguments.end(), most.begin(), most.end());
+  EXPECT_EQ(test::answer_of(arguments).exit_code, exit_done);
+  arguments.push_back(database_);
+  EXPECT_EQ(misuse(arguments), "DB = 65 files (must be at most 64)");
 }
 
 TEST_F(ArchiveCommands, DoNotBackUpOverAFile) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <regex>
 #include <sstream>
 #include <string>
@@ -83,6 +84,22 @@ TEST_F(Check, ShowsWhatAFileAndTheOptionsChange) {
                 "  seed = 3 (instead of 1)\n"
                 "  noise.scale = 0 (instead of 1)\n"
                 "  estimation.correction = \"second_order\" (instead of \"hardy2013\")\n");
+}
+
+TEST_F(Check, PrintsJson) {
+  const auto file = write("campaign = { name = \"mine\", runs = 7 }\nnoise.scale = 0\n");
+  const auto json = nlohmann::json::parse(test::answer_of({"check", file, "--json"}).output);
+  EXPECT_EQ(json["file"], file.string());
+  EXPECT_EQ(json["campaign"], "mine");
+  EXPECT_EQ(json["seed"], "1");
+  EXPECT_EQ(json["num_runs"], 7);
+  EXPECT_EQ(json["num_orbits"], 140);
+  EXPECT_GT(json["one_core_s"], 0.0);
+  EXPECT_EQ(json["all_cores_s"], json["one_core_s"]) << "one batch";
+  EXPECT_GE(json["num_cores"], 1);
+  EXPECT_GT(json["disk_bytes"], 170e3);
+  const nlohmann::json noise{{"field", "noise.scale"}, {"value", "0"}, {"example", "1"}};
+  EXPECT_EQ(json["differences"][1], noise);
 }
 
 TEST_F(Check, CountsTheNumberOfRunsAsNoDifference) {

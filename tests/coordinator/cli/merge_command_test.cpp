@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -51,6 +52,23 @@ class MergeCommand : public test::StoreTest {
     return digest_of(Store::open_read_only(path("whole.db")));
   }
 };
+
+TEST_F(MergeCommand, PrintsJson) {
+  (void)part("a.db", 0, 10);
+  (void)part("b.db", 8, 20);
+  const Answer answer = merge({"a.db", "b.db"}, {"--json"});
+  ASSERT_EQ(answer.exit_code, exit_done) << answer.error;
+  const auto json = nlohmann::json::parse(answer.output);
+  EXPECT_EQ(json["file"], path("whole.db"));
+  EXPECT_EQ(json["parts"][0],
+            (nlohmann::json{{"file", path("a.db")}, {"num_new", 10}, {"num_again", 0}}));
+  EXPECT_EQ(json["parts"][1],
+            (nlohmann::json{{"file", path("b.db")}, {"num_new", 10}, {"num_again", 2}}));
+  EXPECT_EQ(json["num_runs"], num_runs);
+  EXPECT_EQ(json["num_missing"], 4);
+  EXPECT_EQ(json["missing"], (nlohmann::json::array({{{"first_run", 20}, {"num_runs", 4}}})));
+  EXPECT_EQ(json["digest"], digest_of_whole());
+}
 
 TEST_F(MergeCommand, GivesTheDigestOfTheCampaignInAnyOrderOfTheParts) {
   const std::string expected = digest_of(part("undivided.db", 0, num_runs));

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 #include <vector>
@@ -72,6 +73,23 @@ TEST_F(ReplayCommand, EndsWithOneIfABitDiffers) {
   EXPECT_EQ(answer.output.find("run 2 estimate_a_c11_delta_x_m: stored "), 0U) << answer.output;
   EXPECT_EQ(answer.error, "run 2: 1 of its values is not the stored one");
   EXPECT_EQ(names_in(directory_ / ""), std::set<std::string>{"a.db"});
+}
+
+TEST_F(ReplayCommand, PrintsJson) {
+  using Json = nlohmann::json;
+  const std::string output = directory_ / "run1.h5";
+  EXPECT_EQ(Json::parse(printed_by({"--run", "1", "--output", output, "--json"})),
+            (Json{{"runs", Json::array({{{"run", 1},
+                                         {"status", "completed"},
+                                         {"is_equal", true},
+                                         {"differences", Json::array()},
+                                         {"files", {output}}}})}}));
+  const test::Answer answer = replay({"--run", "2", "--json"});
+  EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
+  const Json run = Json::parse(answer.output)["runs"][0];
+  EXPECT_EQ(run["is_equal"], false);
+  EXPECT_EQ(run["differences"][0]["column"], "estimate_a_c11_delta_x_m");
+  EXPECT_NE(run["differences"][0]["stored"], run["differences"][0]["now"]);
 }
 
 TEST_F(ReplayCommand, WritesACsvFileForEachSession) {
