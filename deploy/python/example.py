@@ -5,8 +5,8 @@
 #
 #     python3 example.py hardy2013.db figures
 #
-# It reads the database that `./deploy/quickstart.sh` makes, prints the accuracy of each parameter and
-# writes three figures.
+# It reads the database that `./deploy/quickstart.sh` makes, prints the accuracy of each parameter
+# and writes three figures.
 
 # %%
 import pathlib
@@ -29,7 +29,8 @@ directory.mkdir(parents=True, exist_ok=True)
 
 # %%
 campaign = proofmass.open(file)
-print(f"{campaign.name}, seed {campaign.seed}, {campaign.num_runs} runs, model {campaign.model_version}")
+print(f"{campaign.name}, seed {campaign.seed}, {campaign.num_runs} runs, "
+      f"model {campaign.model_version}")
 print(f"digest {campaign.digest}")
 
 # %% [markdown]
@@ -82,8 +83,8 @@ figure.savefig(directory / "convergence.png")
 
 # %% [markdown]
 # ## Does an error depend on a truth?
-# The correlation of each error with each true value. A large one hints at a systematic error, as does
-# `proofmass sensitivity`, which also looks at products of two.
+# The correlation of each error with each true value. A large one hints at a systematic error.
+# `proofmass sensitivity` also looks at products of two.
 
 # %%
 errors = numpy.array([numpy.asarray(results[quantity.error])[has_estimate]

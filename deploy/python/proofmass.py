@@ -39,15 +39,16 @@ STATUSES = ("completed", "not_converged", "not_finite", "no_draw", "lost")  # 1 
 ROWS_AT_A_TIME = 8192
 
 # Endings of the columns of tables and views, and the units that they stand for.
-UNITS = {"m_s2": "m/s²", "s2_m": "s²/m", "rad_s2": "rad/s²", "rad_s": "rad/s", "rad": "rad", "m": "m",
-         "s": "s", "hz": "Hz"}
+UNITS = {"m_s2": "m/s²", "s2_m": "s²/m", "rad_s2": "rad/s²", "rad_s": "rad/s", "rad": "rad",
+         "m": "m", "s": "s", "hz": "Hz"}
 
 
 class CampaignError(Exception):
     """A file is no campaign database, or cannot be read completely."""
 
 
-class Quantity(collections.namedtuple("Quantity", "name symbol unit objective truth estimate error")):
+class Quantity(collections.namedtuple(
+        "Quantity", "name symbol unit objective truth estimate error")):
     """A quantity that every run estimates.
 
     name        In SQL: `k2d`.
@@ -412,7 +413,8 @@ class Series(collections.abc.Mapping):
         self.attributes = _attributes(dataset)
         names = dataset.dtype.names
         self.units, self.frames, self.meanings = (
-            dict(zip(names, self.attributes.get(name, ()))) for name in ("units", "frames", "meanings"))
+            dict(zip(names, self.attributes.get(name, ())))
+            for name in ("units", "frames", "meanings"))
 
     def __getitem__(self, name):
         if name not in self._dataset.dtype.names:

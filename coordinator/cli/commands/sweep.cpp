@@ -21,6 +21,7 @@
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/cli/sweep_plan.hpp"
+#include "coordinator/report/summarise.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/described_program.hpp"
@@ -44,14 +45,11 @@ std::filesystem::path directory_of_sweep(const SweepOptions& options) {
 struct SweptCampaign {
   SweptValues values;
   RunOptions run;
+  std::uint64_t num_missing = 0;  ///< Runs, at most.
+  std::optional<int> exit_code;   ///< If it is finished already: what it ended with.
 };
 
-/// A sweep that has been checked as a whole.
-struct Sweep {
-  std::vector<SweptCampaign> campaigns;
-  std::size_t num_unfinished = 0;
-  CostEstimate cost;  ///< Of the runs that are missing.
-};
+using Sweep = std::vector<SweptCampaign>;
 
 RunOptions run_options_of(const SweepOptions& options, const SweptValues& values) {
   RunOptions run = options.run;
@@ -81,13 +79,32 @@ std::unique_ptr<Campaign> read_swept(const SweptCampaign& swept) {
   }
 }
 
-/// Runs that a campaign lacks; all if there is no database yet.
-std::uint64_t num_missing_of(const Campaign& campaign, const std::filesystem::path& database) {
-  if (!std::filesystem::exists(database)) return campaign.num_runs;
+/// What is left to be done of a campaign.
+struct FoundCampaign {
+  std::uint64_t num_missing = 0;  ///< Runs, at most.
+  std::optional<int> exit_code;   ///< If nothing is: what `run` ended with.
+};
+
+/// @throws UsageError if there is a database of another campaign, or of one with more runs.
+FoundCampaign look_for(const Campaign& campaign, const RunOptions& run) {
+  const std::filesystem::path& database = *run.database;
+  if (!std::filesystem::exists(database))
+    return {.num_missing = campaign.num_runs, .exit_code = {}};
   const Store store = Store::open_read_only(database);
   require_same(store, campaign, database, "name another directory with --directory");
   require_no_fewer_runs(store, campaign, database);
-  return campaign.num_runs - num_runs_in(store.finished_runs());
+  const std::uint64_t num_finished_runs = num_runs_in(store.finished_runs());
+  const std::optional<Summary> summary = store.summary();
+  // A file at rest, whose statistics are those of its results.
+  const bool is_complete = store.control().phase == wire::CampaignPhase::finished && summary &&
+                           summary->num_finished == num_finished_runs &&
+                           store.given_up_runs().empty() &&
+                           store.stop_plan() == stop_plan_of(run, campaign.num_runs);
+  const bool has_all = num_finished_runs == campaign.num_runs || !run.stop.rule.empty();
+  if (is_complete && has_all) {
+    return {.num_missing = 0, .exit_code = is_rule_missed(store) ? exit_not_met : exit_done};
+  }
+  return {.num_missing = campaign.num_runs - num_finished_runs, .exit_code = {}};
 }
 
 /// Reads and checks every campaign before any is run, so that a sweep does not end in the middle
@@ -97,10 +114,9 @@ Sweep plan_sweep(const SweepOptions& options) {
   for (const std::string& text : options.varied) keys.push_back(parse_varied(text));
   Sweep sweep;
   std::map<std::string, std::string> values_of_definition;
-  std::optional<double> orbit_s;  // Of a batch, measured once.
   for (const SweptValues& values : combinations(keys)) {
-    const SweptCampaign& swept = sweep.campaigns.emplace_back(
-        SweptCampaign{.values = values, .run = run_options_of(options, values)});
+    SweptCampaign& swept = sweep.emplace_back(
+        SweptCampaign{.values = values, .run = run_options_of(options, values), .exit_code = {}});
     const std::unique_ptr<Campaign> campaign = read_swept(swept);
     const auto [same, is_new] = values_of_definition.emplace(
         campaign->definition(TableColumns::left_out).text, text_of(values));
@@ -108,14 +124,32 @@ Sweep plan_sweep(const SweepOptions& options) {
       throw UsageError(
           fmt::format("vary = {} (makes the same campaign as {})", text_of(values), same->second));
     }
-    const std::unique_ptr<const Plan> plan = campaign->prepare();
-    const std::uint64_t num_missing = num_missing_of(*campaign, *swept.run.database);
-    if (num_missing == 0) continue;
-    ++sweep.num_unfinished;
-    if (!orbit_s) orbit_s = measure_batch_s(*campaign, *plan) / plan->num_orbits();
-    sweep.cost += estimated_cost(num_missing, *orbit_s * plan->num_orbits());
+    const FoundCampaign found = look_for(*campaign, swept.run);
+    swept.num_missing = found.num_missing;
+    swept.exit_code = found.exit_code;
   }
   return sweep;
+}
+
+/// What the missing runs of these campaigns take. The time of an orbit is measured with the first,
+/// and the length of a run is looked up for a few of them, as preparing one takes a tenth of a
+/// second: the others are taken to be like the one before them.
+CostEstimate cost_of(const std::vector<const SweptCampaign*>& unfinished) {
+  constexpr std::size_t num_prepared_max = 8;
+  const std::size_t stride = unfinished.size() / num_prepared_max + 1;
+  CostEstimate cost;
+  double orbit_s = 0.0;  // Of a batch.
+  int num_orbits = 0;
+  for (std::size_t i = 0; i < unfinished.size(); ++i) {
+    if (i % stride == 0) {
+      const std::unique_ptr<const Campaign> campaign = read_swept(*unfinished[i]);
+      const std::unique_ptr<const Plan> plan = campaign->prepare();
+      num_orbits = plan->num_orbits();
+      if (i == 0) orbit_s = measure_batch_s(*campaign, *plan) / num_orbits;
+    }
+    cost += estimated_cost(unfinished[i]->num_missing, orbit_s * num_orbits);
+  }
+  return cost;
 }
 
 void make_sweep_directory(const std::filesystem::path& directory) {
@@ -127,27 +161,31 @@ void make_sweep_directory(const std::filesystem::path& directory) {
 
 void say_plan(const Sweep& sweep, const SweepOptions& options) {
   if (options.run.is_quiet) return;
+  std::vector<const SweptCampaign*> unfinished;
+  for (const SweptCampaign& swept : sweep) {
+    if (!swept.exit_code) unfinished.push_back(&swept);
+  }
   std::string text =
-      fmt::format("proofmass: {} campaigns in {}, {} of them unfinished\n", sweep.campaigns.size(),
-                  directory_of_sweep(options).string(), sweep.num_unfinished);
-  if (sweep.num_unfinished > 0) text += cost_text(sweep.cost);
+      fmt::format("proofmass: {} campaigns in {}, {} of them unfinished\n", sweep.size(),
+                  directory_of_sweep(options).string(), unfinished.size());
+  if (!unfinished.empty()) text += cost_text(cost_of(unfinished));
   wire::say(text);
 }
 
-/// Runs one campaign after the other. What cannot be met or done in one keeps no other from being
-/// run.
+/// Runs one campaign after the other, but for those that are finished: their files stay as they
+/// are. What cannot be met or done in one keeps no other from being run.
 /// @return exit_interrupted, or the gravest ExitCode of all.
 int run_all(const Sweep& sweep, bool is_quiet) {
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   int gravest = exit_done;
-  for (std::size_t i = 0; i < sweep.campaigns.size(); ++i) {
+  for (std::size_t i = 0; i < sweep.size(); ++i) {
     if (stop != StopRequest::none) return exit_interrupted;
-    const SweptCampaign& swept = sweep.campaigns[i];
-    if (!is_quiet) {
-      wire::say(fmt::format("proofmass: campaign {} of {}: {}\n", i + 1, sweep.campaigns.size(),
+    const SweptCampaign& swept = sweep[i];
+    if (!is_quiet && !swept.exit_code) {
+      wire::say(fmt::format("proofmass: campaign {} of {}: {}\n", i + 1, sweep.size(),
                             text_of(swept.values)));
     }
-    const int exit_code = run_campaign(swept.run);
+    const int exit_code = swept.exit_code ? *swept.exit_code : run_campaign(swept.run);
     if (exit_code == exit_interrupted) return exit_interrupted;
     if (exit_code == exit_cannot_be_done || gravest == exit_done) gravest = exit_code;
   }
@@ -157,7 +195,7 @@ int run_all(const Sweep& sweep, bool is_quiet) {
 std::string sweep_text(const Sweep& sweep, OutputFormat format, const IsStopped& is_stopped) {
   std::vector<std::filesystem::path> files;
   std::vector<SweptValues> values;
-  for (const SweptCampaign& swept : sweep.campaigns) {
+  for (const SweptCampaign& swept : sweep) {
     files.push_back(*swept.run.database);
     values.push_back(swept.values);
   }
