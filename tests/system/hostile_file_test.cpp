@@ -85,6 +85,7 @@ TEST_F(HostileFile, IsRefusedByEveryCommand) {
                                         {"backup", "hostile.db", "copy.db"},
                                         {"compare", "hostile.db", "good.db"},
                                         {"compare", "good.db", "hostile.db"},
+                                        {"compare", "good.db", "hostile.db", "good.db"},
                                         {"sensitivity", "hostile.db"},
                                         {"tag", "hostile.db", "add", "a"},
                                         {"note", "hostile.db", "text"},

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Reads campaigns with deploy/python/proofmass.py and compares every number with what other programs
+"""Reads campaigns with deploy/python/proofmass.py and compares every number with what others
 read: `proofmass report --json`, SQL by sqlite3, `proofmass query` for the draws and h5py for a
 replay; with pandas and without it, of MICROSCOPE's model and of another one. Then it runs the
 example, which must draw its figures.
@@ -100,7 +100,8 @@ def check_results(machine, campaign, numpy):
         if name in ("run_index", "status", "loss_cause", "loss_session"):
             continue
         expected = numpy.array([numpy.nan if row[i] is None else row[i] for row in stored], float)
-        assert numpy.array_equal(numpy.asarray(results[name], float), expected, equal_nan=True), name
+        own = numpy.asarray(results[name], float)
+        assert numpy.array_equal(own, expected, equal_nan=True), name
     losses = {row[0]: row[1:] for row in sql(
         machine, "SELECT run_index, loss_cause, loss_session FROM loop_health "
                  "WHERE loss_cause IS NOT NULL")}
@@ -161,7 +162,8 @@ def check_replay(machine, proofmass, numpy):
                 assert tuple(series) == dataset.dtype.names
                 for i, name in enumerate(dataset.dtype.names):
                     unit = dataset.attrs["units"][i]
-                    assert series.units[name] == (unit.decode() if isinstance(unit, bytes) else unit)
+                    unit = unit.decode() if isinstance(unit, bytes) else unit
+                    assert series.units[name] == unit, (session, group, name)
                     assert numpy.array_equal(series[name], dataset[name]), (session, group, name)
                     num_signals += 1
     assert num_signals > 3, num_signals

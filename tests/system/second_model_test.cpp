@@ -228,7 +228,7 @@ TEST_F(SecondModel, IsSwept) {
             0)
       << errors_of("sweep");
   const std::string text = output_of("sweep");
-  EXPECT_THAT(text, HasSubstr("\n  sensor.noise_m_s2: 1e-09 in A, 1e-08 in B\n"));
+  EXPECT_THAT(text, HasSubstr("\n  sensor.noise_m_s2: 1e-9 in A, 1e-8 in B\n"));
   ASSERT_EQ(proofmass("again", {"compare", "swept/example-sensor.noise_m_s2=1e-9.db",
                                 "swept/example-sensor.noise_m_s2=1e-8.db"}),
             0)

@@ -81,9 +81,10 @@ TEST_F(ArchiveCommands, PrintTagsAndNotesAndCopiesAsJson) {
   EXPECT_EQ(Json::parse(printed_by({"tag", database_, "--json"})), (Json{{"tags", Json::array()}}));
   EXPECT_EQ(Json::parse(printed_by({"tag", database_, "add", "thesis", "flight", "--json"})),
             (Json{{"tags", {"flight", "thesis"}}}));
-  const Json notes = Json::parse(printed_by({"note", database_, "first \x1b[31m", "--json"}));
+  const Json notes =
+      Json::parse(printed_by({"note", database_, "first \"one\"\nsecond", "--json"}));
   ASSERT_EQ(notes["notes"].size(), 1U);
-  EXPECT_EQ(notes["notes"][0]["text"], "first \x1b[31m");
+  EXPECT_EQ(notes["notes"][0]["text"], "first \"one\"\nsecond");
   EXPECT_EQ(notes["notes"][0]["time_utc"].get<std::string>().size(), 20U);
   EXPECT_EQ(Json::parse(printed_by({"note", database_, "--json"})), notes);
   const auto copy = directory_ / "copy.db";

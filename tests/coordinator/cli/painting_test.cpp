@@ -92,8 +92,8 @@ TEST(Painting, MarksAnswers) {
 }
 
 TEST(Painting, MarksChecks) {
-  const std::string passes =
-      check_text({.name = "digest", .verdict = Verdict::holds, .finding = "that of 32 runs"});
+  const std::string passes = check_text(
+      {.name = "digest", .verdict = Verdict::holds, .finding = "that of 32 runs", .details = {}});
   const std::string fails = check_text({.name = "digest",
                                         .verdict = Verdict::fails,
                                         .finding = "another one",

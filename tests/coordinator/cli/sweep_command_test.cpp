@@ -127,5 +127,13 @@ TEST_F(SweepRefusal, IsOfADatabaseThatHoldsAnotherCampaign) {
   EXPECT_FALSE(std::filesystem::exists(sweep_ / "mine-noise.scale=1.db"));
 }
 
+TEST_F(SweepRefusal, IsOfAFileInThePlaceOfTheDirectory) {
+  std::ofstream(sweep_) << "mine";
+  const test::Answer answer = test::answer_of(
+      {"sweep", file_, "--directory", sweep_, "--vary", "noise.scale=1,2", "--quiet"});
+  EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
+  EXPECT_EQ(answer.error, "directory = " + sweep_.string() + " (Not a directory)");
+}
+
 }  // namespace
 }  // namespace proofmass::coordinator
