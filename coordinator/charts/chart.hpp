@@ -1,0 +1,149 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace proofmass::coordinator {
+
+// What a chart shows, without a pixel. All data are binned or thinned by the caller, so that the
+// size of a picture does not depend on the number of runs. Texts may hold anything: they are
+// escaped where they are drawn.
+
+/// Colours by their role. A page or a theme says what they look like, see theme.hpp. Nothing is
+/// told by colour alone: layers also differ by dash, shape or label.
+enum class Ink : std::uint8_t { first, second, third, fourth, text };
+enum class Dash : std::uint8_t { solid, dashed, dotted };
+enum class Shape : std::uint8_t { circle, triangle, square, diamond };
+
+enum class Scale : std::uint8_t { linear, logarithmic };
+
+struct Axis {
+  std::string label = {};  ///< With its unit: `|error|, nm`.
+  Scale scale = Scale::linear;
+  /// Ends of the axis; an end that is not given is that of the data, rounded outwards. Ends that
+  /// are not finite, or not above 0 on a logarithmic axis, are ignored.
+  std::optional<double> from = {};
+  std::optional<double> to = {};
+};
+
+struct Point {
+  double x = 0.0;
+  double y = 0.0;
+};
+
+/// A histogram.
+struct Bars {
+  std::string name = {};        ///< In the legend; empty: it is not listed there. So below.
+  std::vector<double> edges;    ///< Ascending; one more than there are heights.
+  std::vector<double> heights;  ///< ≥ 0.
+  Ink ink = Ink::first;
+};
+
+/// Points joined by straight lines. A point that is not finite, or not above 0 on a logarithmic
+/// axis, ends the line; the next one begins it anew.
+struct Line {
+  std::string name = {};
+  std::vector<Point> points;
+  Ink ink = Ink::first;
+  Dash dash = Dash::solid;
+};
+
+struct Markers {
+  std::string name = {};
+  std::vector<Point> points;
+  std::vector<std::string> labels = {};  ///< Beside the first points; may be fewer.
+  Ink ink = Ink::first;
+  Shape shape = Shape::circle;
+};
+
+struct BandPoint {
+  double x = 0.0;
+  double lower = 0.0;
+  double upper = 0.0;
+};
+
+/// An area between two curves: an interval along a line.
+struct Band {
+  std::string name = {};
+  std::vector<BandPoint> points;
+  Ink ink = Ink::first;
+};
+
+/// A line across the whole chart, with its label at its end.
+struct LimitLine {
+  enum class Direction : std::uint8_t {
+    vertical,    ///< At a value of x.
+    horizontal,  ///< At a value of y.
+  };
+  std::string label = {};
+  double value = 0.0;
+  Direction direction = Direction::vertical;
+  Ink ink = Ink::second;
+  Dash dash = Dash::dashed;
+};
+
+using Layer = std::variant<Bars, Line, Markers, Band, LimitLine>;
+
+/// What every chart has.
+struct ChartText {
+  /// Unique in a page: elements of the picture are named after it. 1 to 200 of A-Z a-z 0-9 _ and -,
+  /// a letter first.
+  std::string id;
+  std::string title;        ///< Above the picture, and its name for screen readers.
+  std::string description;  ///< What the picture tells, for those who do not see it; sentences.
+};
+
+/// Layers over two axes, drawn in their order.
+struct Chart {
+  ChartText text;
+  Axis x;
+  Axis y;
+  std::vector<Layer> layers;
+  double plot_height = 190.0;  ///< Of the area between the axes, of a picture 480 wide.
+};
+
+/// Values of one kind, one a category. A value that is missing has no bar.
+struct BarSeries {
+  std::string name = {};
+  std::vector<std::optional<double>> values;
+  Ink ink = Ink::first;
+};
+
+/// Horizontal bars, a group a category, with their values as text at their ends.
+struct BarChart {
+  ChartText text;
+  Axis x;  ///< Of the values. Bars begin at the left end of the axis.
+  std::vector<std::string> categories;
+  std::vector<BarSeries> series;  ///< Values in the order of the categories.
+};
+
+/// A cell without a value is empty.
+struct HeatCell {
+  std::optional<double> value = {};  ///< −1 to 1: the strength of the colour, and its sign.
+  std::string label = {};  ///< In the cell, at most four characters; tells sign and value.
+};
+
+/// Cells with a colour each, as for correlations.
+struct HeatMap {
+  ChartText text;
+  std::vector<std::string> rows;
+  std::vector<std::string> columns;
+  std::vector<HeatCell> cells;  ///< Row by row: rows times columns.
+};
+
+/// Several charts as one picture.
+struct ChartGrid {
+  ChartText text;
+  std::size_t num_columns = 2;
+  std::vector<Chart> charts;  ///< Row by row.
+};
+
+using Picture = std::variant<Chart, BarChart, HeatMap, ChartGrid>;
+
+[[nodiscard]] const ChartText& text_of(const Picture& picture);
+
+}  // namespace proofmass::coordinator

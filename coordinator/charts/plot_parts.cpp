@@ -1,0 +1,150 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "coordinator/charts/plot.hpp"
+#include "proto/text/visible_text.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr double line_height = 19.0;
+
+/// Lines of whole words, as far as words fit; at most three.
+std::vector<std::string> wrapped_lines(std::string_view text, double size, double width) {
+  constexpr std::size_t num_lines_max = 3;
+  const auto num_columns = static_cast<std::size_t>(std::max(width / text_width("m", size), 8.0));
+  std::vector<std::string> lines{""};
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(' ', begin), text.size());
+    const std::string word(text.substr(begin, end - begin));
+    const std::string longer = lines.back().empty() ? word : lines.back() + " " + word;
+    if (lines.back().empty() || wire::display_width(longer) <= num_columns ||
+        lines.size() == num_lines_max) {
+      lines.back() = longer;
+    } else {
+      lines.push_back(word);
+    }
+    begin = end + 1;
+  }
+  for (std::string& line : lines) line = wire::shortened(line, num_columns);
+  return lines;
+}
+
+constexpr double sample_width = 22.0;
+
+void draw_sample(const LegendEntry& entry, Point place, SvgWriter& writer) {
+  const double middle = place.y - 4.5;
+  const std::string colour = writer.colour(entry.ink);
+  switch (entry.sample) {
+    case LegendEntry::Sample::area:
+      writer.outlined_rectangle({place.x, place.y - 10.0, sample_width - 6.0, 10.0}, colour,
+                                entry.opacity, {.colour = colour, .width = 1.0});
+      return;
+    case LegendEntry::Sample::line:
+      writer.line({place.x, middle}, {place.x + sample_width - 4.0, middle},
+                  {.colour = colour, .width = 2.0, .dash = entry.dash});
+      return;
+    case LegendEntry::Sample::marker:
+      writer.marker({place.x + 8.0, middle}, entry.shape, entry.ink);
+      return;
+  }
+}
+
+/// Labels that would touch the one before them are left out.
+class FreeSpace {
+ public:
+  [[nodiscard]] bool take(double from, double to) {
+    if (from < end_) return false;
+    end_ = to;
+    return true;
+  }
+
+ private:
+  double end_ = -1e9;
+};
+
+}  // namespace
+
+double AxisMap::at(double value) const {
+  if (scale == Scale::linear) {
+    return begin + (value - range.from) / (range.to - range.from) * (end - begin);
+  }
+  if (!(value > 0.0)) return begin;
+  return begin + std::log(value / range.from) / std::log(range.to / range.from) * (end - begin);
+}
+
+bool AxisMap::contains(double value) const {
+  if (!has(value)) return false;
+  const double place = (at(value) - begin) / (end - begin);
+  return place >= -1e-9 && place <= 1.0 + 1e-9;
+}
+
+bool AxisMap::has(double value) const {
+  return std::isfinite(value) && (scale == Scale::linear || value > 0.0);
+}
+
+double draw_title(std::string_view title, Point corner, double width, SvgWriter& writer) {
+  double height = 0.0;
+  for (const std::string& line : wrapped_lines(title, title_size, width)) {
+    height += line_height;
+    writer.text({corner.x, corner.y + height - 4.0}, line, {.size = title_size, .is_bold = true});
+  }
+  return height + 3.0;
+}
+
+double draw_legend(std::span<const LegendEntry> entries, Point corner, double width,
+                   SvgWriter& writer) {
+  if (entries.empty()) return 0.0;
+  Point place{corner.x, corner.y + 14.0};
+  for (const LegendEntry& entry : entries) {
+    const double needed = sample_width + text_width(entry.name, label_size) + 8.0;
+    if (place.x > corner.x && place.x + needed > corner.x + width) {
+      place = {corner.x, place.y + line_height};
+    }
+    draw_sample(entry, place, writer);
+    writer.text({place.x + sample_width, place.y}, entry.name, {.size = label_size});
+    place.x += needed;
+  }
+  return place.y - corner.y + 8.0;
+}
+
+AxisRange range_of(const Axis& axis, std::optional<double> from, std::optional<double> to,
+                   std::size_t num_ticks_max) {
+  const bool is_linear = axis.scale == Scale::linear;
+  const double lower = from.value_or(is_linear ? 0.0 : 1.0);
+  const double upper = to.value_or(is_linear ? 1.0 : 10.0);
+  return is_linear ? linear_range(axis, lower, upper, num_ticks_max)
+                   : logarithmic_range(axis, lower, upper, num_ticks_max);
+}
+
+void draw_x_axis(const AxisMap& x, const Axis& axis, const Box& box, SvgWriter& writer) {
+  FreeSpace space;
+  for (const Tick& tick : x.range.ticks) {
+    const double at = x.at(tick.value);
+    writer.line({at, box.top}, {at, box.bottom()}, {.colour = writer.colour("--chart-grid")});
+    const double half = text_width(tick.label, label_size) / 2.0;
+    if (!space.take(at - half, at + half + 3.0)) continue;
+    writer.text({at, box.bottom() + 16.0}, tick.label,
+                {.size = label_size, .anchor = Anchor::middle});
+  }
+  writer.line({box.left, box.bottom()}, {box.right(), box.bottom()},
+              {.colour = writer.colour(Ink::text)});
+  writer.text({box.left + box.width / 2.0, box.bottom() + 34.0}, axis.label,
+              {.size = label_size, .anchor = Anchor::middle});
+}
+
+void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer) {
+  for (const Tick& tick : y.range.ticks) {
+    const double at = y.at(tick.value);
+    writer.line({box.left, at}, {box.right(), at}, {.colour = writer.colour("--chart-grid")});
+    writer.text({box.left - 6.0, at + 4.5}, tick.label,
+                {.size = label_size, .anchor = Anchor::end});
+  }
+  writer.line({box.left, box.top}, {box.left, box.bottom()}, {.colour = writer.colour(Ink::text)});
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "coordinator/charts/chart.hpp"
+
+namespace proofmass::coordinator {
+
+/// Where a picture is shown.
+enum class SvgUse : std::uint8_t {
+  /// In an HTML page, which sets the colours with light_colours() and dark_colours(). Without them,
+  /// they are the light ones.
+  embedded,
+  /// As a file: with its namespace, its style and its ground. It follows `prefers-color-scheme`.
+  standalone,
+  /// As a file for programs that know neither custom properties nor media queries, such as those
+  /// that make a bitmap of it: the light colours stand at each element.
+  plain,
+};
+
+/// The picture as SVG, the same bytes for the same picture. It takes the width that it is given and
+/// has its own proportions; texts of a picture 480 wide are readable at 360 pixels. For screen
+/// readers it is one image with title and description.
+///
+/// Data that are not finite, or not above 0 on a logarithmic axis, are left out. Without data the
+/// axes are drawn with `no data` between them.
+[[nodiscard]] std::string svg_of(const Picture& picture, SvgUse use);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,198 @@
+#include "coordinator/charts/svg.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "tests/coordinator/charts/markup_reading.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::SizeIs;
+
+const std::string hostile = "<script>alert(\"1\")</script> & 'x' \x1b[31m \xff \u202e";
+
+Chart histogram() {
+  return {.text = {.id = "histogram", .title = "Errors", .description = "Most are small."},
+          .x = {.label = "|error|, nm", .from = 0.0, .to = 40.0},
+          .y = {.label = "runs", .from = 0.0, .to = 10.0},
+          .layers = {Bars{.name = "runs",
+                          .edges = {0.0, 10.0, 20.0, 30.0, 40.0},
+                          .heights = {10.0, 5.0, 0.0, 1.0}},
+                     LimitLine{.label = "objective 30", .value = 30.0}}};
+}
+
+std::vector<Picture> pictures_with(const std::string& text) {
+  Chart chart = histogram();
+  chart.text.title = chart.text.description = chart.x.label = chart.y.label = text;
+  chart.layers = {
+      Bars{.name = text, .edges = {0.0, 1.0}, .heights = {1.0}},
+      Line{.name = text, .points = {{0.0, 1.0}, {1.0, 2.0}}},
+      Markers{.name = text, .points = {{1.0, 1.0}}, .labels = {text}},
+      Band{.name = text, .points = {{0.0, 1.0, 2.0}, {1.0, 1.0, 2.0}}},
+      LimitLine{.label = text, .value = 20.0},
+      LimitLine{.label = text, .value = 5.0, .direction = LimitLine::Direction::horizontal}};
+  const ChartText of_chart{.id = "x", .title = text, .description = text};
+  const BarChart bars{.text = of_chart,
+                      .x = {.label = text},
+                      .categories = {text},
+                      .series = {{.name = text, .values = {1.0}}}};
+  const HeatMap map{.text = of_chart,
+                    .rows = {text},
+                    .columns = {text},
+                    .cells = {{.value = 1.0, .label = text}}};
+  return {chart, bars, map, ChartGrid{.text = of_chart, .charts = {chart, chart, chart}}};
+}
+
+TEST(Svg, IsWellFormedWhateverTheTexts) {
+  for (const Picture& picture : pictures_with(hostile)) {
+    for (const SvgUse use : {SvgUse::embedded, SvgUse::standalone, SvgUse::plain}) {
+      const std::string svg = svg_of(picture, use);
+      EXPECT_EQ(test::malformed_part(svg), "") << svg;
+      EXPECT_THAT(svg, Not(HasSubstr("<script")));
+      EXPECT_THAT(svg, Not(HasSubstr("\x1b")));
+    }
+  }
+}
+
+TEST(Svg, NamesItselfForScreenReaders) {
+  const std::string svg = svg_of(histogram(), SvgUse::embedded);
+  EXPECT_THAT(svg, HasSubstr("role=\"img\" aria-labelledby=\"histogram-title "
+                             "histogram-description\""));
+  EXPECT_THAT(svg, HasSubstr("<title id=\"histogram-title\">Errors</title>"));
+  EXPECT_THAT(svg, HasSubstr("<desc id=\"histogram-description\">Most are small.</desc>"));
+}
+
+TEST(Svg, TakesTheColoursOfThePage) {
+  const std::string embedded = svg_of(histogram(), SvgUse::embedded);
+  EXPECT_THAT(embedded, HasSubstr("fill=\"var(--chart-first,#0072b2)\""));
+  EXPECT_THAT(embedded, Not(HasSubstr("<style>")));
+}
+
+TEST(Svg, CarriesItsColoursAsAFile) {
+  EXPECT_THAT(svg_of(histogram(), SvgUse::standalone), HasSubstr("prefers-color-scheme:dark"));
+  EXPECT_THAT(svg_of(histogram(), SvgUse::standalone),
+              HasSubstr("xmlns=\"http://www.w3.org/2000/svg\""));
+  const std::string plain = svg_of(histogram(), SvgUse::plain);
+  EXPECT_THAT(plain, HasSubstr("fill=\"#0072b2\""));
+  EXPECT_THAT(plain, Not(HasSubstr("var(")));
+}
+
+TEST(Svg, IsTheSameEachTime) {
+  for (const Picture& picture : pictures_with("text")) {
+    EXPECT_EQ(svg_of(picture, SvgUse::embedded), svg_of(picture, SvgUse::embedded));
+  }
+}
+
+// On axes whose ends are given, a bar's edges and height are linear functions of its values: the
+// bar of 5 of 10 is half as high as that of 10, and all stand side by side on one line.
+TEST(Bars, StandWhereTheirValuesAre) {
+  const std::vector<std::string> bars =
+      test::tags_of(svg_of(histogram(), SvgUse::plain), "<rect[^>]* fill=\"#0072b2\"/>");
+  ASSERT_THAT(bars, SizeIs(3));                                 // One is empty.
+  const double unit = test::number_of(bars[0], "width") + 1.0;  // The gap between bars.
+  EXPECT_NEAR(test::number_of(bars[1], "x") - test::number_of(bars[0], "x"), unit, 0.02);
+  EXPECT_NEAR(test::number_of(bars[2], "x") - test::number_of(bars[0], "x"), 3.0 * unit, 0.02);
+  EXPECT_NEAR(test::number_of(bars[0], "height"), 190.0, 0.02);
+  EXPECT_NEAR(test::number_of(bars[1], "height"), 95.0, 0.02);
+  EXPECT_NEAR(test::number_of(bars[2], "height"), 19.0, 0.02);
+  const auto foot = [](const std::string& bar) {
+    return test::number_of(bar, "y") + test::number_of(bar, "height");
+  };
+  EXPECT_NEAR(foot(bars[1]), foot(bars[0]), 0.02);
+}
+
+/// The points of the only path with this colour.
+std::vector<Point> points_of(const std::string& svg, const std::string& colour) {
+  const std::vector<std::string> paths =
+      test::tags_of(svg, "<path d=\"[^\"]*\" fill=\"none\" stroke=\"" + colour + "\"[^>]*/>");
+  EXPECT_THAT(paths, SizeIs(1));
+  std::vector<Point> points;
+  static const std::regex point("[ML]([-0-9.]+) ([-0-9.]+)");
+  const std::string path = paths.empty() ? "" : paths[0];
+  for (auto it = std::sregex_iterator(path.begin(), path.end(), point);
+       it != std::sregex_iterator(); ++it) {
+    points.push_back({std::stod((*it)[1]), std::stod((*it)[2])});
+  }
+  return points;
+}
+
+Chart curve(std::vector<Point> points, Scale scale) {
+  return {.text = {.id = "curve", .title = "", .description = ""},
+          .x = {.label = "n", .scale = scale, .from = 1.0, .to = 10'000.0},
+          .y = {.label = "std", .from = 0.0, .to = 1.0},
+          .layers = {Line{.name = "", .points = std::move(points), .ink = Ink::third}}};
+}
+
+// Powers of ten are equally far apart on a logarithmic axis.
+TEST(Line, FollowsALogarithmicAxis) {
+  const std::vector<Point> points = points_of(
+      svg_of(curve({{1.0, 0.0}, {10.0, 0.5}, {100.0, 1.0}, {10'000.0, 0.25}}, Scale::logarithmic),
+             SvgUse::plain),
+      "#008f68");
+  ASSERT_THAT(points, SizeIs(4));
+  const double decade = points[1].x - points[0].x;
+  EXPECT_GT(decade, 50.0);
+  EXPECT_NEAR(points[2].x - points[1].x, decade, 0.02);
+  EXPECT_NEAR(points[3].x - points[2].x, 2.0 * decade, 0.03);
+  EXPECT_NEAR(points[0].y - points[1].y, 95.0, 0.02);
+  EXPECT_NEAR(points[0].y - points[2].y, 190.0, 0.02);
+}
+
+TEST(Line, LeavesOutWhatHasNoPlace) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  const std::string svg =
+      svg_of(curve({{0.0, 0.5}, {1.0, nan}, {infinity, 0.5}, {-1.0, 0.5}}, Scale::logarithmic),
+             SvgUse::plain);
+  EXPECT_THAT(svg, Not(HasSubstr("nan")));
+  EXPECT_THAT(svg, Not(HasSubstr("inf")));
+  EXPECT_THAT(test::tags_of(svg, "<path[^>]*#008f68"), SizeIs(0));
+}
+
+TEST(Chart, WithoutDataSaysSo) {
+  Chart chart = histogram();
+  chart.layers = {LimitLine{.label = "objective", .value = 30.0}};
+  EXPECT_THAT(svg_of(chart, SvgUse::embedded), HasSubstr(">no data</text>"));
+  EXPECT_THAT(svg_of(histogram(), SvgUse::embedded), Not(HasSubstr("no data")));
+}
+
+TEST(LimitLine, HasItsLabelAndADash) {
+  const std::string svg = svg_of(histogram(), SvgUse::plain);
+  EXPECT_THAT(svg, HasSubstr(">objective 30</text>"));
+  EXPECT_THAT(svg, HasSubstr("stroke=\"#d55e00\" stroke-width=\"2\" stroke-dasharray"));
+}
+
+TEST(BarChart, HasValuesAsText) {
+  const BarChart chart{.text = {.id = "budget", .title = "Budget", .description = ""},
+                       .x = {.label = "m/s²", .scale = Scale::logarithmic},
+                       .categories = {"a", "b"},
+                       .series = {{.name = "before", .values = {1e-13, 2e-14}},
+                                  {.name = "after", .values = {1e-15, std::nullopt}}}};
+  const std::string svg = svg_of(chart, SvgUse::plain);
+  EXPECT_THAT(svg, HasSubstr(">10⁻¹³</text>"));
+  EXPECT_THAT(svg, HasSubstr(">2×10⁻¹⁴</text>"));
+  // Two samples in the legend, three bars.
+  EXPECT_THAT(test::tags_of(svg, "<rect[^>]*stroke=\"#0072b2\""), SizeIs(5));
+}
+
+// A correlation of −1 has the colour of negative ones at full strength, which is 0.5.
+TEST(HeatMap, ShowsSignAndStrength) {
+  const HeatMap map{.text = {.id = "map", .title = "Correlations", .description = ""},
+                    .rows = {"a"},
+                    .columns = {"b", "c", "d"},
+                    .cells = {{.value = -1.0, .label = "−1"}, {.value = 0.5, .label = ".5"}, {}}};
+  const std::string svg = svg_of(map, SvgUse::plain);
+  EXPECT_THAT(svg, HasSubstr("fill=\"#d55e00\" fill-opacity=\"0.5\""));
+  EXPECT_THAT(svg, HasSubstr("fill=\"#0072b2\" fill-opacity=\"0.25\""));
+  EXPECT_THAT(svg, HasSubstr("fill=\"#0072b2\" fill-opacity=\"0\""));
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
