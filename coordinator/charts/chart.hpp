@@ -37,9 +37,9 @@ struct Point {
 
 /// A histogram.
 struct Bars {
-  std::string name = {};        ///< In the legend; empty: it is not listed there. So below.
-  std::vector<double> edges;    ///< Ascending; one more than there are heights.
-  std::vector<double> heights;  ///< ≥ 0.
+  std::string name = {};             ///< In the legend; empty: it is not listed there. So below.
+  std::vector<double> edges = {};    ///< Ascending; one more than there are heights.
+  std::vector<double> heights = {};  ///< ≥ 0.
   Ink ink = Ink::first;
 };
 
@@ -47,14 +47,14 @@ struct Bars {
 /// axis, ends the line; the next one begins it anew.
 struct Line {
   std::string name = {};
-  std::vector<Point> points;
+  std::vector<Point> points = {};
   Ink ink = Ink::first;
   Dash dash = Dash::solid;
 };
 
 struct Markers {
   std::string name = {};
-  std::vector<Point> points;
+  std::vector<Point> points = {};
   std::vector<std::string> labels = {};  ///< Beside the first points; may be fewer.
   Ink ink = Ink::first;
   Shape shape = Shape::circle;
@@ -69,7 +69,7 @@ struct BandPoint {
 /// An area between two curves: an interval along a line.
 struct Band {
   std::string name = {};
-  std::vector<BandPoint> points;
+  std::vector<BandPoint> points = {};
   Ink ink = Ink::first;
 };
 
@@ -100,9 +100,9 @@ struct ChartText {
 /// Layers over two axes, drawn in their order.
 struct Chart {
   ChartText text;
-  Axis x;
-  Axis y;
-  std::vector<Layer> layers;
+  Axis x = {};
+  Axis y = {};
+  std::vector<Layer> layers = {};
   double plot_height = 190.0;  ///< Of the area between the axes, of a picture 480 wide.
 };
 

@@ -74,9 +74,10 @@ int run_proofmass(int argc, char** argv,
   for (const auto add : {add_run, add_sweep, add_init, add_check, add_keygen}) add(app, chosen);
   add_further_commands(app, chosen);
   for (const auto add :
-       {add_report, add_sensitivity, add_query,   add_verify,  add_export,  add_replay, add_backup,
-        add_merge,  add_compare,     add_list,    add_tag,     add_note,    add_submit, add_status,
-        add_watch,  add_control,     add_workers, add_release, add_factory, add_fetch}) {
+       {add_report,  add_sensitivity, add_plot,   add_query,   add_verify,  add_export,
+        add_replay,  add_backup,      add_merge,  add_compare, add_list,    add_tag,
+        add_note,    add_submit,      add_status, add_watch,   add_control, add_workers,
+        add_release, add_factory,     add_fetch}) {
     add(app, chosen);
   }
   app.footer(exit_codes_text({exit_not_met, exit_interrupted}));

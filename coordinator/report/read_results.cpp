@@ -33,6 +33,19 @@ bool are_current(const Store& store) {
          summary->num_given_up == num_runs_in(store.given_up_runs());
 }
 
+/// Lets a class with the same functions be one of several ResultPasses.
+template <typename Passes>
+class PassesOf final : public ResultPasses {
+ public:
+  template <typename Argument>
+  explicit PassesOf(Argument&& argument) : passes(std::forward<Argument>(argument)) {}
+
+  void add(const RunResult& result) override { passes.add(result); }
+  [[nodiscard]] bool end_pass() override { return passes.end_pass(); }
+
+  Passes passes;
+};
+
 }  // namespace
 
 void MissingEstimates::add(const RunResult& result) {
@@ -83,43 +96,42 @@ std::optional<RunTotals> RunTotalPasses::totals() const {
   return totals;
 }
 
-ReadResults read_results(const Store& store, const Campaign& campaign) {
-  StatisticsPasses passes(campaign.objectives());
-  std::optional<RunTotalPasses> totals;
+ReadResults read_results(const Store& store, const Campaign& campaign,
+                         std::span<ResultPasses* const> further) {
+  PassesOf<StatisticsPasses> statistics(campaign.objectives());
+  std::optional<PassesOf<RunTotalPasses>> totals;
+  std::vector<ResultPasses*> open{&statistics};
   if (std::optional<ErrorBudget> budget = campaign.error_budget()) {
-    totals.emplace(*std::move(budget));
+    open.push_back(&totals.emplace(*std::move(budget)));
   }
+  open.insert(open.end(), further.begin(), further.end());
   ReadResults results{.statistics = {}, .digests = {}, .totals = {}};
-  // Both are asked each time: they may need different numbers of passes.
-  const auto is_pass_needed = [&] {
-    const bool is_for_statistics = passes.end_pass();
-    return (totals && totals->end_pass()) || is_for_statistics;
-  };
   store.read_one_state([&] {
     Digest digest;
     store.for_each_result([&](const RunResult& result) {
       require_in_range(result, model().results());
-      passes.add(result);
-      if (totals) totals->add(result);
+      for (ResultPasses* const passes : open) passes->add(result);
       digest.add(result);
     });
-    while (is_pass_needed()) {
+    // They may need different numbers of passes.
+    const auto is_done = [](ResultPasses* passes) { return !passes->end_pass(); };
+    while (std::erase_if(open, is_done), !open.empty()) {
       store.for_each_result([&](const RunResult& result) {
-        passes.add(result);
-        if (totals) totals->add(result);
+        for (ResultPasses* const passes : open) passes->add(result);
       });
     }
-    results.statistics = passes.statistics();
+    results.statistics = statistics.passes.statistics();
     results.digests = digest.finish();
-    if (totals) results.totals = totals->totals();
+    if (totals) results.totals = totals->passes.totals();
   });
   return results;
 }
 
-CheckedResults read_checked_results(const Store& store, const Campaign& campaign) {
+CheckedResults read_checked_results(const Store& store, const Campaign& campaign,
+                                    std::span<ResultPasses* const> further) {
   CheckedResults checked;
   store.read_one_state([&] {
-    checked.results = read_results(store, campaign);
+    checked.results = read_results(store, campaign, further);
     const CampaignStatistics& statistics = checked.results.statistics;
     checked.check = check_digest(store, statistics.num_runs, checked.results.digests);
     checked.given_up = store.given_up_runs();

@@ -3,10 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "coordinator/report/digest.hpp"
+#include "coordinator/report/result_passes.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
@@ -70,8 +72,10 @@ struct ReadResults {
 
 /// Reads all results, of one state of the file, as often as StatisticsPasses needs them: twice if
 /// they are many. Memory does not grow with them.
+/// @param further  See the same results, in the same passes and in further ones if they need them.
 /// @throws Error if a number is out of range, see require_in_range().
-[[nodiscard]] ReadResults read_results(const Store& store, const Campaign& campaign);
+[[nodiscard]] ReadResults read_results(const Store& store, const Campaign& campaign,
+                                       std::span<ResultPasses* const> further = {});
 
 /// What a report is made of.
 struct CheckedResults {
@@ -81,8 +85,10 @@ struct CheckedResults {
 };
 
 /// Reads all results, of one state of the file, and holds them against what is stored beside them.
+/// @param further  As for read_results().
 /// @throws StoreError as report_text() does.
-[[nodiscard]] CheckedResults read_checked_results(const Store& store, const Campaign& campaign);
+[[nodiscard]] CheckedResults read_checked_results(const Store& store, const Campaign& campaign,
+                                                  std::span<ResultPasses* const> further = {});
 
 /// Stores statistics, their digest, and the budgets that follow from them in the file.
 void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results);

@@ -1,5 +1,6 @@
 #include "coordinator/report/report_json.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -8,6 +9,8 @@
 #include <vector>
 
 #include "coordinator/report/report.hpp"
+#include "coordinator/report/review_tables.hpp"
+#include "coordinator/report/verification_matrix.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/model.hpp"
 
@@ -137,11 +140,29 @@ Json json_of(const RequirementAnswer& answer) {
   return json;
 }
 
+Json json_of(const MatrixRow& row) {
+  Json json{{"id", row.stated.id},
+            {"text", row.stated.text},
+            {"interpretation", interpretation},
+            {"bound", or_null(row.bound)},
+            {"relative_margin", or_null(row.relative_margin())},
+            {"worst_run", row.worst ? Json(row.worst->run.value) : Json(nullptr)},
+            {"worst_value", row.worst ? Json(row.worst->value) : Json(nullptr)}};
+  json.update(json_of(row.answer));
+  json["limit"] = or_null(row.limit);
+  return json;
+}
+
 }  // namespace
 
 std::string report_json(const Store& store, const Campaign& campaign,
-                        std::span<const RequirementAnswer> answers) {
-  const CheckedResults checked = read_checked_results(store, campaign);
+                        std::span<const RequirementAnswer> answers,
+                        std::span<const StatedRequirement> stated) {
+  MatrixPasses matrix(matrix_requirements({stated.begin(), stated.end()}, campaign.objectives()),
+                      campaign.objectives(), num_runs_in(store.given_up_runs()));
+  const std::array<ResultPasses*, 1> further{&matrix};
+  CheckedResults checked;
+  store.read_one_state([&] { checked = read_checked_results(store, campaign, further); });
   const CampaignStatistics& statistics = checked.results.statistics;
   const std::uint64_t num_given_up = num_runs_in(checked.given_up);
   Json json{{"campaign", store.name()},
@@ -163,8 +184,10 @@ std::string report_json(const Store& store, const Campaign& campaign,
               {"num_runs", statistics.num_runs + num_given_up},
               {"fraction_within_interval", bounds_of(statistics.within_objectives(num_given_up))}}},
             {"budget", budget_of(campaign, checked.results)},
-            {"requirements", Json::array()}};
+            {"requirements", Json::array()},
+            {"matrix", Json::array()}};
   for (const RequirementAnswer& answer : answers) json["requirements"].push_back(json_of(answer));
+  for (const MatrixRow& row : matrix.rows()) json["matrix"].push_back(json_of(row));
   constexpr int indent = 2;
   return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -23,7 +23,6 @@ namespace {
 
 constexpr std::array<TextColumn, 4> term_columns{
     {{"error as a sum of", 44, true}, {"slope", 12}, {"of variance", 13}, {"p", 11}}};
-constexpr std::size_t num_terms_max = 3;
 constexpr double p_value_min = 1e-9;  // Below it the approximations of the tests do not hold.
 
 std::vector<std::string> column_names() {
@@ -95,13 +94,6 @@ std::string key_of(const std::vector<Sensitivity>& rows) {
       "% of variance: with its 95 % interval; rank: rank correlation; p: that chance\n"
       "alone makes one of {} quantities look so influential (Kruskal-Wallis, Holm)\n",
       rows.size());
-}
-
-std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
-  const std::string& first = drawn.names[term.first];
-  if (!term.second) return first;
-  return term.second == term.first ? fmt::format("({})²", first)
-                                   : fmt::format("{} × {}", first, drawn.names[*term.second]);
 }
 
 std::string term_row(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
@@ -232,6 +224,13 @@ Json terms_of(const DrawnRuns& drawn, std::size_t quantity) {
 }
 
 }  // namespace
+
+std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
+  const std::string& first = drawn.names[term.first];
+  if (!term.second) return first;
+  return term.second == term.first ? fmt::format("({})²", first)
+                                   : fmt::format("{} × {}", first, drawn.names[*term.second]);
+}
 
 DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uint64_t num_runs_max,
                           std::optional<RunIndex> also) {

@@ -11,6 +11,7 @@
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/runs.hpp"
+#include "core/statistics/term_search.hpp"
 
 namespace proofmass::coordinator {
 
@@ -40,6 +41,12 @@ struct DrawnRuns {
 /// Runs that sensitivities are computed from at most: a million would take minutes and say no more.
 /// The texts say so where a campaign has more.
 inline constexpr std::uint64_t sensitivity_runs_max = 100'000;
+
+/// Parts of a sum that explain an error that are searched for at most.
+inline constexpr std::size_t num_terms_max = 3;
+
+/// The name of a column, of its square or of the product of two: `truth_a_d11_prime × truth_a_d12`.
+[[nodiscard]] std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term);
 
 /// Which drawn quantities drive a parameter's error, and which its magnitude: the first `num_rows`
 /// of sensitivities() of each, and the error as a sum of explanatory_terms(), and how to ask why

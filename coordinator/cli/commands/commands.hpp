@@ -76,6 +76,7 @@ void add_keygen(CLI::App& app, Command& chosen);
 
 // Commands that read or change a database.
 void add_report(CLI::App& app, Command& chosen);
+void add_plot(CLI::App& app, Command& chosen);
 void add_sensitivity(CLI::App& app, Command& chosen);
 void add_query(CLI::App& app, Command& chosen);
 void add_verify(CLI::App& app, Command& chosen);

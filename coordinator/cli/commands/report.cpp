@@ -1,33 +1,60 @@
 #include "coordinator/report/report.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/campaign_file/requirements_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/output_file.hpp"
 #include "coordinator/cli/remote_answer.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/report/report_json.hpp"
 #include "coordinator/report/requirements.hpp"
+#include "coordinator/report/review_html.hpp"
+#include "coordinator/report/review_markdown.hpp"
 #include "coordinator/store/store.hpp"
+#include "proto/command_line/described_program.hpp"
+#include "proto/command_line/option_checks.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 struct ReportOptions {
   std::filesystem::path database;
-  std::vector<std::string> requirements;  ///< See parse_requirement().
+  std::vector<std::string> requirements;    ///< See parse_requirement().
+  std::filesystem::path requirements_file;  ///< Empty: there is none.
   OutputFormat format = OutputFormat::text;
+  std::filesystem::path html;  ///< `-`: standard output. Empty: not wanted; so is the next.
+  std::filesystem::path markdown;
+  IfThere if_there = IfThere::keep;
   ClientConnectionConfig connection;  ///< Of a coordinator, if it is to be asked.
+
+  [[nodiscard]] bool has_document() const { return !html.empty() || !markdown.empty(); }
 };
 
+std::vector<StatedRequirement> stated_in(const ReportOptions& options) {
+  if (options.requirements_file.empty()) return numbered_requirements(options.requirements);
+  if (!options.requirements.empty()) {
+    throw UsageError("requirement = " + options.requirements.front() +
+                     " (must not be given with --requirements)");
+  }
+  return read_requirements(options.requirements_file);
+}
+
 std::vector<RequirementAnswer> answers_of(const Store& store, const Campaign& campaign,
-                                          const std::vector<std::string>& requirements) {
+                                          const std::vector<StatedRequirement>& stated) {
+  std::vector<std::string> texts;
+  for (const StatedRequirement& each : stated) texts.push_back(each.requirement);
   try {
-    return check_requirements(store, campaign.objectives(), requirements);
+    return check_requirements(store, campaign.objectives(), texts);
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }
@@ -42,6 +69,11 @@ std::string answers_text(const std::vector<RequirementAnswer>& answers) {
 }
 
 int print_remote_report(const ReportOptions& options) {
+  if (options.has_document() || !options.requirements_file.empty()) {
+    throw UsageError("connect = " + options.connection.endpoint +
+                     " (must not be given with --html, --markdown and --requirements; fetch the "
+                     "database first)");
+  }
   wire::AnswerRequest question{.campaign = checked_campaign_name(options.database),
                                .question = wire::Question::report};
   for (const std::string& requirement : options.requirements) {
@@ -53,22 +85,66 @@ int print_remote_report(const ReportOptions& options) {
       options.format == OutputFormat::json ? AnswerText::lines : AnswerText::tables);
 }
 
+int exit_code_of(bool are_met) { return are_met ? exit_done : exit_not_met; }
+
+void check_document(const std::filesystem::path& file, IfThere if_there) {
+  if (file.empty() || file == "-") return;
+  check_output_file(file, if_there, "- writes to standard output");
+}
+
+void write_document(const std::filesystem::path& file, IfThere if_there, const std::string& text) {
+  if (file == "-") {
+    write_standard_output(text);
+    return;
+  }
+  constexpr mode_t mode = 0644;
+  wire::write_whole_file(
+      "output", file, text, mode,
+      if_there == IfThere::replace ? wire::IfExists::replace : wire::IfExists::refuse);
+}
+
+/// @return True if all requirements that were asked for are met.
+bool write_documents(const ReportOptions& options, const Store& store, const Campaign& campaign,
+                     const std::vector<StatedRequirement>& stated) {
+  std::optional<Review> review;
+  try {
+    review =
+        read_review(store, campaign, options.database.filename().string(), stated, WithCauses::yes);
+  } catch (const ConfigError& error) {
+    throw UsageError(error.what());
+  }
+  if (!options.html.empty()) write_document(options.html, options.if_there, review_html(*review));
+  if (!options.markdown.empty()) {
+    write_document(options.markdown, options.if_there, review_markdown(*review));
+  }
+  const std::span<const MatrixRow> rows(review->matrix);
+  return std::ranges::all_of(rows.first(stated.size()), [](const MatrixRow& row) {
+    return row.answer.check.verdict == Verdict::met;
+  });
+}
+
 /// Prints the tables of a campaign, finished or not; of requirements, if there are any, the answers
-/// instead. JSON holds both.
+/// instead. JSON holds both. A document takes the place of the text.
 int print_report(const ReportOptions& options) {
   if (is_remote(options.connection)) return print_remote_report(options);
+  check_document(options.html, options.if_there);
+  check_document(options.markdown, options.if_there);
+  const std::vector<StatedRequirement> stated = stated_in(options);
   const Store store = Store::open_read_only(options.database);
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
-  const std::vector<RequirementAnswer> answers = answers_of(store, *campaign, options.requirements);
+  if (options.has_document()) {
+    const bool are_met = write_documents(options, store, *campaign, stated);
+    if (options.format != OutputFormat::json) return exit_code_of(are_met);
+  }
+  const std::vector<RequirementAnswer> answers = answers_of(store, *campaign, stated);
   if (options.format == OutputFormat::json) {
-    print_lines(report_json(store, *campaign, answers));
+    print_lines(report_json(store, *campaign, answers, stated));
   } else {
     print_tables(answers.empty() ? report_text(store, *campaign) : answers_text(answers));
   }
-  const bool are_met = std::ranges::all_of(answers, [](const RequirementAnswer& answer) {
+  return exit_code_of(std::ranges::all_of(answers, [](const RequirementAnswer& answer) {
     return answer.check.verdict == Verdict::met;
-  });
-  return are_met ? exit_done : exit_not_met;
+  }));
 }
 
 }  // namespace
@@ -82,6 +158,20 @@ void add_report(CLI::App& app, Command& chosen) {
                      "Answer whether this requirement is met, as in\n"
                      "\"a_c12 < 9e-4 for 99% with 95%\" or\n"
                      "\"all objectives for 95% with 90%\"; may be repeated");
+  command
+      .add_option("--requirements", options.requirements_file,
+                  "File (TOML) of requirements with id, text and requirement")
+      ->type_name(wire::file_type);
+  command
+      .add_option("--html", options.html,
+                  "Write a report for a review, with charts, as one HTML\n"
+                  "file; - for standard output")
+      ->type_name(wire::file_type);
+  command
+      .add_option("--markdown", options.markdown,
+                  "The same without charts, as Markdown; - for standard\noutput")
+      ->type_name(wire::file_type);
+  add_force_flag(command, options.if_there);
   add_json_flag(command, options.format);
   add_optional_connection(command, options.connection);
 }

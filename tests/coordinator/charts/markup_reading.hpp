@@ -11,7 +11,8 @@ namespace proofmass::test {
 /// Why a text is no well-formed XML as far as these charts use it (elements, attributes in double
 /// quotes, entities of five names and numbers); empty if it is.
 inline std::string malformed_part(const std::string& text) {
-  static const std::regex tag("<(/?)([a-zA-Z]+)((?: [a-zA-Z-]+=\"[^\"<]*\")*)(/?)>|[^<]+|<");
+  static const std::regex tag(
+      "<(/?)([a-zA-Z][a-zA-Z0-9]*)((?: [a-zA-Z-]+=\"[^\"<]*\")*)(/?)>|[^<]+|<");
   static const std::regex entities("&(?!(amp|lt|gt|quot|apos|#[0-9]+);)");
   std::vector<std::string> open;
   for (auto it = std::sregex_iterator(text.begin(), text.end(), tag); it != std::sregex_iterator();

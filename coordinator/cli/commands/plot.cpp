@@ -1,0 +1,144 @@
+#include <fmt/format.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/charts/svg.hpp"
+#include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/output_file.hpp"
+#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/report/review_charts.hpp"
+#include "coordinator/store/draft_file.hpp"
+#include "coordinator/store/store.hpp"
+#include "proto/command_line/described_program.hpp"
+#include "proto/command_line/option_checks.hpp"
+#include "proto/link/start_program.hpp"
+#include "proto/link/whole_file.hpp"
+#include "proto/text/visible_text.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr mode_t picture_mode = 0644;
+
+struct PlotOptions {
+  std::filesystem::path database;
+  std::string chart;
+  std::filesystem::path output;
+  bool is_list = false;
+  IfThere if_there = IfThere::keep;
+};
+
+bool is_png(const std::filesystem::path& output) { return output.extension() == ".png"; }
+
+void check_plot_arguments(const PlotOptions& options) {
+  if (options.is_list) return;
+  if (options.chart.empty()) throw UsageError("chart = (must be given; --list names all)");
+  if (options.output.empty()) throw UsageError("output = (must be given)");
+  const bool is_picture = options.output.extension() == ".svg" || is_png(options.output);
+  if (options.output != "-" && !is_picture) {
+    refuse_output(options.output, "must end in .svg or .png, or be - for SVG on standard output");
+  }
+  if (options.output != "-") {
+    check_output_file(options.output, options.if_there, "- writes to standard output");
+  }
+}
+
+const Picture& chosen_picture(const std::vector<NamedPicture>& pictures, const std::string& name) {
+  const auto found = std::ranges::find(pictures, name, &NamedPicture::name);
+  if (found != pictures.end()) return found->picture;
+  throw UsageError(fmt::format("chart = {} (is none of this campaign; --list names all)",
+                               wire::visible_text(name)));
+}
+
+pid_t start_converter(const std::filesystem::path& svg, const std::filesystem::path& png,
+                      const std::filesystem::path& output) {
+  constexpr std::string_view width = "1200";  // Pixels: twice the width of a column of a page.
+  try {
+    return wire::start_program(
+        {.arguments = {"rsvg-convert", "--width", std::string(width), "--keep-aspect-ratio",
+                       "--format", "png", "--output", png.string(), svg.string()}});
+  } catch (const Error&) {
+    refuse_output(output,
+                  "rsvg-convert is not installed; install the package librsvg2-bin, or write .svg");
+  }
+}
+
+/// Writes a bitmap of the picture. The file appears when it is whole.
+void write_png(const Picture& picture, const PlotOptions& options) {
+  const DraftFile svg(options.output, ".svg-draft");
+  DraftFile png(options.output, ".png-draft");
+  wire::write_whole_file("output", svg.draft(), svg_of(picture, SvgUse::plain), picture_mode,
+                         wire::IfExists::replace);
+  const pid_t converter = start_converter(svg.draft(), png.draft(), options.output);
+  int status = 0;
+  while (waitpid(converter, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+    throw Error(fmt::format("output = {} (rsvg-convert failed)", options.output.string()));
+  }
+  if (const int failure = png.publish(options.if_there); failure != 0) {
+    throw Error(fmt::format("output = {} (cannot be written: {})", options.output.string(),
+                            std::generic_category().message(failure)));
+  }
+  (void)synchronise_directory_of(options.output);
+}
+
+void write_picture(const Picture& picture, const PlotOptions& options) {
+  if (is_png(options.output)) {
+    write_png(picture, options);
+    return;
+  }
+  const std::string svg = svg_of(picture, SvgUse::standalone);
+  if (options.output == "-") {
+    write_standard_output(svg);
+    return;
+  }
+  wire::write_whole_file(
+      "output", options.output, svg, picture_mode,
+      options.if_there == IfThere::replace ? wire::IfExists::replace : wire::IfExists::refuse);
+}
+
+int plot(const PlotOptions& options) {
+  check_plot_arguments(options);
+  const Store store = Store::open_read_only(options.database);
+  const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
+  const bool are_causes_needed = options.is_list || needs_causes(options.chart);
+  const Review review = read_review(store, *campaign, options.database.filename().string(), {},
+                                    are_causes_needed ? WithCauses::yes : WithCauses::no);
+  const std::vector<NamedPicture> pictures = review_pictures(review);
+  if (options.is_list) {
+    std::string names;
+    for (const NamedPicture& named : pictures) names += named.name + "\n";
+    print_lines(names);
+    return exit_done;
+  }
+  write_picture(chosen_picture(pictures, options.chart), options);
+  return exit_done;
+}
+
+}  // namespace
+
+void add_plot(CLI::App& app, Command& chosen) {
+  auto [command, options] = add_command<PlotOptions>(
+      app, chosen, "plot", "Draw a chart of the review report as a picture", plot);
+  command.footer(exit_codes_text({}));
+  add_database(command, options.database);
+  command.add_option("--chart", options.chart,
+                     "Which one, as in errors or histogram:a_c12; see --list");
+  command
+      .add_option("--output", options.output,
+                  "File .svg, or .png by rsvg-convert; - for SVG on\nstandard output")
+      ->type_name(wire::file_type);
+  command.add_flag("--list", options.is_list, "Print the names of all charts");
+  add_force_flag(command, options.if_there);
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,106 @@
+#include "coordinator/report/causes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "coordinator/report/sensitivity.hpp"
+#include "core/statistics/correlation.hpp"
+#include "core/statistics/interval.hpp"
+#include "core/statistics/sensitivity.hpp"
+#include "core/statistics/term_search.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t num_correlated_of_each = 3;
+
+/// What an error may follow from.
+struct CauseInput {
+  std::string name;
+  std::vector<double> values;
+};
+
+using Correlations = std::vector<std::optional<double>>;  // With the error of each quantity.
+
+std::optional<double> coefficient_of(std::span<const double> input,
+                                     std::span<const double> errors) {
+  const auto correlation = linear_correlation(input, errors, default_confidence);
+  const double least = 4.0 / std::sqrt(static_cast<double>(errors.size()));
+  if (!correlation || std::abs(correlation->coefficient) < least) return std::nullopt;
+  return correlation->coefficient;
+}
+
+Correlations correlations_of(std::span<const double> input, const DrawnRuns& drawn) {
+  Correlations correlations;
+  for (const std::vector<double>& errors : drawn.errors) {
+    correlations.push_back(coefficient_of(input, errors));
+  }
+  return correlations;
+}
+
+std::vector<double> values_of_term(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
+  std::vector<double> values = drawn.columns[term.first];
+  if (!term.second) return values;
+  const std::vector<double>& other = drawn.columns[*term.second];
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] *= other[i];
+  return values;
+}
+
+void add_input(Causes& causes, const std::string& name, Correlations correlations) {
+  if (std::ranges::find(causes.inputs, name) != causes.inputs.end()) return;
+  causes.inputs.push_back(name);
+  causes.correlations.push_back(std::move(correlations));
+}
+
+void add_terms(const DrawnRuns& drawn, std::size_t quantity, std::span<const Column> inputs,
+               Causes& causes) {
+  for (const ExplanatoryTerm& term :
+       explanatory_terms(inputs, drawn.errors[quantity], num_terms_max, default_confidence)) {
+    const std::string name = term_name(drawn, term);
+    causes.terms.push_back({.quantity = quantity,
+                            .name = name,
+                            .slope = term.slope,
+                            .share = term.share,
+                            .p_value = term.p_value});
+    add_input(causes, name, correlations_of(values_of_term(drawn, term), drawn));
+  }
+}
+
+/// The columns that correlate the most with the error of a quantity.
+void add_correlated(const DrawnRuns& drawn, std::size_t quantity,
+                    std::span<const Correlations> of_columns, Causes& causes) {
+  std::vector<std::pair<double, std::size_t>> ranked;
+  for (std::size_t i = 0; i < of_columns.size(); ++i) {
+    if (const auto& coefficient = of_columns[i][quantity]) {
+      ranked.emplace_back(-std::abs(*coefficient), i);
+    }
+  }
+  std::ranges::sort(ranked);
+  if (ranked.size() > num_correlated_of_each) ranked.resize(num_correlated_of_each);
+  for (const auto& [strength, column] : ranked) {
+    add_input(causes, drawn.names[column], of_columns[column]);
+  }
+}
+
+}  // namespace
+
+std::optional<Causes> find_causes(const Store& store, const Campaign& campaign) {
+  const DrawnRuns drawn = read_drawn_runs(store, campaign, cause_runs_max);
+  if (drawn.runs.size() < sensitivity_values_min) return std::nullopt;
+  Causes causes{.num_runs = drawn.runs.size(),
+                .num_with_estimate = drawn.num_with_estimate,
+                .terms = {},
+                .inputs = {},
+                .correlations = {}};
+  const std::vector<Column> inputs(drawn.columns.begin(), drawn.columns.end());
+  std::vector<Correlations> of_columns;
+  for (const Column input : inputs) of_columns.push_back(correlations_of(input, drawn));
+  for (std::size_t i = 0; i < drawn.errors.size(); ++i) add_terms(drawn, i, inputs, causes);
+  for (std::size_t i = 0; i < drawn.errors.size(); ++i) {
+    add_correlated(drawn, i, of_columns, causes);
+  }
+  return causes;
+}
+
+}  // namespace proofmass::coordinator

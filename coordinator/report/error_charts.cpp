@@ -1,0 +1,262 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "coordinator/charts/ticks.hpp"
+#include "coordinator/report/review_charts.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "core/campaign/model.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+const Quantity& quantity_at(std::size_t index) { return model().results().quantities[index]; }
+
+/// `|error| of a_c12, 1e-4 rad`; of a pure number without a unit.
+std::string axis_label(std::string_view what, const Quantity& quantity) {
+  const std::string_view unit = quantity.display_unit == "1" ? "" : quantity.display_unit;
+  return unit.empty() ? std::string(what) : fmt::format("{}, {}", what, unit);
+}
+
+Bars bars_of(const Histogram& histogram, double scale) {
+  Bars bars;
+  for (const double edge : histogram.edges) bars.edges.push_back(edge / scale);
+  for (const std::uint64_t count : histogram.counts) {
+    bars.heights.push_back(static_cast<double>(count));
+  }
+  return bars;
+}
+
+std::string objective_sentence(const Review& review, std::size_t index) {
+  const double objective = review.objectives[index];
+  if (!std::isfinite(objective)) return "It has no objective.";
+  const Quantity& quantity = quantity_at(index);
+  const std::uint64_t beyond = review.results.statistics.num_estimated == 0
+                                   ? 0
+                                   : review.results.statistics.accuracy[index].num_beyond_objective;
+  return fmt::format("{} {} the objective of {} {}.", beyond,
+                     beyond == 1 ? "run exceeds" : "runs exceed",
+                     figure_text(objective / quantity.display_scale), quantity.display_unit);
+}
+
+std::string worst_sentence(const Review& review, std::size_t index) {
+  const std::vector<RunError>& worst = review.figures[index].worst;
+  if (worst.empty()) return "No run has an estimate.";
+  const Quantity& quantity = quantity_at(index);
+  std::string text = "The largest errors are";
+  for (std::size_t i = 0; i < worst.size(); ++i) {
+    text +=
+        fmt::format("{} {} in run {}", i == 0 ? "" : ",",
+                    figure_text(worst[i].magnitude / quantity.display_scale), worst[i].run.value);
+  }
+  return text + ".";
+}
+
+std::string below_sentence(const Histogram& histogram) {
+  if (histogram.num_below == 0) return "";
+  return fmt::format(" {} smaller {} not shown.", histogram.num_below,
+                     histogram.num_below == 1 ? "error is" : "errors are");
+}
+
+/// Marks on the axis, the label only at the worst.
+Markers worst_markers(const Review& review, std::size_t index, double scale) {
+  Markers markers{.name = "worst runs", .ink = Ink::fourth, .shape = Shape::triangle};
+  for (const RunError& worst : review.figures[index].worst) {
+    markers.points.push_back({worst.magnitude / scale, 0.0});
+  }
+  if (!markers.points.empty()) {
+    markers.labels = {fmt::format("run {}", review.figures[index].worst[0].run.value)};
+  }
+  return markers;
+}
+
+void add_magnitude_layers(const Review& review, std::size_t index, double scale, Chart& chart) {
+  chart.layers.emplace_back(bars_of(review.figures[index].magnitudes, scale));
+  const double objective = review.objectives[index];
+  if (std::isfinite(objective)) {
+    chart.layers.emplace_back(
+        LimitLine{.label = fmt::format("objective {}", figure_text(objective / scale)),
+                  .value = objective / scale});
+  }
+}
+
+/// The middle of an interval and its ends as lines.
+void add_interval(const std::optional<Interval>& interval, double value, double scale,
+                  std::string_view label, Chart& chart) {
+  chart.layers.emplace_back(LimitLine{
+      .label = std::string(label), .value = value / scale, .ink = Ink::third, .dash = Dash::solid});
+  if (!interval) return;
+  for (const double end : {interval->lower, interval->upper}) {
+    chart.layers.emplace_back(
+        LimitLine{.value = end / scale, .ink = Ink::third, .dash = Dash::dotted});
+  }
+}
+
+Band band_of(std::string name, Ink ink) {
+  return {.name = std::move(name), .points = {}, .ink = ink};
+}
+
+void add_to_band(std::uint64_t num_runs, const std::optional<Interval>& interval, double scale,
+                 Band& band) {
+  if (!interval) return;
+  band.points.push_back({static_cast<double>(num_runs), std::max(interval->lower, 0.0) / scale,
+                         interval->upper / scale});
+}
+
+std::string convergence_sentence(const Review& review, std::size_t index) {
+  const std::vector<ConvergencePoint>& points = review.figures[index].convergence;
+  if (points.empty()) return "No run has an estimate.";
+  const ConvergencePoint& last = points.back();
+  const double scale = quantity_at(index).display_scale;
+  std::string text = fmt::format("After {} runs the worst is {}, the mean {}", last.num_runs,
+                                 figure_text(last.worst / scale), figure_text(last.mean / scale));
+  if (last.mean_interval) {
+    text += fmt::format(" (95 %: {} to {})",
+                        figure_text(std::max(last.mean_interval->lower, 0.0) / scale),
+                        figure_text(last.mean_interval->upper / scale));
+  }
+  return text + fmt::format(", and the standard deviation {} {}.",
+                            figure_text(last.standard_deviation / scale),
+                            quantity_at(index).display_unit);
+}
+
+/// Half the width of an interval over the value in its middle, percent.
+std::optional<double> relative_percent(const std::optional<Interval>& interval, double value) {
+  if (!interval || !(value > 0.0)) return std::nullopt;
+  return 50.0 * (interval->upper - interval->lower) / value;
+}
+
+}  // namespace
+
+Chart magnitude_chart(const Review& review, std::size_t index) {
+  const Quantity& quantity = quantity_at(index);
+  const Histogram& histogram = review.figures[index].magnitudes;
+  Chart chart{.text = {.id = fmt::format("histogram-{}", quantity.name),
+                       .title = fmt::format("|error| of {}", quantity.symbol),
+                       .description = fmt::format(
+                           "Histogram of {} runs. {} {}{}", review.results.statistics.num_estimated,
+                           objective_sentence(review, index), worst_sentence(review, index),
+                           below_sentence(histogram))},
+              .x = {.label = axis_label("|error|", quantity), .scale = Scale::logarithmic},
+              .y = {.label = "runs"},
+              .layers = {}};
+  add_magnitude_layers(review, index, quantity.display_scale, chart);
+  chart.layers.emplace_back(worst_markers(review, index, quantity.display_scale));
+  return chart;
+}
+
+Chart error_chart(const Review& review, std::size_t index) {
+  const Quantity& quantity = quantity_at(index);
+  const CampaignStatistics& statistics = review.results.statistics;
+  Chart chart{.text = {.id = fmt::format("error-{}", quantity.name),
+                       .title = fmt::format("Error of {}", quantity.symbol),
+                       .description = ""},
+              .x = {.label = axis_label("estimate − truth", quantity)},
+              .y = {.label = "runs"},
+              .layers = {bars_of(review.figures[index].errors, quantity.display_scale)}};
+  if (statistics.num_estimated == 0) {
+    chart.text.description = "No run has an estimate.";
+    return chart;
+  }
+  const ErrorStatistic& error = statistics.accuracy[index].error;
+  const double scale = quantity.display_scale;
+  add_interval(error.bias_interval, error.bias, scale,
+               fmt::format("bias {} with 95 % interval", figure_text(error.bias / scale)), chart);
+  chart.text.description = fmt::format(
+      "Histogram of the errors with their signs. The bias is {}{}, the standard deviation {} {}.",
+      figure_text(error.bias / scale),
+      error.bias_interval
+          ? fmt::format(" (95 %: {} to {})", figure_text(error.bias_interval->lower / scale),
+                        figure_text(error.bias_interval->upper / scale))
+          : "",
+      figure_text(error.standard_deviation / scale), quantity.display_unit);
+  return chart;
+}
+
+Chart convergence_chart(const Review& review, std::size_t index) {
+  const Quantity& quantity = quantity_at(index);
+  const double scale = quantity.display_scale;
+  Line worst{.name = "worst", .ink = Ink::second, .dash = Dash::dashed};
+  Line mean{.name = "mean", .ink = Ink::first};
+  Line deviation{.name = "std", .ink = Ink::third, .dash = Dash::dotted};
+  Band mean_band = band_of("", Ink::first);
+  Band deviation_band = band_of("95 % intervals", Ink::third);
+  for (const ConvergencePoint& point : review.figures[index].convergence) {
+    const auto n = static_cast<double>(point.num_runs);
+    worst.points.push_back({n, point.worst / scale});
+    mean.points.push_back({n, point.mean / scale});
+    add_to_band(point.num_runs, point.mean_interval, scale, mean_band);
+    if (point.num_runs < 2) continue;
+    deviation.points.push_back({n, point.standard_deviation / scale});
+    add_to_band(point.num_runs, point.deviation_interval, scale, deviation_band);
+  }
+  return {.text = {.id = fmt::format("convergence-{}", quantity.name),
+                   .title = fmt::format("Convergence of {}", quantity.symbol),
+                   .description = convergence_sentence(review, index)},
+          .x = {.label = "runs", .scale = Scale::logarithmic},
+          .y = {.label = axis_label("|error|", quantity), .from = 0.0},
+          .layers = {std::move(mean_band), std::move(deviation_band), std::move(worst),
+                     std::move(mean), std::move(deviation)}};
+}
+
+ChartGrid magnitude_overview(const Review& review) {
+  ChartGrid grid{
+      .text = {.id = "errors", .title = "Errors in units of their objectives", .description = ""},
+      .num_columns = 2,
+      .charts = {}};
+  for (std::size_t i = 0; i < review.figures.size(); ++i) {
+    const Quantity& quantity = quantity_at(i);
+    const double objective = review.objectives[i];
+    const std::vector<RunError>& worst = review.figures[i].worst;
+    double scale = std::isfinite(objective) ? objective : 1.0;
+    if (!std::isfinite(objective) && !worst.empty() && worst[0].magnitude > 0.0) {
+      scale = worst[0].magnitude;
+    }
+    Chart chart{.text = {.id = fmt::format("errors-{}", quantity.name),
+                         .title = std::string(quantity.symbol),
+                         .description = ""},
+                .x = {.label = std::isfinite(objective) ? "|error| / objective" : "|error| / worst",
+                      .scale = Scale::logarithmic,
+                      .from = 1e-4,
+                      .to = 3.0},
+                .layers = {bars_of(review.figures[i].magnitudes, scale)},
+                .plot_height = 70.0};
+    if (std::isfinite(objective)) chart.layers.emplace_back(LimitLine{.value = 1.0});
+    grid.charts.push_back(std::move(chart));
+    grid.text.description +=
+        fmt::format("{}{}: {}", i == 0 ? "" : " ", quantity.symbol, objective_sentence(review, i));
+  }
+  return grid;
+}
+
+ChartGrid convergence_overview(const Review& review) {
+  ChartGrid grid{.text = {.id = "convergence",
+                          .title = "95 % intervals of mean and std against the number of runs",
+                          .description = "Half the width of the interval over the value."},
+                 .num_columns = 2,
+                 .charts = {}};
+  for (std::size_t i = 0; i < review.figures.size(); ++i) {
+    Line mean{.name = i == 0 ? "mean" : ""};
+    Line deviation{.name = i == 0 ? "std" : "", .ink = Ink::second, .dash = Dash::dashed};
+    for (const ConvergencePoint& point : review.figures[i].convergence) {
+      const auto n = static_cast<double>(point.num_runs);
+      if (const auto width = relative_percent(point.mean_interval, point.mean)) {
+        mean.points.push_back({n, *width});
+      }
+      if (const auto width = relative_percent(point.deviation_interval, point.standard_deviation)) {
+        deviation.points.push_back({n, *width});
+      }
+    }
+    grid.charts.push_back({.text = {.id = fmt::format("convergence-of-{}", quantity_at(i).name),
+                                    .title = std::string(quantity_at(i).symbol),
+                                    .description = ""},
+                           .x = {.label = "runs", .scale = Scale::logarithmic},
+                           .y = {.label = "± %", .from = 0.0, .to = 100.0},
+                           .layers = {std::move(mean), std::move(deviation)},
+                           .plot_height = 90.0});
+  }
+  return grid;
+}
+
+}  // namespace proofmass::coordinator

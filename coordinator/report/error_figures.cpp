@@ -1,0 +1,92 @@
+#include "coordinator/report/error_figures.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t num_worst_shown = 5;
+constexpr std::size_t num_convergence_points = 40;
+constexpr std::uint64_t first_convergence_count = 5;
+
+void add_if_worst(const RunError& candidate, std::vector<RunError>& worst) {
+  if (worst.size() == num_worst_shown && candidate.magnitude <= worst.back().magnitude) return;
+  const auto place =
+      std::ranges::upper_bound(worst, candidate.magnitude, std::greater<>(), &RunError::magnitude);
+  worst.insert(place, candidate);
+  if (worst.size() > num_worst_shown) worst.pop_back();
+}
+
+}  // namespace
+
+std::vector<std::uint64_t> convergence_counts(std::uint64_t num_runs) {
+  std::vector<std::uint64_t> counts;
+  if (num_runs == 0) return counts;
+  const double ratio = static_cast<double>(num_runs) / static_cast<double>(first_convergence_count);
+  for (std::size_t i = 0; i < num_convergence_points && num_runs > first_convergence_count; ++i) {
+    const double part = static_cast<double>(i) / static_cast<double>(num_convergence_points);
+    const auto count = static_cast<std::uint64_t>(
+        std::round(static_cast<double>(first_convergence_count) * std::pow(ratio, part)));
+    if (counts.empty() || counts.back() < count) counts.push_back(count);
+  }
+  if (counts.empty() || counts.back() < num_runs) counts.push_back(num_runs);
+  return counts;
+}
+
+FigurePasses::FigurePasses(std::size_t num_quantities, std::uint64_t num_runs)
+    : counts_(convergence_counts(num_runs)), quantities_(num_quantities) {}
+
+void FigurePasses::add_error(RunIndex run, double error, Growing& quantity) {
+  const double magnitude = std::abs(error);
+  quantity.magnitudes.add(magnitude);
+  quantity.errors.add(error);
+  add_if_worst({.run = run, .magnitude = magnitude}, quantity.worst);
+  if (!quantity.sums) quantity.sums.emplace(magnitude);
+  quantity.sums->add(magnitude);
+}
+
+void FigurePasses::add_convergence() {
+  for (Growing& quantity : quantities_) {
+    const Moments moments = quantity.sums->moments();
+    quantity.convergence.push_back(
+        {.num_runs = num_estimated_,
+         .worst = quantity.worst.front().magnitude,
+         .mean = moments.mean,
+         .mean_interval = mean_interval(moments, default_confidence),
+         .standard_deviation = moments.standard_deviation,
+         .deviation_interval = deviation_interval(moments, default_confidence)});
+  }
+}
+
+void FigurePasses::add(const RunResult& result) {
+  if (!result.has_estimate()) return;
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    add_error(result.run, result.error(i), quantities_[i]);
+  }
+  ++num_estimated_;
+  if (next_count_ >= counts_.size() || num_estimated_ < counts_[next_count_]) return;
+  ++next_count_;
+  add_convergence();
+}
+
+bool FigurePasses::end_pass() {
+  // Where runs have no estimate, the last count is not reached.
+  const bool has_last = !quantities_.empty() && !quantities_[0].convergence.empty() &&
+                        quantities_[0].convergence.back().num_runs == num_estimated_;
+  if (num_estimated_ > 0 && !has_last) add_convergence();
+  return false;
+}
+
+std::vector<QuantityFigures> FigurePasses::figures() const {
+  std::vector<QuantityFigures> figures;
+  for (const Growing& quantity : quantities_) {
+    figures.push_back({.magnitudes = quantity.magnitudes.histogram(),
+                       .errors = quantity.errors.histogram(),
+                       .worst = quantity.worst,
+                       .convergence = quantity.convergence});
+  }
+  return figures;
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "coordinator/report/error_bins.hpp"
+#include "coordinator/report/result_passes.hpp"
+#include "core/runs.hpp"
+#include "core/statistics/interval.hpp"
+#include "core/statistics/moments.hpp"
+
+namespace proofmass::coordinator {
+
+/// A run and the |error| of a quantity in it, SI.
+struct RunError {
+  RunIndex run;
+  double magnitude = 0.0;
+};
+
+/// What the first n runs that have an estimate tell of |error|, SI.
+struct ConvergencePoint {
+  std::uint64_t num_runs = 0;
+  double worst = 0.0;
+  double mean = 0.0;
+  std::optional<Interval> mean_interval;  ///< 95 %; empty for one run.
+  double standard_deviation = 0.0;
+  /// 95 %, by the kurtosis of the errors; empty below five runs. The bootstrap of the tables would
+  /// need all errors at each point.
+  std::optional<Interval> deviation_interval;
+};
+
+/// What the charts of one quantity show: binned or thinned, whatever the number of runs.
+struct QuantityFigures {
+  Histogram magnitudes;                       ///< Of |error|, SI.
+  Histogram errors;                           ///< Of the error with its sign, SI.
+  std::vector<RunError> worst;                ///< The five largest; of equal ones the first.
+  std::vector<ConvergencePoint> convergence;  ///< At most 42, the last of all runs.
+};
+
+/// The numbers of runs at which convergence is shown: 40 from 5 on, equally spaced on a logarithmic
+/// axis. Ascending, without repetition.
+/// @param num_runs  The last one, unless it is 0.
+[[nodiscard]] std::vector<std::uint64_t> convergence_counts(std::uint64_t num_runs);
+
+/// Computes them in one pass. Memory is some 100 kB.
+class FigurePasses final : public ResultPasses {
+ public:
+  /// @param num_runs  Finished runs, with an estimate or without.
+  FigurePasses(std::size_t num_quantities, std::uint64_t num_runs);
+
+  void add(const RunResult& result) override;
+  [[nodiscard]] bool end_pass() override;
+
+  /// Of each quantity. @pre The pass has ended.
+  [[nodiscard]] std::vector<QuantityFigures> figures() const;
+
+ private:
+  struct Growing {
+    MagnitudeBins magnitudes;
+    ErrorBins errors;
+    std::vector<RunError> worst;
+    std::optional<MomentSums> sums;  ///< About the first |error|, which is of their size.
+    std::vector<ConvergencePoint> convergence;
+  };
+
+  static void add_error(RunIndex run, double error, Growing& quantity);
+  void add_convergence();
+
+  std::uint64_t num_estimated_ = 0;
+  std::vector<std::uint64_t> counts_;
+  std::size_t next_count_ = 0;
+  std::vector<Growing> quantities_;
+};
+
+}  // namespace proofmass::coordinator

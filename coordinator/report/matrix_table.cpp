@@ -1,0 +1,152 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "coordinator/report/review_tables.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "core/campaign/model.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using Kind = ReviewCell::Kind;
+
+bool is_joint_row(const MatrixRow& row) {
+  return row.answer.requirement.subject == Requirement::Subject::all_objectives;
+}
+
+ReviewCell words_cell(std::string_view text) {
+  return {.text = std::string(text), .kind = Kind::words};
+}
+
+ReviewCell count_cell(std::uint64_t count) {
+  return {.text = std::to_string(count), .value = static_cast<double>(count)};
+}
+
+ReviewCell percent_cell(double fraction) {
+  return {.text = given_percent(fraction), .value = fraction};
+}
+
+/// In the unit of the tables; a ratio to the objectives without one.
+ReviewCell value_cell(const MatrixRow& row, const std::optional<double>& value,
+                      std::string (*figure)(double)) {
+  if (!value) return words_cell("none");
+  if (is_joint_row(row)) return {.text = figure(*value) + " × objective", .value = *value};
+  const Quantity& quantity = model().results().quantities[row.answer.requirement.parameter];
+  const std::string unit(quantity.display_unit == "1" ? "" : quantity.display_unit);
+  return {.text = figure(*value / quantity.display_scale) + (unit.empty() ? "" : " ") + unit,
+          .value = *value};
+}
+
+std::string margin_figure(double value) { return signed_figure(100.0 * value) + " %"; }
+
+ReviewCell margin_cell(const MatrixRow& row) {
+  const std::optional<double> margin = row.relative_margin();
+  if (!margin) return words_cell("none");
+  return {.text = margin_figure(*margin), .value = *margin};
+}
+
+std::string statement_of(const MatrixRow& row) {
+  if (row.stated.text.empty()) return row.stated.requirement;
+  return fmt::format("{}: {}", row.stated.text, row.stated.requirement);
+}
+
+std::vector<ReviewCell> matrix_cells(const Review& review, const MatrixRow& row) {
+  const RequirementCheck& check = row.answer.check;
+  const Tolerance& tolerance = row.answer.requirement.tolerance;
+  std::vector<ReviewCell> cells{
+      words_cell(row.stated.id),
+      words_cell(statement_of(row)),
+      value_cell(row, row.limit, given_figure),
+      words_cell(interpretation),
+      percent_cell(tolerance.coverage),
+      percent_cell(tolerance.confidence),
+      count_cell(check.num_runs),
+      count_cell(check.num_without_estimate),
+      count_cell(check.num_exceedances),
+      count_cell(check.num_allowed),
+      value_cell(row, row.bound, measured_figure),
+      margin_cell(row),
+      {.text = std::string(name_of(check.verdict)), .kind = Kind::verdict}};
+  if (!row.worst) {
+    cells.insert(cells.end(), {words_cell("none"), words_cell("")});
+    return cells;
+  }
+  ReviewCell worst = value_cell(row, row.worst->value, measured_figure);
+  cells.push_back(std::move(worst));
+  cells.push_back({.text = fmt::format("proofmass replay {} --run {}", shell_word(review.database),
+                                       row.worst->run.value),
+                   .value = static_cast<double>(row.worst->run.value),
+                   .kind = Kind::command});
+  return cells;
+}
+
+std::vector<std::string> matrix_notes(const Review& review) {
+  std::vector<std::string> notes{
+      "Statistical interpretation in the terms of ECSS-E-ST-60-10C: mixed. Each draw is one "
+      "instrument with one realisation of the noise, and probabilities are over both together.",
+      "A draw without an estimate counts as an exceedance. Allowed are the exceedances with which "
+      "so many draws meet the requirement.",
+      "Bound: with the confidence of the row, the stated part of all draws stays below it (order "
+      "statistics, any law). Margin: (limit − bound) / limit."};
+  if (std::ranges::any_of(review.matrix, is_joint_row)) {
+    notes.emplace_back(
+        "All objectives together: limit and bound are of the largest ratio of an |error| to its "
+        "objective in a draw.");
+  }
+  const bool has_default = std::ranges::any_of(review.matrix, [](const MatrixRow& row) {
+    return row.stated.text.starts_with("Objective of ") || row.stated.id == "all";
+  });
+  if (has_default) {
+    notes.push_back(fmt::format(
+        "Rows made of the objectives of the campaign ask for {} of all draws with {} confidence, "
+        "which is the default of the program and not a demand of a project.",
+        given_percent(default_tolerance.coverage), given_percent(default_tolerance.confidence)));
+  }
+  return notes;
+}
+
+}  // namespace
+
+std::string shell_word(std::string_view text) {
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '/' || c == '-' || c == '+';
+  };
+  if (!text.empty() && std::ranges::all_of(text, is_plain) && text[0] != '-') {
+    return std::string(text);
+  }
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
+  return word + "'";
+}
+
+ReviewTable matrix_table(const Review& review) {
+  const auto mixed = [](std::string_view title) {
+    return fmt::format("{} ({})", title, interpretation);
+  };
+  ReviewTable table{.id = "matrix",
+                    .caption = "Verification matrix (statistical interpretation: mixed)",
+                    .columns = {{.title = "id", .is_text = true},
+                                {.title = "requirement", .is_text = true},
+                                {.title = "limit"},
+                                {.title = "interpretation", .is_text = true},
+                                {.title = mixed("probability")},
+                                {.title = mixed("confidence")},
+                                {.title = "draws"},
+                                {.title = "without estimate"},
+                                {.title = "exceedances"},
+                                {.title = "allowed"},
+                                {.title = mixed("bound")},
+                                {.title = "margin"},
+                                {.title = "verdict", .is_text = true},
+                                {.title = "worst |error|"},
+                                {.title = "its run", .is_text = true}},
+                    .rows = {},
+                    .notes = matrix_notes(review)};
+  for (const MatrixRow& row : review.matrix) table.rows.push_back(matrix_cells(review, row));
+  return table;
+}
+
+}  // namespace proofmass::coordinator

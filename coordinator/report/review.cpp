@@ -1,0 +1,87 @@
+#include "coordinator/report/review.hpp"
+
+#include <array>
+#include <span>
+#include <utility>
+
+#include "coordinator/report/summarise.hpp"
+#include "core/campaign/model.hpp"
+#include "core/runs.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+CampaignIdentity identity_of(const Store& store) {
+  return {.name = store.name(),
+          .seed = store.seed(),
+          .num_runs = store.num_runs(),
+          .model_version = store.model_version(),
+          .build = store.build(),
+          .created_utc = store.created_utc(),
+          .definition_digest = store.table_digest(),
+          .tags = store.tags(),
+          .notes = store.notes()};
+}
+
+MissingEstimates missing_of(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
+  return {.num_not_finite = statistics.num_not_finite,
+          .num_no_draw = statistics.num_no_draw,
+          .num_lost = statistics.num_lost,
+          .num_given_up = num_given_up};
+}
+
+enum class WithChecks : std::uint8_t { no, yes };
+
+Review read_of_one_state(const Store& store, const Campaign& campaign,
+                         std::vector<StatedRequirement> stated, WithChecks with_checks) {
+  Review review{.database = {},
+                .identity = identity_of(store),
+                .results = {},
+                .missing = {},
+                .objectives = campaign.objectives(),
+                .budget = campaign.error_budget(),
+                .figures = {},
+                .matrix = {},
+                .causes = {},
+                .execution = {},
+                .stop = {}};
+  review.num_given_up = num_runs_in(store.given_up_runs());
+  FigurePasses figures(review.objectives.size(), num_runs_in(store.finished_runs()));
+  MatrixPasses matrix(std::move(stated), review.objectives, review.num_given_up);
+  const std::array<ResultPasses*, 2> further{&figures, &matrix};
+  if (with_checks == WithChecks::yes) {
+    CheckedResults checked = read_checked_results(store, campaign, further);
+    review.results = std::move(checked.results);
+    review.digest_check = checked.check;
+  } else {
+    review.results = read_results(store, campaign, std::span(further).first(1));
+  }
+  review.missing = missing_of(review.results.statistics, review.num_given_up);
+  review.figures = figures.figures();
+  if (with_checks == WithChecks::yes) review.matrix = matrix.rows();
+  return review;
+}
+
+}  // namespace
+
+Review read_review(const Store& store, const Campaign& campaign, std::string_view database,
+                   std::vector<StatedRequirement> stated, WithCauses with_causes) {
+  Review review;
+  stated = matrix_requirements(std::move(stated), campaign.objectives());
+  store.read_one_state([&] {
+    review = read_of_one_state(store, campaign, std::move(stated), WithChecks::yes);
+    if (with_causes == WithCauses::yes) review.causes = find_causes(store, campaign);
+    review.execution = store.execution();
+    review.stop = stop_text(store);
+  });
+  review.database = std::string(database);
+  return review;
+}
+
+Review read_live_review(const Store& store, const Campaign& campaign) {
+  Review review;
+  store.read_one_state([&] { review = read_of_one_state(store, campaign, {}, WithChecks::no); });
+  return review;
+}
+
+}  // namespace proofmass::coordinator

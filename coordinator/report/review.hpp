@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "coordinator/report/causes.hpp"
+#include "coordinator/report/error_figures.hpp"
+#include "coordinator/report/read_results.hpp"
+#include "coordinator/report/verification_matrix.hpp"
+#include "coordinator/store/execution.hpp"
+#include "coordinator/store/records.hpp"
+#include "coordinator/store/store.hpp"
+#include "core/campaign/campaign.hpp"
+
+namespace proofmass::coordinator {
+
+/// What a campaign database says of itself. Any of these texts may come from a stranger.
+struct CampaignIdentity {
+  std::string name;
+  std::uint64_t seed = 0;
+  std::uint64_t num_runs = 0;  ///< Wanted.
+  std::string model_version;
+  std::string build;
+  std::string created_utc;
+  std::string definition_digest;
+  std::vector<std::string> tags;
+  std::vector<Note> notes;
+};
+
+/// Everything that a review report and its charts are made of.
+struct Review {
+  std::string database;  ///< As commands name it.
+  CampaignIdentity identity;
+  ReadResults results;
+  DigestCheck digest_check = DigestCheck::not_checked;
+  std::uint64_t num_given_up = 0;
+  MissingEstimates missing;
+  std::vector<double> objectives;  ///< Of each quantity, SI.
+  std::optional<ErrorBudget> budget;
+  std::vector<QuantityFigures> figures;  ///< Of each quantity.
+  std::vector<MatrixRow> matrix;         ///< That of all objectives together is the last one.
+  std::optional<Causes> causes;          ///< Empty if runs are too few, or not asked for.
+  Execution execution;
+  std::string stop;  ///< See stop_text().
+};
+
+enum class WithCauses : std::uint8_t { no, yes };
+
+/// Reads all results, of one state of the file, twice or as often as more than 65,536 runs need it,
+/// and once more for the causes. Memory does not grow with the runs.
+///
+/// @param database  The name of the file, for the commands that the report shows.
+/// @param stated    Requirements; of none, the objectives. All objectives together follow, unless
+///                  they are asked for or the campaign has none.
+/// @throws ConfigError as parse_requirement(); StoreError as report_text().
+[[nodiscard]] Review read_review(const Store& store, const Campaign& campaign,
+                                 std::string_view database, std::vector<StatedRequirement> stated,
+                                 WithCauses with_causes);
+
+/// The same of results as they are, finished or not, without what takes long or looks for damage:
+/// neither stored digest nor stop checks are compared, and there are no causes.
+[[nodiscard]] Review read_live_review(const Store& store, const Campaign& campaign);
+
+}  // namespace proofmass::coordinator

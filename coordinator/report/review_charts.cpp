@@ -1,0 +1,195 @@
+#include "coordinator/report/review_charts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "coordinator/charts/ticks.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "core/campaign/model.hpp"
+#include "core/statistics/distribution.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+/// P(at most this many of n draws exceed) if each does with this probability.
+double probability_to_meet(std::uint64_t num_runs, const Tolerance& tolerance,
+                           double exceedance_probability) {
+  const std::uint64_t order = wilks_order(tolerance, num_runs);
+  if (order == 0) return 0.0;  // No number of exceedances is few enough.
+  if (exceedance_probability <= 0.0) return 1.0;
+  if (exceedance_probability >= 1.0) return 0.0;
+  return binomial_at_most(static_cast<double>(order) - 1.0, static_cast<double>(num_runs),
+                          exceedance_probability);
+}
+
+bool is_same(const Tolerance& a, const Tolerance& b) {
+  return !(a.coverage < b.coverage || a.coverage > b.coverage || a.confidence < b.confidence ||
+           a.confidence > b.confidence);
+}
+
+/// The axis ends where nearly every campaign fails, and at what was seen at the farthest.
+double largest_shown(const Review& review, const Tolerance& tolerance) {
+  double end = std::min(4.0 * (1.0 - tolerance.coverage), 1.0);
+  for (const MatrixRow& row : review.matrix) {
+    const RequirementCheck& check = row.answer.check;
+    if (!is_same(row.answer.requirement.tolerance, tolerance) || check.num_runs == 0) continue;
+    end = std::max(end, 1.1 * static_cast<double>(check.num_exceedances) /
+                            static_cast<double>(check.num_runs));
+  }
+  return std::min(end, 1.0);
+}
+
+Markers observed_fractions(const Review& review, const Tolerance& tolerance) {
+  Markers markers{.name = "seen in this campaign", .ink = Ink::fourth, .shape = Shape::diamond};
+  for (const MatrixRow& row : review.matrix) {
+    const RequirementCheck& check = row.answer.check;
+    if (!is_same(row.answer.requirement.tolerance, tolerance) || check.num_runs == 0) continue;
+    const double seen =
+        static_cast<double>(check.num_exceedances) / static_cast<double>(check.num_runs);
+    markers.points.push_back(
+        {100.0 * seen, 100.0 * probability_to_meet(check.num_runs, tolerance, seen)});
+  }
+  return markers;
+}
+
+Chart characteristic_chart(const Review& review, const MatrixRow& first, std::size_t number) {
+  const Tolerance& tolerance = first.answer.requirement.tolerance;
+  const std::uint64_t num_runs = first.answer.check.num_runs;
+  const double end = largest_shown(review, tolerance);
+  constexpr int num_points = 120;
+  Line line{.name = fmt::format("{} draws", num_runs)};
+  for (int i = 0; i <= num_points; ++i) {
+    const double probability = end * i / num_points;
+    line.points.push_back(
+        {100.0 * probability, 100.0 * probability_to_meet(num_runs, tolerance, probability)});
+  }
+  const double allowed = 1.0 - tolerance.coverage;
+  const std::uint64_t order = wilks_order(tolerance, num_runs);
+  return {
+      .text = {.id = fmt::format("characteristic-{}", number),
+               .title =
+                   fmt::format("Requirements for {} with {}", given_percent(tolerance.coverage),
+                               given_percent(tolerance.confidence)),
+               .description = fmt::format(
+                   "Probability that {} draws meet such a requirement, against the probability "
+                   "with which a draw exceeds its limit. {} Where {} of all draws exceed it, the "
+                   "requirement is called met with a probability of {} %.",
+                   num_runs,
+                   order == 0 ? "So few draws never meet it."
+                              : fmt::format("At most {} of them may exceed it.", order - 1),
+                   given_percent(allowed),
+                   figure_text(100.0 * probability_to_meet(num_runs, tolerance, allowed)))},
+      .x = {.label = "draws that exceed the limit, % of all draws", .from = 0.0, .to = 100.0 * end},
+      .y = {.label = "campaigns that meet the requirement, %", .from = 0.0, .to = 100.0},
+      .layers = {std::move(line),
+                 LimitLine{.label = fmt::format("allowed {}", given_percent(allowed)),
+                           .value = 100.0 * allowed},
+                 observed_fractions(review, tolerance)}};
+}
+
+std::string cell_label(double correlation) {
+  const long hundredths = std::lround(100.0 * std::abs(correlation));
+  if (hundredths >= 100) return correlation < 0.0 ? "−1" : "1";
+  return fmt::format("{}.{:02}", correlation < 0.0 ? "−" : "", hundredths);
+}
+
+std::string strongest_sentence(const Causes& causes) {
+  std::string text;
+  for (const CauseTerm& term : causes.terms) {
+    if (term.share < 0.5) continue;
+    text += fmt::format(" The error of {} is {} times {}, which explains {:.0f} % of its variance.",
+                        model().results().quantities[term.quantity].symbol, figure_text(term.slope),
+                        term.name, 100.0 * term.share);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<Chart> characteristic_charts(const Review& review) {
+  std::vector<Chart> charts;
+  std::vector<Tolerance> shown;
+  for (const MatrixRow& row : review.matrix) {
+    const Tolerance& tolerance = row.answer.requirement.tolerance;
+    const bool is_shown =
+        std::ranges::any_of(shown, [&](const Tolerance& one) { return is_same(one, tolerance); });
+    if (is_shown || row.answer.check.num_runs == 0) continue;
+    shown.push_back(tolerance);
+    charts.push_back(characteristic_chart(review, row, charts.size() + 1));
+  }
+  return charts;
+}
+
+std::optional<BarChart> budget_chart(const Review& review) {
+  if (!review.budget) return std::nullopt;
+  const ErrorBudget& budget = *review.budget;
+  const CampaignStatistics& statistics = review.results.statistics;
+  const bool has_errors = statistics.num_estimated > 0;
+  const Budget worst = has_errors ? budget.after(statistics.worst_errors()) : Budget{};
+  BarChart chart;
+  chart.text = {.id = "budget",
+                .title = "Budget before and after calibration",
+                .description = fmt::format("{}. Before calibration the total is {}", budget.title,
+                                           figure_text(budget.before.total))};
+  chart.x = {.label = "m/s²", .scale = Scale::logarithmic};
+  chart.series = {{.name = "before", .values = {}, .ink = Ink::second},
+                  {.name = "after, worst errors", .values = {}, .ink = Ink::first}};
+  const auto add = [&](std::string_view label, double before, double after) {
+    chart.categories.emplace_back(label);
+    chart.series[0].values.emplace_back(before);
+    chart.series[1].values.push_back(has_errors ? std::optional(after) : std::nullopt);
+  };
+  for (std::size_t i = 0; i < budget.infos.size(); ++i) {
+    add(budget.infos[i].label, budget.before.entries[i], has_errors ? worst.entries[i] : 0.0);
+  }
+  add(budget.total_info.label, budget.before.total, worst.total);
+  chart.text.description +=
+      has_errors ? fmt::format(", after it at most {} m/s².", figure_text(worst.total)) : " m/s².";
+  return chart;
+}
+
+std::optional<HeatMap> cause_map(const Review& review) {
+  if (!review.causes || review.causes->inputs.empty()) return std::nullopt;
+  const Causes& causes = *review.causes;
+  HeatMap map{.text = {.id = "causes",
+                       .title = "Correlation of the errors with draws and their products",
+                       .description = fmt::format("Linear correlation coefficients of {} runs.{}",
+                                                  causes.num_runs, strongest_sentence(causes))},
+              .rows = causes.inputs,
+              .columns = {},
+              .cells = {}};
+  for (const Quantity& quantity : model().results().quantities) {
+    map.columns.emplace_back(quantity.symbol);
+  }
+  for (const auto& row : causes.correlations) {
+    for (const std::optional<double>& value : row) {
+      map.cells.push_back({.value = value, .label = value ? cell_label(*value) : ""});
+    }
+  }
+  return map;
+}
+
+std::vector<NamedPicture> review_pictures(const Review& review) {
+  std::vector<NamedPicture> pictures{{"errors", magnitude_overview(review)},
+                                     {"convergence", convergence_overview(review)}};
+  const std::vector<Quantity>& quantities = model().results().quantities;
+  for (std::size_t i = 0; i < quantities.size(); ++i) {
+    const std::string_view name = quantities[i].name;
+    pictures.push_back({fmt::format("histogram:{}", name), magnitude_chart(review, i)});
+    pictures.push_back({fmt::format("error:{}", name), error_chart(review, i)});
+    pictures.push_back({fmt::format("convergence:{}", name), convergence_chart(review, i)});
+  }
+  for (Chart& chart : characteristic_charts(review)) {
+    pictures.push_back({"characteristic", std::move(chart)});
+    break;  // Without requirements there is one: that of the default tolerance.
+  }
+  if (auto chart = budget_chart(review)) pictures.push_back({"budget", *std::move(chart)});
+  if (auto map = cause_map(review)) pictures.push_back({"causes", *std::move(map)});
+  return pictures;
+}
+
+bool needs_causes(std::string_view name) { return name == "causes"; }
+
+}  // namespace proofmass::coordinator

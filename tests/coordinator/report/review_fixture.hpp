@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "coordinator/report/review.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::test {
+
+inline const std::string hostile_text =
+    "<script>alert(1)</script> \"quoted\" 'single' & | `code` \x1b[31m";
+
+/// A campaign database with results whose errors are known: run r is off by (r + 1) % of the
+/// objective in each parameter.
+class ReviewTest : public StoreTest {
+ protected:
+  [[nodiscard]] coordinator::Store store_with(std::uint64_t num_runs) const {
+    const MicroscopeCampaign campaign = campaign_of(num_runs);
+    coordinator::Store store =
+        coordinator::Store::create(file(), campaign, canonical_definition(campaign));
+    const std::vector<double> objectives = campaign.objectives();
+    std::vector<coordinator::Entry> entries;
+    coordinator::WorkerJoined worker = worker_1();
+    worker.host = hostile_text;
+    entries.emplace_back(worker);
+    for (std::uint64_t run = 0; run < num_runs; ++run) {
+      coordinator::Delivery delivery = delivery_of(run);
+      for (std::size_t i = 0; i < objectives.size(); ++i) {
+        delivery.result.truth[i] = 0.0;
+        delivery.result.estimate[i] = objectives[i] * static_cast<double>(run + 1) / 100.0;
+      }
+      entries.emplace_back(delivery);
+    }
+    store.write(entries);
+    return store;
+  }
+
+  [[nodiscard]] static coordinator::Review review_of(
+      const coordinator::Store& store, std::uint64_t num_runs,
+      std::vector<coordinator::StatedRequirement> stated = {}) {
+    return coordinator::read_review(store, campaign_of(num_runs), "a campaign.db",
+                                    std::move(stated), coordinator::WithCauses::no);
+  }
+};
+
+}  // namespace proofmass::test
