@@ -19,7 +19,7 @@ test_packages=(
   python3-numpy python3-pandas python3-matplotlib
   sshfs openssh-sftp-server busybox-static
   slurmctld slurmd slurm-client slurm-wlm-basic-plugins munge
-  groff-base zsh fish
+  groff-base zsh fish librsvg2-bin
   systemd systemd-container mmdebstrap dpkg-dev python3-yaml python3-distributed
 )
 # The fuzzer, the systems that the dispatch is measured beside, and what builds images.

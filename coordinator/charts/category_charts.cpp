@@ -115,7 +115,7 @@ std::vector<std::string> column_labels(const HeatMap& map) {
 }  // namespace
 
 double draw_chart(const BarChart& chart, Point corner, double width, SvgWriter& writer) {
-  constexpr double value_margin = 64.0;
+  constexpr double value_margin = 84.0;
   const std::vector<std::string> labels = shortened_labels(chart.categories, 26);
   const double left = widest(labels, label_size) + 10.0;
   double height = draw_title(chart.text.title, corner, width, writer);

@@ -101,7 +101,7 @@ double draw_legend(std::span<const LegendEntry> entries, Point corner, double wi
   if (entries.empty()) return 0.0;
   Point place{corner.x, corner.y + 14.0};
   for (const LegendEntry& entry : entries) {
-    const double needed = sample_width + text_width(entry.name, label_size) + 8.0;
+    const double needed = sample_width + 1.06 * text_width(entry.name, label_size) + 14.0;
     if (place.x > corner.x && place.x + needed > corner.x + width) {
       place = {corner.x, place.y + line_height};
     }

@@ -168,10 +168,10 @@ AxisRange logarithmic_range(const Axis& axis, double from, double to, std::size_
   if (!(range.to > range.from)) range.to = 10.0 * range.from;
   const int first = decade_of(range.from);
   const int last = decade_of(range.to);
-  if (range.to / range.from < 100.0) {
-    for (int decade = first; decade <= last; ++decade) add_ticks(range, decade, mantissas);
-    return range;
-  }
+  for (int decade = first; decade <= last; ++decade) add_ticks(range, decade, mantissas);
+  const bool are_few_powers = range.to / range.from < 100.0;
+  if (are_few_powers || range.ticks.size() <= num_ticks_max) return range;
+  range.ticks.clear();
   const int stride = 1 + (last - first) / static_cast<int>(num_ticks_max);
   for (int decade = first; decade <= last; ++decade) {
     if (decade % stride == 0) add_ticks(range, decade, std::array{1.0});

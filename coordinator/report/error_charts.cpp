@@ -59,15 +59,14 @@ std::string below_sentence(const Histogram& histogram) {
                      histogram.num_below == 1 ? "error is" : "errors are");
 }
 
-/// Marks on the axis, the label only at the worst.
+/// Marks on the axis.
 Markers worst_markers(const Review& review, std::size_t index, double scale) {
-  Markers markers{.name = "worst runs", .ink = Ink::fourth, .shape = Shape::triangle};
-  for (const RunError& worst : review.figures[index].worst) {
-    markers.points.push_back({worst.magnitude / scale, 0.0});
-  }
-  if (!markers.points.empty()) {
-    markers.labels = {fmt::format("run {}", review.figures[index].worst[0].run.value)};
-  }
+  const std::vector<RunError>& all = review.figures[index].worst;
+  Markers markers{
+      .name = all.empty() ? "" : fmt::format("worst runs (the worst: run {})", all[0].run.value),
+      .ink = Ink::fourth,
+      .shape = Shape::triangle};
+  for (const RunError& worst : all) markers.points.push_back({worst.magnitude / scale, 0.0});
   return markers;
 }
 

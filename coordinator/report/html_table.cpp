@@ -94,18 +94,23 @@ std::string review_style() {
 .scroll:focus-visible,a:focus-visible{outline:3px solid var(--chart-first);outline-offset:2px}
 table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
 caption{text-align:left;font-weight:600;padding:.3rem 0;white-space:nowrap}
-th,td{padding:.25rem .6rem;text-align:right;vertical-align:top;border-bottom:1px solid var(--chart-grid)}
-thead th{vertical-align:bottom;background:var(--faint)}
+th,td{padding:.25rem .6rem;text-align:right;vertical-align:top}
+th,td{border-bottom:1px solid var(--chart-grid)}
+thead th{vertical-align:bottom}
+thead th,thead td{background:var(--faint)}
 th[scope=colgroup]{text-align:center}
 th.words,td.words{text-align:left}
+td{white-space:nowrap}
+td.words{white-space:normal}
 tbody th{font-weight:600}
 .met{color:var(--met)}.unmet{color:var(--unmet)}.open{color:var(--open)}
 .note{font-size:.9rem;margin:.3rem 0;max-width:48rem}
 code{font-family:ui-monospace,monospace;font-size:.9em}
 figure{margin:.5rem 0;min-width:0}
+figure svg{display:block;height:auto}
 .charts{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(22rem,100%),1fr));gap:1rem}
 .wide svg{min-width:40rem;max-width:64rem}
-.overview svg{max-width:52rem}
+.overview svg{max-width:44rem}
 .single svg{max-width:36rem}
 )";
 }

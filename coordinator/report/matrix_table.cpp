@@ -34,8 +34,11 @@ ReviewCell value_cell(const MatrixRow& row, const std::optional<double>& value,
   if (!value) return words_cell("none");
   if (is_joint_row(row)) return {.text = figure(*value) + " × objective", .value = *value};
   const Quantity& quantity = model().results().quantities[row.answer.requirement.parameter];
-  const std::string unit(quantity.display_unit == "1" ? "" : quantity.display_unit);
-  return {.text = figure(*value / quantity.display_scale) + (unit.empty() ? "" : " ") + unit,
+  const std::string text = figure(*value / quantity.display_scale);
+  if (quantity.display_unit == "1") return {.text = text, .value = *value};
+  // A unit such as 1e-4 rad begins with a number.
+  const bool is_multiple = quantity.display_unit.starts_with("1e");
+  return {.text = fmt::format("{} {}{}", text, is_multiple ? "× " : "", quantity.display_unit),
           .value = *value};
 }
 
@@ -73,8 +76,7 @@ std::vector<ReviewCell> matrix_cells(const Review& review, const MatrixRow& row)
     cells.insert(cells.end(), {words_cell("none"), words_cell("")});
     return cells;
   }
-  ReviewCell worst = value_cell(row, row.worst->value, measured_figure);
-  cells.push_back(std::move(worst));
+  cells.push_back(value_cell(row, row.worst->value, measured_figure));
   cells.push_back({.text = fmt::format("proofmass replay {} --run {}", shell_word(review.database),
                                        row.worst->run.value),
                    .value = static_cast<double>(row.worst->run.value),

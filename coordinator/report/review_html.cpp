@@ -20,7 +20,8 @@ constexpr std::string_view policy =
 
 constexpr std::string_view page_style =
     R"(*{box-sizing:border-box}
-body{margin:0;background:var(--chart-ground);color:var(--chart-text);font:16px/1.5 system-ui,"Noto Sans","DejaVu Sans",sans-serif}
+body{margin:0;background:var(--chart-ground);color:var(--chart-text)}
+body{font:16px/1.5 system-ui,"Noto Sans","DejaVu Sans",sans-serif}
 header,main,footer{padding:0 1rem;max-width:90rem;margin:0 auto}
 h1{font-size:1.6rem;line-height:1.25;margin:1rem 0 .3rem;overflow-wrap:anywhere}
 h2{font-size:1.3rem;margin:2rem 0 .5rem;border-bottom:2px solid var(--chart-first)}
@@ -33,7 +34,22 @@ td.words{overflow-wrap:anywhere;min-width:6rem}
 #matrix code{white-space:nowrap}
 .skip{position:absolute;left:-99rem}
 .skip:focus{position:static}
-@media print{body{font-size:10pt}nav,.skip{display:none}.scroll{overflow:visible}table{font-size:7pt}th,td{padding:.1rem .25rem}#matrix td:nth-child(2){min-width:8rem}#matrix code{white-space:normal}section{break-before:page}section:first-of-type{break-before:auto}figure,tr{break-inside:avoid}.charts{grid-template-columns:1fr 1fr}.wide svg{min-width:0}}
+@page{size:A4 landscape;margin:12mm}
+@media print{
+body{font-size:10pt}
+nav,.skip{display:none}
+.scroll{overflow:visible}
+table{font-size:7pt}
+th,td{padding:.1rem .25rem}
+td{white-space:normal}
+#matrix td:nth-child(2){min-width:8rem}
+#matrix code{white-space:normal}
+section{break-before:page}
+section:first-of-type{break-before:auto}
+figure,tr{break-inside:avoid}
+.charts{grid-template-columns:1fr 1fr 1fr}
+.wide svg{min-width:0}
+}
 )";
 
 struct Section {

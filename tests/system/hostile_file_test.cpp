@@ -79,6 +79,8 @@ TEST_F(HostileFile, IsRefusedByEveryCommand) {
   const std::vector<Arguments> commands{{"list", "hostile.db"},
                                         {"list"},
                                         {"report", "hostile.db"},
+                                        {"report", "hostile.db", "--html", "-"},
+                                        {"plot", "hostile.db", "--list"},
                                         {"verify", "hostile.db"},
                                         {"export", "hostile.db"},
                                         {"replay", "hostile.db", "--run", "0"},
@@ -161,6 +163,8 @@ TEST_F(HostileFile, CannotSteerATerminalOrForgeALine) {
     make(file, "PRAGMA ignore_check_constraints = ON; UPDATE OR REPLACE " + table + " SET " +
                    column + " = '" + evil + "'");
     std::vector<Arguments> commands{{"report", file},
+                                    {"report", file, "--html", "-"},
+                                    {"report", file, "--markdown", "-"},
                                     {"verify", file, "--fraction", "0"},
                                     {"query", file, "SELECT " + column + " FROM " + table}};
     if (table == "campaign") {

@@ -188,6 +188,11 @@ TEST_F(SecondModel, IsReportedAndAnswersQueries) {
   ASSERT_EQ(proofmass("sensitivity", {"sensitivity", "a.db"}), 0) << errors_of("sensitivity");
   EXPECT_THAT(output_of("sensitivity"), HasSubstr("scale_factor"));
   EXPECT_THAT(output_of("sensitivity"), HasSubstr("natural_frequency_hz"));
+  ASSERT_EQ(proofmass("html", {"report", "a.db", "--html", "-"}), 0) << errors_of("html");
+  EXPECT_THAT(output_of("html"), HasSubstr(">Objective of "));
+  EXPECT_THAT(output_of("html"), HasSubstr("id=\"histogram-quadrature\""));  // No objective.
+  ASSERT_EQ(proofmass("plot", {"plot", "a.db", "--list"}), 0) << errors_of("plot");
+  EXPECT_THAT(output_of("plot"), HasSubstr("error:in_phase\n"));
 }
 
 // P = (2/N) Σ y cos ωt, added up in the order of the samples: the replayed readings have the bits

@@ -61,7 +61,7 @@ TEST(RequirementsFile, NamesWhatIsWrong) {
               testing::StartsWith("r.toml: requirements[0].requirement = k2e < 1 for 9% with 9% ("
                                   "k2e is no parameter"));
   EXPECT_THAT(refusal_of_requirements(std::string(good) + "[[requirement]]\n"),
-              testing::HasSubstr("unknown key; nearest is requirements"));
+              testing::HasSubstr("requirement = [...] (unknown key)"));
 }
 
 TEST(RequirementsFile, LimitsWhatIsRead) {

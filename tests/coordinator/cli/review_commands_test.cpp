@@ -11,6 +11,7 @@
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
+#include "tests/skip_for_want.hpp"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
@@ -144,6 +145,19 @@ TEST_F(ReviewCommands, RefuseAChartThatIsNone) {
             "output = (must be given)");
   EXPECT_EQ(test::answer_of({"plot", database_, "--chart", "errors", "--output", "a.gif"}).error,
             "output = a.gif (must end in .svg or .png, or be - for SVG on standard output)");
+}
+
+TEST_F(ReviewCommands, PlotABitmap) {
+  if (std::system("command -v rsvg-convert > /dev/null") != 0) {
+    test::skip_for_want("no rsvg-convert");
+    return;
+  }
+  const std::filesystem::path png = directory_ / "a.png";
+  const test::Answer answer =
+      test::answer_of({"plot", database_, "--chart", "errors", "--output", png});
+  EXPECT_EQ(answer.exit_code, exit_done) << answer.error;
+  EXPECT_THAT(text_of_file(png), StartsWith("\x89PNG"));
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "a.png.svg-draft"));
 }
 
 TEST_F(ReviewCommands, SayThatTheConverterIsMissing) {

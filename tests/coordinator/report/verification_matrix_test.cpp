@@ -73,7 +73,9 @@ TEST(MatrixPasses, AgreeWithTheErrorsThemselves) {
     EXPECT_EQ(row.answer.check.num_exceedances, expected.num_exceedances);
     EXPECT_EQ(row.answer.check.num_allowed, expected.num_allowed);
     ASSERT_EQ(row.bound.has_value(), expected.bound.has_value()) << count;
-    if (row.bound) EXPECT_EQ(*row.bound, expected.bound->value) << count;
+    if (row.bound) {
+      EXPECT_EQ(*row.bound, expected.bound->value) << count;
+    }
     EXPECT_EQ(row.worst->value, *std::ranges::max_element(errors));
   }
 }
