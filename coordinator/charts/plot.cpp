@@ -156,7 +156,7 @@ void draw_layers(const Chart& chart, const PlotArea& area, SvgWriter& writer) {
 double draw_head(const Chart& chart, Point corner, double width, SvgWriter& writer) {
   double height = draw_title(chart.text.title, corner, width, writer);
   height += draw_legend(legend_of(chart), {corner.x, corner.y + height}, width, writer);
-  if (chart.y.label.empty()) return height + 4.0;
+  if (chart.y.label.empty()) return height + 8.0;
   writer.text({corner.x, corner.y + height + 13.0}, chart.y.label, {.size = label_size});
   return height + 24.0;
 }
@@ -174,7 +174,7 @@ double draw_chart(const Chart& chart, Point corner, double width, SvgWriter& wri
   area.box = {corner.x + left, 0.0, width - left - right_margin, chart.plot_height};
   area.x = {
       .scale = chart.x.scale,
-      .range = range_of(chart.x, extents.x.from, extents.x.to, num_ticks_for(area.box.width, 62.0)),
+      .range = range_of(chart.x, extents.x.from, extents.x.to, num_ticks_for(area.box.width, 50.0)),
       .begin = area.box.left,
       .end = area.box.right()};
   const std::vector<const LimitLine*> limits = vertical_limits(chart, area.x);

@@ -230,11 +230,13 @@ ChartGrid magnitude_overview(const Review& review) {
 }
 
 ChartGrid convergence_overview(const Review& review) {
-  ChartGrid grid{.text = {.id = "convergence",
-                          .title = "95 % intervals of mean and std against the number of runs",
-                          .description = "Half the width of the interval over the value."},
-                 .num_columns = 2,
-                 .charts = {}};
+  ChartGrid grid{
+      .text = {.id = "convergence",
+               .title = "95 % intervals of mean and std of |error|",
+               .description =
+                   "Half the width of each interval over the value, against the number of runs."},
+      .num_columns = 2,
+      .charts = {}};
   for (std::size_t i = 0; i < review.figures.size(); ++i) {
     Line mean{.name = i == 0 ? "mean" : ""};
     Line deviation{.name = i == 0 ? "std" : "", .ink = Ink::second, .dash = Dash::dashed};

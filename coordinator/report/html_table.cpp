@@ -102,13 +102,13 @@ th[scope=colgroup]{text-align:center}
 th.words,td.words{text-align:left}
 td{white-space:nowrap}
 td.words{white-space:normal}
-tbody th{font-weight:600}
+tbody th{font-weight:600;position:sticky;left:0;background:var(--chart-ground)}
 .met{color:var(--met)}.unmet{color:var(--unmet)}.open{color:var(--open)}
 .note{font-size:.9rem;margin:.3rem 0;max-width:48rem}
 code{font-family:ui-monospace,monospace;font-size:.9em}
 figure{margin:.5rem 0;min-width:0}
 figure svg{display:block;height:auto}
-.charts{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(22rem,100%),1fr));gap:1rem}
+.charts{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(22rem,100%),1fr));gap:1rem}
 .wide svg{min-width:40rem;max-width:64rem}
 .overview svg{max-width:44rem}
 .single svg{max-width:36rem}

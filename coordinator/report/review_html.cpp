@@ -30,8 +30,9 @@ a{color:inherit}
 nav ul{display:flex;flex-wrap:wrap;gap:.2rem 1rem;padding:0;margin:.5rem 0;list-style:none}
 p{max-width:48rem}
 td.words{overflow-wrap:anywhere;min-width:6rem}
-#matrix td:nth-child(2){min-width:16rem}
-#matrix code{white-space:nowrap}
+#matrix{font-size:.8rem}
+#matrix th,#matrix td{padding:.2rem .4rem}
+#matrix td:nth-child(2){min-width:13rem}
 .skip{position:absolute;left:-99rem}
 .skip:focus{position:static}
 @page{size:A4 landscape;margin:12mm}
@@ -43,7 +44,6 @@ table{font-size:7pt}
 th,td{padding:.1rem .25rem}
 td{white-space:normal}
 #matrix td:nth-child(2){min-width:8rem}
-#matrix code{white-space:normal}
 section{break-before:page}
 section:first-of-type{break-before:auto}
 figure,tr{break-inside:avoid}

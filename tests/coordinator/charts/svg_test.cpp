@@ -125,20 +125,24 @@ std::vector<Point> points_of(const std::string& svg, const std::string& colour) 
 
 Chart curve(std::vector<Point> points, Scale scale) {
   return {.text = {.id = "curve", .title = "", .description = ""},
-          .x = {.label = "n", .scale = scale, .from = 1.0, .to = 10'000.0},
+          .x = {.label = "n", .scale = scale, .from = 0.1, .to = 1000.0},
           .y = {.label = "std", .from = 0.0, .to = 1.0},
           .layers = {Line{.name = "", .points = std::move(points), .ink = Ink::third}}};
 }
 
-// Powers of ten are equally far apart on a logarithmic axis.
+// Powers of ten are equally far apart on a logarithmic axis, and its lower end is at the left.
 TEST(Line, FollowsALogarithmicAxis) {
-  const std::vector<Point> points = points_of(
-      svg_of(curve({{1.0, 0.0}, {10.0, 0.5}, {100.0, 1.0}, {10'000.0, 0.25}}, Scale::logarithmic),
-             SvgUse::plain),
-      "#008f68");
+  const std::string svg =
+      svg_of(curve({{0.1, 0.0}, {1.0, 0.5}, {10.0, 1.0}, {1000.0, 0.25}}, Scale::logarithmic),
+             SvgUse::plain);
+  const std::vector<Point> points = points_of(svg, "#008f68");
   ASSERT_THAT(points, SizeIs(4));
-  const double decade = points[1].x - points[0].x;
-  EXPECT_GT(decade, 50.0);
+  const std::vector<std::string> boxes =
+      test::tags_of(svg, "<clipPath id=\"curve-clip\"><rect[^>]*>");
+  ASSERT_THAT(boxes, SizeIs(1));
+  EXPECT_NEAR(points[0].x, test::number_of(boxes[0], "x"), 0.02);
+  const double decade = test::number_of(boxes[0], "width") / 4.0;
+  EXPECT_NEAR(points[1].x - points[0].x, decade, 0.02);
   EXPECT_NEAR(points[2].x - points[1].x, decade, 0.02);
   EXPECT_NEAR(points[3].x - points[2].x, 2.0 * decade, 0.03);
   EXPECT_NEAR(points[0].y - points[1].y, 95.0, 0.02);

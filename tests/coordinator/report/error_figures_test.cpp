@@ -59,8 +59,9 @@ TEST(FigurePasses, NameTheFiveWorstRuns) {
   const std::vector<double> errors{0.25, -0.5, 0.125, 0.5, -1.0, 0.0, 0.75, 0.0625};
   for (std::uint64_t run = 0; run < errors.size(); ++run) passes.add(run_with(run, errors[run]));
   EXPECT_FALSE(passes.end_pass());
+  const std::vector<QuantityFigures> figures = passes.figures();
   std::vector<std::uint64_t> runs;
-  for (const RunError& worst : passes.figures()[0].worst) runs.push_back(worst.run.value);
+  for (const RunError& worst : figures[0].worst) runs.push_back(worst.run.value);
   EXPECT_THAT(runs, ElementsAre(4, 6, 1, 3, 0));  // Of the equal ones 1 and 3 the first.
 }
 
