@@ -1,0 +1,172 @@
+#include "coordinator/store/campaign_history.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <set>
+#include <utility>
+
+#include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/file_system.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using detail::Database;
+using detail::Statement;
+
+wire::Attempt attempt_in(const Statement& row, int column) {
+  return {static_cast<decltype(wire::Attempt::value)>(row.count(column))};
+}
+
+bool is_of_batch(const ComputedRuns& batch, const Statement& row) {
+  return batch.worker_key == row.count(1) && batch.attempt == attempt_in(row, 2) &&
+         batch.received_unix_s == row.count(4);
+}
+
+/// Runs of one batch have the same share of its time, to the bit, and come in one message.
+std::vector<ComputedRuns> computed_runs(const Database& database, std::size_t num_runs_max) {
+  Statement row = database.prepare(
+      "SELECT run_index, worker_key, attempt, compute_s, received_unix_s FROM "
+      "(SELECT * FROM delivery ORDER BY received_unix_s DESC, run_index LIMIT ?) "
+      "ORDER BY received_unix_s DESC, worker_key, compute_s, attempt, run_index");
+  row.bind_all(static_cast<std::uint64_t>(num_runs_max));
+  std::vector<ComputedRuns> computed;
+  std::uint64_t last_share_bits = 0;
+  while (row.step()) {
+    const double share_s = row.real(3);
+    const auto share_bits = std::bit_cast<std::uint64_t>(share_s);
+    const bool is_same_share = share_bits == std::exchange(last_share_bits, share_bits);
+    if (computed.empty() || !is_same_share || !is_of_batch(computed.back(), row)) {
+      computed.push_back({.runs = {},
+                          .attempt = attempt_in(row, 2),
+                          .worker_key = row.count(1),
+                          .received_unix_s = row.count(4)});
+    }
+    computed.back().runs.push_back({row.count(0)});
+    computed.back().compute_s = share_s * static_cast<double>(computed.back().runs.size());
+  }
+  return computed;
+}
+
+std::vector<LostAttempt> lost_attempts(const Database& database, std::size_t count_max) {
+  Statement row = database.prepare(
+      "SELECT first_run, num_runs, attempt, worker_key, reason, lost_unix_s FROM attempt "
+      "ORDER BY attempt_id DESC LIMIT ?");
+  row.bind_all(static_cast<std::uint64_t>(count_max));
+  std::vector<LostAttempt> lost;
+  while (row.step()) {
+    lost.push_back({.runs = {{row.count(0)}, row.count(1)},
+                    .attempt = attempt_in(row, 2),
+                    .worker_key = row.count(3),
+                    .reason = row.text(4),
+                    .lost_unix_s = row.count(5)});
+  }
+  return lost;
+}
+
+std::vector<WorkerRecord> worker_records(const Database& database, const RecentAttempts& attempts) {
+  std::set<std::uint64_t> keys;
+  for (const ComputedRuns& computed : attempts.computed) keys.insert(computed.worker_key);
+  for (const LostAttempt& lost : attempts.lost) keys.insert(lost.worker_key);
+  Statement row = database.prepare("SELECT worker, host FROM worker WHERE worker_key = ?");
+  std::vector<WorkerRecord> workers;
+  for (const std::uint64_t key : keys) {
+    row.bind_all(key);
+    if (!row.step()) continue;
+    workers.push_back({.key = key, .name = row.text(0), .host = row.text(1)});
+    row.finish();
+  }
+  return workers;
+}
+
+}  // namespace
+
+CampaignHistory::CampaignHistory(const std::filesystem::path& file) {
+  detail::check_presence(file);
+  database_ = std::make_unique<Database>(file, detail::Access::read_only);
+  detail::prepare_reader(*database_, file);
+}
+
+CampaignHistory::~CampaignHistory() = default;
+
+std::vector<StoredEvent> CampaignHistory::events_after(std::uint64_t id,
+                                                       std::size_t count_max) const {
+  Statement row = database_->prepare(
+      "SELECT event_id, time_utc, kind, text FROM event WHERE event_id > ? "
+      "ORDER BY event_id DESC LIMIT ?");
+  row.bind_all(id, static_cast<std::uint64_t>(count_max));
+  std::vector<StoredEvent> events;
+  while (row.step()) {
+    events.push_back(
+        {.id = row.count(0), .time_utc = row.text(1), .kind = row.text(2), .text = row.text(3)});
+  }
+  std::ranges::reverse(events);
+  return events;
+}
+
+std::vector<LossCount> CampaignHistory::losses() const {
+  Statement row = database_->prepare(
+      "SELECT reason, count(*), sum(num_runs), sum(is_blamed) FROM attempt GROUP BY reason "
+      "ORDER BY 3 DESC, reason");
+  std::vector<LossCount> losses;
+  while (row.step()) {
+    losses.push_back({.reason = row.text(0),
+                      .num_losses = row.count(1),
+                      .num_runs = row.count(2),
+                      .num_blamed = row.count(3)});
+  }
+  return losses;
+}
+
+// The condition of the inner query is that of an index: results with an estimate are not looked at.
+std::vector<EndCount> CampaignHistory::ends_without_estimate() const {
+  Statement row = database_->prepare(
+      "SELECT status, cause, session, count(*) FROM "
+      "(SELECT r.status, ifnull(h.loss_cause, '') AS cause, ifnull(h.loss_session, '') AS session "
+      " FROM run_result AS r LEFT JOIN loop_health AS h USING (run_index) "
+      " WHERE r.status <> 1 AND r.status >= 3) "
+      "GROUP BY 1, 2, 3 ORDER BY 4 DESC, 1, 2, 3");
+  std::vector<EndCount> ends;
+  while (row.step()) {
+    const std::uint64_t status = row.count(0);
+    ends.push_back({.status = status == 3   ? "not finite"
+                              : status == 4 ? "no draw"
+                                            : "lost",
+                    .cause = row.text(1),
+                    .session = row.text(2),
+                    .num_runs = row.count(3)});
+  }
+  return ends;
+}
+
+std::vector<GivenUpRecord> CampaignHistory::given_up(std::size_t count_max) const {
+  Statement row = database_->prepare(
+      "SELECT run_index, reason, num_attempts, given_up_utc FROM run_failure "
+      "ORDER BY run_index LIMIT ?");
+  row.bind_all(static_cast<std::uint64_t>(count_max));
+  std::vector<GivenUpRecord> runs;
+  while (row.step()) {
+    runs.push_back({.run = {row.count(0)},
+                    .reason = row.text(1),
+                    .num_attempts = row.count(2),
+                    .given_up_utc = row.text(3)});
+  }
+  return runs;
+}
+
+RecentAttempts CampaignHistory::recent_attempts(std::size_t num_runs_max,
+                                                std::size_t num_losses_max) const {
+  const detail::ReadTransaction one_state(*database_);
+  RecentAttempts attempts{.computed = computed_runs(*database_, num_runs_max),
+                          .lost = lost_attempts(*database_, num_losses_max),
+                          .workers = {}};
+  attempts.workers = worker_records(*database_, attempts);
+  const std::uint64_t num_runs = database_->count("SELECT count(*) FROM delivery");
+  const std::uint64_t num_losses = database_->count("SELECT count(*) FROM attempt");
+  attempts.num_runs_left_out = num_runs - std::min<std::uint64_t>(num_runs, num_runs_max);
+  attempts.num_losses_left_out = num_losses - std::min<std::uint64_t>(num_losses, num_losses_max);
+  return attempts;
+}
+
+}  // namespace proofmass::coordinator

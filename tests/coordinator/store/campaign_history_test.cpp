@@ -1,0 +1,138 @@
+#include "coordinator/store/campaign_history.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include "tests/coordinator/store/store_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using test::delivery_of;
+using test::result_of;
+using test::session_1;
+using ::testing::ElementsAre;
+
+class CampaignHistoryTest : public test::StoreTest {
+ protected:
+  CampaignHistoryTest() : store(Store::create(file(), test::campaign_of(100), "definition")) {
+    write({test::worker_1()});
+  }
+  void write(const std::vector<Entry>& entries) { (void)store.write(entries); }
+
+  static Delivery failed(std::uint64_t run, RunStatus status) {
+    Delivery delivery = delivery_of(run);
+    delivery.result = result_of(run, status);
+    return delivery;
+  }
+  static LostRuns lost(std::uint64_t first, std::uint64_t count, wire::LossReason reason,
+                       bool is_blamed) {
+    return {.runs = {{first}, count},
+            .attempt = {1},
+            .worker = session_1,
+            .reason = reason,
+            .is_blamed = is_blamed};
+  }
+
+  Store store;
+};
+
+TEST_F(CampaignHistoryTest, HasTheEventsAfterOne) {
+  for (int i = 0; i < 5; ++i) store.record_event("event", fmt::format("number {}", i));
+  const CampaignHistory history(file());
+  const std::vector<StoredEvent> all = history.events_after(0, 100);
+  ASSERT_EQ(all.size(), 5U);
+  EXPECT_EQ(all[0].text, "number 0");
+  EXPECT_EQ(all[4].kind, "event");
+  const std::vector<StoredEvent> some = history.events_after(all[2].id, 100);
+  ASSERT_EQ(some.size(), 2U);
+  EXPECT_EQ(some[0].text, "number 3");
+  // The newest ones if there are too many.
+  EXPECT_EQ(history.events_after(0, 2)[0].text, "number 3");
+  store.record_event("event", "later");
+  EXPECT_EQ(history.events_after(all[4].id, 100)[0].text, "later");
+}
+
+TEST_F(CampaignHistoryTest, CountsLossesByReason) {
+  write({lost(0, 10, wire::LossReason::silent, false), lost(10, 5, wire::LossReason::silent, false),
+         lost(20, 1, wire::LossReason::crashed, true)});
+  const std::vector<LossCount> losses = CampaignHistory(file()).losses();
+  ASSERT_EQ(losses.size(), 2U);
+  EXPECT_EQ(losses[0].reason, "silent");
+  EXPECT_EQ(losses[0].num_losses, 2U);
+  EXPECT_EQ(losses[0].num_runs, 15U);
+  EXPECT_EQ(losses[0].num_blamed, 0U);
+  EXPECT_EQ(losses[1].reason, "crashed");
+  EXPECT_EQ(losses[1].num_blamed, 1U);
+}
+
+TEST_F(CampaignHistoryTest, CountsHowRunsEndedWithoutAnEstimate) {
+  write({delivery_of(0), failed(1, RunStatus::not_converged), failed(2, RunStatus::not_finite),
+         failed(3, RunStatus::no_draw), failed(4, RunStatus::no_draw)});
+  const std::vector<EndCount> ends = CampaignHistory(file()).ends_without_estimate();
+  ASSERT_EQ(ends.size(), 2U);
+  EXPECT_EQ(ends[0].status, "no draw");
+  EXPECT_EQ(ends[0].num_runs, 2U);
+  EXPECT_EQ(ends[1].status, "not finite");
+  EXPECT_EQ(ends[1].num_runs, 1U);
+  EXPECT_EQ(ends[1].cause, "");
+}
+
+TEST_F(CampaignHistoryTest, NamesRunsThatWereGivenUp) {
+  for (const std::uint64_t run : {7U, 3U, 5U}) {
+    write({lost(run, 1, wire::LossReason::crashed, true), GivenUpRun{{run}}});
+  }
+  const std::vector<GivenUpRecord> runs = CampaignHistory(file()).given_up(2);
+  ASSERT_EQ(runs.size(), 2U);
+  EXPECT_EQ(runs[0].run.value, 3U);
+  EXPECT_EQ(runs[1].run.value, 5U);
+  EXPECT_EQ(runs[0].reason, "crashed");
+  EXPECT_EQ(runs[0].num_attempts, 1U);
+}
+
+// Three runs of one batch share its time; a fourth one was computed by itself.
+TEST_F(CampaignHistoryTest, JoinsTheRunsOfABatch) {
+  std::vector<Entry> entries;
+  for (const std::uint64_t run : {4U, 5U, 6U}) entries.emplace_back(delivery_of(run));
+  Delivery single = delivery_of(9);
+  single.compute_s = 2.0;
+  entries.emplace_back(single);
+  write(entries);
+  test::change(file(), "UPDATE delivery SET received_unix_s = 2000");
+  const RecentAttempts attempts = CampaignHistory(file()).recent_attempts(100, 100);
+  ASSERT_EQ(attempts.computed.size(), 2U);
+  EXPECT_THAT(attempts.computed[0].runs, ElementsAre(RunIndex{4}, RunIndex{5}, RunIndex{6}));
+  EXPECT_DOUBLE_EQ(attempts.computed[0].compute_s, 1.5);
+  EXPECT_EQ(attempts.computed[0].received_unix_s, 2000U);
+  EXPECT_THAT(attempts.computed[1].runs, ElementsAre(RunIndex{9}));
+  ASSERT_EQ(attempts.workers.size(), 1U);
+  EXPECT_EQ(attempts.workers[0].name, "worker-1");
+  EXPECT_EQ(attempts.workers[0].host, "node-1");
+}
+
+TEST_F(CampaignHistoryTest, HasTheNewestAttemptsAndCountsTheOthers) {
+  std::vector<Entry> entries;
+  for (std::uint64_t run = 0; run < 20; ++run) entries.emplace_back(delivery_of(run));
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    entries.emplace_back(lost(50 + i, 1, wire::LossReason::silent, false));
+  }
+  write(entries);
+  test::change(file(), "UPDATE delivery SET received_unix_s = 1000 + run_index");
+  const RecentAttempts attempts = CampaignHistory(file()).recent_attempts(8, 2);
+  EXPECT_EQ(attempts.num_runs_left_out, 12U);
+  EXPECT_EQ(attempts.num_losses_left_out, 3U);
+  ASSERT_EQ(attempts.computed.size(), 8U);
+  EXPECT_EQ(attempts.computed.front().runs.front().value, 19U);
+  EXPECT_EQ(attempts.computed.back().runs.front().value, 12U);
+  ASSERT_EQ(attempts.lost.size(), 2U);
+  EXPECT_EQ(attempts.lost[0].runs.first.value, 54U);
+}
+
+TEST_F(CampaignHistoryTest, RefusesWhatIsNoCampaign) {
+  test::write_file(directory() / "other.db", "hello");
+  EXPECT_THROW(CampaignHistory(directory() / "other.db"), StoreError);
+  EXPECT_THROW(CampaignHistory(directory() / "none.db"), StoreError);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
