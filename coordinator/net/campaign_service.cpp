@@ -204,6 +204,20 @@ wire::CampaignStatus CampaignService::status_of(CampaignId id) const {
   return ended == ended_.end() ? status_of_served(id) : ended->second.status;
 }
 
+std::vector<CampaignSnapshot> CampaignService::snapshots() const {
+  std::vector<CampaignSnapshot> snapshots;
+  snapshots.reserve(order_.size());
+  for (const CampaignId id : order_) {
+    const auto served = served_.find(id);
+    const bool is_here = served != served_.end();
+    snapshots.push_back(
+        {.status = status_of(id),
+         .file = is_here ? served->second.file : ended_.at(id).file,
+         .num_waiting = is_here ? state_.campaigns.at(id).delivered.size() : std::uint64_t{0}});
+  }
+  return snapshots;
+}
+
 wire::CampaignStatus CampaignService::status_of_served(CampaignId id) const {
   const CampaignState& campaign = state_.campaigns.at(id);
   const Served& served = served_.at(id);

@@ -15,6 +15,7 @@
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
 #include "coordinator/net/service_context.hpp"
+#include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/net/timing.hpp"
 #include "coordinator/net/worker_history.hpp"
 #include "coordinator/store/store_writer.hpp"
@@ -106,6 +107,8 @@ class CampaignService {
                                                            std::size_t count_max) const;
   [[nodiscard]] std::size_t num_campaigns() const { return order_.size(); }
   [[nodiscard]] wire::CampaignStatus status_of(CampaignId id) const;
+  /// All campaigns, in the same order.
+  [[nodiscard]] std::vector<CampaignSnapshot> snapshots() const;
 
   /// True if nobody waits to be told of the end of a campaign, see ServiceConfig::on_notice.
   [[nodiscard]] bool is_all_told() const;

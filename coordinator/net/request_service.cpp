@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "coordinator/dispatch/workers.hpp"
+#include "coordinator/net/service_snapshot.hpp"
 #include "core/campaign/model.hpp"
 #include "core/error.hpp"
 #include "proto/wire/client_codec.hpp"
@@ -72,6 +73,28 @@ RequestService::RequestService(const ServiceContext& context, CampaignService& c
       began_at_(context.now()),
       answers_(context) {}
 
+wire::StatusReply RequestService::service_status() const {
+  const State& state = context_.state;
+  const TimePoint now = context_.now();
+  wire::StatusReply reply{.version = context_.config.version,
+                          .model_version = std::string(model().version()),
+                          .uptime_s = seconds(now - began_at_),
+                          .num_workers = state.workers.size(),
+                          .num_slots = state.num_slots,
+                          .campaigns = {},
+                          .num_campaigns = campaigns_.num_campaigns(),
+                          .unserved_files = directory_.unserved(wire::unserved_files_per_reply_max),
+                          .num_unserved_files = directory_.num_unserved(),
+                          .factories = factories_.current(now)};
+  const std::set<std::string> hosts = quarantined_hosts(state);
+  reply.num_quarantined_hosts = hosts.size();
+  for (const std::string& host : hosts) {
+    if (reply.quarantined_hosts.size() == wire::quarantined_hosts_per_reply_max) break;
+    reply.quarantined_hosts.push_back(host);
+  }
+  return reply;
+}
+
 template <>
 void RequestService::take(Submission&& submission, const Asker& asker, const Respond& respond) {
   submit(std::make_shared<const Submission>(std::move(submission)), asker, respond);
@@ -107,25 +130,8 @@ template <>
 void RequestService::take(wire::StatusRequest&& request, const Asker& asker,
                           const Respond& respond) {
   require_right(asker, Right::observe);
-  const State& state = context_.state;
-  const Duration uptime = context_.now() - began_at_;
-  wire::StatusReply reply{
-      .version = context_.config.version,
-      .model_version = std::string(model().version()),
-      .uptime_s = std::chrono::duration<double>(uptime).count(),
-      .num_workers = state.workers.size(),
-      .num_slots = state.num_slots,
-      .campaigns = campaigns_.statuses(request.first_campaign, wire::campaigns_per_reply_max),
-      .num_campaigns = campaigns_.num_campaigns(),
-      .unserved_files = directory_.unserved(wire::unserved_files_per_reply_max),
-      .num_unserved_files = directory_.num_unserved(),
-      .factories = factories_.current(context_.now())};
-  const std::set<std::string> hosts = quarantined_hosts(state);
-  reply.num_quarantined_hosts = hosts.size();
-  for (const std::string& host : hosts) {
-    if (reply.quarantined_hosts.size() == wire::quarantined_hosts_per_reply_max) break;
-    reply.quarantined_hosts.push_back(host);
-  }
+  wire::StatusReply reply = service_status();
+  reply.campaigns = campaigns_.statuses(request.first_campaign, wire::campaigns_per_reply_max);
   respond(std::move(reply));
 }
 
@@ -139,16 +145,7 @@ void RequestService::take(wire::WorkersRequest&& request, const Asker& asker,
   for (auto item = state.workers.upper_bound(WorkerId{request.after_worker_id});
        item != state.workers.end() && reply.workers.size() < wire::workers_per_reply_max; ++item) {
     const auto& [id, worker] = *item;
-    reply.workers.push_back(
-        {.id = id,
-         .name = worker.name,
-         .host = worker.host.name,
-         .process_id = worker.process_id,
-         .num_slots = worker.num_slots,
-         .num_lent = worker.num_lent,
-         .num_results = worker.num_results,
-         .silent_s = std::chrono::duration<double>(now - worker.heard_at).count(),
-         .is_quarantined = state.quarantined.contains(worker.host)});
+    reply.workers.push_back(status_of(state, id, worker, now));
   }
   respond(std::move(reply));
 }

@@ -33,6 +33,9 @@ class RequestService {
   ///         not ask for it, has submitted too much, or too many requests are under way.
   void carry_out(Request request, const Asker& asker, Respond respond);
 
+  /// What a client is told of the coordinator, without any campaign.
+  [[nodiscard]] wire::StatusReply service_status() const;
+
   /// Carries out submissions that had to wait, and responds to questions whose answers are there.
   /// To be called several times a second.
   void review();

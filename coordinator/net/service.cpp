@@ -1,5 +1,6 @@
 #include "coordinator/net/service.hpp"
 
+#include <algorithm>
 #include <exception>
 #include <functional>
 #include <string_view>
@@ -93,6 +94,18 @@ class Service::Impl final : public Outbox {
     end(stop == StopRequest::leave);
   }
 
+  [[nodiscard]] ServiceSnapshot snapshot(SnapshotDepth depth) {
+    ServiceSnapshot snapshot{.status = request_service_.service_status(),
+                             .campaigns = campaign_service_.snapshots(),
+                             .workers = {},
+                             .num_leases = state_.leases.size(),
+                             .num_sockets_reset = sockets_.num_resets(),
+                             .num_messages_unsent = worker_gateway_.num_unsent(),
+                             .num_connections_refused = num_connections_refused()};
+    add_workers(state_, now(), depth, snapshot);
+    return snapshot;
+  }
+
   void worker_ended(WorkerId worker, LossReason reason) {
     // What it sent before it ended may still be waiting in the socket.
     receive_from_workers();
@@ -152,7 +165,8 @@ class Service::Impl final : public Outbox {
  private:
   /// Warns if not all workers that could register will find room; `proofmass run` has few of them.
   void begin_to_limit_connections() {
-    const std::uint64_t descriptors_max = raise_descriptor_limit();
+    const std::uint64_t limit = raise_descriptor_limit();
+    const std::uint64_t descriptors_max = limit - std::min(config_.num_descriptors_reserved, limit);
     connection_limit_ =
         connection_limit(descriptors_max, lowest_free_descriptor(), sockets_.clients_endpoint());
     limit_connections(connection_limit_);
@@ -160,7 +174,7 @@ class Service::Impl final : public Outbox {
     if (!config_.clients_endpoint || num_workers_max >= config_.dispatch.num_workers_max) return;
     log({.severity = Severity::warning,
          .kind = "few_descriptors",
-         .fields = {{"limit", descriptors_max},
+         .fields = {{"limit", limit},
                     {"workers_max", num_workers_max},
                     Field::remark("(raise the limit of open files, ulimit -n or LimitNOFILE, to "
                                   "serve more)")}});
@@ -443,6 +457,8 @@ void Service::run(const std::atomic<StopRequest>& stop, const std::function<void
 std::vector<wire::CampaignStatus> Service::campaigns() const {
   return impl_->campaign_service().statuses(0, impl_->campaign_service().num_campaigns());
 }
+
+ServiceSnapshot Service::snapshot(SnapshotDepth depth) const { return impl_->snapshot(depth); }
 
 bool Service::is_done() const { return impl_->is_done(); }
 

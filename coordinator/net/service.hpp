@@ -15,6 +15,7 @@
 #include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/campaign_files.hpp"
+#include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/store/store_writer.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/wire/client_messages.hpp"
@@ -82,6 +83,8 @@ struct ServiceConfig {
   std::string version;  ///< Of the program, for people.
   DispatchConfig dispatch;
   WriterConfig writer;
+  /// Descriptors that the process needs for something else than workers, clients and files.
+  std::uint64_t num_descriptors_reserved = 0;
   std::optional<wire::FaultPlan> faults;  ///< Of workers' messages; for tests of this program.
 };
 
@@ -111,6 +114,8 @@ class Service {
 
   /// The campaigns, in the order in which they came.
   [[nodiscard]] std::vector<wire::CampaignStatus> campaigns() const;
+  /// Everything about it now, for other threads. To be called in its own thread.
+  [[nodiscard]] ServiceSnapshot snapshot(SnapshotDepth depth) const;
   /// True if every campaign is finished or cancelled, and no file waits to be served.
   [[nodiscard]] bool is_done() const;
   /// True if results were delivered and could not be stored, or a campaign cannot store any. To be

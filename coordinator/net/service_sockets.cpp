@@ -108,6 +108,7 @@ bool ServiceSockets::send_to_client(const std::string& routing_id, const std::st
 }
 
 void ServiceSockets::close() {
+  ++num_resets_;
   set_closing(true);
   wake_.notify();
   workers_->close();

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -44,6 +46,9 @@ class ServiceSockets {
   /// Who may connect; null if there are no keys.
   [[nodiscard]] Authenticator* authenticator() { return authenticator_.get(); }
 
+  /// How often the sockets were closed and bound again to free memory.
+  [[nodiscard]] std::uint64_t num_resets() const { return num_resets_; }
+
   /// Until a message, a handshake or a wake() is there, or the time is over.
   void wait(std::chrono::milliseconds duration_max);
   /// Ends a wait(); from any thread.
@@ -79,6 +84,7 @@ class ServiceSockets {
   std::condition_variable closed_;
   bool is_closing_ = false;
   std::vector<Event> notes_;
+  std::atomic<std::uint64_t> num_resets_ = 0;
   std::optional<MemoryGuard> guard_;  ///< Uses all the others: the last one.
 };
 

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "coordinator/dispatch/state.hpp"
+#include "proto/wire/client_messages.hpp"
+
+namespace proofmass::coordinator {
+
+/// What a worker does, as far as the coordinator knows. Each worker is in one of these states.
+enum class WorkerActivity : std::uint8_t {
+  computing,    ///< It holds runs.
+  idle,         ///< It holds none.
+  silent,       ///< It has said nothing for DispatchConfig::suspect_after: is lent nothing more.
+  quarantined,  ///< Too many workers crashed on its host: likewise.
+};
+
+inline constexpr std::array worker_activities{WorkerActivity::computing, WorkerActivity::idle,
+                                              WorkerActivity::silent, WorkerActivity::quarantined};
+
+[[nodiscard]] std::string_view name_of(WorkerActivity activity);  ///< `computing`, `idle`, ...
+
+/// A registered worker.
+struct WorkerSnapshot {
+  wire::WorkerStatus status = {};
+  WorkerActivity activity = WorkerActivity::idle;
+  double registered_s = 0.0;  ///< Since it registered with this coordinator.
+};
+
+/// A campaign, served or ended.
+struct CampaignSnapshot {
+  wire::CampaignStatus status = {};
+  std::filesystem::path file = {};  ///< Its database.
+  std::uint64_t num_waiting = 0;    ///< Results that were delivered and are not stored yet.
+};
+
+/// Everything about a service at one instant. It refers to nothing of the service, so that another
+/// thread may keep it.
+struct ServiceSnapshot {
+  wire::StatusReply status = {};                 ///< Without the campaigns, which are below.
+  std::vector<CampaignSnapshot> campaigns = {};  ///< All, in the order in which they came.
+  std::vector<WorkerSnapshot> workers = {};  ///< All, by number; none if they were not asked for.
+  /// Of each of worker_activities, whether or not `workers` lists them.
+  std::array<std::uint64_t, worker_activities.size()> num_workers_by_activity{};
+  std::uint64_t num_leases = 0;
+  std::uint64_t num_sockets_reset = 0;        ///< How often a lack of memory closed the sockets.
+  std::uint64_t num_messages_unsent = 0;      ///< To workers; dropped because they found no room.
+  std::uint64_t num_connections_refused = 0;  ///< Because descriptors were lacking.
+};
+
+/// How much a snapshot holds. A copy of 10,000 workers takes some milliseconds.
+enum class SnapshotDepth : std::uint8_t { without_workers, with_workers };
+
+/// The worker as a client sees it.
+[[nodiscard]] wire::WorkerStatus status_of(const State& state, WorkerId id, const Worker& worker,
+                                           TimePoint now);
+[[nodiscard]] WorkerActivity activity_of(const State& state, const Worker& worker, TimePoint now);
+
+/// Counts the workers by activity and, if they are asked for, copies them.
+void add_workers(const State& state, TimePoint now, SnapshotDepth depth, ServiceSnapshot& snapshot);
+
+}  // namespace proofmass::coordinator
