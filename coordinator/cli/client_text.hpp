@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "coordinator/report/status_json.hpp"
 #include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
@@ -25,14 +26,7 @@ namespace proofmass::coordinator {
 /// `hardy2013 active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left`, and the notes.
 [[nodiscard]] std::string campaign_line(const wire::CampaignStatus& campaign);
 
-// What a coordinator replied, for programs: a JSON object with stable keys, units in their names.
-// README.md lists them.
-
-/// Object on one line or on several; ends with the end of a line.
-enum class JsonLayout : std::uint8_t { one_line, indented };
-
-[[nodiscard]] std::string status_json(const wire::StatusReply& status, JsonLayout layout);
-[[nodiscard]] std::string workers_json(const wire::WorkersReply& workers);
+// What a coordinator replied, for programs; coordinator/report/status_json.hpp has the rest.
 
 /// @param action    What was asked for: `pause`, `submit`.
 /// @param campaign  Its name.

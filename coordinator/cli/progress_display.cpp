@@ -43,15 +43,6 @@ std::string figures(const wire::CampaignStatus& status) {
 
 }  // namespace
 
-std::string duration_text(double seconds) {
-  constexpr double longest_s = 9999.0 * 86400.0;
-  const auto total = static_cast<std::uint64_t>(std::ceil(std::clamp(seconds, 0.0, longest_s)));
-  if (total < 60) return fmt::format("{} s", total);
-  if (total < 3600) return fmt::format("{} min {} s", total / 60, total % 60);
-  if (total < 86400) return fmt::format("{} h {} min", total / 3600, total % 3600 / 60);
-  return fmt::format("{} d {} h", total / 86400, total % 86400 / 3600);
-}
-
 wire::CampaignStatus out_of(wire::CampaignStatus status, std::uint64_t num_runs) {
   if (num_runs <= status.num_runs) return status;
   status.num_runs = num_runs;

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "coordinator/report/text_cells.hpp"
 #include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
@@ -35,9 +36,6 @@ enum class DisplayMode : std::uint8_t {
 
 /// The same without a bar.
 [[nodiscard]] std::string progress_line(const wire::CampaignStatus& status);
-
-/// For people: `42 s`, `3 min 20 s`, `5 h 10 min`, `12 d 4 h`.
-[[nodiscard]] std::string duration_text(double seconds);
 
 /// Shows a campaign's progress and notes beside it.
 class ProgressDisplay {

@@ -67,4 +67,7 @@ enum class WideCell : std::uint8_t { shorten, keep };
 /// A number ≥ 0 given by somebody: the same without zeros that say nothing, `7.3`, `2000`.
 [[nodiscard]] std::string given_figure(double value);
 
+/// For people: `42 s`, `3 min 20 s`, `5 h 10 min`, `12 d 4 h`.
+[[nodiscard]] std::string duration_text(double seconds);
+
 }  // namespace proofmass::coordinator

@@ -1,0 +1,100 @@
+#include "coordinator/report/status_json.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using StatusJson = nlohmann::ordered_json;
+
+StatusJson factory_object(const wire::FactoryStatus& factory) {
+  const wire::FactoryReport& report = factory.report;
+  StatusJson json{{"name", report.name},
+                  {"batch_system", report.batch_system},
+                  {"phase", wire::name_of(report.phase)},
+                  {"num_wanted", report.num_wanted},
+                  {"num_registered", report.num_registered},
+                  {"num_queued", report.num_queued},
+                  {"wait_s", nullptr},
+                  {"reason", nullptr},
+                  {"interval_s", report.interval_s},
+                  {"silent_s", factory.silent_s},
+                  {"owner", nullptr}};
+  if (report.phase == wire::FactoryPhase::waiting) json["wait_s"] = report.wait_s;
+  if (!report.reason.empty()) json["reason"] = report.reason;
+  if (!factory.owner.empty()) json["owner"] = factory.owner;
+  return json;
+}
+
+}  // namespace
+
+std::string dumped(const nlohmann::ordered_json& json, JsonLayout layout) {
+  constexpr auto replace = nlohmann::ordered_json::error_handler_t::replace;
+  return json.dump(layout == JsonLayout::indented ? 2 : -1, ' ', false, replace) + "\n";
+}
+
+nlohmann::ordered_json campaign_object(const wire::CampaignStatus& campaign) {
+  StatusJson json{{"name", campaign.name},
+                  {"phase", wire::name_of(campaign.phase)},
+                  {"priority", campaign.priority},
+                  {"num_runs", campaign.num_runs},
+                  {"num_done", campaign.num_done},
+                  {"num_without_estimate", campaign.num_without_estimate},
+                  {"num_given_up", campaign.num_given_up},
+                  {"num_lent", campaign.num_lent},
+                  {"num_duplicates", campaign.num_duplicates},
+                  {"num_audited", campaign.num_audited},
+                  {"num_mismatches", campaign.num_mismatches},
+                  {"rate_hz", campaign.rate_hz},
+                  {"remaining_s", nullptr},
+                  {"storage_failure", nullptr},
+                  {"owner", nullptr}};
+  if (campaign.remaining_s) json["remaining_s"] = *campaign.remaining_s;
+  if (!campaign.storage_failure.empty()) json["storage_failure"] = campaign.storage_failure;
+  if (!campaign.owner.empty()) json["owner"] = campaign.owner;
+  return json;
+}
+
+nlohmann::ordered_json worker_object(const wire::WorkerStatus& worker) {
+  return {{"worker_id", worker.id.value},
+          {"name", worker.name},
+          {"host", worker.host},
+          {"process_id", worker.process_id},
+          {"num_slots", worker.num_slots},
+          {"num_lent", worker.num_lent},
+          {"num_results", worker.num_results},
+          {"silent_s", worker.silent_s},
+          {"is_quarantined", worker.is_quarantined}};
+}
+
+nlohmann::ordered_json status_object(const wire::StatusReply& status) {
+  StatusJson json{{"version", status.version},     {"model_version", status.model_version},
+                  {"uptime_s", status.uptime_s},   {"num_workers", status.num_workers},
+                  {"num_slots", status.num_slots}, {"campaigns", StatusJson::array()}};
+  for (const auto& campaign : status.campaigns)
+    json["campaigns"].push_back(campaign_object(campaign));
+  json["unserved_files"] = StatusJson::array();
+  for (const wire::UnservedFile& file : status.unserved_files) {
+    json["unserved_files"].push_back({{"file", file.file}, {"reason", file.reason}});
+  }
+  json["num_unserved_files"] = status.num_unserved_files;
+  json["quarantined_hosts"] = status.quarantined_hosts;
+  json["num_quarantined_hosts"] = status.num_quarantined_hosts;
+  json["factories"] = StatusJson::array();
+  for (const auto& factory : status.factories) json["factories"].push_back(factory_object(factory));
+  return json;
+}
+
+std::string status_json(const wire::StatusReply& status, JsonLayout layout) {
+  return dumped(status_object(status), layout);
+}
+
+std::string workers_json(const wire::WorkersReply& workers) {
+  StatusJson json{{"workers", StatusJson::array()}};
+  for (const auto& worker : workers.workers) json["workers"].push_back(worker_object(worker));
+  return dumped(json, JsonLayout::indented);
+}
+
+}  // namespace proofmass::coordinator

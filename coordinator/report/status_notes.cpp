@@ -1,0 +1,89 @@
+#include "coordinator/report/status_notes.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "coordinator/report/text_cells.hpp"
+#include "proto/text/visible_text.hpp"
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+
+std::string counted(std::uint64_t count, std::string_view thing) {
+  return fmt::format("{} {}{}", count, thing, count == 1 ? "" : "s");
+}
+
+std::string further_note(std::uint64_t count, std::size_t num_shown, std::string_view thing) {
+  if (count <= num_shown) return {};
+  return fmt::format("and {}", counted(count - num_shown, thing));
+}
+
+namespace {
+
+std::string comparison_note(const wire::CampaignStatus& campaign) {
+  const std::string compared =
+      counted(campaign.num_audited, "result") + " compared with a second computation: ";
+  if (campaign.num_mismatches == 0) return compared + "all equal";
+  return compared + fmt::format("{} differ (none may)", campaign.num_mismatches);
+}
+
+}  // namespace
+
+std::vector<std::string> notes_about(const wire::CampaignStatus& campaign) {
+  std::vector<std::string> notes;
+  if (!campaign.storage_failure.empty()) {
+    notes.push_back("nothing can be stored: " + wire::visible_text(campaign.storage_failure));
+  }
+  if (campaign.num_given_up > 0) {
+    notes.push_back(counted(campaign.num_given_up, "run") + " given up: too many workers crashed");
+  }
+  if (campaign.num_without_estimate > 0) {
+    notes.push_back(counted(campaign.num_without_estimate, "run") + " without an estimate");
+  }
+  if (campaign.num_audited > 0 || campaign.num_mismatches > 0) {
+    notes.push_back(comparison_note(campaign));
+  }
+  return notes;
+}
+
+namespace {
+
+std::string quarantine_note(const std::string& host) {
+  return fmt::format(
+      "host {0} is in quarantine: too many workers crashed there; `proofmass release {0}`", host);
+}
+
+std::string factory_note(const wire::FactoryStatus& factory) {
+  const wire::FactoryReport& report = factory.report;
+  std::string note =
+      fmt::format("factory {} ({}) {}: {} wanted, {} registered, {} in the queue", report.name,
+                  report.batch_system, wire::name_of(report.phase),
+                  counted(report.num_wanted, "worker"), report.num_registered, report.num_queued);
+  if (report.phase == wire::FactoryPhase::waiting) {
+    const double left_s = std::max(0.0, report.wait_s - factory.silent_s);
+    note += fmt::format("; tries again in {}", duration_text(left_s));
+  }
+  if (!report.reason.empty()) note += "; " + wire::visible_text(report.reason);
+  return note;
+}
+
+}  // namespace
+
+std::vector<std::string> service_notes(const wire::StatusReply& status) {
+  std::vector<std::string> notes;
+  const auto add = [&](std::string note) {
+    if (!note.empty()) notes.push_back(std::move(note));
+  };
+  for (const wire::UnservedFile& file : status.unserved_files) {
+    add("not served, tried again: " + wire::visible_text(file.reason));
+  }
+  add(further_note(status.num_unserved_files, status.unserved_files.size(), "more such file"));
+  for (const std::string& host : status.quarantined_hosts) add(quarantine_note(host));
+  add(further_note(status.num_quarantined_hosts, status.quarantined_hosts.size(),
+                   "more such host"));
+  for (const wire::FactoryStatus& factory : status.factories) add(factory_note(factory));
+  return notes;
+}
+
+}  // namespace proofmass::coordinator
