@@ -11,7 +11,7 @@ packages=(
   libzmq3-dev cppzmq-dev libsodium-dev libprotobuf-dev protobuf-compiler
   libsqlite3-dev sqlite3 libhdf5-dev
   libspdlog-dev libfmt-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev
-  libutfcpp-dev
+  libutfcpp-dev libboost-dev
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev qemu-user clang-format
@@ -20,8 +20,11 @@ test_packages=(
   sshfs openssh-sftp-server busybox-static
   slurmctld slurmd slurm-client slurm-wlm-basic-plugins munge
   groff-base zsh fish librsvg2-bin
+  chromium nodejs prometheus
   systemd systemd-container mmdebstrap dpkg-dev python3-yaml python3-distributed
 )
+# Node.js of other origin brings npm and excludes Debian's package of that name.
+command -v npm >/dev/null || test_packages+=(npm)
 # The fuzzer, the systems that the dispatch is measured beside, and what builds images.
 more_packages=(clang libclang-rt-14-dev parallel python3-ipyparallel buildah)
 

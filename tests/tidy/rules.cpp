@@ -58,6 +58,9 @@ std::string broken_layer(const SourceFile& file, const std::string& include) {
       !(matches(file.path, "^(coordinator/net|worker/net|proto/link)/") && is_source)) {
     return "ZeroMQ stays in */net/*.cpp and proto/link/*.cpp";
   }
+  if (matches(include, "^boost/(asio|beast)") && file.path != "coordinator/page/http_server.cpp") {
+    return "HTTP stays in coordinator/page/http_server.cpp";
+  }
   if (matches(include, "\\.pb\\.h$|^google/protobuf") && !(file.is_in("proto/wire") && is_source)) {
     return "Protobuf types stay in proto/wire/*.cpp";
   }

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "coordinator/store/campaign_history.hpp"
+
+namespace proofmass::coordinator {
+
+/// When runs were computed. The database knows the second in which their results came.
+struct PlacedAttempt {
+  const ComputedRuns* computed = nullptr;  ///< Borrowed.
+  double end_s = 0.0;                      ///< Since 1970; up to a second before the results came.
+
+  [[nodiscard]] double begin_s() const { return end_s - computed->compute_s; }
+};
+
+/// Attempts of a worker that do not overlap: about those of one of its threads.
+struct AttemptLane {
+  std::uint64_t worker_key = 0;
+  std::size_t number = 0;               ///< Of the worker's lanes, from 0.
+  std::vector<PlacedAttempt> attempts;  ///< The newest first.
+};
+
+/// The lanes of all attempts, by worker and number. They borrow from the attempts.
+[[nodiscard]] std::vector<AttemptLane> lanes_of(const RecentAttempts& attempts);
+
+/// A timeline of the newest attempts of each worker as SVG: at most half an hour and 24 lanes; how
+/// many lanes are left out is said.
+[[nodiscard]] std::string attempts_chart(const RecentAttempts& attempts);
+
+/// All of the attempts as Chrome trace events, a JSON object that Perfetto and chrome://tracing
+/// open: a process a worker, a thread a lane. Times are seconds since 1970, to the second: that is
+/// how the database keeps them.
+/// @param campaign  Name.
+[[nodiscard]] std::string attempts_trace(const RecentAttempts& attempts, std::string_view campaign);
+
+}  // namespace proofmass::coordinator

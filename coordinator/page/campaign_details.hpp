@@ -1,0 +1,122 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "coordinator/dispatch/state.hpp"
+#include "coordinator/store/campaign_history.hpp"
+
+namespace proofmass::coordinator {
+
+/// Bounds of what is read of a campaign for people.
+inline constexpr std::size_t page_events_max = 10'000;
+inline constexpr std::size_t page_attempts_max = 5'000;
+inline constexpr std::size_t page_losses_max = 1'000;
+inline constexpr std::size_t page_given_up_max = 100;
+
+/// What happened to a campaign, as its database has it.
+struct CampaignEvents {
+  std::deque<StoredEvent> events = {};  ///< In order; at most page_events_max.
+  std::vector<LossCount> losses = {};
+  std::vector<EndCount> ends = {};           ///< Without an estimate.
+  std::vector<GivenUpRecord> given_up = {};  ///< At most page_given_up_max.
+  RecentAttempts attempts = {};
+  std::string failure = {};  ///< Why the database could not be read; empty if it could.
+};
+
+/// What the results of a campaign yield.
+struct CampaignResults {
+  std::string html = {};       ///< Sections of a page.
+  std::uint64_t num_runs = 0;  ///< Finished runs when they were read, at least.
+  std::string failure = {};    ///< Likewise.
+};
+
+/// What was read, and when. Parts are null before they were read for the first time.
+struct CampaignDetails {
+  std::shared_ptr<const CampaignEvents> events = {};
+  std::shared_ptr<const CampaignResults> results = {};
+  TimePoint events_at{};
+  TimePoint results_at{};
+};
+
+/// What is known of a campaign without looking into its database.
+struct DetailSubject {
+  std::filesystem::path file = {};
+  std::uint64_t num_finished = 0;  ///< Results are read again only if this changes, ...
+  std::uint64_t num_given_up = 0;  ///< ... or this.
+};
+
+/// How campaign databases are read.
+struct DetailSources {
+  /// @param before  What was read of the file last time; null at first.
+  std::function<std::shared_ptr<const CampaignEvents>(const std::filesystem::path&,
+                                                      const CampaignEvents* before)>
+      read_events;
+  std::function<CampaignResults(const std::filesystem::path&)> read_results;
+};
+
+/// Those of a coordinator.
+[[nodiscard]] DetailSources database_sources();
+
+/// When something is read again whose reading ended at `ended_at` and took so much processor time:
+/// not before 2 s, nor before fifty times that time, so that reading takes 2 % of a core at most.
+[[nodiscard]] TimePoint next_reading(TimePoint ended_at, Duration cpu_time);
+
+/// Reads the databases of those campaigns at which somebody looks, in one thread of low priority.
+/// A campaign that nobody has asked for in the last minute is not read; at most 16 are kept.
+class DetailReader {
+ public:
+  static constexpr std::chrono::seconds wanted_for{60};
+  static constexpr std::size_t num_campaigns_max = 16;
+
+  explicit DetailReader(DetailSources sources);
+  ~DetailReader();  ///< Waits until what is being read is read.
+  DetailReader(const DetailReader&) = delete;
+  DetailReader& operator=(const DetailReader&) = delete;
+
+  /// What was read of the campaign so far; asks for more. Never waits.
+  [[nodiscard]] CampaignDetails details(const std::string& name, const DetailSubject& campaign,
+                                        TimePoint now);
+
+ private:
+  struct Watched {
+    DetailSubject campaign;
+    TimePoint asked_at;
+    CampaignDetails details;
+    TimePoint events_due{};
+    TimePoint results_due{};
+    std::optional<std::pair<std::uint64_t, std::uint64_t>> results_of;  ///< Counts when read.
+  };
+  enum class Part : std::uint8_t { events, results };
+  struct Choice {
+    std::string name;
+    Part part = Part::events;
+  };
+
+  void work();
+  /// What is to be read now, if anything, and otherwise when to look again.
+  [[nodiscard]] std::optional<Choice> choose(TimePoint now, TimePoint& look_again) const;
+  void read(const Choice& choice, std::unique_lock<std::mutex>& lock);
+  void forget_oldest();
+
+  DetailSources sources_;
+  std::mutex mutex_;  ///< For what follows.
+  std::condition_variable changed_;
+  std::map<std::string, Watched> watched_;  ///< By name.
+  bool is_stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace proofmass::coordinator

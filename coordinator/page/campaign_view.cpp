@@ -1,0 +1,164 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "coordinator/page/attempts_chart.hpp"
+#include "coordinator/page/page_views.hpp"
+#include "coordinator/report/status_notes.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "proto/text/visible_text.hpp"
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using wire::markup_text;
+
+/// Events that the page shows, page by page; the database and the API have more.
+constexpr std::size_t shown_events_max = 200;
+
+std::string fact(std::string_view name, std::string_view value) {
+  return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", name, value);
+}
+
+std::string facts_of(const CampaignSnapshot& campaign) {
+  const wire::CampaignStatus& status = campaign.status;
+  std::string html =
+      "<dl>" + fact("phase", wire::name_of(status.phase)) + fact("done", grouped(status.num_done)) +
+      fact("of runs", grouped(status.num_runs)) +
+      fact("runs/s", status.rate_hz > 0.0 ? measured_figure(status.rate_hz) : "–") +
+      fact("time left", status.remaining_s ? duration_text(*status.remaining_s) : "–") +
+      fact("lent", grouped(status.num_lent)) + fact("to be stored", grouped(campaign.num_waiting)) +
+      fact("priority", std::to_string(status.priority));
+  if (!status.owner.empty()) html += fact("owner", markup_text(status.owner));
+  return html + "</dl>\n";
+}
+
+std::string reading_line(TimePoint read_at, TimePoint now) {
+  return fmt::format("{} ago", duration_text(seconds(now - read_at)));
+}
+
+std::string results_of(const CampaignDetails& details, TimePoint now) {
+  if (details.results == nullptr) return "<p class=\"note\">The results are being read.</p>\n";
+  const CampaignResults& results = *details.results;
+  if (!results.failure.empty()) {
+    return notes_list({"the results cannot be shown: " + results.failure});
+  }
+  return fmt::format("<p class=\"note\">as of {} finished runs, read {}</p>\n{}",
+                     grouped(results.num_runs), reading_line(details.results_at, now),
+                     results.html);
+}
+
+std::string ends_table(const CampaignEvents& events) {
+  if (events.ends.empty()) return {};
+  std::vector<std::vector<std::string>> rows;
+  for (const EndCount& end : events.ends) {
+    rows.push_back({markup_text(end.status), markup_text(end.cause), markup_text(end.session),
+                    grouped(end.num_runs)});
+  }
+  return "<h3>Finished runs without an estimate</h3>\n" +
+         html_table("Finished runs without an estimate",
+                    {{"status", true}, {"cause", true}, {"session", true}, {"runs"}}, rows);
+}
+
+std::string given_up_table(const CampaignEvents& events, std::uint64_t num_given_up) {
+  if (events.given_up.empty()) return {};
+  std::vector<std::vector<std::string>> rows;
+  for (const GivenUpRecord& run : events.given_up) {
+    rows.push_back({std::to_string(run.run.value), markup_text(run.reason),
+                    grouped(run.num_attempts), markup_text(run.given_up_utc)});
+  }
+  std::string html =
+      "<h3>Runs that were given up</h3>\n" +
+      html_table("Runs that were given up",
+                 {{"run"}, {"reason", true}, {"attempts"}, {"given up", true}}, rows);
+  if (num_given_up > rows.size()) {
+    html += fmt::format("<p class=\"note\">showing the first {} of {}</p>\n", rows.size(),
+                        grouped(num_given_up));
+  }
+  return html;
+}
+
+std::string losses_table(const CampaignEvents& events) {
+  if (events.losses.empty()) return {};
+  std::vector<std::vector<std::string>> rows;
+  for (const LossCount& loss : events.losses) {
+    rows.push_back({markup_text(loss.reason), grouped(loss.num_losses), grouped(loss.num_runs),
+                    grouped(loss.num_blamed)});
+  }
+  return "<h3>Attempts without a result, lent again</h3>\n" +
+         html_table("Attempts without a result",
+                    {{"reason", true}, {"losses"}, {"runs"}, {"counted against runs"}}, rows);
+}
+
+std::string failures_of(const CampaignEvents& events, std::uint64_t num_given_up) {
+  const std::string tables =
+      ends_table(events) + given_up_table(events, num_given_up) + losses_table(events);
+  return "<section><h2>Failures</h2>\n" +
+         (tables.empty() ? "<p class=\"note\">none</p>\n" : tables) + "</section>\n";
+}
+
+std::string attempts_of(const CampaignEvents& events, const std::string& name) {
+  const RecentAttempts& attempts = events.attempts;
+  std::string html = "<section><h2>Attempts</h2>\n" + attempts_chart(attempts);
+  html += fmt::format(
+      "<p class=\"note\">A bar is the time that runs of one batch took; a line is a loss. "
+      "<a href=\"../api/campaigns/{}/trace\" download=\"{}-trace.json\">Trace for "
+      "Perfetto or chrome://tracing</a>",
+      percent_encoded(name), markup_text(name));
+  if (attempts.num_runs_left_out > 0) {
+    html += fmt::format("; without {} older runs", grouped(attempts.num_runs_left_out));
+  }
+  return html + "</p></section>\n";
+}
+
+std::string events_of(const CampaignEvents& events, const std::string& name, std::size_t page) {
+  const std::size_t count = std::min(events.events.size(), shown_events_max);
+  const PageOfList list = page_of_list(page, count, rows_per_page);
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = list.first; i < list.end; ++i) {
+    const StoredEvent& event = events.events[events.events.size() - 1 - i];
+    rows.push_back({markup_text(event.time_utc), markup_text(event.kind),
+                    "<span class=\"long\">" + markup_text(event.text) + "</span>"});
+  }
+  std::string html = "<section><h2>Events</h2>\n";
+  if (!rows.empty()) {
+    html += html_table("Events", {{"time", true}, {"event", true}, {"details", true}}, rows);
+  }
+  html += list_navigation(list, "events, the newest first", percent_encoded(name) + "?events=");
+  if (events.events.size() > count) {
+    html += fmt::format(
+        "<p class=\"note\">{} older events: <a href=\"../api/campaigns/{}/events\">as JSON</a>, or "
+        "the table <code>event</code> of the database</p>\n",
+        grouped(events.events.size() - count), percent_encoded(name));
+  }
+  return html + "</section>\n";
+}
+
+std::string history_of(const CampaignDetails& details, const CampaignSnapshot& campaign,
+                       const PageRequest& request) {
+  if (details.events == nullptr) return "<p class=\"note\">The database is being read.</p>\n";
+  const CampaignEvents& events = *details.events;
+  std::string html;
+  if (!events.failure.empty()) {
+    html += notes_list({"the database cannot be read now: " + events.failure});
+  }
+  const std::string& name = campaign.status.name;
+  return html + failures_of(events, campaign.status.num_given_up) + attempts_of(events, name) +
+         events_of(events, name, request.number("events").value_or(1));
+}
+
+}  // namespace
+
+PageContent campaign_page(const CampaignSnapshot& campaign, const CampaignDetails& details,
+                          const PageRequest& request, TimePoint now) {
+  const wire::CampaignStatus& status = campaign.status;
+  return {.title = "Campaign " + status.name,
+          .to_root = "../",
+          .live = fmt::format("<p class=\"large\">{}</p>\n",
+                              progress_bar(status.num_done, status.num_runs, "progress")) +
+                  facts_of(campaign) + notes_list(notes_about(status)) + results_of(details, now) +
+                  history_of(details, campaign, request)};
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,313 @@
+#include "coordinator/page/http_server.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <pthread.h>
+#include <signal.h>
+
+#include <array>
+#include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http.hpp>
+#include <exception>
+#include <thread>
+
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = boost::beast::http;
+using asio::ip::tcp;
+using ErrorCode = boost::system::error_code;
+
+constexpr std::chrono::milliseconds ask_again_after(20);
+constexpr std::chrono::milliseconds accept_again_after(100);
+constexpr std::chrono::milliseconds farewell_max(1000);
+constexpr std::size_t farewell_size_max = 65'536;
+constexpr int backlog = 128;
+
+/// What the connections of a server share.
+struct Shared {
+  HttpConfig config;
+  HttpServer::Handler handler;
+  std::atomic<std::uint64_t> num_connections = 0;
+  std::atomic<std::uint64_t> num_requests = 0;
+  std::atomic<std::uint64_t> num_refused = 0;
+};
+
+HttpAnswer plain_answer(unsigned status, std::string_view text) {
+  return {.status = status,
+          .content_type = "text/plain; charset=utf-8",
+          .body = fmt::format("{}\n", text)};
+}
+
+HttpAnswer content_refusal() { return plain_answer(413, "a request must have no content"); }
+
+/// A connection, from its first byte to its end. Its pending operation owns it.
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  Session(tcp::socket socket, Shared& shared)
+      : shared_(shared), stream_(std::move(socket)), timer_(stream_.get_executor()) {
+    ++shared_.num_connections;
+  }
+  ~Session() { --shared_.num_connections; }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  /// Waits for the first byte of a request, then for the whole request.
+  void begin(std::chrono::milliseconds first_byte_max) {
+    if (buffer_.size() > 0) return read();
+    stream_.expires_after(first_byte_max);
+    stream_.async_read_some(buffer_.prepare(1024),
+                            [self = shared_from_this()](ErrorCode error, std::size_t size) {
+                              if (error) return;
+                              self->buffer_.commit(size);
+                              self->read();
+                            });
+  }
+
+ private:
+  using Parser = http::request_parser<http::empty_body>;
+
+  void read() {
+    parser_.emplace();
+    parser_->header_limit(static_cast<std::uint32_t>(shared_.config.header_size_max));
+    stream_.expires_after(shared_.config.request_duration_max);
+    http::async_read_header(
+        stream_, buffer_, *parser_,
+        [self = shared_from_this()](ErrorCode error, std::size_t) { self->take(error); });
+  }
+
+  void take(ErrorCode error) {
+    if (error == http::error::end_of_stream || error == beast::error::timeout) return;
+    is_last_ = true;  // Unless all is well.
+    if (error == http::error::header_limit || error == http::error::buffer_overflow) {
+      return answer(plain_answer(431, "the header is too large"));
+    }
+    if (error == http::error::body_limit) return answer(content_refusal());
+    if (error && error.category() != http::make_error_code(http::error::bad_method).category()) {
+      return;  // The connection broke.
+    }
+    if (error) return answer(plain_answer(400, "this is no request of HTTP/1.1"));
+    ++shared_.num_requests;
+    const auto& message = parser_->get();
+    is_head_ = message.method() == http::verb::head;
+    if (!is_head_ && message.method() != http::verb::get) {
+      HttpAnswer refusal = plain_answer(405, "only GET and HEAD are answered");
+      refusal.headers.emplace_back("Allow", "GET, HEAD");
+      return answer(std::move(refusal));
+    }
+    if (!parser_->is_done()) return answer(content_refusal());
+    is_last_ = !message.keep_alive();
+    note_request();
+    ask();
+  }
+
+  void note_request() {
+    const auto& message = parser_->get();
+    const auto text = [&](http::field field) { return std::string(message[field]); };
+    request_ = {.target = std::string(message.target()),
+                .host = text(http::field::host),
+                .authorization = text(http::field::authorization),
+                .cookie = text(http::field::cookie)};
+    // Two of them may be meant differently by whoever passes the request on.
+    if (message.count(http::field::host) > 1) request_.host.clear();
+    asked_at_ = std::chrono::steady_clock::now();
+  }
+
+  void ask() {
+    using Patience = HttpServer::Patience;
+    const auto waited = std::chrono::steady_clock::now() - asked_at_;
+    const Patience patience = waited < shared_.config.wait_max ? Patience::left : Patience::over;
+    std::optional<HttpAnswer> given;
+    try {
+      given = shared_.handler(request_, patience);
+    } catch (const std::exception&) {
+      given = plain_answer(500, "the page could not be made");
+    }
+    if (given) return answer(std::move(*given));
+    if (patience == Patience::over) return answer(plain_answer(503, "no answer in time"));
+    stream_.expires_never();
+    timer_.expires_after(ask_again_after);
+    timer_.async_wait([self = shared_from_this()](ErrorCode error) {
+      if (!error) self->ask();
+    });
+  }
+
+  void answer(HttpAnswer given) {
+    response_ = {};
+    response_.version(11);
+    response_.result(given.status);
+    response_.set(http::field::content_type, given.content_type);
+    for (const auto& [name, value] : shared_.config.headers) response_.set(name, value);
+    for (const auto& [name, value] : given.headers) response_.set(name, value);
+    response_.keep_alive(!is_last_);
+    response_.content_length(given.body.size());
+    if (!is_head_) response_.body() = std::move(given.body);
+    stream_.expires_after(shared_.config.answer_duration_max);
+    serializer_.emplace(response_);
+    const auto then = [self = shared_from_this()](ErrorCode error, std::size_t) {
+      if (!error) self->go_on();
+    };
+    if (is_head_) return http::async_write_header(stream_, *serializer_, then);
+    http::async_write(stream_, *serializer_, then);
+  }
+
+  void go_on() {
+    if (!is_last_) return begin(shared_.config.idle_max);
+    // A connection that is closed with bytes unread is reset, and the client may not see the
+    // answer.
+    ErrorCode ignored;
+    stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    stream_.expires_after(farewell_max);
+    read_away(0);
+  }
+
+  void read_away(std::size_t size_so_far) {
+    if (size_so_far > farewell_size_max) return;
+    stream_.async_read_some(asio::buffer(discarded_), [self = shared_from_this(), size_so_far](
+                                                          ErrorCode error, std::size_t size) {
+      if (!error) self->read_away(size_so_far + size);
+    });
+  }
+
+  Shared& shared_;
+  beast::tcp_stream stream_;
+  asio::steady_timer timer_;
+  beast::flat_buffer buffer_{65'536};  // At most; of one request and the beginning of the next.
+  std::optional<Parser> parser_;
+  HttpRequest request_;
+  std::chrono::steady_clock::time_point asked_at_;
+  http::response<http::string_body> response_;
+  std::optional<http::response_serializer<http::string_body>> serializer_;
+  std::array<char, 4096> discarded_{};
+  bool is_head_ = false;
+  bool is_last_ = false;  ///< The connection ends after this answer.
+};
+
+[[noreturn]] void refuse_address(const HttpConfig& config, const std::string& reason) {
+  throw Error(fmt::format("page = {}:{} ({})", config.host, config.port, reason));
+}
+
+tcp::endpoint endpoint_of(const HttpConfig& config) {
+  ErrorCode error;
+  const asio::ip::address address = asio::ip::make_address(config.host, error);
+  if (error) refuse_address(config, "is no address");
+  return {address, config.port};
+}
+
+/// No program that this process starts may keep the connection open. The library does not say so
+/// when it makes the descriptor.
+void keep_from_children(int descriptor) { (void)fcntl(descriptor, F_SETFD, FD_CLOEXEC); }
+
+/// Signals are for the other threads of the process.
+class BlockedSignals {
+ public:
+  BlockedSignals() {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~BlockedSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  BlockedSignals(const BlockedSignals&) = delete;
+  BlockedSignals& operator=(const BlockedSignals&) = delete;
+
+ private:
+  sigset_t before_{};
+};
+
+}  // namespace
+
+class HttpServer::Impl {
+ public:
+  Impl(const HttpConfig& config, Handler handler) : acceptor_(context_), pause_(context_) {
+    shared_.config = config;
+    shared_.handler = std::move(handler);
+    listen();
+    const BlockedSignals blocked;
+    thread_ = std::thread([this] { context_.run(); });
+  }
+  ~Impl() {
+    context_.stop();
+    thread_.join();
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] HttpCounts counts() const {
+    return {.num_connections = shared_.num_connections,
+            .num_requests = shared_.num_requests,
+            .num_refused = shared_.num_refused};
+  }
+
+ private:
+  void listen() {
+    const tcp::endpoint endpoint = endpoint_of(shared_.config);
+    try {
+      acceptor_.open(endpoint.protocol());
+      keep_from_children(acceptor_.native_handle());
+      acceptor_.set_option(tcp::acceptor::reuse_address(true));
+      acceptor_.bind(endpoint);
+      acceptor_.listen(backlog);
+      port_ = acceptor_.local_endpoint().port();
+    } catch (const boost::system::system_error& error) {
+      refuse_address(shared_.config, error.code().message());
+    }
+    accept();
+  }
+
+  void accept() {
+    acceptor_.async_accept([this](ErrorCode error, tcp::socket socket) {
+      if (!error) serve(std::move(socket));
+      if (!error || error == asio::error::connection_aborted) return accept();
+      // No descriptor is left: the next attempt would fail at once.
+      pause_.expires_after(accept_again_after);
+      pause_.async_wait([this](ErrorCode stopped) {
+        if (!stopped) accept();
+      });
+    });
+  }
+
+  void serve(tcp::socket socket) {
+    keep_from_children(socket.native_handle());
+    if (shared_.num_connections < shared_.config.num_connections_max) {
+      std::make_shared<Session>(std::move(socket), shared_)
+          ->begin(shared_.config.request_duration_max);
+      return;
+    }
+    ++shared_.num_refused;
+    constexpr std::string_view refusal =
+        "HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nRetry-After: 5\r\n"
+        "Connection: close\r\n\r\n";
+    ErrorCode ignored;
+    socket.non_blocking(true, ignored);
+    socket.write_some(asio::buffer(refusal), ignored);
+  }
+
+  Shared shared_;
+  asio::io_context context_{1};  // Ends before what its connections use.
+  tcp::acceptor acceptor_;
+  asio::steady_timer pause_;
+  std::uint16_t port_ = 0;
+  std::thread thread_;
+};
+
+HttpServer::HttpServer(const HttpConfig& config, Handler handler)
+    : impl_(std::make_unique<Impl>(config, std::move(handler))) {}
+
+HttpServer::~HttpServer() = default;
+
+std::uint16_t HttpServer::port() const { return impl_->port(); }
+
+HttpCounts HttpServer::counts() const { return impl_->counts(); }
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,274 @@
+#include "coordinator/page/metrics.hpp"
+
+#include <dirent.h>
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <sstream>
+#include <string_view>
+
+#include "proto/text/visible_text.hpp"
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+enum class MetricKind : std::uint8_t { counter, gauge };
+
+/// Writes metrics one after the other.
+class MetricWriter {
+ public:
+  /// Begins a metric, whose samples follow.
+  void begin(std::string_view name, MetricKind kind, std::string_view help) {
+    name_ = name;
+    text_ += fmt::format("# HELP {} {}\n# TYPE {} {}\n", name, help, name,
+                         kind == MetricKind::counter ? "counter" : "gauge");
+  }
+  /// @param labels  `{campaign="a"}`, or nothing.
+  template <typename Number>
+  void add(const std::string& labels, Number value) {
+    text_ += fmt::format("{}{} {}\n", name_, labels, value);
+  }
+  template <typename Number>
+  void write(std::string_view name, MetricKind kind, std::string_view help, Number value) {
+    begin(name, kind, help);
+    add("", value);
+  }
+  [[nodiscard]] std::string take() { return std::move(text_); }
+
+ private:
+  std::string name_;
+  std::string text_;
+};
+
+std::string campaign_label(const wire::CampaignStatus& campaign) {
+  return fmt::format("{{campaign=\"{}\"}}", label_value(campaign.name));
+}
+
+/// Those with metrics of their own: campaigns that may still change first, then the newest ones.
+std::vector<const CampaignSnapshot*> measured_campaigns(const ServiceSnapshot& service) {
+  std::vector<const CampaignSnapshot*> campaigns;
+  const auto add_those = [&](bool is_over) {
+    for (auto item = service.campaigns.rbegin(); item != service.campaigns.rend(); ++item) {
+      if (campaigns.size() == campaigns_with_metrics_max) return;
+      if (has_ended(item->status.phase) == is_over) campaigns.push_back(&*item);
+    }
+  };
+  add_those(false);
+  add_those(true);
+  return campaigns;
+}
+
+/// A metric of each campaign.
+struct CampaignMetric {
+  std::string_view name;
+  MetricKind kind;
+  std::string_view help;
+  std::function<double(const CampaignSnapshot&)> value;
+};
+
+const std::vector<CampaignMetric>& campaign_metrics() {
+  using Snapshot = const CampaignSnapshot&;
+  const auto number = [](std::uint64_t count) { return static_cast<double>(count); };
+  static const std::vector<CampaignMetric> metrics{
+      {"proofmass_runs_wanted", MetricKind::gauge, "Runs that the campaign is to have.",
+       [=](Snapshot of) { return number(of.status.num_runs); }},
+      {"proofmass_runs_finished_total", MetricKind::counter, "Runs whose results are on disk.",
+       [=](Snapshot of) { return number(of.status.num_done); }},
+      {"proofmass_runs_without_estimate_total", MetricKind::counter,
+       "Runs that ended without an estimate since the coordinator started.",
+       [=](Snapshot of) { return number(of.status.num_without_estimate); }},
+      {"proofmass_runs_given_up", MetricKind::gauge, "Runs that crashed too many workers.",
+       [=](Snapshot of) { return number(of.status.num_given_up); }},
+      {"proofmass_runs_lent", MetricKind::gauge, "Runs that workers hold.",
+       [=](Snapshot of) { return number(of.status.num_lent); }},
+      {"proofmass_results_waiting", MetricKind::gauge, "Results that are to be stored.",
+       [=](Snapshot of) { return number(of.num_waiting); }},
+      {"proofmass_results_duplicate_total", MetricKind::counter, "Results that were there already.",
+       [=](Snapshot of) { return number(of.status.num_duplicates); }},
+      {"proofmass_results_compared_total", MetricKind::counter,
+       "Results that were compared with a second computation.",
+       [=](Snapshot of) { return number(of.status.num_audited); }},
+      {"proofmass_results_different_total", MetricKind::counter,
+       "Compared results that differ; must be 0.",
+       [=](Snapshot of) { return number(of.status.num_mismatches); }},
+      {"proofmass_storage_failed", MetricKind::gauge, "1 while nothing can be stored.",
+       [](Snapshot of) { return of.status.storage_failure.empty() ? 0.0 : 1.0; }},
+      {"proofmass_campaign_priority", MetricKind::gauge,
+       "Runs of a higher priority are lent first.",
+       [](Snapshot of) { return static_cast<double>(of.status.priority); }},
+  };
+  return metrics;
+}
+
+void write_campaigns(const ServiceSnapshot& service, MetricWriter& writer) {
+  const std::vector<const CampaignSnapshot*> campaigns = measured_campaigns(service);
+  for (const CampaignMetric& metric : campaign_metrics()) {
+    writer.begin(metric.name, metric.kind, metric.help);
+    for (const CampaignSnapshot* campaign : campaigns) {
+      writer.add(campaign_label(campaign->status), metric.value(*campaign));
+    }
+  }
+  writer.write("proofmass_campaigns_left_out", MetricKind::gauge,
+               "Campaigns without metrics of their own.",
+               service.campaigns.size() - campaigns.size());
+  writer.begin("proofmass_campaigns", MetricKind::gauge, "Campaigns by phase.");
+  using wire::CampaignPhase;
+  for (const CampaignPhase phase : {CampaignPhase::active, CampaignPhase::paused,
+                                    CampaignPhase::finished, CampaignPhase::cancelled}) {
+    const auto count = std::ranges::count_if(
+        service.campaigns, [&](const auto& one) { return one.status.phase == phase; });
+    writer.add(fmt::format("{{phase=\"{}\"}}", wire::name_of(phase)), count);
+  }
+}
+
+void write_service(const ServiceSnapshot& service, MetricWriter& writer) {
+  const wire::StatusReply& status = service.status;
+  writer.begin("proofmass_info", MetricKind::gauge, "1, with the versions as labels.");
+  writer.add(fmt::format("{{version=\"{}\",model=\"{}\"}}", label_value(status.version),
+                         label_value(status.model_version)),
+             1);
+  writer.begin("proofmass_workers", MetricKind::gauge, "Registered workers by state.");
+  for (std::size_t i = 0; i < worker_activities.size(); ++i) {
+    writer.add(fmt::format("{{state=\"{}\"}}", name_of(worker_activities[i])),
+               service.num_workers_by_activity[i]);
+  }
+  const auto gauge = [&](std::string_view name, std::string_view help, std::uint64_t value) {
+    writer.write(name, MetricKind::gauge, help, value);
+  };
+  const auto counter = [&](std::string_view name, std::string_view help, std::uint64_t value) {
+    writer.write(name, MetricKind::counter, help, value);
+  };
+  gauge("proofmass_worker_slots", "Runs that all workers compute at a time.", status.num_slots);
+  gauge("proofmass_leases", "Leases of runs to workers.", service.num_leases);
+  gauge("proofmass_quarantined_hosts", "Hosts that are lent nothing.",
+        status.num_quarantined_hosts);
+  gauge("proofmass_unserved_files", "Files of the directory that cannot be served.",
+        status.num_unserved_files);
+  gauge("proofmass_factories", "Factories that report.", status.factories.size());
+  counter("proofmass_sockets_reset_total", "How often a lack of memory closed the sockets.",
+          service.num_sockets_reset);
+  counter("proofmass_messages_unsent_total", "Messages to workers that found no room.",
+          service.num_messages_unsent);
+  counter("proofmass_connections_refused_total", "Connections for which descriptors were lacking.",
+          service.num_connections_refused);
+}
+
+void write_page(const HttpCounts& page, double age_s, MetricWriter& writer) {
+  writer.write("proofmass_page_connections", MetricKind::gauge, "Open connections of the page.",
+               page.num_connections);
+  writer.write("proofmass_page_requests_total", MetricKind::counter, "Requests to the page.",
+               page.num_requests);
+  writer.write("proofmass_page_connections_refused_total", MetricKind::counter,
+               "Connections to the page that were one too many.", page.num_refused);
+  writer.write("proofmass_snapshot_age_seconds", MetricKind::gauge,
+               "Age of what these figures say of the service.", age_s);
+}
+
+void write_process(const ProcessFigures& process, MetricWriter& writer) {
+  writer.write("process_cpu_seconds_total", MetricKind::counter, "Processor time in seconds.",
+               process.cpu_s);
+  writer.write("process_resident_memory_bytes", MetricKind::gauge, "Resident memory in bytes.",
+               process.resident_size);
+  writer.write("process_virtual_memory_bytes", MetricKind::gauge, "Virtual memory in bytes.",
+               process.virtual_size);
+  writer.write("process_open_fds", MetricKind::gauge, "Open descriptors.", process.num_descriptors);
+  writer.write("process_max_fds", MetricKind::gauge, "Descriptors that may be open.",
+               process.num_descriptors_max);
+  writer.write("process_start_time_seconds", MetricKind::gauge,
+               "When the process started, in seconds since 1970.", process.start_unix_s);
+}
+
+/// The fields of /proc/self/stat behind the name of the program, which may hold anything.
+std::vector<double> stat_fields() {
+  std::ifstream file("/proc/self/stat");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::size_t end = text.rfind(") ");
+  if (end == std::string::npos) return {};
+  std::istringstream words(text.substr(end + 4));  // Behind the state as well.
+  return {std::istream_iterator<double>(words), {}};
+}
+
+double boot_unix_s() {
+  std::ifstream file("/proc/stat");
+  std::string line;
+  while (std::getline(file, line)) {
+    if (line.starts_with("btime ")) return std::stod(line.substr(6));
+  }
+  return 0.0;
+}
+
+std::uint64_t num_open_descriptors() {
+  DIR* const directory = opendir("/proc/self/fd");
+  if (directory == nullptr) return 0;
+  std::uint64_t count = 0;
+  while (const dirent* entry = readdir(directory)) {
+    if (entry->d_name[0] != '.') ++count;
+  }
+  closedir(directory);
+  return count - 1;  // Without the directory itself.
+}
+
+}  // namespace
+
+std::string label_value(std::string_view text) {
+  std::string value;
+  while (!text.empty()) {
+    const wire::Character character = wire::first_character(text);
+    const std::string_view bytes = text.substr(0, character.size);
+    if (!character.is_valid) {
+      value += "\uFFFD";
+    } else if (bytes == "\\" || bytes == "\"") {
+      value += fmt::format("\\{}", bytes);
+    } else {
+      value += bytes == "\n" ? std::string_view("\\n") : bytes;
+    }
+    text.remove_prefix(character.size);
+  }
+  return value;
+}
+
+ProcessFigures process_figures() {
+  // Places behind the state: proc(5) counts them from 4 on.
+  constexpr std::size_t start_ticks = 22 - 4, virtual_size = 23 - 4, resident_pages = 24 - 4;
+  ProcessFigures figures;
+  rusage usage{};
+  if (getrusage(RUSAGE_SELF, &usage) == 0) {
+    const auto time_s = [](const timeval& time) {
+      return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+    };
+    figures.cpu_s = time_s(usage.ru_utime) + time_s(usage.ru_stime);
+  }
+  const std::vector<double> fields = stat_fields();
+  if (fields.size() > resident_pages) {
+    const auto page_size = static_cast<double>(sysconf(_SC_PAGESIZE));
+    figures.virtual_size = static_cast<std::uint64_t>(fields[virtual_size]);
+    figures.resident_size = static_cast<std::uint64_t>(fields[resident_pages] * page_size);
+    figures.start_unix_s =
+        boot_unix_s() + fields[start_ticks] / static_cast<double>(sysconf(_SC_CLK_TCK));
+  }
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) == 0) figures.num_descriptors_max = limit.rlim_cur;
+  figures.num_descriptors = num_open_descriptors();
+  return figures;
+}
+
+std::string metrics_text(const PageSnapshot& snapshot, TimePoint now, const ProcessFigures& process,
+                         const HttpCounts& page) {
+  MetricWriter writer;
+  const double age_s = seconds(now - snapshot.taken_at);
+  write_service(snapshot.service, writer);
+  writer.write("proofmass_uptime_seconds", MetricKind::gauge, "Since the coordinator started.",
+               snapshot.service.status.uptime_s + age_s);
+  write_campaigns(snapshot.service, writer);
+  write_page(page, age_s, writer);
+  write_process(process, writer);
+  return writer.take();
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,158 @@
+#include "coordinator/page/page_access.hpp"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <sodium.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "core/error.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t token_size_min = 16;
+constexpr std::size_t token_size_max = 256;
+constexpr std::string_view cookie_name = "proofmass_page";
+constexpr std::string_view cookie_purpose = "proofmass page cookie";
+
+using TokenDigest = std::array<unsigned char, 32>;
+
+TokenDigest digest_of(std::string_view text, std::string_view purpose) {
+  TokenDigest digest{};
+  crypto_generichash(digest.data(), digest.size(),
+                     reinterpret_cast<const unsigned char*>(text.data()), text.size(),
+                     reinterpret_cast<const unsigned char*>(purpose.data()), purpose.size());
+  return digest;
+}
+
+std::string hexadecimal(const TokenDigest& digest) {
+  std::string text;
+  for (const unsigned char byte : digest) text += fmt::format("{:02x}", byte);
+  return text;
+}
+
+[[noreturn]] void refuse_token_file(const std::filesystem::path& file, std::string_view rule) {
+  throw Error(fmt::format("page token file = {} ({})", file.string(), rule));
+}
+
+/// Closes a descriptor at the end of a scope.
+struct TokenFile {
+  int descriptor;
+  ~TokenFile() { ::close(descriptor); }
+};
+
+void check_token_file(const std::filesystem::path& file, int descriptor) {
+  struct stat status {};
+  if (::fstat(descriptor, &status) != 0) refuse_token_file(file, std::strerror(errno));
+  if (!S_ISREG(status.st_mode)) refuse_token_file(file, "must be a regular file");
+  if (status.st_uid != ::geteuid()) {
+    refuse_token_file(file, "must be owned by the user who runs this program");
+  }
+  if ((status.st_mode & 077) == 0) return;
+  refuse_token_file(file, fmt::format("mode {:04o}; must be readable by its owner alone: chmod 600",
+                                      status.st_mode & 07777));
+}
+
+/// The value of our cookie in a header `a=b; c=d`; empty if it is not there.
+std::string_view cookie_in(std::string_view header) {
+  while (!header.empty()) {
+    const std::size_t end = header.find(';');
+    std::string_view part = header.substr(0, end);
+    header = end == std::string_view::npos ? std::string_view() : header.substr(end + 1);
+    part.remove_prefix(std::min(part.find_first_not_of(' '), part.size()));
+    if (part.starts_with(cookie_name) && part.substr(cookie_name.size()).starts_with('=')) {
+      return part.substr(cookie_name.size() + 1);
+    }
+  }
+  return {};
+}
+
+std::string_view bearer_in(std::string_view header) {
+  constexpr std::string_view scheme = "Bearer ";
+  return header.starts_with(scheme) ? header.substr(scheme.size()) : std::string_view();
+}
+
+}  // namespace
+
+PageToken PageToken::read(const std::filesystem::path& file) {
+  const TokenFile opened{::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
+  if (opened.descriptor < 0) refuse_token_file(file, std::strerror(errno));
+  check_token_file(file, opened.descriptor);
+  std::string text(token_size_max + 2, '\0');
+  const ssize_t size = ::read(opened.descriptor, text.data(), text.size());
+  if (size < 0) refuse_token_file(file, std::strerror(errno));
+  text.resize(static_cast<std::size_t>(size));
+  if (text.ends_with('\n')) text.pop_back();
+  const bool is_visible = std::ranges::all_of(text, [](char c) { return c > ' ' && c <= '~'; });
+  if (!is_visible || text.size() < token_size_min || text.size() > token_size_max) {
+    refuse_token_file(file, fmt::format("must hold {} to {} visible ASCII characters and nothing "
+                                        "else",
+                                        token_size_min, token_size_max));
+  }
+  return PageToken(text);
+}
+
+PageToken::PageToken(std::string_view text)
+    : digest_(digest_of(text, "")), cookie_value_(hexadecimal(digest_of(text, cookie_purpose))) {}
+
+bool PageToken::is(std::string_view text) const {
+  const TokenDigest other = digest_of(text, "");
+  return sodium_memcmp(digest_.data(), other.data(), digest_.size()) == 0;
+}
+
+bool PageToken::is_cookie(std::string_view value) const {
+  return value.size() == cookie_value_.size() &&
+         sodium_memcmp(value.data(), cookie_value_.data(), value.size()) == 0;
+}
+
+std::optional<HttpAnswer> PageAccess::refusal_of(const HttpRequest& request) const {
+  if (!token_) {
+    if (is_loopback_host(request.host)) return std::nullopt;
+    return HttpAnswer{.status = 403,
+                      .content_type = "text/plain; charset=utf-8",
+                      .body =
+                          "Host: must be localhost or a loopback address, unless the "
+                          "coordinator has a --page-token-file\n"};
+  }
+  if (token_->is(bearer_in(request.authorization))) return std::nullopt;
+  if (token_->is_cookie(cookie_in(request.cookie))) return std::nullopt;
+  return HttpAnswer{
+      .status = 401,
+      .body =
+          "<!DOCTYPE html><html lang=\"en\"><head><title>Proofmass</title></head><body><main>"
+          "<h1>A token is needed</h1><p>Open this page once with <code>?token=</code> and the "
+          "content of the page token file at the end of its address. If you have just done so "
+          "by a link from another page, <a href=\"./\">open it again</a>.</p></main></body>"
+          "</html>\n",
+      .headers = {{"WWW-Authenticate", "Bearer"}}};
+}
+
+// The cookie has no path: the browser takes that of the page, also behind a proxy.
+std::optional<HttpAnswer> PageAccess::welcome(std::string_view given_token) const {
+  if (!token_ || !token_->is(given_token)) return std::nullopt;
+  return HttpAnswer{.status = 303,
+                    .content_type = "text/plain; charset=utf-8",
+                    .body = "the token is right\n",
+                    .headers = {{"Location", "./"},
+                                {"Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict",
+                                                           cookie_name, token_->cookie_value())}}};
+}
+
+bool is_loopback_host(std::string_view host) {
+  if (host.starts_with('[')) return host == "[::1]" || host.starts_with("[::1]:");
+  const std::string name(host.substr(0, host.find(':')));
+  if (name == "localhost") return true;
+  in_addr ipv4{};
+  constexpr std::uint32_t loopback_network = 127;
+  return inet_pton(AF_INET, name.c_str(), &ipv4) == 1 &&
+         ntohl(ipv4.s_addr) >> 24 == loopback_network;
+}
+
+}  // namespace proofmass::coordinator

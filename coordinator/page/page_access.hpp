@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "coordinator/page/http_server.hpp"
+
+namespace proofmass::coordinator {
+
+/// A secret that a page asks for. Only its digests are kept, so that it reaches no log.
+class PageToken {
+ public:
+  /// Reads a file that holds nothing but the token: 16 to 256 visible ASCII characters.
+  /// @throws Error reading `page token file = PATH (rule)` if it cannot be read, is somebody
+  ///         else's, can be read by others than its owner, or holds no such token. No message has
+  ///         the token.
+  [[nodiscard]] static PageToken read(const std::filesystem::path& file);
+
+  /// @pre The text is as read() wants it.
+  explicit PageToken(std::string_view text);
+
+  /// Takes the same time for each text of one length.
+  [[nodiscard]] bool is(std::string_view text) const;
+  /// What a browser keeps instead of the token, which cannot be found out from it.
+  [[nodiscard]] const std::string& cookie_value() const { return cookie_value_; }
+  [[nodiscard]] bool is_cookie(std::string_view value) const;
+
+ private:
+  std::array<unsigned char, 32> digest_{};
+  std::string cookie_value_;
+};
+
+/// Who may see a page.
+class PageAccess {
+ public:
+  /// Without a token, the page is for this machine alone: the header Host must name loopback. Else
+  /// a page of the internet could have its own name point to this machine and read along (DNS
+  /// rebinding). With a token the name does not matter, as the browser sends the cookie only to the
+  /// name that set it.
+  explicit PageAccess(std::optional<PageToken> token) : token_(std::move(token)) {}
+
+  [[nodiscard]] bool has_token() const { return token_.has_value(); }
+
+  /// Why a request is not answered; nothing if it is.
+  [[nodiscard]] std::optional<HttpAnswer> refusal_of(const HttpRequest& request) const;
+
+  /// The answer to a visit with the token in the address: sets the cookie and leads to the address
+  /// without it. Nothing if the token is another one.
+  [[nodiscard]] std::optional<HttpAnswer> welcome(std::string_view given_token) const;
+
+ private:
+  std::optional<PageToken> token_;
+};
+
+/// True if the header names this machine: `localhost`, an address 127.x.x.x or `[::1]`, with a port
+/// or without.
+[[nodiscard]] bool is_loopback_host(std::string_view host);
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace proofmass::coordinator {
+
+/// The parts of a page of the live page.
+struct PageContent {
+  std::string title = {};    ///< Plain text; becomes the heading, too.
+  std::string to_root = "";  ///< From the page's address to the first page: ``, or `../`.
+  std::string form = "";     ///< Above `live`; is not exchanged. Markup, as the next.
+  std::string live = {};     ///< What the script exchanges every two seconds.
+};
+
+/// A whole page.
+[[nodiscard]] std::string whole_page(const PageContent& content);
+
+/// Part of a list that is shown: pages count from 1.
+struct PageOfList {
+  std::size_t page = 1;
+  std::size_t num_pages = 1;
+  std::size_t first = 0;  ///< Index of the first item shown.
+  std::size_t end = 0;    ///< One beyond the last.
+  std::size_t count = 0;  ///< Of all.
+};
+
+/// The page that was asked for, or the last one if there are not so many.
+[[nodiscard]] PageOfList page_of_list(std::size_t page, std::size_t count,
+                                      std::size_t num_per_page);
+
+/// `showing 1–50 of 10,000 workers`, and links to the first, previous, next and last page.
+/// @param address  Of a page, without its number: `workers?sort=name&amp;page=`; markup.
+[[nodiscard]] std::string list_navigation(const PageOfList& list, std::string_view things,
+                                          std::string_view address);
+
+/// A column of a table. Text stands left, numbers right.
+struct HtmlColumn {
+  std::string title = {};  ///< Markup.
+  bool is_text = false;
+  std::string sort = "";  ///< `ascending` or `descending` if the rows are in this column's order.
+};
+
+/// A table that scrolls by itself where the window is narrow.
+/// @param name  For screen readers; plain text.
+/// @param rows  Markup; the first cell of each is its heading.
+[[nodiscard]] std::string html_table(std::string_view name, const std::vector<HtmlColumn>& columns,
+                                     const std::vector<std::vector<std::string>>& rows);
+
+/// A bar with its percentage in words.
+[[nodiscard]] std::string progress_bar(std::uint64_t count, std::uint64_t total,
+                                       std::string_view name);
+
+/// `1,234,567`
+[[nodiscard]] std::string grouped(std::uint64_t count);
+
+/// A list of notes; nothing if there are none.
+[[nodiscard]] std::string notes_list(const std::vector<std::string>& notes);
+
+/// The style sheet and the script of all pages.
+[[nodiscard]] std::string_view page_style();
+[[nodiscard]] std::string_view page_script();
+
+}  // namespace proofmass::coordinator

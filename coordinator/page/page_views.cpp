@@ -1,0 +1,250 @@
+#include "coordinator/page/page_views.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <tuple>
+
+#include "coordinator/report/status_notes.hpp"
+#include "coordinator/report/text_cells.hpp"
+#include "proto/text/visible_text.hpp"
+#include "proto/wire/names.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using wire::CampaignStatus;
+using wire::markup_text;
+
+std::string campaign_link(const CampaignStatus& campaign) {
+  return fmt::format("<a href=\"campaigns/{}\">{}</a>", percent_encoded(campaign.name),
+                     markup_text(campaign.name));
+}
+
+std::string rate_cell(const CampaignStatus& campaign) {
+  return campaign.rate_hz > 0.0 ? measured_figure(campaign.rate_hz) : "–";
+}
+
+std::string time_left_cell(const CampaignStatus& campaign) {
+  return campaign.remaining_s ? duration_text(*campaign.remaining_s) : "–";
+}
+
+std::string title_of(const PageSnapshot& snapshot) {
+  const wire::StatusReply& status = snapshot.service.status;
+  return fmt::format("<p>Proofmass {}, model {}, up {}</p>\n", markup_text(status.version),
+                     markup_text(status.model_version), duration_text(status.uptime_s));
+}
+
+/// The line that screen readers announce when it changes: it must not change often.
+std::string summary_line(const PageSnapshot& snapshot) {
+  std::uint64_t num_active = 0;
+  for (const CampaignSnapshot& campaign : snapshot.service.campaigns) {
+    if (campaign.status.phase == wire::CampaignPhase::active) ++num_active;
+  }
+  const wire::StatusReply& status = snapshot.service.status;
+  return fmt::format("<p aria-live=\"polite\">{} to compute, {} with {}</p>\n",
+                     counted(num_active, "campaign"), counted(status.num_workers, "worker"),
+                     counted(status.num_slots, "slot"));
+}
+
+std::string age_line(TimePoint taken_at, TimePoint now) {
+  const double age_s = seconds(now - taken_at);
+  if (age_s < 10.0) return {};
+  return notes_list(
+      {fmt::format("the coordinator has not answered for {}: this is what it said "
+                   "then",
+                   duration_text(age_s))});
+}
+
+std::size_t page_number(const PageRequest& request, const std::string& parameter) {
+  return request.number(parameter).value_or(1);
+}
+
+std::vector<std::string> overview_notes(const ServiceSnapshot& service, const PageOfList& list) {
+  std::vector<std::string> notes = service_notes(service.status);
+  for (std::size_t i = list.first; i < list.end; ++i) {
+    const CampaignStatus& campaign = service.campaigns[i].status;
+    for (const std::string& note : notes_about(campaign)) {
+      notes.push_back(campaign.name + ": " + note);
+    }
+  }
+  return notes;
+}
+
+// Workers.
+
+int place_of(WorkerActivity activity) {
+  switch (activity) {
+    case WorkerActivity::quarantined:
+      return 0;
+    case WorkerActivity::silent:
+      return 1;
+    case WorkerActivity::computing:
+      return 2;
+    case WorkerActivity::idle:
+      return 3;
+  }
+  return 3;
+}
+
+bool comes_before(const WorkerSnapshot& a, const WorkerSnapshot& b, WorkerOrder order) {
+  const auto key = [](const WorkerSnapshot& worker) {
+    return std::tie(worker.status.name, worker.status.id.value);
+  };
+  if (order == WorkerOrder::state && a.activity != b.activity) {
+    return place_of(a.activity) < place_of(b.activity);
+  }
+  if (order == WorkerOrder::throughput) {
+    const double a_rate = results_per_h(a), b_rate = results_per_h(b);
+    if (a_rate > b_rate || a_rate < b_rate) return a_rate > b_rate;
+  }
+  return key(a) < key(b);
+}
+
+std::string sort_link(const WorkerChoice& choice, WorkerOrder order, std::string_view text) {
+  if (choice.order == order) return std::string(text);
+  return fmt::format("<a href=\"workers?sort={}&amp;filter={}\">{}</a>", name_of(order),
+                     percent_encoded(choice.filter), text);
+}
+
+std::vector<HtmlColumn> worker_columns_of(const WorkerChoice& choice) {
+  const auto column = [&](WorkerOrder order, std::string_view text, std::string_view direction) {
+    return HtmlColumn{.title = sort_link(choice, order, text),
+                      .is_text = order != WorkerOrder::throughput,
+                      .sort = choice.order == order ? std::string(direction) : std::string()};
+  };
+  return {column(WorkerOrder::name, "worker", "ascending"),
+          {"host", true},
+          column(WorkerOrder::state, "state", "ascending"),
+          {"slots"},
+          {"lent"},
+          {"results"},
+          column(WorkerOrder::throughput, "results/h", "descending"),
+          {"heard"},
+          {"process"}};
+}
+
+std::vector<std::string> worker_row(const WorkerSnapshot& worker) {
+  const wire::WorkerStatus& status = worker.status;
+  return {markup_text(status.name),
+          markup_text(status.host),
+          std::string(name_of(worker.activity)),
+          grouped(status.num_slots),
+          grouped(status.num_lent),
+          grouped(status.num_results),
+          measured_figure(results_per_h(worker)),
+          fmt::format("{} ago", duration_text(status.silent_s)),
+          std::to_string(status.process_id)};
+}
+
+std::string worker_counts(const ServiceSnapshot& service) {
+  std::string html = "<dl>";
+  for (std::size_t i = 0; i < worker_activities.size(); ++i) {
+    html += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", name_of(worker_activities[i]),
+                        grouped(service.num_workers_by_activity[i]));
+  }
+  return html + "</dl>\n";
+}
+
+std::string filter_form(const WorkerChoice& choice) {
+  return fmt::format(
+      "<form action=\"workers\" method=\"get\" role=\"search\"><label for=\"filter\">Name or host "
+      "contains</label> <input id=\"filter\" name=\"filter\" value=\"{}\" maxlength=\"128\">"
+      "<input type=\"hidden\" name=\"sort\" value=\"{}\"> <button>Show</button></form>\n",
+      markup_text(choice.filter), name_of(choice.order));
+}
+
+}  // namespace
+
+std::string_view name_of(WorkerOrder order) {
+  switch (order) {
+    case WorkerOrder::name:
+      return "name";
+    case WorkerOrder::state:
+      return "state";
+    case WorkerOrder::throughput:
+      return "throughput";
+  }
+  return "name";
+}
+
+WorkerChoice worker_choice(const PageRequest& request) {
+  constexpr std::size_t filter_size_max = 128;
+  WorkerChoice choice{.filter = request.text("filter").substr(0, filter_size_max),
+                      .page = page_number(request, "page")};
+  for (const WorkerOrder order : {WorkerOrder::state, WorkerOrder::throughput}) {
+    if (request.text("sort") == name_of(order)) choice.order = order;
+  }
+  return choice;
+}
+
+double results_per_h(const WorkerSnapshot& worker) {
+  if (worker.registered_s <= 0.0) return 0.0;
+  return 3600.0 * static_cast<double>(worker.status.num_results) / worker.registered_s;
+}
+
+ChosenWorkers choose_workers(const std::vector<WorkerSnapshot>& workers,
+                             const WorkerChoice& choice) {
+  std::vector<const WorkerSnapshot*> chosen;
+  chosen.reserve(workers.size());
+  for (const WorkerSnapshot& worker : workers) {
+    const bool is_wanted = choice.filter.empty() ||
+                           worker.status.name.find(choice.filter) != std::string::npos ||
+                           worker.status.host.find(choice.filter) != std::string::npos;
+    if (is_wanted) chosen.push_back(&worker);
+  }
+  const PageOfList list = page_of_list(choice.page, chosen.size(), rows_per_page);
+  const auto before = [&](const WorkerSnapshot* a, const WorkerSnapshot* b) {
+    return comes_before(*a, *b, choice.order);
+  };
+  // Only those of the page are sorted.
+  const auto first = chosen.begin() + static_cast<std::ptrdiff_t>(list.first);
+  const auto end = chosen.begin() + static_cast<std::ptrdiff_t>(list.end);
+  std::nth_element(chosen.begin(), first, chosen.end(), before);
+  std::partial_sort(first, end, chosen.end(), before);
+  return {.list = list, .workers = {first, end}};
+}
+
+PageContent overview_page(const PageSnapshot& snapshot, const PageRequest& request, TimePoint now) {
+  const std::vector<CampaignSnapshot>& campaigns = snapshot.service.campaigns;
+  const PageOfList list =
+      page_of_list(page_number(request, "page"), campaigns.size(), rows_per_page);
+  const std::vector<HtmlColumn> columns{{"campaign", true}, {"phase", true}, {"progress", true},
+                                        {"done"},           {"runs"},        {"runs/s"},
+                                        {"time left"},      {"priority"}};
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = list.first; i < list.end; ++i) {
+    const CampaignStatus& campaign = campaigns[i].status;
+    rows.push_back(
+        {campaign_link(campaign), std::string(wire::name_of(campaign.phase)),
+         progress_bar(campaign.num_done, campaign.num_runs, "progress of " + campaign.name),
+         grouped(campaign.num_done), grouped(campaign.num_runs), rate_cell(campaign),
+         time_left_cell(campaign), std::to_string(campaign.priority)});
+  }
+  const std::string table = rows.empty() ? "" : html_table("Campaigns", columns, rows);
+  return {.title = "Campaigns",
+          .live = title_of(snapshot) + summary_line(snapshot) + age_line(snapshot.taken_at, now) +
+                  notes_list(overview_notes(snapshot.service, list)) + table +
+                  list_navigation(list, "campaigns", "./?page=")};
+}
+
+PageContent workers_page(const PageSnapshot& snapshot, const PageRequest& request, TimePoint now) {
+  const WorkerChoice choice = worker_choice(request);
+  const ChosenWorkers chosen = choose_workers(snapshot.service.workers, choice);
+  std::vector<std::vector<std::string>> rows;
+  for (const WorkerSnapshot* worker : chosen.workers) rows.push_back(worker_row(*worker));
+  const std::string table =
+      rows.empty() ? "" : html_table("Workers", worker_columns_of(choice), rows);
+  const std::string address =
+      fmt::format("workers?sort={}&amp;filter={}&amp;page=", name_of(choice.order),
+                  percent_encoded(choice.filter));
+  return {.title = "Workers",
+          .form = filter_form(choice),
+          .live = summary_line(snapshot) + age_line(snapshot.taken_at, now) +
+                  worker_counts(snapshot.service) + table +
+                  list_navigation(chosen.list, "workers", address) +
+                  "<p class=\"note\">results/h: since the worker registered with this coordinator"
+                  "</p>\n"};
+}
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,119 @@
+#include "coordinator/page/campaign_details.hpp"
+
+#include <gmock/gmock.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace proofmass::coordinator {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(NextReading, ComesAfterTwoSecondsOrFiftyTimesWhatTheLastTook) {
+  const TimePoint ended{1000s};
+  EXPECT_EQ(next_reading(ended, 0s), ended + 2s);
+  EXPECT_EQ(next_reading(ended, 40ms), ended + 2s);
+  EXPECT_EQ(next_reading(ended, 100ms), ended + 5s);
+  EXPECT_EQ(next_reading(ended, 8s), ended + 400s);
+}
+
+/// A reader whose databases are played; counts how often each is read.
+class DetailReaderTest : public ::testing::Test {
+ protected:
+  DetailSources sources() {
+    return {.read_events =
+                [this](const std::filesystem::path& file, const CampaignEvents* before) {
+                  note("events " + file.string());
+                  auto events = std::make_shared<CampaignEvents>();
+                  events->events = before == nullptr ? decltype(events->events){} : before->events;
+                  events->events.push_back({.id = events->events.size() + 1});
+                  return events;
+                },
+            .read_results =
+                [this](const std::filesystem::path& file) {
+                  note("results " + file.string());
+                  return CampaignResults{.html = "<p>" + file.string() + "</p>"};
+                }};
+  }
+  void note(const std::string& what) {
+    const std::lock_guard lock(mutex_);
+    ++counts_[what];
+    changed_.notify_all();
+  }
+  void wait_for(const std::string& what, int count) {
+    std::unique_lock lock(mutex_);
+    EXPECT_TRUE(changed_.wait_for(lock, 20s, [&] { return counts_[what] >= count; })) << what;
+  }
+  int count_of(const std::string& what) {
+    const std::lock_guard lock(mutex_);
+    return counts_[what];
+  }
+  /// Asks until both parts are there.
+  static CampaignDetails whole(DetailReader& reader, const std::string& name,
+                               const DetailSubject& subject) {
+    const auto end = std::chrono::steady_clock::now() + 20s;
+    while (std::chrono::steady_clock::now() < end) {
+      CampaignDetails details = reader.details(name, subject, std::chrono::steady_clock::now());
+      if (details.events != nullptr && details.results != nullptr) return details;
+      std::this_thread::yield();
+    }
+    ADD_FAILURE() << "the details never came";
+    return {};
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::map<std::string, int> counts_;
+};
+
+TEST_F(DetailReaderTest, ReadsACampaignAtWhichSomebodyLooks) {
+  DetailReader reader(sources());
+  const CampaignDetails first =
+      reader.details("a", {.file = "a.db"}, std::chrono::steady_clock::now());
+  EXPECT_EQ(first.events, nullptr);  // It never waits.
+  const CampaignDetails details = whole(reader, "a", {.file = "a.db"});
+  EXPECT_EQ(details.results->html, "<p>a.db</p>");
+  EXPECT_EQ(details.events->events.size(), 1U);
+}
+
+TEST_F(DetailReaderTest, ReadsEventsFurtherAndResultsOnlyIfThereAreMore) {
+  DetailReader reader(sources());
+  const DetailSubject subject{.file = "a.db", .num_finished = 5};
+  (void)whole(reader, "a", subject);
+  wait_for("events a.db", 2);  // Two seconds later.
+  EXPECT_EQ(count_of("results a.db"), 1);
+  (void)reader.details("a", {.file = "a.db", .num_finished = 6}, std::chrono::steady_clock::now());
+  wait_for("results a.db", 2);
+  EXPECT_GE(whole(reader, "a", subject).events->events.size(), 2U);
+}
+
+TEST_F(DetailReaderTest, BeginsAnewWithAnotherFileOfThatName) {
+  DetailReader reader(sources());
+  (void)whole(reader, "a", {.file = "a.db"});
+  EXPECT_EQ(whole(reader, "a", {.file = "b.db"}).results->html, "<p>b.db</p>");
+}
+
+TEST_F(DetailReaderTest, KeepsABoundedNumberOfCampaigns) {
+  DetailReader reader(sources());
+  (void)whole(reader, "first", {.file = "first.db"});
+  for (std::size_t i = 0; i < DetailReader::num_campaigns_max; ++i) {
+    const std::string name = "c" + std::to_string(i);
+    (void)whole(reader, name, {.file = name + ".db"});
+  }
+  const auto now = std::chrono::steady_clock::now();
+  EXPECT_EQ(reader.details("first", {.file = "first.db"}, now).events, nullptr);
+}
+
+TEST(DatabaseSources, SayWhyAFileCannotBeRead) {
+  const DetailSources sources = database_sources();
+  EXPECT_THAT(sources.read_events("/nowhere/a.db", nullptr)->failure,
+              testing::HasSubstr("/nowhere/a.db"));
+  EXPECT_THAT(sources.read_results("/nowhere/a.db").failure, testing::HasSubstr("/nowhere/a.db"));
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

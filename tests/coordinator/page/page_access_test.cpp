@@ -1,0 +1,133 @@
+#include "coordinator/page/page_access.hpp"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "core/error.hpp"
+#include "tests/coordinator/cli/temporary_directory.hpp"
+#include "tests/coordinator/page/page_fixture.hpp"
+#include "tests/message_of.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using test::page_secret;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+std::string header_of(const HttpAnswer& answer, const std::string& name) {
+  for (const auto& [key, value] : answer.headers) {
+    if (key == name) return value;
+  }
+  return "";
+}
+
+TEST(LoopbackHost, IsThisMachineByNameOrAddress) {
+  for (const std::string host :
+       {"localhost", "localhost:5557", "127.0.0.1", "127.1.2.3:80", "[::1]", "[::1]:5557"}) {
+    EXPECT_TRUE(is_loopback_host(host)) << host;
+  }
+  for (const std::string host :
+       {"", "evil.example", "localhost.evil.example", "127.0.0.1.evil.example", "1.2.3.4",
+        "[::1].evil.example", "[::2]", "[::1]x", "evil.example:5557", "127.0.0.1@evil.example"}) {
+    EXPECT_FALSE(is_loopback_host(host)) << host;
+  }
+}
+
+TEST(PageWithoutToken, IsForThisMachineAlone) {
+  const PageAccess access{std::nullopt};
+  EXPECT_FALSE(access.refusal_of({.host = "localhost:5557"}).has_value());
+  const auto refusal = access.refusal_of({.host = "evil.example:5557"});
+  ASSERT_TRUE(refusal.has_value());
+  EXPECT_EQ(refusal->status, 403U);
+  EXPECT_FALSE(access.welcome(page_secret).has_value());
+}
+
+TEST(PageWithToken, AsksForIt) {
+  const PageAccess access{PageToken(page_secret)};
+  const auto status = [&](const HttpRequest& request) {
+    const auto refusal = access.refusal_of(request);
+    return refusal ? refusal->status : 200U;
+  };
+  EXPECT_EQ(status({.host = "localhost"}), 401U);
+  EXPECT_EQ(status({.authorization = "Bearer " + page_secret}), 200U);
+  EXPECT_EQ(status({.authorization = "Bearer " + page_secret + "x"}), 401U);
+  EXPECT_EQ(status({.authorization = "Bearer "}), 401U);
+  EXPECT_EQ(status({.authorization = page_secret}), 401U);
+  EXPECT_EQ(status({.cookie = "proofmass_page=" + page_secret}),
+            401U);  // The cookie is another word.
+  EXPECT_EQ(status({.cookie = "proofmass_page="}), 401U);
+}
+
+TEST(PageWithToken, GivesACookieForIt) {
+  const PageAccess access{PageToken(page_secret)};
+  EXPECT_FALSE(access.welcome("another-secret-of-20").has_value());
+  EXPECT_FALSE(access.welcome("").has_value());
+  const auto welcome = access.welcome(page_secret);
+  ASSERT_TRUE(welcome.has_value());
+  EXPECT_EQ(welcome->status, 303U);
+  EXPECT_EQ(header_of(*welcome, "Location"), "./");
+  const std::string cookie = header_of(*welcome, "Set-Cookie");
+  EXPECT_THAT(cookie, HasSubstr("; HttpOnly; SameSite=Strict"));
+  EXPECT_THAT(cookie, Not(HasSubstr(page_secret)));
+  const std::string pair = cookie.substr(0, cookie.find(';'));
+  EXPECT_FALSE(access.refusal_of({.cookie = pair}).has_value());
+  EXPECT_FALSE(access.refusal_of({.cookie = "a=b; " + pair + "; c=d"}).has_value());
+  EXPECT_TRUE(access.refusal_of({.cookie = "x" + pair}).has_value());
+  const PageAccess other{PageToken("another-secret-of-20")};
+  EXPECT_TRUE(other.refusal_of({.cookie = pair}).has_value());
+}
+
+class TokenFileTest : public ::testing::Test {
+ protected:
+  std::filesystem::path write(const std::string& text, std::filesystem::perms mode) {
+    const std::filesystem::path file = directory_ / "token";
+    std::ofstream(file, std::ios::binary) << text;
+    std::filesystem::permissions(file, mode);
+    return file;
+  }
+  /// Of the error that begins with the name of the file.
+  std::string rule_for(const std::filesystem::path& file) {
+    const std::string message = test::message_of<Error>([&] { (void)PageToken::read(file); });
+    EXPECT_THAT(message, testing::StartsWith("page token file = " + file.string() + " ("));
+    EXPECT_THAT(message, Not(HasSubstr("secret")));
+    return message;
+  }
+  static constexpr auto owner_only =
+      std::filesystem::perms::owner_read | std::filesystem::perms::owner_write;
+
+ private:
+  test::TemporaryDirectory directory_;
+};
+
+TEST_F(TokenFileTest, HoldsTheToken) {
+  EXPECT_TRUE(PageToken::read(write(page_secret, owner_only)).is(page_secret));
+  EXPECT_TRUE(PageToken::read(write(page_secret + "\n", owner_only)).is(page_secret));
+  EXPECT_FALSE(PageToken::read(write(page_secret, owner_only)).is(page_secret + "\n"));
+}
+
+TEST_F(TokenFileTest, MustBePrivate) {
+  EXPECT_THAT(rule_for(write(page_secret, owner_only | std::filesystem::perms::group_read)),
+              HasSubstr("mode 0640; must be readable by its owner alone: chmod 600"));
+}
+
+TEST_F(TokenFileTest, MustHoldEnoughAndNothingElse) {
+  const std::string rule = "must hold 16 to 256 visible ASCII characters and nothing else";
+  for (const std::string& text :
+       {std::string(), std::string("secret-of-15-si"), "secret with blank" + page_secret,
+        page_secret + "\n\n", page_secret + "\r\n", page_secret + "é",
+        "secret" + std::string(251, 'x')}) {
+    EXPECT_THAT(rule_for(write(text, owner_only)), HasSubstr(rule)) << text;
+  }
+}
+
+TEST_F(TokenFileTest, MustBeThere) {
+  EXPECT_THAT(rule_for("/nowhere/token"), HasSubstr("No such file or directory"));
+  EXPECT_THAT(rule_for("/dev"), HasSubstr("must be a regular file"));
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

@@ -1,0 +1,214 @@
+#include "coordinator/page/page_views.hpp"
+
+#include <gmock/gmock.h>
+
+#include <random>
+#include <string>
+
+#include "coordinator/page/page_json.hpp"
+#include "tests/coordinator/page/page_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using test::campaign_snapshot;
+using test::hostile_name;
+using test::worker_snapshot;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// All that a page has, as if it were one.
+std::string text_of(const PageContent& content) { return whole_page(content); }
+
+/// Nothing that a browser could take for markup or a script, and no control character.
+void expect_harmless(const std::string& html) {
+  EXPECT_THAT(html, Not(HasSubstr("<script>alert")));
+  EXPECT_THAT(html, Not(HasSubstr("\x1b")));
+  EXPECT_THAT(html, Not(HasSubstr("\xff")));
+  EXPECT_THAT(html, Not(HasSubstr("alert(\"1\")")));
+}
+
+TEST(PageOfList, IsWithinTheList) {
+  const PageOfList second = page_of_list(2, 120, 50);
+  EXPECT_EQ(second.first, 50U);
+  EXPECT_EQ(second.end, 100U);
+  EXPECT_EQ(second.num_pages, 3U);
+  EXPECT_EQ(page_of_list(99, 120, 50).page, 3U);
+  EXPECT_EQ(page_of_list(99, 120, 50).end, 120U);
+  EXPECT_EQ(page_of_list(0, 120, 50).page, 1U);
+  EXPECT_EQ(page_of_list(1, 0, 50).num_pages, 1U);
+  EXPECT_EQ(page_of_list(1, 0, 50).end, 0U);
+}
+
+TEST(ListNavigation, SaysWhatIsShownOfAll) {
+  EXPECT_THAT(list_navigation(page_of_list(1, 10'000, 50), "workers", "workers?page="),
+              HasSubstr("showing 1–50 of 10,000 workers"));
+  const std::string last =
+      list_navigation(page_of_list(200, 10'000, 50), "workers", "workers?page=");
+  EXPECT_THAT(last, HasSubstr("showing 9,951–10,000 of 10,000 workers"));
+  EXPECT_THAT(last, HasSubstr("<a href=\"workers?page=199\">previous</a>"));
+  EXPECT_THAT(last, HasSubstr("<span class=\"off\">next</span>"));
+  EXPECT_THAT(list_navigation(page_of_list(1, 0, 50), "workers", ""), HasSubstr("no workers"));
+}
+
+TEST(GroupedNumber, HasACommaEveryThreeDigits) {
+  EXPECT_EQ(grouped(0), "0");
+  EXPECT_EQ(grouped(999), "999");
+  EXPECT_EQ(grouped(1000), "1,000");
+  EXPECT_EQ(grouped(1234567), "1,234,567");
+}
+
+TEST(OverviewPage, ShowsEachCampaign) {
+  PageSnapshot snapshot;
+  snapshot.service.campaigns = {campaign_snapshot("hardy2013", 42, 100)};
+  snapshot.service.campaigns[0].status.rate_hz = 0.5;
+  snapshot.service.campaigns[0].status.remaining_s = 116.0;
+  const std::string html = overview_page(snapshot, {}, {}).live;
+  EXPECT_THAT(html, HasSubstr("<a href=\"campaigns/hardy2013\">hardy2013</a>"));
+  EXPECT_THAT(html, HasSubstr("<progress max=\"100\" value=\"42\""));
+  EXPECT_THAT(html, HasSubstr("42&nbsp;%"));
+  EXPECT_THAT(html, HasSubstr("<td>0.500</td><td>1 min 56 s</td>"));
+}
+
+TEST(OverviewPage, ShowsFiftyCampaignsAtATime) {
+  PageSnapshot snapshot;
+  for (int i = 0; i < 60; ++i) {
+    snapshot.service.campaigns.push_back(campaign_snapshot("c" + std::to_string(i), 0, 1));
+  }
+  const std::string second = overview_page(snapshot, *parse_target("/?page=2"), {}).live;
+  EXPECT_THAT(second, HasSubstr(">c50</a>"));
+  EXPECT_THAT(second, Not(HasSubstr(">c49</a>")));
+  EXPECT_THAT(second, HasSubstr("showing 51–60 of 60 campaigns"));
+}
+
+TEST(OverviewPage, SaysWhenTheCoordinatorIsSilent) {
+  const PageSnapshot snapshot{.service = {}, .taken_at = TimePoint{}};
+  const auto html_after = [&](std::chrono::seconds age) {
+    return overview_page(snapshot, {}, TimePoint{} + age).live;
+  };
+  EXPECT_THAT(html_after(std::chrono::seconds(5)), Not(HasSubstr("has not answered")));
+  EXPECT_THAT(html_after(std::chrono::seconds(12)), HasSubstr("has not answered for 12 s"));
+}
+
+TEST(Pages, ShowHostileTextAsText) {
+  PageSnapshot snapshot;
+  snapshot.service.campaigns = {campaign_snapshot(hostile_name, 1, 2)};
+  snapshot.service.campaigns[0].status.owner = hostile_name;
+  snapshot.service.campaigns[0].status.storage_failure = hostile_name;
+  snapshot.service.status.unserved_files = {{.file = hostile_name, .reason = hostile_name}};
+  snapshot.service.status.num_unserved_files = 1;
+  snapshot.service.workers = {worker_snapshot(hostile_name, 1)};
+  expect_harmless(text_of(overview_page(snapshot, {}, {})));
+  expect_harmless(text_of(workers_page(
+      snapshot, *parse_target("/workers?filter=" + percent_encoded(hostile_name)), {})));
+
+  auto events = std::make_shared<CampaignEvents>();
+  events->events.push_back(
+      {.id = 1, .time_utc = hostile_name, .kind = hostile_name, .text = hostile_name});
+  events->losses = {{.reason = hostile_name, .num_losses = 1, .num_runs = 2, .num_blamed = 0}};
+  events->ends = {{.status = hostile_name, .cause = hostile_name, .session = hostile_name}};
+  events->given_up = {{.run = {3}, .reason = hostile_name, .given_up_utc = hostile_name}};
+  events->attempts.computed = {{.runs = {{4}}, .worker_key = 1, .received_unix_s = 1000}};
+  events->attempts.lost = {{.runs = {{5}, 1}, .worker_key = 1, .reason = hostile_name}};
+  events->attempts.workers = {{.key = 1, .name = hostile_name, .host = hostile_name}};
+  events->failure = hostile_name;
+  const CampaignDetails details{.events = events, .results = nullptr};
+  const std::string html =
+      text_of(campaign_page(snapshot.service.campaigns[0], details, {}, TimePoint{}));
+  expect_harmless(html);
+  EXPECT_THAT(html, HasSubstr("&lt;script&gt;"));
+}
+
+TEST(ChosenWorkers, AreThoseOfOnePageInOrder) {
+  const std::vector<WorkerSnapshot> workers = test::many_workers(120);
+  const ChosenWorkers second = choose_workers(workers, {.page = 2});
+  ASSERT_EQ(second.workers.size(), rows_per_page);
+  EXPECT_EQ(second.workers.front()->status.name, "w00050");
+  EXPECT_EQ(second.workers.back()->status.name, "w00099");
+  EXPECT_EQ(choose_workers(workers, {.page = 3}).workers.size(), 20U);
+}
+
+// Sorting only what is shown must give the same as sorting all.
+TEST(ChosenWorkers, HaveEachWorkerOnceOverAllPages) {
+  std::vector<WorkerSnapshot> workers = test::many_workers(333);
+  std::mt19937 random(1);
+  std::shuffle(workers.begin(), workers.end(), random);
+  for (WorkerSnapshot& worker : workers) {
+    worker.activity = worker_activities[worker.status.id.value % worker_activities.size()];
+  }
+  for (const WorkerOrder order : {WorkerOrder::name, WorkerOrder::state, WorkerOrder::throughput}) {
+    std::set<std::string> names;
+    for (std::size_t page = 1; page <= 7; ++page) {
+      for (const auto* worker : choose_workers(workers, {.order = order, .page = page}).workers) {
+        names.insert(worker->status.name);
+      }
+    }
+    EXPECT_EQ(names.size(), 333U) << name_of(order);
+  }
+}
+
+TEST(ChosenWorkers, AreSortedByStateAndThroughput) {
+  std::vector<WorkerSnapshot> workers = test::many_workers(4);
+  workers[2].activity = WorkerActivity::quarantined;
+  workers[0].activity = WorkerActivity::silent;
+  workers[3].activity = WorkerActivity::computing;
+  const auto names = [&](WorkerOrder order) {
+    std::string text;
+    for (const auto* worker : choose_workers(workers, {.order = order}).workers) {
+      text += worker->status.name.back();
+    }
+    return text;
+  };
+  EXPECT_EQ(names(WorkerOrder::state), "2031");
+  EXPECT_EQ(names(WorkerOrder::throughput), "3210");
+}
+
+TEST(ChosenWorkers, CanBeThoseWithANameOrHost) {
+  const std::vector<WorkerSnapshot> workers = test::many_workers(1000);
+  EXPECT_EQ(choose_workers(workers, {.filter = "w0099"}).list.count, 10U);
+  EXPECT_EQ(choose_workers(workers, {.filter = "host-w00001"}).list.count, 1U);
+  EXPECT_EQ(choose_workers(workers, {.filter = "nobody"}).list.count, 0U);
+}
+
+TEST(WorkersPage, SaysHowManyAreShown) {
+  PageSnapshot snapshot;
+  snapshot.service.workers = test::many_workers(10'000);
+  EXPECT_THAT(workers_page(snapshot, {}, {}).live, HasSubstr("showing 1–50 of 10,000 workers"));
+}
+
+TEST(CampaignPage, ShowsTheNewestEventsPageByPage) {
+  auto events = std::make_shared<CampaignEvents>();
+  for (std::uint64_t id = 1; id <= 300; ++id) {
+    events->events.push_back({.id = id, .time_utc = "t", .kind = "e" + std::to_string(id)});
+  }
+  const CampaignDetails details{.events = events, .results = nullptr};
+  const auto page = [&](const std::string& target) {
+    return campaign_page(campaign_snapshot("a", 1, 2), details, *parse_target(target), {}).live;
+  };
+  EXPECT_THAT(page("/"), HasSubstr("<td class=\"text\">e300</td>"));
+  EXPECT_THAT(page("/"), Not(HasSubstr("<td class=\"text\">e250</td>")));
+  EXPECT_THAT(page("/?events=2"), HasSubstr("<td class=\"text\">e250</td>"));
+  EXPECT_THAT(page("/?events=4"), HasSubstr("showing 151–200 of 200 events"));
+  EXPECT_THAT(page("/"), HasSubstr("100 older events"));
+}
+
+TEST(CampaignPage, SaysWhatIsStillBeingRead) {
+  const std::string html = campaign_page(campaign_snapshot("a", 1, 2), {}, {}, {}).live;
+  EXPECT_THAT(html, HasSubstr("The results are being read."));
+  EXPECT_THAT(html, HasSubstr("The database is being read."));
+}
+
+TEST(WholePage, HasRelativeAddressesOnly) {
+  const std::string root = whole_page({.title = "a", .live = "x"});
+  EXPECT_THAT(root, HasSubstr("href=\"./style.css\""));
+  const std::string below = whole_page({.title = "a", .to_root = "../", .live = "x"});
+  EXPECT_THAT(below, HasSubstr("href=\"../style.css\""));
+  EXPECT_THAT(below, HasSubstr("src=\"../script.js\""));
+  for (const std::string& html : {root, below}) {
+    EXPECT_THAT(html, Not(HasSubstr("=\"/")));
+    EXPECT_THAT(html, Not(HasSubstr("//")));
+  }
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator

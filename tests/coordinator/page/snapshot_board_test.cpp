@@ -1,0 +1,92 @@
+#include "coordinator/page/snapshot_board.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+
+namespace proofmass::coordinator {
+namespace {
+
+using namespace std::chrono_literals;
+
+class SnapshotBoardTest : public ::testing::Test {
+ protected:
+  void turn() {
+    board.on_turn(now, [this](SnapshotDepth depth) {
+      ++num_taken;
+      last_depth = depth;
+      return ServiceSnapshot{};
+    });
+  }
+  auto want(SnapshotDepth depth = SnapshotDepth::without_workers) { return board.want(depth, now); }
+
+  TimePoint now{1000s};
+  SnapshotBoard board{now};
+  int num_taken = 0;
+  SnapshotDepth last_depth = SnapshotDepth::without_workers;
+};
+
+TEST_F(SnapshotBoardTest, CostsNothingWhileNobodyAsks) {
+  for (int i = 0; i < 100; ++i) {
+    now += 100ms;
+    turn();
+  }
+  EXPECT_EQ(num_taken, 0);
+  EXPECT_EQ(board.newest(), nullptr);
+}
+
+TEST_F(SnapshotBoardTest, HasASnapshotAfterTheNextTurn) {
+  EXPECT_EQ(want(), nullptr);
+  turn();
+  const auto snapshot = want();
+  ASSERT_NE(snapshot, nullptr);
+  EXPECT_EQ(snapshot->taken_at, now);
+  EXPECT_EQ(snapshot, board.newest());
+}
+
+TEST_F(SnapshotBoardTest, TakesOneASecondForHalfAMinute) {
+  (void)want();
+  for (int i = 0; i < 600; ++i) {
+    turn();
+    now += 100ms;
+  }
+  EXPECT_EQ(num_taken, 30);
+}
+
+TEST_F(SnapshotBoardTest, HandsOutNothingOld) {
+  (void)want();
+  turn();
+  now += SnapshotBoard::age_max;
+  EXPECT_NE(want(), nullptr);
+  now += 1ms;
+  EXPECT_EQ(want(), nullptr);
+  EXPECT_NE(board.newest(), nullptr);  // For those who cannot wait.
+}
+
+TEST_F(SnapshotBoardTest, CopiesWorkersOnlyIfTheyAreAskedFor) {
+  (void)want();
+  turn();
+  EXPECT_EQ(last_depth, SnapshotDepth::without_workers);
+  EXPECT_EQ(want(SnapshotDepth::with_workers), nullptr);
+  now += 100ms;
+  turn();  // Without waiting for the second to end.
+  EXPECT_EQ(last_depth, SnapshotDepth::with_workers);
+  EXPECT_NE(want(SnapshotDepth::with_workers), nullptr);
+  EXPECT_NE(want(), nullptr);
+  EXPECT_EQ(num_taken, 2);
+  now += SnapshotBoard::wanted_for;
+  (void)want();
+  turn();
+  EXPECT_EQ(last_depth, SnapshotDepth::without_workers);
+}
+
+TEST_F(SnapshotBoardTest, TellsHowLongTheServiceHasNotComeRound) {
+  now += 3s;
+  EXPECT_EQ(board.since_turn(now), 3s);
+  turn();
+  now += 1s;
+  EXPECT_EQ(board.since_turn(now), 1s);
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
