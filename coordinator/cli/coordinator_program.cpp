@@ -16,10 +16,12 @@
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/notice_commands.hpp"
+#include "coordinator/cli/page_options.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/service.hpp"
+#include "coordinator/page/page.hpp"
 #include "coordinator/report/report.hpp"
 #include "core/campaign/model.hpp"
 #include "proto/command_line/described_program.hpp"
@@ -36,6 +38,7 @@ constexpr double drain_time_s_max = 366.0 * 86400.0;
 constexpr std::chrono::seconds command_wait_max(60);
 constexpr std::uint64_t memory_mib_min = 64;
 constexpr std::uint64_t memory_mib_max = std::uint64_t{1} << 24;
+constexpr std::size_t workers_max_max = 65'536;
 constexpr std::size_t campaigns_per_key_max = 1'000'000;
 constexpr std::uint64_t bytes_per_key_max = std::uint64_t{1} << 50;
 
@@ -49,7 +52,9 @@ struct ServeOptions {
   ServiceEnd end = ServiceEnd::never;
   double drain_time_s = 120.0;          ///< ≥ 0.
   std::uint64_t memory_mib_max = 2048;  ///< ≥ 64; of the process.
-  SubmissionLimits limits;              ///< Of each client's key.
+  std::size_t num_workers_max = DispatchConfig{}.num_workers_max;
+  SubmissionLimits limits;  ///< Of each client's key.
+  PageOptions page;
   NoticeCommands::Config commands;
   wire::LogFormat log_format = wire::LogFormat::text;
   std::string faults;       ///< As FaultPlan::parse() reads them.
@@ -111,6 +116,9 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
   config.answer_program = answer_program();
   config.answer_directory = folder.answers();
   config.version = PROOFMASS_VERSION;
+  config.dispatch.num_workers_max = options.num_workers_max;
+  config.dispatch.hosts_per_key_max =
+      std::max(config.dispatch.hosts_per_key_max, options.num_workers_max);
   config.dispatch.reference_digest = model().reference_digest(best_instruction_set());
   if (!options.faults.empty()) config.faults = wire::FaultPlan::parse(options.faults);
   scale_times(config, options.time_scale);
@@ -156,6 +164,7 @@ bool has_given_up_runs(const Service& service) {
 /// Serves all campaigns of a directory to the workers that connect.
 /// @return An ExitCode.
 int serve_campaigns(const ServeOptions& options) {
+  const std::optional<PageConfig> page_config = page_config_of(options.page);
   const Log log = wire::make_log("proofmass-coordinator", options.log_format, wire::LogLevel::info);
   const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::drain);
@@ -166,15 +175,20 @@ int serve_campaigns(const ServeOptions& options) {
   if (config.faults && config.faults->kill) {
     wire::arm_kill_point(config.faults->kill->point, config.faults->kill->passage);
   }
+  if (page_config) config.num_descriptors_reserved = page_descriptors_max();
   Service service(campaigns_of(options, folder), config, log);
+  std::optional<Page> page;
+  if (page_config) page.emplace(*page_config, log);
   log_start(service, log);
   wire::ServiceNotices notices;
   notices.ready();
   service.run(stop, [&] {
     if (stop != StopRequest::none) notices.stopping();
     commands.review();
+    if (page) page->on_turn(service);
     notices.on_tick(std::chrono::steady_clock::now(), [&] { return status_of(service); });
   });
+  page.reset();                     // It may be reading files, too.
   commands.wait(command_wait_max);  // Before the files are closed, which they may be reading.
   const bool is_done = service.is_done();
   const bool has_given_up = has_given_up_runs(service);
@@ -221,6 +235,10 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
       ->check(wire::in_range(memory_mib_min, memory_mib_max))
       ->envname("PROOFMASS_MEMORY_MAX")
       ->capture_default_str();
+  app.add_option("--workers-max", options.num_workers_max,
+                 "Workers that may be registered at a time;\nothers are refused and ask again")
+      ->check(wire::in_range(std::size_t{1}, workers_max_max))
+      ->capture_default_str();
   app.add_option("--campaigns-per-key", options.limits.campaigns_max,
                  "Unfinished campaigns that a client's key may\nhave, at most")
       ->check(wire::in_range(std::size_t{1}, campaigns_per_key_max))
@@ -263,6 +281,7 @@ int run_proofmass_coordinator(int argc, char** argv) {
   bool ends_when_done = false;
   add_service(app, options, ends_when_done);
   add_addresses(app, options);
+  add_page_options(app, options.page);
   wire::add_manual_option(app, {"proofmass", "proofmass-worker"});
   return run_program(app, argc, argv, [&] {
     if (ends_when_done) options.end = ServiceEnd::when_done;

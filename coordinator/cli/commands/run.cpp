@@ -27,6 +27,7 @@
 #include "coordinator/dispatch/run_set.hpp"
 #include "coordinator/net/private_endpoint.hpp"
 #include "coordinator/net/service.hpp"
+#include "coordinator/page/page.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/report_json.hpp"
 #include "coordinator/report/summarise.hpp"
@@ -112,6 +113,18 @@ ServiceConfig service_config(const PrivateEndpoint& endpoint, std::uint64_t num_
   return config;
 }
 
+/// A page for people who watch the campaign, and a line that says where it is; null if none is
+/// wanted.
+std::unique_ptr<Page> begin_page(const RunOptions& options, ProgressDisplay& display) {
+  const std::optional<PageConfig> config = page_config_of(options.page);
+  if (!config) return nullptr;
+  auto page = std::make_unique<Page>(*config, [&display](const Event& event) {
+    if (event.severity != Severity::info) display.note("proofmass: warning: " + to_text(event));
+  });
+  display.note(fmt::format("proofmass: live page at {}", page->url()));
+  return page;
+}
+
 /// What nobody needs to see while all goes well goes into the database only.
 Log log_to(ProgressDisplay& display) {
   return [&display](const Event& event) {
@@ -188,12 +201,15 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
     display.update(options.part ? of_part(status, part.count, num_finished_beside)
                                 : out_of(status, num_runs));
   };
+  std::unique_ptr<Page> page = begin_page(options, display);
   workers.start(num_local);
   service.run(stop, [&] {
+    if (page) page->on_turn(service);
     if (stop == StopRequest::none && !service.is_done()) workers.replace_dead();
     show();
   });
   show();
+  page.reset();  // What it reads would keep the log from being folded in.
   const bool is_done = service.is_done();
   return {.store = std::move(service.close().front().store), .is_done = is_done};
 }
@@ -312,6 +328,7 @@ int run_campaign(const RunOptions& options) {
   const std::unique_ptr<Campaign> campaign =
       read_campaign(options.campaign_file, options.overrides);
   check_part(options, *campaign);
+  (void)page_config_of(options.page);  // Before any file is made.
   const std::filesystem::path database = database_of(options);
   Outcome outcome =
       compute(open_or_create(*campaign, stop_plan_of(options, campaign->num_runs), database),
@@ -348,6 +365,7 @@ void add_run(CLI::App& app, Command& chosen) {
       ->type_name(database_type);
   add_range_option(command, options.part);
   add_run_options(command, options);
+  add_page_options(command, options.page);
   command.add_flag_callback(
       "--json", [&output = options.output] { output = RunOutput::json; }, "Print JSON");
 }

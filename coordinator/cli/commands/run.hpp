@@ -6,6 +6,7 @@
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/override_options.hpp"
+#include "coordinator/cli/page_options.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {
@@ -22,12 +23,13 @@ struct RunOptions {
   std::optional<double> audit_fraction;  ///< Of the runs that are missing, computed twice; 0 to 1.
   std::optional<RunRange> part;          ///< Only these runs are computed.
   StopOptions stop;
+  PageOptions page;
   bool is_quiet = false;
   RunOutput output = RunOutput::tables;
 };
 
-/// Declares the options of `run` that say which campaign is run and how, but for FILE, --db and
-/// --range.
+/// Declares the options of `run` that say which campaign is run and how, but for FILE, --db,
+/// --range and those of the page.
 /// @param options  Lives as long as the command.
 void add_run_options(CLI::App& command, RunOptions& options);
 
