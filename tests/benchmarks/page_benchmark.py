@@ -1,0 +1,165 @@
+#!/usr/bin/env python3
+"""What the live page costs a coordinator with thousands of workers and a million runs.
+
+Usage: page_benchmark.py BIN_DIRECTORY [options]
+
+The workers are those of proofmass-swarm, see scale_benchmark.py. Five viewers ask for a page each two
+seconds, as its script does. Prints a line of JSON for each phase; `coordinator_cores` is the processor
+time of the whole coordinator. Exit code 1 if an answer took longer than 0.2 s or the viewers cost more
+than 2 % of a core.
+"""
+
+import argparse
+import json
+import pathlib
+import resource
+import statistics
+import sys
+import tempfile
+import threading
+import time
+import urllib.request
+
+from dispatch_benchmark import Program
+from scale_benchmark import Fleet, free_port, say, wait_until
+
+PATHS = ["", "workers", "workers?sort=throughput&page=100", "campaigns/scale",
+         "campaigns/scale?events=2"]
+FURTHER_PATHS = ["workers?filter=99", "metrics", "api/status", "api/workers?page=7",
+                 "api/campaigns/scale", "api/campaigns/scale/events", "api/campaigns/scale/trace"]
+ANSWER_S_MAX = 0.2
+VIEWERS_CORES_MAX = 0.02
+
+
+class PageFleet(Fleet):
+    """The coordinator serves a page and takes more workers than usual."""
+
+    def start_coordinator(self):
+        self.page_port = free_port()
+        coordinator = Program(
+            [self.binaries / "proofmass-coordinator", "--directory", self.directory / "served",
+             "--bind", f"tcp://127.0.0.1:{self.port}", "--bind-clients", self.clients,
+             "--log-format", "json", f"--page=127.0.0.1:{self.page_port}",
+             "--workers-max", str(self.options.agents), *self.keys], "stderr")
+        coordinator.wait_for(lambda line: line["event"] == "coordinator_started")
+        return coordinator
+
+    def fetch(self, path):
+        """Seconds and bytes of an answer."""
+        begin = time.monotonic()
+        with urllib.request.urlopen(f"http://127.0.0.1:{self.page_port}/{path}", timeout=30) as got:
+            size = len(got.read())
+        return time.monotonic() - begin, size
+
+    def num_done(self):
+        with urllib.request.urlopen(f"http://127.0.0.1:{self.page_port}/api/status",
+                                    timeout=30) as got:
+            return json.load(got)["campaigns"][0]["num_done"]
+
+
+class Viewers:
+    """Five of them, each with a page of its own."""
+
+    def __init__(self, fleet):
+        self.fleet, self.times, self.is_over = fleet, [], threading.Event()
+        self.threads = [threading.Thread(target=self.look, args=(path,)) for path in PATHS]
+        for thread in self.threads:
+            thread.start()
+
+    def look(self, path):
+        address = path + ("&" if "?" in path else "?") + "fragment=1"
+        while not self.is_over.wait(2.0):
+            self.times.append(self.fleet.fetch(address)[0])
+
+    def end(self):
+        self.is_over.set()
+        for thread in self.threads:
+            thread.join()
+
+
+def watched(fleet, phase, duration_s, with_viewers):
+    """Processor time of the coordinator in a phase, in cores."""
+    viewers = Viewers(fleet) if with_viewers else None
+    time.sleep(5.0)  # What the first looks cost is none of this phase.
+    begin, cpu_s = time.monotonic(), fleet.coordinator.cpu_s()
+    time.sleep(duration_s)
+    cores = (fleet.coordinator.cpu_s() - cpu_s) / (time.monotonic() - begin)
+    figures = {"coordinator_cores": round(cores, 4)}
+    if viewers is not None:
+        viewers.end()
+        figures |= {"answers": len(viewers.times),
+                    "answer_s_median": round(statistics.median(viewers.times), 4),
+                    "answer_s_max": round(max(viewers.times), 4)}
+    say(phase, **figures)
+    return figures
+
+
+def time_of_pages(fleet):
+    worst = 0.0
+    for path in PATHS + FURTHER_PATHS:
+        fleet.fetch(path)  # The first one may wait for what nobody wanted before.
+        time.sleep(0.5)
+        times = [fleet.fetch(path) for _ in range(5)]
+        middle, longest = statistics.median(time_s for time_s, _ in times), max(times)[0]
+        worst = max(worst, longest)
+        say("page", path=path, bytes=times[0][1], seconds_median=round(middle, 4),
+            seconds_max=round(longest, 4))
+    return worst
+
+
+def measure(fleet, options):
+    fleet.add_agents(options.agents)
+    fleet.wait_for_agents()
+    say("registered", agents=options.agents)
+    fleet.submit(options.runs)
+    wait_until("runs", lambda: fleet.num_done() > 0)
+    computing = [watched(fleet, "computing, nobody looks", options.watch_s, False),
+                 watched(fleet, "computing, five viewers", options.watch_s, True)]
+    fleet.wait_for_end()
+    say("finished", runs=fleet.num_done())
+    time.sleep(35.0)  # Until nobody has asked for so long that no snapshots are taken.
+    resting = [watched(fleet, "at rest, nobody looks", options.watch_s, False),
+               watched(fleet, "at rest, five viewers", options.watch_s, True)]
+    worst = time_of_pages(fleet)
+    cost = resting[1]["coordinator_cores"] - resting[0]["coordinator_cores"]
+    say("cost", viewers_cores_at_rest=round(cost, 4), viewers_cores_computing=round(
+        computing[1]["coordinator_cores"] - computing[0]["coordinator_cores"], 4),
+        memory_mb_max=round(fleet.memory_mb_max()))
+    missed = []
+    if cost > VIEWERS_CORES_MAX:
+        missed.append(f"viewers_cores_at_rest = {cost:.4f} (limit {VIEWERS_CORES_MAX})")
+    if worst > ANSWER_S_MAX:
+        missed.append(f"seconds_max = {worst:.3f} (limit {ANSWER_S_MAX})")
+    return missed
+
+
+def read_options():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("binaries", type=pathlib.Path, help="where the programs are")
+    parser.add_argument("--agents", type=int, default=10_000, help="workers")
+    parser.add_argument("--slots", type=int, default=16, help="of each")
+    parser.add_argument("--batch-time-s", type=float, default=30.0, help="of 16 runs")
+    parser.add_argument("--runs", type=int, default=1_000_000, help="of the campaign")
+    parser.add_argument("--watch-s", type=float, default=30.0, help="length of each phase")
+    parser.add_argument("--without-keys", action="store_true", help="nothing is encrypted")
+    parser.add_argument("--directory", type=pathlib.Path, help="for the campaign database")
+    return parser.parse_args()
+
+
+def main():
+    options = read_options()
+    hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    with tempfile.TemporaryDirectory(dir=options.directory, prefix="page_benchmark.") as folder:
+        fleet = PageFleet(options.binaries.resolve(), pathlib.Path(folder), options)
+        try:
+            missed = measure(fleet, options)
+        finally:
+            fleet.close()
+    for text in missed:
+        print("page_benchmark: missed: " + text, file=sys.stderr)
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
