@@ -33,6 +33,7 @@ td.words{overflow-wrap:anywhere;min-width:6rem}
 #matrix{font-size:.8rem}
 #matrix th,#matrix td{padding:.2rem .4rem}
 #matrix td:nth-child(2){min-width:13rem}
+#matrix td:last-child{min-width:14rem}
 .skip{position:absolute;left:-99rem}
 .skip:focus{position:static}
 @page{size:A4 landscape;margin:12mm}
@@ -43,7 +44,7 @@ nav,.skip{display:none}
 table{font-size:7pt}
 th,td{padding:.1rem .25rem}
 td{white-space:normal}
-#matrix td:nth-child(2){min-width:8rem}
+#matrix td:nth-child(2),#matrix td:last-child{min-width:8rem}
 section{break-before:page}
 section:first-of-type{break-before:auto}
 figure,tr{break-inside:avoid}
