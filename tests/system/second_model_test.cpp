@@ -190,7 +190,7 @@ TEST_F(SecondModel, IsReportedAndAnswersQueries) {
   EXPECT_THAT(output_of("sensitivity"), HasSubstr("natural_frequency_hz"));
   ASSERT_EQ(proofmass("html", {"report", "a.db", "--html", "-"}), 0) << errors_of("html");
   EXPECT_THAT(output_of("html"), HasSubstr(">Objective of "));
-  EXPECT_THAT(output_of("html"), HasSubstr("id=\"histogram-quadrature\""));  // No objective.
+  EXPECT_THAT(output_of("html"), HasSubstr("id=\"histogram-quadrature-title\""));  // No objective.
   ASSERT_EQ(proofmass("plot", {"plot", "a.db", "--list"}), 0) << errors_of("plot");
   EXPECT_THAT(output_of("plot"), HasSubstr("error:in_phase\n"));
 }

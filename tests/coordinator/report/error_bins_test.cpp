@@ -86,5 +86,12 @@ TEST(MagnitudeBins, LeaveOutOnePercentAtMost) {
   EXPECT_THAT(histogram.counts, ElementsAre(199));
 }
 
+TEST(MagnitudeBins, ShowTenPercent) {
+  MagnitudeBins bins;
+  for (int i = 0; i < 90; ++i) bins.add(1.5);
+  for (int i = 0; i < 10; ++i) bins.add(0.75);
+  EXPECT_THAT(bins.histogram().counts, ElementsAre(10, 0, 0, 90));
+}
+
 }  // namespace
 }  // namespace proofmass::coordinator
