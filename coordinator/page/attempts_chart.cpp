@@ -223,7 +223,8 @@ std::string attempts_chart(const RecentAttempts& attempts) {
   const double height = static_cast<double>(num_shown) * lane_height;
   std::string svg = fmt::format(
       "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Timeline of attempts\">"
-      "<svg viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" role=\"img\" "
+      "<svg class=\"attempts\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
+      "height=\"{1:.0f}\" role=\"img\" "
       "aria-label=\"batches: {2}, losses: {3}, workers: {4}, seconds: {5:.0f}\">",
       chart_width, height + axis_height, attempts.computed.size(), attempts.lost.size(),
       attempts.workers.size(), axis.end_s - axis.begin_s);

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/page/live_results.hpp"
+#include "coordinator/report/review_html.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {

@@ -44,9 +44,10 @@ std::string results_of(const CampaignDetails& details, TimePoint now) {
   if (!results.failure.empty()) {
     return notes_list({"the results cannot be shown: " + results.failure});
   }
-  return fmt::format("<p class=\"note\">as of {} finished runs, read {}</p>\n{}",
-                     grouped(results.num_runs), reading_line(details.results_at, now),
-                     results.html);
+  return fmt::format(
+      "<section><h2>Results</h2>\n<p class=\"note\">as of {} finished runs, read "
+      "{}</p>\n{}</section>\n",
+      grouped(results.num_runs), reading_line(details.results_at, now), results.html);
 }
 
 std::string ends_table(const CampaignEvents& events) {

@@ -1,10 +1,14 @@
+#include <string>
+
 #include "coordinator/page/page_layout.hpp"
+#include "coordinator/report/review_html.hpp"
 
 namespace proofmass::coordinator {
 
 namespace {
 
-// The colours have a contrast of 4.5 at least, in both themes.
+// Beside review_style(), which tables of results and charts need. The colours have a contrast
+// of 4.5 at least, in both themes.
 constexpr std::string_view style = R"css(:root {
   color-scheme: light dark;
   --ground: #ffffff; --panel: #f3f5f8; --line: #c9d0d9; --text: #1b222c; --faint: #566070;
@@ -56,12 +60,11 @@ input, select, button { font: inherit; color: inherit; background: var(--ground)
   border: 1px solid var(--faint); border-radius: 4px; padding: 0.25rem 0.5rem; max-width: 100%; }
 .pages a, .pages span { display: inline-block; padding: 0.25rem 0.5rem; }
 .pages .off { color: var(--faint); }
-svg { max-width: 100%; height: auto; }
-.scroll svg { min-width: 56rem; }
-svg text { fill: var(--text); font: 12px system-ui, sans-serif; }
-svg .axis { stroke: var(--line); }
-svg .run { fill: var(--bar); }
-svg .loss { stroke: var(--lost); stroke-width: 2; }
+.attempts { max-width: 100%; height: auto; min-width: 56rem; }
+.attempts text { fill: var(--text); font: 12px system-ui, sans-serif; }
+.attempts .axis { stroke: var(--line); }
+.attempts .run { fill: var(--bar); }
+.attempts .loss { stroke: var(--lost); stroke-width: 2; }
 @media (max-width: 34rem) {
   main { padding: 0.3rem 0.6rem 2rem; }
   th, td { padding: 0.25rem 0.45rem; }
@@ -152,7 +155,7 @@ constexpr std::string_view script = R"js('use strict';
 
 }  // namespace
 
-std::string_view page_style() { return style; }
+std::string page_style() { return review_style() + std::string(style); }
 
 std::string_view page_script() { return script; }
 

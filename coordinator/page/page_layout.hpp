@@ -61,7 +61,7 @@ struct HtmlColumn {
 [[nodiscard]] std::string notes_list(const std::vector<std::string>& notes);
 
 /// The style sheet and the script of all pages.
-[[nodiscard]] std::string_view page_style();
+[[nodiscard]] std::string page_style();
 [[nodiscard]] std::string_view page_script();
 
 }  // namespace proofmass::coordinator

@@ -33,7 +33,7 @@ HttpAnswer html_answer(const PageRequest& request, const PageContent& content) {
 
 std::optional<HttpAnswer> file_answer(const std::string& name) {
   if (name == "style.css") {
-    return HttpAnswer{.content_type = "text/css; charset=utf-8", .body = std::string(page_style())};
+    return HttpAnswer{.content_type = "text/css; charset=utf-8", .body = page_style()};
   }
   if (name == "script.js") {
     return HttpAnswer{.content_type = "text/javascript; charset=utf-8",

@@ -83,8 +83,9 @@ std::string html_table(const ReviewTable& table) {
 std::string review_style() {
   // Verdicts: the inks of the charts are for lines; text needs 4.5:1.
   constexpr std::string_view light =
-      "--met:#00603f;--unmet:#a83c00;--open:#6b4a00;--faint:#f2f4f6;";
-  constexpr std::string_view dark = "--met:#45c79b;--unmet:#ff9d5c;--open:#e6b84d;--faint:#1f242b;";
+      "--met:#00603f;--unmet:#a83c00;--open:#6b4a00;--heading:#f2f4f6;";
+  constexpr std::string_view dark =
+      "--met:#45c79b;--unmet:#ff9d5c;--open:#e6b84d;--heading:#1f242b;";
   return fmt::format(
              ":root{{color-scheme:light dark;{}{}}}\n"
              "@media (prefers-color-scheme:dark){{:root{{{}{}}}}}\n"
@@ -97,7 +98,7 @@ caption{text-align:left;font-weight:600;padding:.3rem 0;white-space:nowrap}
 th,td{padding:.25rem .6rem;text-align:right;vertical-align:top}
 th,td{border-bottom:1px solid var(--chart-grid)}
 thead th{vertical-align:bottom}
-thead th,thead td{background:var(--faint)}
+thead th,thead td{background:var(--heading)}
 th[scope=colgroup]{text-align:center}
 th.words,td.words{text-align:left}
 td{white-space:nowrap}

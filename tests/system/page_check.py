@@ -122,7 +122,7 @@ def figure(value):
 
 def accuracy_cells(database, page):
     """What the table must show, from the database's view; the scale follows from the unit shown."""
-    units = dict(re.findall(r'<th scope="row"[^>]*>([^<]+)</th><td class="text">([^<]*)</td>', page))
+    units = dict(re.findall(r'<th scope="row"[^>]*>([^<]+)</th><td class="words"[^>]*>([^<]*)</td>', page))
     units = {key.replace("&#39;", "'"): value for key, value in units.items()}
     connection = sqlite3.connect(f"file:{database}?mode=ro", uri=True)
     rows = connection.execute(

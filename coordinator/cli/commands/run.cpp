@@ -287,7 +287,7 @@ void check_part(const RunOptions& options, const Campaign& campaign) {
 
 void print_outcome(const Store& store, const Campaign& campaign, RunOutput output) {
   if (output == RunOutput::tables) print_tables(report_text(store, campaign));
-  if (output == RunOutput::json) print_lines(report_json(store, campaign, {}));
+  if (output == RunOutput::json) print_lines(report_json(store, campaign, {}, {}));
 }
 
 /// The runs of `50:100`, which are 50 to 99; empty if the text is none such.

@@ -36,7 +36,7 @@ constexpr std::string_view delete_old_losses_sql =
     "DELETE FROM attempt WHERE attempt_id NOT IN"
     " (SELECT attempt_id FROM attempt ORDER BY attempt_id DESC LIMIT ?)";
 
-constexpr std::string_view insert_failure_sql =
+constexpr std::string_view merged_failure_sql =
     "INSERT INTO run_failure (run_index, reason, num_attempts, given_up_utc) VALUES (?, ?, ?, ?)"
     " ON CONFLICT DO NOTHING";
 
@@ -147,7 +147,7 @@ void MergeRows::add_losses(const Database& part, const WorkerKeys& workers) {
 void MergeRows::add_failures(const Database& part) {
   Statement select =
       part.prepare("SELECT run_index, reason, num_attempts, given_up_utc FROM run_failure");
-  Statement insert = whole_.prepare(insert_failure_sql);
+  Statement insert = whole_.prepare(merged_failure_sql);
   while (select.step()) {
     insert.run(select.integer(0), select.text(1), select.integer(2), select.text(3));
   }

@@ -83,7 +83,7 @@ class RunPlan final : public Plan {
 
   /// simulate() for several runs at once, bit for bit the same results.
   ///
-  /// @param requests  At most batch_lanes; a batch that is not full costs no more than a full one.
+  /// @param requests  At most batch_lanes; up to half as many take about half of the time.
   [[nodiscard]] std::vector<RunResult> simulate_batch(
       std::span<const RunRequest> requests, InstructionSet set,
       const std::function<void(int)>& progress = {}) const override;
