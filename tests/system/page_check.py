@@ -12,8 +12,8 @@ A coordinator with a worker computes a small campaign and serves the page. In tu
 - Prometheus scrapes the metrics, and a query to it returns the number of finished runs.
 
 Further HTML files, such as a report, are looked at in the same way if they are named. Needs node, npm
-and its registry, chromium and prometheus. Exit code 0 if all holds, 1 if not; 77 if something is
-lacking, but 1 if the environment has CI.
+and its registry, chromium and prometheus. Exit code 0 if all holds, 1 if not; 77 if a program is
+lacking, but then 1 if the environment has CI; 77 if the registry cannot be reached.
 """
 
 import argparse
@@ -283,11 +283,12 @@ def main():
                if not shutil.which(name)]
     with tempfile.TemporaryDirectory(prefix="page_check.") as name:
         directory = Path(name)
-        if not lacking and not install(directory):
-            lacking = ["the registry of npm"]
         if lacking:
             print("SKIPPED: needs " + ", ".join(lacking))
             sys.exit(1 if "CI" in os.environ else 77)
+        if not install(directory):
+            print("SKIPPED: the registry of npm cannot be reached")
+            sys.exit(77)
         try:
             check_all(arguments, directory, chromium)
         except AssertionError as error:
