@@ -49,16 +49,6 @@ std::uint64_t rounds_wanted(const State& state, CampaignId id, const CampaignSta
                                  std::min({rounds, by_share, rounds_with_room(state, campaign)}));
 }
 
-/// One round, or half of one if that is a fair share of the runs that are left. A worker computes a
-/// half-filled batch in about half of the time, so that the last round is the shorter the more
-/// workers share it.
-std::uint64_t one_round(const State& state, const CampaignState& campaign, const Worker& worker) {
-  const std::uint64_t slots = std::max(state.num_slots, state.config.num_slots_expected);
-  const std::uint64_t half = (worker.num_slots + std::uint64_t{1}) / 2;
-  const bool is_half_enough = num_waiting(campaign) * worker.num_slots <= half * slots;
-  return is_half_enough ? half : worker.num_slots;
-}
-
 /// Runs of a campaign that a worker may hold if all of them together are not to deliver more than a
 /// coordinator can take: the part of its slots in all that.
 std::uint64_t share_of_intake(const State& state, CampaignId id, const CampaignState& campaign,
@@ -187,10 +177,9 @@ bool lend_of(State& state, WorkerId id, CampaignId campaign_id, TimePoint now, O
   CampaignState& campaign = state.campaigns.at(campaign_id);
   if (!is_lent(campaign) || is_backed_up(state, campaign)) return false;
   Worker& worker = state.workers.at(id);
-  const std::uint64_t rounds = rounds_wanted(state, campaign_id, campaign, worker);
   const std::uint64_t wanted = std::min<std::uint64_t>(
-      {rounds == 1 ? one_round(state, campaign, worker) : rounds * worker.num_slots,
-       worker.num_runs_max, share_of_intake(state, campaign_id, campaign, worker)});
+      {worker.num_slots * rounds_wanted(state, campaign_id, campaign, worker), worker.num_runs_max,
+       share_of_intake(state, campaign_id, campaign, worker)});
   if (has_enough(worker, wanted)) return true;
   const Borrower borrower{state, id, worker, campaign_id, campaign, wanted, now, outbox};
   lend_pending(borrower);

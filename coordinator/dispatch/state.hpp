@@ -50,9 +50,6 @@ struct DispatchConfig {
   /// than a message and its answer ever take while the worker is not suspect.
   Duration arrival_max = std::chrono::seconds(12);
   double lease_work_s = 1.5;  ///< Work that a slot is lent at a time, once run times are known.
-  /// Slots of all workers that are known to come: the first one to register is then lent no more
-  /// than a fair share of a small campaign.
-  std::uint64_t num_slots_expected = 0;
   /// Runs of a campaign that are lent or on their way to the store: near that many, workers get no
   /// more than two rounds; with half of it on the way to the store, nothing. A disk that is slower
   /// than the workers must not fill the memory.

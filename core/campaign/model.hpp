@@ -53,8 +53,7 @@ class Model {
   /// What is drawn for a run, in the order of RunDraw::values.
   [[nodiscard]] virtual std::span<const DrawnQuantity> drawn() const = 0;
 
-  /// Runs that one call of Plan::simulate_batch() takes at most. At the end of a campaign, runs are
-  /// shared out as if half as many took half of the time.
+  /// Runs that one call of Plan::simulate_batch() takes at most; fewer cost no more.
   [[nodiscard]] virtual std::size_t batch_size() const = 0;
 
   /// Digest of the results of a short fixed campaign: the same number from every sound build and

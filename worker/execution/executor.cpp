@@ -184,22 +184,12 @@ void Executor::serve() {
   changed_.notify_all();
 }
 
-/// At the end of a campaign there are fewer runs than room for them: all threads then end sooner
-/// than one of them with all runs.
-std::size_t Executor::next_batch_size() const {
-  const std::size_t half = (config_.batch_size_max + 1) / 2;
-  const std::size_t num_free = config_.num_threads - std::min(config_.num_threads, batches_.size());
-  const std::size_t num_ready =
-      queue_.num_ready([this](wire::CampaignId campaign) { return is_ready(campaign); });
-  return num_ready <= half * num_free ? half : config_.batch_size_max;
-}
-
 std::shared_ptr<Executor::Batch> Executor::next_batch() {
   const auto is_ready_now = [this](wire::CampaignId campaign) { return is_ready(campaign); };
   std::unique_lock lock(mutex_);
   while (true) {
     if (is_ending_ || failure_) return nullptr;
-    Assignment assignment = queue_.take(next_batch_size(), is_ready_now);
+    Assignment assignment = queue_.take(config_.batch_size_max, is_ready_now);
     if (!assignment.requests.empty()) {
       KnownCampaign& known = campaigns_.at(assignment.campaign);
       known.used = ++num_uses_;

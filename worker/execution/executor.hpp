@@ -43,10 +43,9 @@ struct ExecutorConfig {
 /// Computes runs on threads of its own, in the order in which they are submitted.
 ///
 /// A free thread takes a batch of runs of one campaign from the queue, of as many leases as it
-/// takes, and starts at once with what is there. If the free threads can take all of it in batches
-/// of half the size, which need about half of the time, they do. What each run took, `elapsed_s`,
-/// is the time of its batch, of which it has an equal share in `compute_s`. A campaign is prepared
-/// by a thread when its first run is due, while the others go on.
+/// takes, and starts at once with what is there. What each run took, `elapsed_s`, is the time of
+/// its batch, of which it has an equal share in `compute_s`. A campaign is prepared by a thread
+/// when its first run is due, while the others go on.
 class Executor final : public Execution {
  public:
   /// @param prepare    Called on the threads, once for each definition.
@@ -96,7 +95,6 @@ class Executor final : public Execution {
   void serve();
   /// Waits for runs, and prepares their campaign if no other thread does; null at the end.
   [[nodiscard]] std::shared_ptr<Batch> next_batch();
-  [[nodiscard]] std::size_t next_batch_size() const;
   [[nodiscard]] bool is_ready(wire::CampaignId campaign) const;
   [[nodiscard]] wire::CampaignId campaign_to_prepare() const;  ///< 0 if there is none.
   void prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock);

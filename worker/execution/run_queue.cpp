@@ -57,11 +57,6 @@ bool RunQueue::has(wire::CampaignId campaign) const {
   return std::ranges::any_of(runs_, [&](const Waiting& run) { return run.campaign == campaign; });
 }
 
-std::size_t RunQueue::num_ready(const IsReady& is_ready) const {
-  const wire::CampaignId campaign = first_campaign(is_ready);
-  return static_cast<std::size_t>(std::ranges::count(runs_, campaign, &Waiting::campaign));
-}
-
 wire::CampaignId RunQueue::first_campaign(const IsReady& is_wanted) const {
   const auto found =
       std::ranges::find_if(runs_, [&](const Waiting& run) { return is_wanted(run.campaign); });

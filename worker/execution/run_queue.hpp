@@ -35,9 +35,6 @@ class RunQueue {
   void clear() { runs_.clear(); }
 
   [[nodiscard]] bool has(wire::CampaignId campaign) const;
-  /// Runs of the first campaign that is ready: as many as take() could remove, but for one that is
-  /// to be alone.
-  [[nodiscard]] std::size_t num_ready(const IsReady& is_ready) const;
   /// The first campaign with a run here for which `is_wanted` holds; 0 if there is none.
   [[nodiscard]] wire::CampaignId first_campaign(const IsReady& is_wanted) const;
 

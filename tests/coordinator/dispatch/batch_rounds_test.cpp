@@ -2,10 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <deque>
 #include <map>
-#include <utility>
 #include <vector>
 
 #include "coordinator/dispatch/campaigns.hpp"
@@ -23,10 +21,7 @@ struct HeldRun {
   RunIndex run;
 };
 
-constexpr std::size_t half_batch = batch_lanes / 2;
-
-/// A worker: each of its threads takes what is there, up to a batch, or up to half of one if that
-/// is enough for all that waits.
+/// A worker: each of its threads takes what is there, up to a batch, and needs one round for it.
 struct PlayedWorker {
   std::deque<HeldRun> queue;
   std::vector<std::vector<HeldRun>> batches;  ///< Of each thread; empty if it is idle.
@@ -34,10 +29,7 @@ struct PlayedWorker {
   void take_batches() {
     for (std::vector<HeldRun>& batch : batches) {
       if (!batch.empty()) continue;
-      const auto num_free = static_cast<std::size_t>(
-          std::ranges::count_if(batches, [](const auto& other) { return other.empty(); }));
-      const bool is_half_enough = queue.size() <= half_batch * num_free;
-      const std::size_t count = std::min(queue.size(), is_half_enough ? half_batch : batch_lanes);
+      const std::size_t count = std::min(queue.size(), batch_lanes);
       const auto end = queue.begin() + static_cast<std::ptrdiff_t>(count);
       batch.assign(queue.begin(), end);
       queue.erase(queue.begin(), end);
@@ -49,10 +41,10 @@ struct PlayedWorker {
 class Rounds final : public Outbox {
  public:
   Rounds(std::uint64_t num_runs, std::size_t num_workers, std::size_t num_threads,
-         std::vector<RunRange> finished = {}, const DispatchConfig& config = {}) {
+         std::vector<RunRange> finished = {}) {
     MicroscopeCampaign campaign;
     campaign.num_runs = num_runs;
-    state_ = initial_state(config, {}, {});
+    state_ = initial_state({}, {}, {});
     on_campaign(state_, id_,
                 {.definition = std::make_shared<const MicroscopeCampaign>(campaign),
                  .finished = std::move(finished),
@@ -79,7 +71,6 @@ class Rounds final : public Outbox {
   int play(double batch_time_s) {
     int num_rounds = 0;
     while (!is_finished(state_.campaigns.at(id_))) {
-      num_partial_before_last_ = num_partial_batches_;
       for (auto& [id, worker] : workers_) worker.take_batches();
       for (auto& [id, worker] : workers_) {
         for (std::size_t i = 0; i < worker.batches.size(); ++i) deliver(id, i, batch_time_s);
@@ -90,32 +81,7 @@ class Rounds final : public Outbox {
     return num_rounds;
   }
 
-  /// Time until the campaign is finished, if threads begin as soon as there are runs, a full batch
-  /// takes 1 and one that is at most half full takes `half_time`.
-  double play_in_time(double half_time) {
-    std::map<std::pair<WorkerId, std::size_t>, double> ends;  // Of threads that compute.
-    double now = 0.0;
-    while (!is_finished(state_.campaigns.at(id_))) {
-      for (auto& [id, worker] : workers_) {
-        worker.take_batches();
-        for (std::size_t i = 0; i < worker.batches.size(); ++i) {
-          const std::size_t count = worker.batches[i].size();
-          if (count > 0) ends.try_emplace({id, i}, now + (count > half_batch ? 1.0 : half_time));
-        }
-      }
-      const auto next = std::ranges::min_element(
-          ends, {}, [](const auto& end) { return std::pair(end.second, end.first); });
-      const auto [id, thread] = next->first;
-      now = next->second;
-      ends.erase(next);
-      deliver(id, thread, 2.4);
-      check_invariants(state_);
-    }
-    return now;
-  }
-
-  /// Of all rounds but the last.
-  [[nodiscard]] int num_partial_batches() const { return num_partial_before_last_; }
+  [[nodiscard]] int num_partial_batches() const { return num_partial_batches_; }
 
   void send(WorkerId id, wire::Message message) override {
     const auto* const lease = std::get_if<wire::RunLease>(&message);
@@ -166,7 +132,6 @@ class Rounds final : public Outbox {
   std::map<WorkerId, PlayedWorker> workers_;
   std::vector<RunIndex> stored_;
   int num_partial_batches_ = 0;
-  int num_partial_before_last_ = 0;
 };
 
 TEST(BatchRounds, AreAsFewAsTheyCanBe) {
@@ -196,25 +161,6 @@ TEST(BatchRounds, AreAsFewAndOneIfLeasesAreSmallerThanBatches) {
   Rounds rounds(1000, 2, 2, finished);
   EXPECT_LE(rounds.play(2.4), 15 + 1);  // 900 runs are 56.25 batches, four at a time.
   EXPECT_LE(rounds.num_partial_batches(), 2 * 4);
-}
-
-// Whatever the order in which the workers come, as `run` knows how many there will be. A batch
-// takes 2.0 s and half of one 1.1 s with AVX-512.
-TEST(BatchRounds, EndTogetherWithHalfBatches) {
-  constexpr double half_time = 0.55;
-  struct Size {
-    std::uint64_t num_runs;
-    std::size_t num_workers;
-  };
-  for (const Size& size : {Size{100, 2}, Size{100, 16}, Size{1000, 64}, Size{100, 64},
-                           Size{1000, 16}, Size{10'000, 64}}) {
-    const DispatchConfig config{.num_slots_expected = size.num_workers * batch_lanes};
-    Rounds rounds(size.num_runs, size.num_workers, 1, {}, config);
-    const double work = static_cast<double>(size.num_runs) / batch_lanes;
-    EXPECT_LE(rounds.play_in_time(half_time),
-              1.2 * (work / static_cast<double>(size.num_workers) + half_time))
-        << size.num_runs << " runs, " << size.num_workers << " workers";
-  }
 }
 
 }  // namespace
