@@ -17,9 +17,9 @@ std::string_view value_of_variable(const char* name) {
   return value == nullptr ? std::string_view() : value;
 }
 
-std::string in_ink(std::string_view text, Ink ink) {
+std::string in_tone(std::string_view text, Tone tone) {
   if (text.empty()) return {};
-  const int colour = colour_of(ink);
+  const int colour = colour_of(tone);
   if (colour == 0) return fmt::format("\033[1m{}\033[0m", text);
   return fmt::format("\033[1;38;5;{}m{}\033[0m", colour, text);
 }
@@ -28,13 +28,13 @@ std::string in_ink(std::string_view text, Ink ink) {
 struct PaintedVerdict {
   std::string_view begin;  ///< Of the line; blanks may follow it.
   std::string_view word;
-  Ink ink;
+  Tone tone;
 };
 
 constexpr std::array painted_verdicts{
-    PaintedVerdict{"Answer ", "not met", Ink::bad},
-    PaintedVerdict{"Answer ", "met", Ink::good},
-    PaintedVerdict{"Answer ", "undecided", Ink::bad},
+    PaintedVerdict{"Answer ", "not met", Tone::bad},
+    PaintedVerdict{"Answer ", "met", Tone::good},
+    PaintedVerdict{"Answer ", "undecided", Tone::bad},
 };
 
 /// Texts of lines that are painted as a whole.
@@ -93,8 +93,8 @@ std::string_view word_at(std::string_view line, WordPlace place) {
   return line.substr(place.begin, place.end - place.begin);
 }
 
-std::string with_word_painted(std::string_view line, WordPlace place, Ink ink) {
-  return std::string(line.substr(0, place.begin)) + in_ink(word_at(line, place), ink) +
+std::string with_word_painted(std::string_view line, WordPlace place, Tone tone) {
+  return std::string(line.substr(0, place.begin)) + in_tone(word_at(line, place), tone) +
          std::string(line.substr(place.end));
 }
 
@@ -104,32 +104,32 @@ std::string with_stars_painted(const std::string& line) {
   for (std::size_t i = 0; i < line.size(); ++i) {
     const bool is_star = line[i] == '*' && i > 0 && line[i - 1] == ' ' &&
                          (i + 1 == line.size() || line[i + 1] == ' ');
-    text += is_star ? in_ink("*", Ink::changed) : line.substr(i, 1);
+    text += is_star ? in_tone("*", Tone::changed) : line.substr(i, 1);
   }
   return text;
 }
 
 /// The verdict of a check of `verify`: `name  ok  finding`.
 std::string with_check_painted(std::string_view line) {
-  for (const auto& [word, ink] : {std::pair(std::string_view("FAILS"), Ink::bad),
-                                  std::pair(std::string_view("ok"), Ink::good)}) {
+  for (const auto& [word, tone] : {std::pair(std::string_view("FAILS"), Tone::bad),
+                                   std::pair(std::string_view("ok"), Tone::good)}) {
     const std::size_t name_end = line.find(' ');
     if (name_end == std::string_view::npos || name_end == 0) continue;
     const std::size_t begin = line.find_first_not_of(' ', name_end);
     if (begin == std::string_view::npos || !line.substr(begin).starts_with(word)) continue;
     const std::size_t end = begin + word.size();
     if (end < line.size() && line.substr(end, 2) != "  " && line.substr(end) != " ") continue;
-    return with_word_painted(line, {.begin = begin, .end = end}, ink);
+    return with_word_painted(line, {.begin = begin, .end = end}, tone);
   }
   return std::string(line);
 }
 
 std::string with_verdict_painted(std::string_view line) {
-  for (const auto& [begin, word, ink] : painted_verdicts) {
+  for (const auto& [begin, word, tone] : painted_verdicts) {
     if (!line.starts_with(begin)) continue;
     const std::size_t place = line.find_first_not_of(' ', begin.size());
     if (place == std::string_view::npos || line.substr(place) != word) continue;
-    return with_word_painted(line, {.begin = place, .end = line.size()}, ink);
+    return with_word_painted(line, {.begin = place, .end = line.size()}, tone);
   }
   return with_check_painted(line);
 }
@@ -141,12 +141,12 @@ class Painter {
     if (is_rule(next)) return begin_table(line);
     if (line.empty()) is_table_ = counts_beyond_ = false;
     if (is_rule(line)) return std::string(line);
-    if (is_trouble(line)) return in_ink(line, Ink::bad);
+    if (is_trouble(line)) return in_tone(line, Tone::bad);
     if (!is_table_) return with_verdict_painted(line);
     const WordPlace place = word_before_line(line);
     const std::string_view count = word_at(line, place);
     const bool is_beyond = counts_beyond_ && !count.empty() && count != "0" && count != "-";
-    return with_stars_painted(is_beyond ? with_word_painted(line, place, Ink::bad)
+    return with_stars_painted(is_beyond ? with_word_painted(line, place, Tone::bad)
                                         : std::string(line));
   }
 
@@ -154,7 +154,7 @@ class Painter {
   [[nodiscard]] std::string begin_table(std::string_view titles) {
     is_table_ = true;
     counts_beyond_ = word_at(titles, word_before_line(titles)) == "beyond";
-    return in_ink(titles, Ink::heading);
+    return in_tone(titles, Tone::heading);
   }
 
   bool is_table_ = false;
@@ -173,14 +173,14 @@ std::vector<std::string_view> lines_in(std::string_view text) {
 
 }  // namespace
 
-int colour_of(Ink ink) {
-  switch (ink) {
-    case Ink::good:
+int colour_of(Tone tone) {
+  switch (tone) {
+    case Tone::good:
       return 31;  // #0087af.
-    case Ink::bad:
+    case Tone::bad:
       return 130;  // #af5f00.
-    case Ink::heading:
-    case Ink::changed:
+    case Tone::heading:
+    case Tone::changed:
       break;
   }
   return 0;

@@ -9,17 +9,17 @@ namespace proofmass::coordinator {
 
 /// What a part of a text is painted for. Colour never says anything that the words do not: it only
 /// helps to find them.
-enum class Ink : std::uint8_t {
+enum class Tone : std::uint8_t {
   heading,  ///< Titles of a table.
   good,     ///< A requirement that is met, a check that passes.
   bad,      ///< What somebody should look at: an error beyond its objective, a failure, a loss.
   changed,  ///< A significant change, good or bad.
 };
 
-/// Number of an ink's colour among the 256 of a terminal, or 0 for the terminal's own. Blue and
+/// Number of a tone's colour among the 256 of a terminal, or 0 for the terminal's own. Blue and
 /// orange can be told apart by colour-blind people, and have a contrast of at least 4:1 on black
 /// and on white.
-[[nodiscard]] int colour_of(Ink ink);
+[[nodiscard]] int colour_of(Tone tone);
 
 /// True if what is written to the stream may be painted: it is a terminal, NO_COLOR is not set or
 /// empty (https://no-color.org), and TERM is neither unset nor `dumb`.

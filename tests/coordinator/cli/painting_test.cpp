@@ -51,13 +51,13 @@ double light_of(int colour) {
   return 0.2126 * linear(cube / 36) + 0.7152 * linear(cube / 6 % 6) + 0.0722 * linear(cube % 6);
 }
 
-TEST(Ink, IsReadableOnBlackAndOnWhite) {
-  for (const Ink ink : {Ink::good, Ink::bad}) {
-    const double light = light_of(colour_of(ink));
-    EXPECT_GT((light + 0.05) / 0.05, 4.0) << colour_of(ink);
-    EXPECT_GT(1.05 / (light + 0.05), 4.0) << colour_of(ink);
+TEST(Tone, IsReadableOnBlackAndOnWhite) {
+  for (const Tone tone : {Tone::good, Tone::bad}) {
+    const double light = light_of(colour_of(tone));
+    EXPECT_GT((light + 0.05) / 0.05, 4.0) << colour_of(tone);
+    EXPECT_GT(1.05 / (light + 0.05), 4.0) << colour_of(tone);
   }
-  EXPECT_EQ(colour_of(Ink::heading), 0) << "the terminal's own";
+  EXPECT_EQ(colour_of(Tone::heading), 0) << "the terminal's own";
 }
 
 TEST(Painting, MarksCountsBeyondAnObjective) {
