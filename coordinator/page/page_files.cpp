@@ -36,6 +36,8 @@ main { max-width: 84rem; margin: 0 auto; padding: 0.5rem 1rem 3rem; }
 main:focus { outline: none; }
 h1 { font-size: 1.5rem; margin: 0.6rem 0; overflow-wrap: anywhere; }
 h2 { font-size: 1.15rem; margin: 1.6rem 0 0.4rem; }
+h3 { font-size: 1rem; margin: 1.1rem 0 0.3rem; }
+td.words { min-width: 6rem; }
 .note { color: var(--faint); margin: 0.3rem 0; }
 .notes { background: var(--warn-ground); color: var(--warn); padding: 0.5rem 0.5rem 0.5rem 1.6rem;
   border-radius: 4px; overflow-wrap: anywhere; }
