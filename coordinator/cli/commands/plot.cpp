@@ -132,7 +132,7 @@ void add_plot(CLI::App& app, Command& chosen) {
   command.footer(exit_codes_text({}));
   add_database(command, options.database);
   command.add_option("--chart", options.chart,
-                     "Which one, as in errors or histogram:a_c12; see --list");
+                     "Which one, as in errors or histogram:a_c12; see\n--list");
   command
       .add_option("--output", options.output,
                   "File .svg, or .png by rsvg-convert; - for SVG on\nstandard output")

@@ -160,16 +160,16 @@ void add_report(CLI::App& app, Command& chosen) {
                      "\"all objectives for 95% with 90%\"; may be repeated");
   command
       .add_option("--requirements", options.requirements_file,
-                  "File (TOML) of requirements with id, text and requirement")
+                  "File (TOML) of requirements, each with id, text\nand requirement")
       ->type_name(wire::file_type);
   command
       .add_option("--html", options.html,
-                  "Write a report for a review, with charts, as one HTML\n"
-                  "file; - for standard output")
+                  "Write a report for a review, with charts, as\n"
+                  "one HTML file; - for standard output")
       ->type_name(wire::file_type);
   command
       .add_option("--markdown", options.markdown,
-                  "The same without charts, as Markdown; - for standard\noutput")
+                  "The same without charts, as Markdown; - for\nstandard output")
       ->type_name(wire::file_type);
   add_force_flag(command, options.if_there);
   add_json_flag(command, options.format);
