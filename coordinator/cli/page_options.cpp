@@ -22,9 +22,11 @@ std::optional<PageConfig> page_config_of(const PageOptions& options) {
   const bool is_off = options.address.empty() || options.address == "false";
   const bool is_default = options.address == "true";
   if (!is_off) {
-    return PageConfig{.address = parse_page_address(is_default ? page_address_by_default
+    PageConfig config{.address = parse_page_address(is_default ? page_address_by_default
                                                                : std::string_view(options.address)),
                       .token_file = options.token_file};
+    config.validate();
+    return config;
   }
   if (options.token_file) {
     throw UsageError(

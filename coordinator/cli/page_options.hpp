@@ -20,8 +20,8 @@ struct PageOptions {
 void add_page_options(CLI::App& app, PageOptions& options);
 
 /// Nothing if no page is wanted.
-/// @throws UsageError `page token file = PATH (rule)`, InvalidArgument as parse_page_address()
-/// does.
+/// @throws UsageError `page token file = PATH (rule)`, Error as parse_page_address() and
+///         PageConfig::validate() do.
 [[nodiscard]] std::optional<PageConfig> page_config_of(const PageOptions& options);
 
 }  // namespace proofmass::coordinator

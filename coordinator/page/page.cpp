@@ -61,6 +61,8 @@ std::optional<PageToken> token_of(const PageConfig& config) {
 
 }  // namespace
 
+void PageConfig::validate() const { (void)token_of(*this); }
+
 std::uint64_t page_descriptors_max() { return connections_allowed() + further_descriptors; }
 
 struct Page::Impl {

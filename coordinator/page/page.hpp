@@ -17,6 +17,11 @@ struct PageConfig {
   PageAddress address;
   /// Secret that visitors must show; needed for addresses that other machines reach.
   std::optional<std::filesystem::path> token_file = {};
+
+  /// @throws InvalidArgument `page = HOST:PORT (rule)` if such an address has no token; Error if
+  /// the
+  ///         token file cannot be used.
+  void validate() const;
 };
 
 /// Descriptors that a live page may take beside those of the service.
@@ -27,8 +32,7 @@ struct PageConfig {
 class Page {
  public:
   /// Listens. Warns if other machines can reach the address, because nothing is encrypted.
-  /// @throws InvalidArgument `page = HOST:PORT (rule)` if such an address has no token; Error if
-  ///         the address or the token file cannot be used.
+  /// @throws Error as PageConfig::validate() does, or if the address cannot be used.
   Page(const PageConfig& config, const Log& log);
   ~Page();  ///< Waits for a database that is being read.
   Page(const Page&) = delete;

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+
 #include "coordinator/cli/program.hpp"
+#include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/message_of.hpp"
 
 namespace proofmass::coordinator {
@@ -35,11 +39,24 @@ TEST(PageOption, TakesNoFileForAnAddress) {
 }
 
 TEST(PageOption, TakesAnAddressBehindItsName) {
-  const ParsedPage parsed = parsed_page("--page=*:80 --page-token-file t a.toml");
+  const test::TemporaryDirectory directory;
+  const std::string token = (directory / "token").string();
+  std::ofstream(token) << "0123456789abcdef\n";
+  std::filesystem::permissions(token, std::filesystem::perms::owner_read);
+  const ParsedPage parsed = parsed_page("--page=*:80 --page-token-file " + token + " a.toml");
   ASSERT_TRUE(parsed.config.has_value());
   EXPECT_EQ(parsed.config->address.port, 80);
   EXPECT_FALSE(parsed.config->address.is_loopback);
-  EXPECT_EQ(parsed.config->token_file, "t");
+  EXPECT_EQ(parsed.config->token_file, token);
+}
+
+// `run` asks for this before it makes a database.
+TEST(PageOption, NeedsATokenBeyondThisMachine) {
+  EXPECT_EQ(test::message_of<InvalidArgument>([] { (void)parsed_page("--page=1.2.3.4:80"); }),
+            "page = 1.2.3.4:80 (must be a loopback address, or with --page-token-file)");
+  EXPECT_EQ(test::message_of<Error>(
+                [] { (void)parsed_page("--page=1.2.3.4:80 --page-token-file missing"); }),
+            "page token file = missing (No such file or directory)");
 }
 
 TEST(PageOption, MustBeAnAddress) {
