@@ -98,22 +98,38 @@ constexpr std::string_view script = R"js('use strict';
     }
   };
 
+  const isAlike = (old, fresh) => old.nodeName === fresh.nodeName &&
+    old.className === fresh.className;
+
+  // Notes come and go before a table: what has the focus is never removed to make room for them.
   const merge = (old, fresh) => {
-    const news = [...fresh.childNodes];
-    news.forEach((node, i) => {
-      const there = old.childNodes[i];
-      if (!there) {
-        old.appendChild(document.importNode(node, true));
-      } else if (there.nodeType !== node.nodeType || there.nodeName !== node.nodeName) {
-        old.replaceChild(document.importNode(node, true), there);
-      } else if (node.nodeType === Node.ELEMENT_NODE) {
-        mergeAttributes(there, node);
-        merge(there, node);
-      } else if (there.data !== node.data) {
-        there.data = node.data;
+    let there = old.firstChild;
+    for (const node of fresh.childNodes) {
+      let match = there;
+      while (match && !isAlike(match, node)) {
+        match = match.contains(document.activeElement) ? null : match.nextSibling;
       }
-    });
-    while (old.childNodes.length > news.length) old.removeChild(old.lastChild);
+      if (!match) {
+        old.insertBefore(document.importNode(node, true), there);
+        continue;
+      }
+      while (there !== match) {
+        there = there.nextSibling;
+        there.previousSibling.remove();
+      }
+      there = match.nextSibling;
+      if (node.nodeType === Node.ELEMENT_NODE) {
+        mergeAttributes(match, node);
+        merge(match, node);
+      } else if (match.data !== node.data) {
+        match.data = node.data;
+      }
+    }
+    while (there) {
+      const next = there.nextSibling;
+      there.remove();
+      there = next;
+    }
   };
 
   const refresh = async () => {
