@@ -191,7 +191,7 @@ double PROOFMASS_NAME(make_noise_, PROOFMASS_KERNEL_SET)(const BatchSession& ses
         sum = sum + noise.next_deviate();
         continue;
       }
-      const SampleNoise<Batch> sample = noise.next();
+      const SampleNoise<Batch>& sample = noise.next();
       const Vector3<Batch> total = sample.sensor_K[0] + sample.sensor_K[1] + sample.angular_S +
                                    sample.star_tracker_S + sample.thrust_S + sample.torque_S;
       sum = sum + total.x + total.y + total.z;

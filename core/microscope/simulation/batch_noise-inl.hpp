@@ -191,16 +191,18 @@ class BatchNoise {
         philox_(philox_of(session, first_lane)),
         states_(states) {}
 
-  HWY_INLINE SampleNoise<Batch> next() {
-    if (next_in_block_ == samples_per_noise_block) refill();
-    const std::size_t i = next_in_block_++;
-    return shape_sample<Batch>(model_, states_,
-                               [&](std::size_t channel) HWY_ATTR { return deviate(channel, i); });
+  /// The reference holds until the next call.
+  HWY_INLINE const SampleNoise<Batch>& next() {
+    if (next_in_block_ == samples_per_noise_block) {
+      make_deviates();
+      shape_deviates();
+    }
+    return block_[next_in_block_++];
   }
 
   /// Makes a sample's deviates for all channels and returns that of the first.
   HWY_INLINE Batch next_deviate() {
-    if (next_in_block_ == samples_per_noise_block) refill();
+    if (next_in_block_ == samples_per_noise_block) make_deviates();
     return deviate(0, next_in_block_++);
   }
 
@@ -231,7 +233,7 @@ class BatchNoise {
   }
 
   /// Three short loops rather than a long one: the processor overlaps several turns of each.
-  HWY_NOINLINE void refill() {
+  HWY_NOINLINE void make_deviates() {
     alignas(64) std::uint32_t radius_words[num_noise_channels][2][num_lanes];
     alignas(64) std::uint32_t angle_words[num_noise_channels][2][num_lanes];
     philox_.begin(num_blocks_);
@@ -257,6 +259,15 @@ class BatchNoise {
     next_in_block_ = 0;
   }
 
+  HWY_NOINLINE void shape_deviates() {
+    const auto white = [&](std::size_t channel) HWY_ATTR {
+      OfSamples<Batch> deviates;
+      for (std::size_t k = 0; k < deviates.size(); ++k) deviates[k] = deviate(channel, k);
+      return deviates;
+    };
+    shape_block<Batch>(model_, states_, white, block_);
+  }
+
   const NoiseModel& model_;
   const NoiseStreams& streams_;
   BatchPhilox philox_;
@@ -264,6 +275,7 @@ class BatchNoise {
   /// Deviates of samples 0 and 2, and of samples 1 and 3 of a block, by channel.
   alignas(64) float cosines_[num_noise_channels][2][num_lanes];
   alignas(64) float sines_[num_noise_channels][2][num_lanes];
+  OfSamples<SampleNoise<Batch>> block_;
   std::uint32_t num_blocks_ = 0;
   std::size_t next_in_block_ = samples_per_noise_block;
 };

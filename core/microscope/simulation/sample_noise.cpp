@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/microscope/control/star_tracker.hpp"
@@ -105,19 +106,19 @@ SessionNoise::SessionNoise(const NoiseModel& model, std::uint64_t seed, RunIndex
       streams_(noise_streams(session_name)),
       states_(stationary_states(model, seed, run, session_name)) {}
 
-SampleNoise<double> SessionNoise::next() {
+const SampleNoise<double>& SessionNoise::next() {
   if (next_in_block_ == samples_per_noise_block) {
-    for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
-      deviates_[channel] =
-          normal_deviates(RandomStream(seed_, run_, streams_[channel]).block(num_blocks_));
-    }
+    const auto white = [&](std::size_t channel) {
+      const RandomStream stream(seed_, run_, streams_[channel]);
+      OfSamples<double> deviates;
+      std::ranges::copy(normal_deviates(stream.block(num_blocks_)), deviates.begin());
+      return deviates;
+    };
+    shape_block<double>(*model_, states_, white, block_);
     ++num_blocks_;
     next_in_block_ = 0;
   }
-  const std::size_t i = next_in_block_++;
-  return shape_sample<double>(*model_, states_, [&](std::size_t channel) {
-    return static_cast<double>(deviates_[channel][i]);
-  });
+  return block_[next_in_block_++];
 }
 
 }  // namespace proofmass

@@ -39,6 +39,14 @@ struct NoiseModel {
 /// output of the model is that of scale 1 times the scale, and exactly 0 with scale 0.
 [[nodiscard]] NoiseModel make_noise_model(const NoiseConfig& config, double sample_period_s);
 
+inline constexpr std::size_t num_noise_channels = 18;
+inline constexpr std::size_t num_coloured_channels = 9;  ///< The first ones.
+inline constexpr std::size_t samples_per_noise_block = 4;
+
+/// A number of each sample of a block: of as many samples as one block of random bits serves.
+template <typename T>
+using OfSamples = std::array<T, samples_per_noise_block>;
+
 /// Memory of a NoiseShape. It is driven by a white sequence of unit variance and does not depend on
 /// noise.scale.
 template <typename T>
@@ -47,57 +55,80 @@ struct NoiseState {
   T pair_real{};
   T pair_imaginary{};
 
-  /// The next value, from the next of a white sequence of unit variance.
-  PROOFMASS_INLINE T advance(const NoiseShape& shape, const T& white) {
-    T sum = T(shape.gain) * white;
+  /// The next values, from the next of a white sequence of unit variance. Pole by pole, so that the
+  /// state and the coefficients of a pole are read once for all samples.
+  PROOFMASS_INLINE OfSamples<T> advance(const NoiseShape& shape, const OfSamples<T>& white) {
+    OfSamples<T> sum;
+    for (std::size_t k = 0; k < sum.size(); ++k) sum[k] = T(shape.gain) * white[k];
     for (std::size_t i = 0; i < shape.num_real; ++i) {
-      sum = sum + T(shape.coefficient[i]) * real[i];
-      real[i] = T(shape.pole[i]) * real[i] + white;
+      const T coefficient = T(shape.coefficient[i]);
+      const T pole = T(shape.pole[i]);
+      T state = real[i];
+      for (std::size_t k = 0; k < sum.size(); ++k) {
+        sum[k] = sum[k] + coefficient * state;
+        state = pole * state + white[k];
+      }
+      real[i] = state;
     }
-    if (shape.has_pair) {
-      sum = sum + T(2.0 * shape.pair_coefficient.real()) * pair_real -
-            T(2.0 * shape.pair_coefficient.imag()) * pair_imaginary;
-      const T rotated = T(shape.pair_pole.real()) * pair_real -
-                        T(shape.pair_pole.imag()) * pair_imaginary + white;
-      pair_imaginary =
-          T(shape.pair_pole.real()) * pair_imaginary + T(shape.pair_pole.imag()) * pair_real;
-      pair_real = rotated;
-    }
+    if (shape.has_pair) advance_pair(shape, white, sum);
     return sum;
   }
-};
 
-inline constexpr std::size_t num_noise_channels = 18;
-inline constexpr std::size_t num_coloured_channels = 9;  ///< The first ones.
-inline constexpr std::size_t samples_per_noise_block = 4;
+ private:
+  PROOFMASS_INLINE void advance_pair(const NoiseShape& shape, const OfSamples<T>& white,
+                                     OfSamples<T>& sum) {
+    const T twice_real = T(2.0 * shape.pair_coefficient.real());
+    const T twice_imaginary = T(2.0 * shape.pair_coefficient.imag());
+    const T pole_real = T(shape.pair_pole.real());
+    const T pole_imaginary = T(shape.pair_pole.imag());
+    for (std::size_t k = 0; k < sum.size(); ++k) {
+      sum[k] = sum[k] + twice_real * pair_real - twice_imaginary * pair_imaginary;
+      const T rotated = pole_real * pair_real - pole_imaginary * pair_imaginary + white[k];
+      pair_imaginary = pole_real * pair_imaginary + pole_imaginary * pair_real;
+      pair_real = rotated;
+    }
+  }
+};
 
 template <typename T>
 using NoiseStates = std::array<NoiseState<T>, num_coloured_channels>;
 
-/// One sample of noise from a white number for each channel.
-/// @param white  white(c) yields the next deviate of channel c as T.
+/// The noise of a block of samples from white numbers.
+/// @param white  white(c) yields the next deviates of channel c as OfSamples<T>.
 template <typename T, typename White>
-PROOFMASS_INLINE SampleNoise<T> shape_sample(const NoiseModel& model, NoiseStates<T>& states,
-                                             const White& white) {
-  const auto triple = [&](std::size_t first) {
-    return Vector3<T>{white(first), white(first + 1), white(first + 2)};
+PROOFMASS_INLINE void shape_block(const NoiseModel& model, NoiseStates<T>& states,
+                                  const White& white, OfSamples<SampleNoise<T>>& block) {
+  const auto put = [&](const OfSamples<T>& values, const auto& place) {
+    for (std::size_t k = 0; k < values.size(); ++k) place(block[k]) = values[k];
   };
-  SampleNoise<T> noise;
+  const auto shape = [&](std::size_t channel, const NoiseShape& by, const auto& place) {
+    put(states[channel].advance(by, white(channel)), place);
+  };
+  using Noise = SampleNoise<T>;
   for (std::size_t k = 0; k < 2; ++k) {
-    noise.sensor_K[k] = {states[3 * k].advance(model.linear_x, white(3 * k)),
-                         states[3 * k + 1].advance(model.linear_yz, white(3 * k + 1)),
-                         states[3 * k + 2].advance(model.linear_yz, white(3 * k + 2))};
+    shape(3 * k, model.linear_x, [k](Noise& n) -> T& { return n.sensor_K[k].x; });
+    shape(3 * k + 1, model.linear_yz, [k](Noise& n) -> T& { return n.sensor_K[k].y; });
+    shape(3 * k + 2, model.linear_yz, [k](Noise& n) -> T& { return n.sensor_K[k].z; });
   }
-  noise.angular_S = {states[6].advance(model.angular, white(6)),
-                     states[7].advance(model.angular, white(7)),
-                     states[8].advance(model.angular, white(8))};
-  const Vector3<T> star = triple(9);
+  shape(6, model.angular, [](Noise& n) -> T& { return n.angular_S.x; });
+  shape(7, model.angular, [](Noise& n) -> T& { return n.angular_S.y; });
+  shape(8, model.angular, [](Noise& n) -> T& { return n.angular_S.z; });
+
+  const auto triple = [&](std::size_t first) {
+    const OfSamples<T> x = white(first), y = white(first + 1), z = white(first + 2);
+    OfSamples<Vector3<T>> triples;
+    for (std::size_t k = 0; k < triples.size(); ++k) triples[k] = {x[k], y[k], z[k]};
+    return triples;
+  };
   const std::array<double, 6>& factor = model.star_tracker_factor;
-  noise.star_tracker_S = {T(factor[0]) * star.x, T(factor[1]) * star.x + T(factor[2]) * star.y,
-                          T(factor[3]) * star.x + T(factor[4]) * star.y + T(factor[5]) * star.z};
-  noise.thrust_S = T(model.thrust_deviation) * triple(12);
-  noise.torque_S = T(model.torque_deviation) * triple(15);
-  return noise;
+  const OfSamples<Vector3<T>> star = triple(9), thrust = triple(12), torque = triple(15);
+  for (std::size_t k = 0; k < block.size(); ++k) {
+    block[k].star_tracker_S = {
+        T(factor[0]) * star[k].x, T(factor[1]) * star[k].x + T(factor[2]) * star[k].y,
+        T(factor[3]) * star[k].x + T(factor[4]) * star[k].y + T(factor[5]) * star[k].z};
+    block[k].thrust_S = T(model.thrust_deviation) * thrust[k];
+    block[k].torque_S = T(model.torque_deviation) * torque[k];
+  }
 }
 
 /// Names of the channels, which are part of their streams' names; x, y, z for each vector of
@@ -121,7 +152,8 @@ class SessionNoise {
   SessionNoise(const NoiseModel& model, std::uint64_t seed, RunIndex run,
                std::string_view session_name);
 
-  [[nodiscard]] SampleNoise<double> next();
+  /// The reference holds until the next call.
+  [[nodiscard]] const SampleNoise<double>& next();
 
  private:
   const NoiseModel* model_;
@@ -129,7 +161,7 @@ class SessionNoise {
   RunIndex run_;
   NoiseStreams streams_;
   NoiseStates<double> states_;
-  std::array<std::array<float, samples_per_noise_block>, num_noise_channels> deviates_{};
+  OfSamples<SampleNoise<double>> block_{};
   std::uint32_t num_blocks_ = 0;
   std::size_t next_in_block_ = samples_per_noise_block;
 };
