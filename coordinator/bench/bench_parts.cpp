@@ -85,7 +85,7 @@ double sums_ns(Bench& bench) {
   return ns_per_call([&] {
     keep(observation);
     add_sample(ground_signals(observation, shared, target.product), weights.data(), weights.size(),
-               target.signals, sums);
+               target.product, target.signals, sums);
     keep(sums);
   });
 }

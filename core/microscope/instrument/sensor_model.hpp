@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
@@ -28,6 +29,9 @@ struct SatelliteMotion {
   Vector3<T> omega_dot_IS_S;  ///< Ω̇, rad/s².
 };
 
+/// Whether a session moves a test mass. Where none moves, the terms of the motion are not computed.
+enum class TestMasses : std::uint8_t { at_rest, moving };
+
 /// Factors of the motion q_S(t) = motion_direction_S·(position, velocity, acceleration) that a
 /// session commands of a test mass. All are 0 where no mass moves.
 struct MassMotionPhase {
@@ -50,18 +54,24 @@ struct SensorModel {
 /// Γ_App,k + p_k in S, m/s²: the applied acceleration without the parasitic one ([Hardy2013]
 /// eq:instrument-dynamics with O_kO_sat = −r_k): Γ_sat − ([T] − [In]) r + [Cor] ṙ + r̈. The mass
 /// follows the session's command exactly, as the sensor's own loop is far faster.
-template <typename T>
+///
+/// @tparam masses  `at_rest` only with a motion that is 0; then it makes no difference to the
+/// value.
+template <TestMasses masses = TestMasses::moving, typename T>
 PROOFMASS_INLINE Vector3<T> kinematic_acceleration(const SensorModel<T>& sensor,
                                                    const SatelliteMotion<T>& satellite,
                                                    const MassMotionPhase& motion) {
-  const Vector3<T> r_S =
-      sensor.rest_position_S_m + T(motion.position_m) * sensor.motion_direction_S;
+  Vector3<T> r_S = sensor.rest_position_S_m;
+  if constexpr (masses == TestMasses::moving) {
+    r_S += T(motion.position_m) * sensor.motion_direction_S;
+  }
+  const Vector3<T> at_rest_S =
+      satellite.acceleration_S - gravity_gradient(satellite.gradient_s2, satellite.radial_S, r_S) +
+      inertia_gradient(satellite.omega_IS_S, satellite.omega_dot_IS_S, r_S);
+  if constexpr (masses == TestMasses::at_rest) return at_rest_S;
   const Vector3<T> velocity_S = T(motion.velocity_m_s) * sensor.motion_direction_S;
   const Vector3<T> acceleration_S = T(motion.acceleration_m_s2) * sensor.motion_direction_S;
-  return satellite.acceleration_S -
-         gravity_gradient(satellite.gradient_s2, satellite.radial_S, r_S) +
-         inertia_gradient(satellite.omega_IS_S, satellite.omega_dot_IS_S, r_S) +
-         T(2.0) * cross(satellite.omega_IS_S, velocity_S) + acceleration_S;
+  return at_rest_S + T(2.0) * cross(satellite.omega_IS_S, velocity_S) + acceleration_S;
 }
 
 /// Γ_mes,k in K without noise, m/s² ([Hardy2013] eq:measurement):

@@ -114,7 +114,9 @@ struct Loop {
   ///
   /// @param shared  Of this sample; what all runs have in common.
   /// @param noise   Of this sample; its scale is in it already.
+  /// @tparam masses  `at_rest` only in a session that moves no test mass.
   /// @returns What instrument and estimator report at this sample.
+  template <TestMasses masses = TestMasses::moving>
   PROOFMASS_INLINE Observation<T> advance(const LoopConstants<T>& constants,
                                           const DragFreeGains& drag_free_gains,
                                           const AttitudeGains& attitude_gains,
@@ -125,7 +127,8 @@ struct Loop {
     Observation<T> observation;
     for (std::size_t k = 0; k < 2; ++k) {
       const SensorModel<T>& sensor = constants.sensors[k];
-      const Vector3<T> kinematic_S = kinematic_acceleration(sensor, satellite, shared.mass_motion);
+      const Vector3<T> kinematic_S =
+          kinematic_acceleration<masses>(sensor, satellite, shared.mass_motion);
       observation.kinematic_S_x[k] = kinematic_S.x;
       observation.measured_K[k] = measured_acceleration(sensor, kinematic_S) + noise.sensor_K[k];
     }

@@ -177,13 +177,15 @@ struct RunPlan::Impl {
 
   [[nodiscard]] SessionSetup setup(std::size_t i, Readers& readers) const {
     const Session& session = campaign.scenario.sessions[i];
-    return {.reader = &readers.lines,
-            .drag_free = drag_free,
-            .attitude = attitude,
-            .product = target_info(session.target).product,
-            .signals = method.needs(session).signals,
-            .known_readers = readers.known,
-            .residual_reader = readers.residual ? &*readers.residual : nullptr};
+    return {
+        .masses = mass_excitation(session) == nullptr ? TestMasses::at_rest : TestMasses::moving,
+        .reader = &readers.lines,
+        .drag_free = drag_free,
+        .attitude = attitude,
+        .product = target_info(session.target).product,
+        .signals = method.needs(session).signals,
+        .known_readers = readers.known,
+        .residual_reader = readers.residual ? &*readers.residual : nullptr};
   }
 
   /// @param observer  Null if nobody observes the run.

@@ -72,6 +72,7 @@ PROOFMASS_INLINE std::array<T, num_signals> ground_signals(const Observation<T>&
 
 /// What the runs of a batch share in one session.
 struct SessionSetup {
+  TestMasses masses = TestMasses::moving;  ///< `at_rest` if no excitation moves one.
   WeightReader* reader = nullptr;
   DragFreeGains drag_free;
   AttitudeGains attitude;
@@ -102,10 +103,15 @@ PROOFMASS_INLINE void add_weighted(const std::array<T, num_signals>& values, con
 /// Adds one sample's signals to the sums of every output.
 template <typename T>
 PROOFMASS_INLINE void add_sample(const std::array<T, num_signals>& values, const double* weights,
-                                 std::size_t num_outputs, SignalSet signals, SignalSums<T>& sums) {
+                                 std::size_t num_outputs, Product product, SignalSet signals,
+                                 SignalSums<T>& sums) {
+  constexpr std::size_t product_index = index(Signal::product);
   for (std::size_t i = 0; i < num_outputs; ++i) {
     const T weight = T(weights[i]);
-    add_weighted<0, num_common_signals>(values, weight, i, sums);
+    add_weighted<0, product_index>(values, weight, i, sums);
+    if (product != Product::none) {
+      add_weighted<product_index, num_common_signals>(values, weight, i, sums);
+    }
     if (signals == SignalSet::all) {
       add_weighted<num_common_signals, num_signals>(values, weight, i, sums);
     }
@@ -135,8 +141,8 @@ __attribute__((noinline)) void add_known_lines(const std::array<T, num_signals> 
                                                std::size_t k, KnownSums<T>& sums) {
   for (std::size_t i = 0; i < setup.known_readers.size(); ++i) {
     const std::size_t num_outputs = 2 * setup.known_readers[i].weights().num_fit_lines();
-    add_sample(values, weights + i * known_block_size + k * num_outputs, num_outputs, setup.signals,
-               sums[i]);
+    add_sample(values, weights + i * known_block_size + k * num_outputs, num_outputs, setup.product,
+               setup.signals, sums[i]);
   }
 }
 
@@ -158,35 +164,80 @@ struct SessionOutcome {
   KnownSums<double> known_sums{};
 };
 
+/// Whether LoopMonitor is filled.
+enum class Monitoring : std::uint8_t { off, on };
+
+/// What a compiled sample loop computes. Parts that are left out are not even branches in it.
+struct SampleKind {
+  TestMasses masses = TestMasses::moving;
+  SignalSet signals = SignalSet::all;
+  bool has_product = true;  ///< Of any kind but Product::none.
+  Monitoring monitoring = Monitoring::off;
+};
+
 /// Advances all groups by some samples.
-/// @tparam is_monitored  Whether weights.residual are there. A session without the monitor is not
-///                       slowed by what the monitor keeps in registers (2 % with SSE4).
+/// @tparam kind     Covers what `setup` asks for.
 /// @param weights   Of these samples; none while the loops settle, when nothing is summed.
 /// @param observer  NoObserver or, for a run alone, SessionObserver.
-template <bool is_monitored, typename Signals, typename Group, typename Observer>
+template <SampleKind kind, typename Signals, typename Group, typename Observer>
 __attribute__((noinline)) void advance_groups(Signals& signals, const SessionSetup& setup,
                                               std::span<Group> groups, std::size_t num_samples,
                                               const BlockWeights& weights, Observer& observer) {
   const std::size_t num_outputs = 2 * setup.reader->weights().num_fit_lines();
+  const Product product = kind.has_product ? setup.product : Product::none;
+  const SignalSet recorded = kind.signals == SignalSet::all ? setup.signals : SignalSet::common;
   for (std::size_t k = 0; k < num_samples; ++k) {
     const SharedSample& shared = signals.next();
     for (auto& [constants, noise, loop, sums, monitor, known_sums] : groups) {
       if constexpr (Observer::is_active) observer.begin_sample(loop);
-      const auto observation = loop.advance(constants, setup.drag_free, setup.attitude, shared,
-                                            noise.next(), k % 4 == 0 ? Watch::yes : Watch::no);
+      const auto observation =
+          loop.template advance<kind.masses>(constants, setup.drag_free, setup.attitude, shared,
+                                             noise.next(), k % 4 == 0 ? Watch::yes : Watch::no);
       if constexpr (Observer::is_active) {
         observer(shared, observation, ground_signals(observation, shared, setup.product));
       }
       if (weights.lines == nullptr) continue;
-      const auto values = ground_signals(observation, shared, setup.product);
-      add_sample(values, weights.lines + k * num_outputs, num_outputs, setup.signals, sums);
+      const auto values = ground_signals(observation, shared, product);
+      add_sample(values, weights.lines + k * num_outputs, num_outputs, product, recorded, sums);
       if (weights.known != nullptr) [[unlikely]]
         add_known_lines(values, setup, weights.known, k, known_sums);
-      if constexpr (is_monitored) {
+      if constexpr (kind.monitoring == Monitoring::on) {
         monitor.add(constants.sensors, observation, weights.residual + 2 * k);
       }
     }
   }
+}
+
+template <typename Signals, typename Group, typename Observer>
+using AdvanceGroups = void (*)(Signals&, const SessionSetup&, std::span<Group>, std::size_t,
+                               const BlockWeights&, Observer&);
+
+/// The compiled loop for a session. Each session of the paper's campaign has one that computes what
+/// it needs and no more, except for the one that is monitored; the last one covers all others. A
+/// loop for each combination would take the compiler minutes.
+template <typename Signals, typename Group, typename Observer>
+AdvanceGroups<Signals, Group, Observer> advance_groups_of(const SessionSetup& setup) {
+  using enum TestMasses;
+  using enum SignalSet;
+  if (setup.residual_reader != nullptr) {
+    return advance_groups<SampleKind{.monitoring = Monitoring::on}, Signals, Group, Observer>;
+  }
+  if constexpr (!Observer::is_active) {
+    const bool has_product = setup.product != Product::none;
+    if (setup.masses == moving && setup.signals == common) {
+      return advance_groups<SampleKind{moving, common}, Signals, Group, Observer>;
+    }
+    if (setup.masses == at_rest && setup.signals == common && has_product) {
+      return advance_groups<SampleKind{at_rest, common}, Signals, Group, Observer>;
+    }
+    if (setup.masses == at_rest && setup.signals == common) {
+      return advance_groups<SampleKind{at_rest, common, false}, Signals, Group, Observer>;
+    }
+    if (setup.masses == at_rest && !has_product) {
+      return advance_groups<SampleKind{at_rest, all, false}, Signals, Group, Observer>;
+    }
+  }
+  return advance_groups<SampleKind{}, Signals, Group, Observer>;
 }
 
 /// Writes the weights of a block: first those of the lines to be fitted, then those at f_EP if the
@@ -223,18 +274,15 @@ inline void record_session(Signals& signals, const SessionSetup& setup, std::spa
                            std::span<double> buffer, const Progress& progress, Observer observer) {
   for (Group& group : groups) group.loop.begin(signals.reference_at_start());
   const auto num_settling = static_cast<std::size_t>(signals.num_settling());
-  advance_groups<false>(signals, setup, groups, num_settling, {}, observer);
+  const auto advance = advance_groups_of<Signals, Group, Observer>(setup);
+  advance(signals, setup, groups, num_settling, {}, observer);
   for (Group& group : groups) group.loop.begin_record();
   const LineWeights& weights = setup.reader->weights();
   std::size_t num_done = 0;
   for (std::size_t block = 0; block < weights.num_blocks(); ++block) {
     const BlockWeights block_weights = fill_block(setup, block, buffer);
     const std::size_t num_samples = weights.samples_in(block);
-    if (block_weights.residual != nullptr) {
-      advance_groups<true>(signals, setup, groups, num_samples, block_weights, observer);
-    } else {
-      advance_groups<false>(signals, setup, groups, num_samples, block_weights, observer);
-    }
+    advance(signals, setup, groups, num_samples, block_weights, observer);
     // A block that is not full has a sum of its own size.
     if (num_samples == LineWeights::block_size) {
       for (Group& group : groups) group.monitor.end_block(block == 0);
