@@ -142,7 +142,34 @@ struct ChartGrid {
   std::vector<Chart> charts;  ///< Row by row.
 };
 
-using Picture = std::variant<Chart, BarChart, HeatMap, ChartGrid>;
+/// Something that took a time: a bar of a timeline, as wide as a pixel at least.
+struct TimelineBar {
+  double begin = 0.0;
+  double end = 0.0;
+  std::string tooltip = {};  ///< Shown under the pointer.
+};
+
+/// Something that happened: a line across its lane.
+struct TimelineMark {
+  double time = 0.0;
+  std::string tooltip = {};
+};
+
+struct TimelineLane {
+  std::string label = {};  ///< Empty: the lane belongs to the one above.
+  std::vector<TimelineBar> bars = {};
+  std::vector<TimelineMark> marks = {};
+};
+
+/// Lanes over one axis of time, which is linear and gives both of its ends. What is outside of them
+/// is cut off.
+struct Timeline {
+  ChartText text;
+  Axis x;
+  std::vector<TimelineLane> lanes;
+};
+
+using Picture = std::variant<Chart, BarChart, HeatMap, ChartGrid, Timeline>;
 
 [[nodiscard]] const ChartText& text_of(const Picture& picture);
 

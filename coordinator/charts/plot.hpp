@@ -33,6 +33,7 @@ double draw_chart(const Chart& chart, Point corner, double width, SvgWriter& wri
 double draw_chart(const BarChart& chart, Point corner, double width, SvgWriter& writer);
 double draw_chart(const HeatMap& map, Point corner, double width, SvgWriter& writer);
 double draw_chart(const ChartGrid& grid, Point corner, double width, SvgWriter& writer);
+double draw_chart(const Timeline& timeline, Point corner, double width, SvgWriter& writer);
 
 /// The width that the cells and labels of a map take.
 [[nodiscard]] double width_of(const HeatMap& map);

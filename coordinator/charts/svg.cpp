@@ -16,8 +16,10 @@ namespace {
 
 constexpr double margin = 6.0;
 constexpr double picture_width = 480.0;
+constexpr double timeline_width = 900.0;
 
 double width_of_picture(const Picture& picture) {
+  if (std::holds_alternative<Timeline>(picture)) return timeline_width;
   const auto* map = std::get_if<HeatMap>(&picture);
   return map == nullptr ? picture_width : std::max(picture_width, width_of(*map) + 2.0 * margin);
 }

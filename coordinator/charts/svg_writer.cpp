@@ -135,4 +135,8 @@ void SvgWriter::marker(Point centre, Shape shape, Ink ink) {
                   stroke_attributes({.colour = colour("--chart-ground"), .width = 1.0}));
 }
 
+void SvgWriter::begin_group(std::string_view tooltip) {
+  markup_ += fmt::format("<g><title>{}</title>", wire::markup_text(tooltip));
+}
+
 }  // namespace proofmass::coordinator

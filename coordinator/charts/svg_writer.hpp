@@ -60,6 +60,10 @@ class SvgWriter {
   void area(std::string_view path, std::string_view fill, double opacity);
   void marker(Point centre, Shape shape, Ink ink);
 
+  /// What is drawn until end_group() shows this text under the pointer.
+  void begin_group(std::string_view tooltip);
+  void end_group() { markup_ += "</g>\n"; }
+
   void raw(std::string_view markup) { markup_ += markup; }
   [[nodiscard]] const std::string& markup() const { return markup_; }
 

@@ -5,22 +5,18 @@
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <span>
 
+#include "coordinator/charts/svg.hpp"
 #include "coordinator/report/status_json.hpp"
-#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 using TraceJson = nlohmann::ordered_json;
-using wire::markup_text;
 
 constexpr double chart_span_s = 1800.0;
 constexpr std::size_t chart_lanes_max = 24;
-constexpr double chart_width = 900.0;
-constexpr double label_width = 170.0;
-constexpr double lane_height = 16.0;
-constexpr double axis_height = 22.0;
 
 double end_of(const ComputedRuns& computed) {
   return static_cast<double>(computed.received_unix_s);
@@ -50,19 +46,14 @@ std::string runs_text(const RunRange& runs) {
   return fmt::format("runs {} to {}", runs.first.value, runs.end() - 1);
 }
 
-/// Seconds since 1970 to places of the chart.
-struct TimeAxis {
+/// The part of time that the chart shows, seconds since 1970: from the first attempt to the last
+/// one, at most chart_span_s.
+struct ShownTime {
   double begin_s;
   double end_s;
-
-  [[nodiscard]] double x(double time_s) const {
-    const double fraction = (std::clamp(time_s, begin_s, end_s) - begin_s) / (end_s - begin_s);
-    return label_width + fraction * (chart_width - label_width);
-  }
 };
 
-/// From the first attempt that is shown to the last one; at most chart_span_s.
-TimeAxis axis_of(const RecentAttempts& attempts) {
+ShownTime shown_time(const RecentAttempts& attempts) {
   double begin_s = 1e300, end_s = 0.0;
   for (const ComputedRuns& computed : attempts.computed) {
     begin_s = std::min(begin_s, begin_of(computed));
@@ -76,58 +67,34 @@ TimeAxis axis_of(const RecentAttempts& attempts) {
   return {.begin_s = std::min(begin_s, end_s - 1.0), .end_s = end_s};
 }
 
-std::string lane_bars(const AttemptLane& lane, const TimeAxis& axis, double y) {
-  constexpr double width_min = 1.0;
-  std::string svg;
+std::vector<TimelineBar> bars_of(const AttemptLane& lane, double last_s) {
+  std::vector<TimelineBar> bars;
   for (const PlacedAttempt& attempt : lane.attempts) {
-    if (attempt.end_s < axis.begin_s) continue;
-    const double x = axis.x(attempt.begin_s());
-    svg += fmt::format(
-        "<rect class=\"run\" x=\"{:.1f}\" y=\"{:.0f}\" width=\"{:.1f}\" height=\"{:.0f}\">"
-        "<title>{}, {:.3g} s, attempt {}</title></rect>",
-        x, y + 3.0, std::max(width_min, axis.x(attempt.end_s) - x), lane_height - 6.0,
-        runs_text(attempt.computed->runs), attempt.computed->compute_s,
-        attempt.computed->attempt.value);
+    bars.push_back(
+        {.begin = attempt.begin_s() - last_s,
+         .end = attempt.end_s - last_s,
+         .tooltip = fmt::format("{}, {:.3g} s, attempt {}", runs_text(attempt.computed->runs),
+                                attempt.computed->compute_s, attempt.computed->attempt.value)});
   }
-  return svg;
+  return bars;
 }
 
-std::string loss_lines(const RecentAttempts& attempts, std::uint64_t worker_key,
-                       const TimeAxis& axis, double y) {
-  std::string svg;
+std::vector<TimelineMark> losses_of(const RecentAttempts& attempts, std::uint64_t worker_key,
+                                    double last_s) {
+  std::vector<TimelineMark> marks;
   for (const LostAttempt& lost : attempts.lost) {
-    const auto time_s = static_cast<double>(lost.lost_unix_s);
-    if (lost.worker_key != worker_key || time_s < axis.begin_s) continue;
-    const double x = axis.x(time_s);
-    svg += fmt::format(
-        "<line class=\"loss\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.0f}\" y2=\"{2:.0f}\"><title>"
-        "{3} lost: {4}</title></line>",
-        x, y + 1.0, y + lane_height - 1.0, runs_text(lost.runs), markup_text(lost.reason));
+    if (lost.worker_key != worker_key) continue;
+    marks.push_back({.time = static_cast<double>(lost.lost_unix_s) - last_s,
+                     .tooltip = fmt::format("{} lost: {}", runs_text(lost.runs), lost.reason)});
   }
-  return svg;
-}
-
-std::string axis_lines(const TimeAxis& axis, double height) {
-  constexpr int num_parts = 4;
-  std::string svg;
-  for (int i = 0; i <= num_parts; ++i) {
-    const double time_s = axis.begin_s + (axis.end_s - axis.begin_s) * i / num_parts;
-    const double x = axis.x(time_s);
-    const std::string_view anchor = i == num_parts ? "end" : "middle";
-    svg += fmt::format(
-        "<line class=\"axis\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"0\" y2=\"{1:.0f}\"/>"
-        "<text x=\"{0:.1f}\" y=\"{2:.0f}\" text-anchor=\"{3}\">{4}</text>",
-        x, height, height + 15.0, anchor,
-        i == num_parts ? "last" : fmt::format("−{:.3g} s", axis.end_s - time_s));
-  }
-  return svg;
+  return marks;
 }
 
 // Lanes end with the span of the chart: others have nothing to show.
-std::vector<AttemptLane> shown_lanes(const RecentAttempts& attempts, const TimeAxis& axis) {
+std::vector<AttemptLane> shown_lanes(const RecentAttempts& attempts, const ShownTime& shown) {
   std::vector<AttemptLane> lanes = lanes_of(attempts);
   std::erase_if(lanes, [&](const AttemptLane& lane) {
-    return lane.number > 0 && lane.attempts.front().end_s < axis.begin_s;
+    return lane.number > 0 && lane.attempts.front().end_s < shown.begin_s;
   });
   return lanes;
 }
@@ -216,35 +183,36 @@ std::string attempts_chart(const RecentAttempts& attempts) {
   if (attempts.computed.empty() && attempts.lost.empty()) {
     return "<p class=\"note\">none yet</p>\n";
   }
-  const TimeAxis axis = axis_of(attempts);
-  const std::vector<AttemptLane> lanes = shown_lanes(attempts, axis);
+  const ShownTime shown = shown_time(attempts);
+  const std::vector<AttemptLane> lanes = shown_lanes(attempts, shown);
   const std::size_t num_shown = std::min(lanes.size(), chart_lanes_max);
   const auto workers = workers_by_key(attempts);
-  const double height = static_cast<double>(num_shown) * lane_height;
-  std::string svg = fmt::format(
-      "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Timeline of attempts\">"
-      "<svg class=\"attempts\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
-      "height=\"{1:.0f}\" role=\"img\" "
-      "aria-label=\"batches: {2}, losses: {3}, workers: {4}, seconds: {5:.0f}\">",
-      chart_width, height + axis_height, attempts.computed.size(), attempts.lost.size(),
-      attempts.workers.size(), axis.end_s - axis.begin_s);
-  svg += axis_lines(axis, height);
-  for (std::size_t i = 0; i < num_shown; ++i) {
-    const double y = static_cast<double>(i) * lane_height;
-    if (lanes[i].number == 0) {
-      svg +=
-          fmt::format("<text x=\"0\" y=\"{:.0f}\">{}</text>", y + lane_height - 4.0,
-                      markup_text(wire::shortened(worker_name(workers, lanes[i].worker_key), 24)));
-      svg += loss_lines(attempts, lanes[i].worker_key, axis, y);
-    }
-    svg += lane_bars(lanes[i], axis, y);
+  Timeline timeline{
+      .text = {.id = "attempts",
+               .title = "Attempts by worker",
+               .description = fmt::format("Batches: {}, losses: {}, workers: {}, within {:.0f} s.",
+                                          attempts.computed.size(), attempts.lost.size(),
+                                          attempts.workers.size(), shown.end_s - shown.begin_s)},
+      .x = {.label = "time until the last result, s",
+            .from = shown.begin_s - shown.end_s,
+            .to = 0.0},
+      .lanes = {}};
+  for (const AttemptLane& lane : std::span(lanes).first(num_shown)) {
+    TimelineLane& drawn = timeline.lanes.emplace_back();
+    drawn.bars = bars_of(lane, shown.end_s);
+    if (lane.number > 0) continue;
+    drawn.label = worker_name(workers, lane.worker_key);
+    drawn.marks = losses_of(attempts, lane.worker_key, shown.end_s);
   }
-  svg += "</svg></div>\n";
+  std::string html = fmt::format(
+      "<div class=\"scroll attempts\" tabindex=\"0\" role=\"region\" "
+      "aria-label=\"Timeline of attempts\">{}</div>\n",
+      svg_of(timeline, SvgUse::embedded));
   if (num_shown < lanes.size()) {
-    svg += fmt::format("<p class=\"note\">showing {} of {} lanes; the trace has all</p>\n",
-                       num_shown, lanes.size());
+    html += fmt::format("<p class=\"note\">showing {} of {} lanes; the trace has all</p>\n",
+                        num_shown, lanes.size());
   }
-  return svg;
+  return html;
 }
 
 std::string attempts_trace(const RecentAttempts& attempts, std::string_view campaign) {

@@ -47,7 +47,11 @@ std::vector<Picture> pictures_with(const std::string& text) {
                     .rows = {text},
                     .columns = {text},
                     .cells = {{.value = 1.0, .label = text}}};
-  return {chart, bars, map, ChartGrid{.text = of_chart, .charts = {chart, chart, chart}}};
+  const Timeline timeline{
+      .text = of_chart,
+      .x = {.label = text, .from = 0.0, .to = 9.0},
+      .lanes = {{.label = text, .bars = {{1.0, 2.0, text}}, .marks = {{3.0, text}}}}};
+  return {chart, bars, map, ChartGrid{.text = of_chart, .charts = {chart, chart, chart}}, timeline};
 }
 
 TEST(Svg, IsWellFormedWhateverTheTexts) {
@@ -184,6 +188,34 @@ TEST(BarChart, HasValuesAsText) {
   EXPECT_THAT(svg, HasSubstr(">2×10⁻¹⁴</text>"));
   // Two samples in the legend, three bars.
   EXPECT_THAT(test::tags_of(svg, "<rect[^>]*stroke=\"#0072b2\""), SizeIs(5));
+}
+
+// On an axis from −20 to 0, a bar of ten seconds is half as wide as the axis, and one that begins
+// before its left end is cut off there. Lanes are equally far apart.
+TEST(Timeline, HasBarsWhereTheirTimesAre) {
+  const Timeline timeline{
+      .text = {.id = "attempts", .title = "Attempts", .description = ""},
+      .x = {.label = "s", .from = -20.0, .to = 0.0},
+      .lanes = {{.label = "a", .bars = {{-10.0, 0.0, "run 1"}, {-25.0, -15.0, "run 0"}}},
+                {.label = "", .bars = {{-10.0, -5.0, "run 2"}, {-40.0, -30.0, "left out"}}},
+                {.label = "b", .marks = {{-10.0, "run 3 lost"}, {-30.0, "left out"}}}}};
+  const std::string svg = svg_of(timeline, SvgUse::plain);
+  const std::vector<std::string> bars = test::tags_of(svg, "<rect[^>]* fill=\"#0072b2\"/>");
+  ASSERT_THAT(bars, SizeIs(3));
+  const auto x = [&](std::size_t i) { return test::number_of(bars[i], "x"); };
+  const auto width = [&](std::size_t i) { return test::number_of(bars[i], "width"); };
+  EXPECT_NEAR(x(0) - x(1), width(0), 0.02);
+  EXPECT_NEAR(width(1), width(0) / 2.0, 0.02);
+  EXPECT_NEAR(x(2), x(0), 0.02);
+  EXPECT_NEAR(width(2), width(0) / 2.0, 0.02);
+  EXPECT_NEAR(test::number_of(bars[1], "y"), test::number_of(bars[0], "y"), 0.02);
+  const double lane = test::number_of(bars[2], "y") - test::number_of(bars[0], "y");
+  const std::vector<Point> loss = points_of(svg, "#d55e00");
+  ASSERT_THAT(loss, SizeIs(2));
+  EXPECT_NEAR(loss[0].x, x(0), 0.02);
+  EXPECT_GT(loss[0].y, test::number_of(bars[2], "y") + lane / 2.0);
+  EXPECT_THAT(svg, HasSubstr("<g><title>run 1</title>"));
+  EXPECT_THAT(svg, Not(HasSubstr("left out")));
 }
 
 // A correlation of −1 has the colour of negative ones at full strength, which is 0.5.
