@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/report/report_json.hpp"
+#include "coordinator/report/review.hpp"
 #include "coordinator/report/review_html.hpp"
 #include "coordinator/store/store.hpp"
 
@@ -49,7 +51,9 @@ CampaignResults read_results_of(const std::filesystem::path& file) {
     const Store store = Store::open_read_only(file);
     const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
     results.num_runs = num_runs_in(store.finished_runs());
-    results.html = live_results_html(store, *campaign);
+    const Review review = read_live_review(store, *campaign);
+    results.html = live_results_html(review);
+    results.json = accuracy_json(*campaign, review.results.statistics);
   } catch (const std::exception& error) {
     results.failure = error.what();
   }

@@ -39,6 +39,7 @@ struct CampaignEvents {
 /// What the results of a campaign yield.
 struct CampaignResults {
   std::string html = {};       ///< Sections of a page.
+  std::string json = {};       ///< Of accuracy_json(); empty if they could not be read.
   std::uint64_t num_runs = 0;  ///< Finished runs when they were read, at least.
   std::string failure = {};    ///< Likewise.
 };

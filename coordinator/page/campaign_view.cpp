@@ -4,6 +4,7 @@
 
 #include "coordinator/page/attempts_chart.hpp"
 #include "coordinator/page/page_views.hpp"
+#include "coordinator/report/html_table.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "proto/text/visible_text.hpp"
@@ -52,27 +53,29 @@ std::string results_of(const CampaignDetails& details, TimePoint now) {
 
 std::string ends_table(const CampaignEvents& events) {
   if (events.ends.empty()) return {};
-  std::vector<std::vector<std::string>> rows;
+  std::vector<HtmlRow> rows;
   for (const EndCount& end : events.ends) {
     rows.push_back({markup_text(end.status), markup_text(end.cause), markup_text(end.session),
                     grouped(end.num_runs)});
   }
   return "<h3>Finished runs without an estimate</h3>\n" +
-         html_table("Finished runs without an estimate",
-                    {{"status", true}, {"cause", true}, {"session", true}, {"runs"}}, rows);
+         html_table({.name = "Finished runs without an estimate",
+                     .columns = {{"status", true}, {"cause", true}, {"session", true}, {"runs"}},
+                     .rows = std::move(rows)});
 }
 
 std::string given_up_table(const CampaignEvents& events, std::uint64_t num_given_up) {
   if (events.given_up.empty()) return {};
-  std::vector<std::vector<std::string>> rows;
+  std::vector<HtmlRow> rows;
   for (const GivenUpRecord& run : events.given_up) {
     rows.push_back({std::to_string(run.run.value), markup_text(run.reason),
                     grouped(run.num_attempts), markup_text(run.given_up_utc)});
   }
   std::string html =
       "<h3>Runs that were given up</h3>\n" +
-      html_table("Runs that were given up",
-                 {{"run"}, {"reason", true}, {"attempts"}, {"given up", true}}, rows);
+      html_table({.name = "Runs that were given up",
+                  .columns = {{"run"}, {"reason", true}, {"attempts"}, {"given up", true}},
+                  .rows = std::move(rows)});
   if (num_given_up > rows.size()) {
     html += fmt::format("<p class=\"note\">showing the first {} of {}</p>\n", rows.size(),
                         grouped(num_given_up));
@@ -82,14 +85,15 @@ std::string given_up_table(const CampaignEvents& events, std::uint64_t num_given
 
 std::string losses_table(const CampaignEvents& events) {
   if (events.losses.empty()) return {};
-  std::vector<std::vector<std::string>> rows;
+  std::vector<HtmlRow> rows;
   for (const LossCount& loss : events.losses) {
     rows.push_back({markup_text(loss.reason), grouped(loss.num_losses), grouped(loss.num_runs),
                     grouped(loss.num_blamed)});
   }
   return "<h3>Attempts without a result, lent again</h3>\n" +
-         html_table("Attempts without a result",
-                    {{"reason", true}, {"losses"}, {"runs"}, {"counted against runs"}}, rows);
+         html_table({.name = "Attempts without a result",
+                     .columns = {{"reason", true}, {"losses"}, {"runs"}, {"counted against runs"}},
+                     .rows = std::move(rows)});
 }
 
 std::string failures_of(const CampaignEvents& events, std::uint64_t num_given_up) {
@@ -116,7 +120,7 @@ std::string attempts_of(const CampaignEvents& events, const std::string& name) {
 std::string events_of(const CampaignEvents& events, const std::string& name, std::size_t page) {
   const std::size_t count = std::min(events.events.size(), shown_events_max);
   const PageOfList list = page_of_list(page, count, rows_per_page);
-  std::vector<std::vector<std::string>> rows;
+  std::vector<HtmlRow> rows;
   for (std::size_t i = list.first; i < list.end; ++i) {
     const StoredEvent& event = events.events[events.events.size() - 1 - i];
     rows.push_back({markup_text(event.time_utc), markup_text(event.kind),
@@ -124,7 +128,9 @@ std::string events_of(const CampaignEvents& events, const std::string& name, std
   }
   std::string html = "<section><h2>Events</h2>\n";
   if (!rows.empty()) {
-    html += html_table("Events", {{"time", true}, {"event", true}, {"details", true}}, rows);
+    html += html_table({.name = "Events",
+                        .columns = {{"time", true}, {"event", true}, {"details", true}},
+                        .rows = std::move(rows)});
   }
   html += list_navigation(list, "events, the newest first", percent_encoded(name) + "?events=");
   if (events.events.size() > count) {

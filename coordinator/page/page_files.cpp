@@ -1,7 +1,7 @@
 #include <string>
 
 #include "coordinator/page/page_layout.hpp"
-#include "coordinator/report/review_html.hpp"
+#include "coordinator/report/html_table.hpp"
 
 namespace proofmass::coordinator {
 
@@ -12,12 +12,12 @@ namespace {
 constexpr std::string_view style = R"css(:root {
   color-scheme: light dark;
   --ground: #ffffff; --panel: #f3f5f8; --line: #c9d0d9; --text: #1b222c; --faint: #566070;
-  --accent: #1257a8; --bar: #1c6dd0; --warn-ground: #fff3d6; --warn: #6b4700; --lost: #a8321a;
+  --accent: #1257a8; --bar: #1c6dd0; --warn-ground: #fff3d6; --warn: #6b4700;
 }
 @media (prefers-color-scheme: dark) {
   :root {
     --ground: #14181e; --panel: #1d232c; --line: #3a4453; --text: #e6eaf0; --faint: #a3adbb;
-    --accent: #8abaff; --bar: #5d9df0; --warn-ground: #3a2e10; --warn: #ffd98a; --lost: #ff9d87;
+    --accent: #8abaff; --bar: #5d9df0; --warn-ground: #3a2e10; --warn: #ffd98a;
   }
 }
 * { box-sizing: border-box; }
@@ -47,9 +47,11 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: 0.25rem 0.7rem; text-align: right; border-bottom: 1px solid var(--line);
   white-space: nowrap; }
 tbody th { font-weight: normal; }
-th.text, td.text, tbody th[scope="row"] { text-align: left; }
+tbody th[scope="row"] { text-align: left; }
+.list td.words { white-space: nowrap; min-width: 0; }
 thead th { color: var(--faint); font-weight: 600; vertical-align: bottom; }
-td.long { white-space: normal; min-width: 16rem; max-width: 46rem; overflow-wrap: anywhere; }
+.long { display: inline-block; white-space: normal; min-width: 16rem; max-width: 46rem;
+  overflow-wrap: anywhere; }
 progress { width: 8rem; height: 0.8rem; accent-color: var(--bar); vertical-align: middle; }
 .large progress { width: min(28rem, 60vw); height: 1.1rem; }
 dl { display: grid; grid-template-columns: repeat(auto-fit, minmax(9rem, 1fr)); gap: 0.6rem;
@@ -62,11 +64,7 @@ input, select, button { font: inherit; color: inherit; background: var(--ground)
   border: 1px solid var(--faint); border-radius: 4px; padding: 0.25rem 0.5rem; max-width: 100%; }
 .pages a, .pages span { display: inline-block; padding: 0.25rem 0.5rem; }
 .pages .off { color: var(--faint); }
-.attempts { max-width: 100%; height: auto; min-width: 56rem; }
-.attempts text { fill: var(--text); font: 12px system-ui, sans-serif; }
-.attempts .axis { stroke: var(--line); }
-.attempts .run { fill: var(--bar); }
-.attempts .loss { stroke: var(--lost); stroke-width: 2; }
+.attempts svg { display: block; height: auto; min-width: 56rem; max-width: 75rem; }
 @media (max-width: 34rem) {
   main { padding: 0.3rem 0.6rem 2rem; }
   th, td { padding: 0.25rem 0.45rem; }

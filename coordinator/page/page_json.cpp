@@ -69,6 +69,19 @@ PageJson given_up_of(const CampaignEvents& events) {
   return json;
 }
 
+/// Null before the results were read for the first time.
+PageJson accuracy_of(const CampaignDetails& details, TimePoint now) {
+  if (details.results == nullptr) return nullptr;
+  const CampaignResults& results = *details.results;
+  PageJson json{{"age_s", seconds(now - details.results_at)},
+                {"num_runs", results.num_runs},
+                {"failure", nullptr},
+                {"parameters", PageJson::array()}};
+  if (!results.failure.empty()) json["failure"] = results.failure;
+  if (!results.json.empty()) json["parameters"] = PageJson::parse(results.json);
+  return json;
+}
+
 }  // namespace
 
 std::string status_answer(const PageSnapshot& snapshot, TimePoint now) {
@@ -115,6 +128,7 @@ std::string campaign_answer(const CampaignSnapshot& campaign, const CampaignDeta
   json["ends_without_estimate"] = ends_of(events);
   json["given_up"] = given_up_of(events);
   json["losses"] = losses_of(events);
+  json["accuracy"] = accuracy_of(details, now);
   json["last_event_id"] = events.events.empty() ? 0 : events.events.back().id;
   return dumped(json, JsonLayout::one_line);
 }

@@ -17,23 +17,6 @@ std::string page_link(std::string_view address, std::size_t page, std::string_vi
   return fmt::format("<a href=\"{}{}\">{}</a>", address, page, text);
 }
 
-std::string header_cell(const HtmlColumn& column) {
-  const std::string sort = column.sort.empty() ? "" : fmt::format(" aria-sort=\"{}\"", column.sort);
-  return fmt::format("<th scope=\"col\"{}{}>{}</th>", column.is_text ? " class=\"text\"" : "", sort,
-                     column.title);
-}
-
-std::string table_line(const std::vector<HtmlColumn>& columns,
-                       const std::vector<std::string>& cells) {
-  std::string line = "<tr>";
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const std::string_view kind = columns[i].is_text ? " class=\"text\"" : "";
-    line += i == 0 ? fmt::format("<th scope=\"row\"{}>{}</th>", kind, cells[i])
-                   : fmt::format("<td{}>{}</td>", kind, cells[i]);
-  }
-  return line + "</tr>\n";
-}
-
 }  // namespace
 
 std::string whole_page(const PageContent& content) {
@@ -81,17 +64,6 @@ std::string list_navigation(const PageOfList& list, std::string_view things,
                     page_link(address, list.page - 1, "previous", has_before), grouped(list.page),
                     grouped(list.num_pages), page_link(address, list.page + 1, "next", has_after),
                     page_link(address, list.num_pages, "last", has_after));
-}
-
-std::string html_table(std::string_view name, const std::vector<HtmlColumn>& columns,
-                       const std::vector<std::vector<std::string>>& rows) {
-  std::string html = fmt::format(
-      "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\"><table>\n<thead><tr>",
-      markup_text(name));
-  for (const HtmlColumn& column : columns) html += header_cell(column);
-  html += "</tr></thead>\n<tbody>\n";
-  for (const auto& cells : rows) html += table_line(columns, cells);
-  return html + "</tbody></table></div>\n";
 }
 
 std::string progress_bar(std::uint64_t count, std::uint64_t total, std::string_view name) {

@@ -37,19 +37,6 @@ struct PageOfList {
 [[nodiscard]] std::string list_navigation(const PageOfList& list, std::string_view things,
                                           std::string_view address);
 
-/// A column of a table. Text stands left, numbers right.
-struct HtmlColumn {
-  std::string title = {};  ///< Markup.
-  bool is_text = false;
-  std::string sort = "";  ///< `ascending` or `descending` if the rows are in this column's order.
-};
-
-/// A table that scrolls by itself where the window is narrow.
-/// @param name  For screen readers; plain text.
-/// @param rows  Markup; the first cell of each is its heading.
-[[nodiscard]] std::string html_table(std::string_view name, const std::vector<HtmlColumn>& columns,
-                                     const std::vector<std::vector<std::string>>& rows);
-
 /// A bar with its percentage in words.
 [[nodiscard]] std::string progress_bar(std::uint64_t count, std::uint64_t total,
                                        std::string_view name);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "coordinator/report/html_table.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "proto/text/visible_text.hpp"
@@ -124,7 +125,7 @@ std::vector<HtmlColumn> worker_columns_of(const WorkerChoice& choice) {
           {"process"}};
 }
 
-std::vector<std::string> worker_row(const WorkerSnapshot& worker) {
+HtmlRow worker_row(const WorkerSnapshot& worker) {
   const wire::WorkerStatus& status = worker.status;
   return {markup_text(status.name),
           markup_text(status.host),
@@ -212,7 +213,7 @@ PageContent overview_page(const PageSnapshot& snapshot, const PageRequest& reque
   const std::vector<HtmlColumn> columns{{"campaign", true}, {"phase", true}, {"progress", true},
                                         {"done"},           {"runs"},        {"runs/s"},
                                         {"time left"},      {"priority"}};
-  std::vector<std::vector<std::string>> rows;
+  std::vector<HtmlRow> rows;
   for (std::size_t i = list.first; i < list.end; ++i) {
     const CampaignStatus& campaign = campaigns[i].status;
     rows.push_back(
@@ -221,7 +222,9 @@ PageContent overview_page(const PageSnapshot& snapshot, const PageRequest& reque
          grouped(campaign.num_done), grouped(campaign.num_runs), rate_cell(campaign),
          time_left_cell(campaign), std::to_string(campaign.priority)});
   }
-  const std::string table = rows.empty() ? "" : html_table("Campaigns", columns, rows);
+  const std::string table =
+      rows.empty() ? ""
+                   : html_table({.name = "Campaigns", .columns = columns, .rows = std::move(rows)});
   return {.title = "Campaigns",
           .live = title_of(snapshot) + summary_line(snapshot) + age_line(snapshot.taken_at, now) +
                   notes_list(overview_notes(snapshot.service, list)) + table +
@@ -231,10 +234,13 @@ PageContent overview_page(const PageSnapshot& snapshot, const PageRequest& reque
 PageContent workers_page(const PageSnapshot& snapshot, const PageRequest& request, TimePoint now) {
   const WorkerChoice choice = worker_choice(request);
   const ChosenWorkers chosen = choose_workers(snapshot.service.workers, choice);
-  std::vector<std::vector<std::string>> rows;
+  std::vector<HtmlRow> rows;
   for (const WorkerSnapshot* worker : chosen.workers) rows.push_back(worker_row(*worker));
   const std::string table =
-      rows.empty() ? "" : html_table("Workers", worker_columns_of(choice), rows);
+      rows.empty()
+          ? ""
+          : html_table(
+                {.name = "Workers", .columns = worker_columns_of(choice), .rows = std::move(rows)});
   const std::string address =
       fmt::format("workers?sort={}&amp;filter={}&amp;page=", name_of(choice.order),
                   percent_encoded(choice.filter));

@@ -1,9 +1,11 @@
+#include "coordinator/report/html_table.hpp"
+
 #include <fmt/format.h>
 
 #include <string_view>
+#include <utility>
 
 #include "coordinator/charts/theme.hpp"
-#include "coordinator/report/review_html.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -11,69 +13,97 @@ namespace {
 
 using wire::markup_text;
 
-std::string group_row(const ReviewTable& table) {
-  std::string row;
+std::string_view text_class(bool is_text) { return is_text ? " class=\"words\"" : ""; }
+
+std::string group_line(const HtmlTable& table) {
+  std::string line;
   bool has_groups = false;
   for (std::size_t i = 0; i < table.columns.size();) {
     std::size_t end = i + 1;
     const std::string& group = table.columns[i].group;
     while (!group.empty() && end < table.columns.size() && table.columns[end].group == group) ++end;
     has_groups |= !group.empty();
-    row += group.empty() ? "<td></td>"
-                         : fmt::format("<th scope=\"colgroup\" colspan=\"{}\">{}</th>", end - i,
-                                       markup_text(group));
+    line += group.empty() ? "<td></td>"
+                          : fmt::format("<th scope=\"colgroup\" colspan=\"{}\">{}</th>", end - i,
+                                        markup_text(group));
     i = end;
   }
-  return has_groups ? "<tr>" + row + "</tr>\n" : "";
+  return has_groups ? "<tr>" + line + "</tr>\n" : "";
 }
 
-std::string title_row(const ReviewTable& table) {
-  std::string row;
-  for (const ReviewColumn& column : table.columns) {
-    row += fmt::format("<th scope=\"col\"{}>{}</th>", column.is_text ? " class=\"words\"" : "",
-                       markup_text(column.title));
+std::string title_line(const HtmlTable& table) {
+  std::string line;
+  for (const HtmlColumn& column : table.columns) {
+    const std::string sort =
+        column.sort.empty() ? "" : fmt::format(" aria-sort=\"{}\"", column.sort);
+    line += fmt::format("<th scope=\"col\"{}{}>{}</th>", text_class(column.is_text), sort,
+                        column.title);
   }
-  return "<tr>" + row + "</tr>\n";
+  return "<tr>" + line + "</tr>\n";
 }
 
-std::string value_attribute(const ReviewCell& cell) {
-  return cell.value ? fmt::format(" data-value=\"{}\"", *cell.value) : "";
+std::string row_line(const HtmlTable& table, const HtmlRow& row) {
+  std::string line = "<tr>";
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    const HtmlCell& cell = row[i];
+    const std::string_view text = text_class(cell.is_text || table.columns[i].is_text);
+    const std::string value =
+        cell.value ? fmt::format(" data-value=\"{}\"", *cell.value) : std::string();
+    line += i == 0 ? fmt::format("<th scope=\"row\"{}{}>{}</th>", text, value, cell.markup)
+                   : fmt::format("<td{}{}>{}</td>", text, value, cell.markup);
+  }
+  return line + "</tr>\n";
 }
 
-std::string cell_markup(const ReviewCell& cell, bool is_first) {
+/// The region, the table and its name.
+std::string opening_of(const HtmlTable& table) {
+  if (table.id.empty()) {
+    return fmt::format(
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\">"
+        "<table class=\"list\">\n",
+        markup_text(table.name));
+  }
+  return fmt::format(
+      "<div class=\"scroll\" role=\"region\" aria-labelledby=\"{0}-caption\" tabindex=\"0\">\n"
+      "<table id=\"{0}\">\n<caption id=\"{0}-caption\">{1}</caption>\n",
+      table.id, markup_text(table.name));
+}
+
+HtmlCell cell_of(const ReviewCell& cell, bool is_first) {
   const std::string text = markup_text(cell.text);
-  if (is_first) return fmt::format("<th scope=\"row\" class=\"words\">{}</th>", text);
-  switch (cell.kind) {
-    case ReviewCell::Kind::figure:
-      return fmt::format("<td{}>{}</td>", value_attribute(cell), text);
-    case ReviewCell::Kind::words:
-      return fmt::format("<td class=\"words\"{}>{}</td>", value_attribute(cell), text);
-    case ReviewCell::Kind::command:
-      return fmt::format("<td class=\"words\"{}><code>{}</code></td>", value_attribute(cell), text);
-    case ReviewCell::Kind::verdict:
-      return fmt::format("<td class=\"words\"><strong class=\"{}\">{}</strong></td>",
-                         cell.text == "met"       ? "met"
-                         : cell.text == "not met" ? "unmet"
-                                                  : "open",
-                         text);
+  HtmlCell html(text);
+  html.is_text = is_first || cell.kind != ReviewCell::Kind::figure;
+  html.value = cell.value;
+  if (cell.kind == ReviewCell::Kind::command) html.markup = "<code>" + text + "</code>";
+  if (cell.kind == ReviewCell::Kind::verdict) {
+    const std::string_view kind = cell.text == "met"       ? "met"
+                                  : cell.text == "not met" ? "unmet"
+                                                           : "open";
+    html.markup = fmt::format("<strong class=\"{}\">{}</strong>", kind, text);
   }
-  return "";
+  return html;
 }
 
 }  // namespace
 
+std::string html_table(const HtmlTable& table) {
+  std::string html = opening_of(table) + "<thead>\n" + group_line(table) + title_line(table) +
+                     "</thead>\n<tbody>\n";
+  for (const HtmlRow& row : table.rows) html += row_line(table, row);
+  return html + "</tbody>\n</table>\n</div>\n";
+}
+
 std::string html_table(const ReviewTable& table) {
-  std::string html = fmt::format(
-      "<div class=\"scroll\" role=\"region\" aria-labelledby=\"{0}-caption\" tabindex=\"0\">\n"
-      "<table id=\"{0}\">\n<caption id=\"{0}-caption\">{1}</caption>\n<thead>\n{2}{3}</thead>\n"
-      "<tbody>\n",
-      table.id, markup_text(table.caption), group_row(table), title_row(table));
-  for (const std::vector<ReviewCell>& row : table.rows) {
-    html += "<tr>";
-    for (std::size_t i = 0; i < row.size(); ++i) html += cell_markup(row[i], i == 0);
-    html += "</tr>\n";
+  HtmlTable shown{.name = table.caption, .id = table.id, .columns = {}, .rows = {}};
+  for (const ReviewColumn& column : table.columns) {
+    shown.columns.push_back(
+        {.title = markup_text(column.title), .is_text = column.is_text, .group = column.group});
   }
-  html += "</tbody>\n</table>\n</div>\n";
+  for (const std::vector<ReviewCell>& row : table.rows) {
+    HtmlRow& cells = shown.rows.emplace_back();
+    for (const ReviewCell& cell : row) cells.push_back(cell_of(cell, cells.empty()));
+  }
+  std::string html = html_table(shown);
   for (const std::string& note : table.notes) {
     if (!note.empty()) html += fmt::format("<p class=\"note\">{}</p>\n", markup_text(note));
   }

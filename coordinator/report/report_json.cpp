@@ -192,4 +192,8 @@ std::string report_json(const Store& store, const Campaign& campaign,
   return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
+std::string accuracy_json(const Campaign& campaign, const CampaignStatistics& statistics) {
+  return parameters_of(campaign, statistics).dump();
+}
+
 }  // namespace proofmass::coordinator

@@ -7,6 +7,7 @@
 #include "coordinator/report/stated_requirement.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
+#include "core/campaign/statistics.hpp"
 
 namespace proofmass::coordinator {
 
@@ -18,5 +19,9 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string report_json(const Store& store, const Campaign& campaign,
                                       std::span<const RequirementAnswer> answers,
                                       std::span<const StatedRequirement> stated);
+
+/// The statistics of each quantity, a JSON array: the key `parameters` of report_json().
+[[nodiscard]] std::string accuracy_json(const Campaign& campaign,
+                                        const CampaignStatistics& statistics);
 
 }  // namespace proofmass::coordinator

@@ -60,7 +60,10 @@ enum class WithCauses : std::uint8_t { no, yes };
                                  WithCauses with_causes);
 
 /// The same of results as they are, finished or not, without what takes long or looks for damage:
-/// neither stored digest nor stop checks are compared, and there are no causes.
+/// neither stored digest nor stop checks are compared, there are no causes, and nothing is written.
+///
+/// Takes 5 µs of a core for each finished run, 5 s for a million: call it in the background, and
+/// not for each viewer.
 [[nodiscard]] Review read_live_review(const Store& store, const Campaign& campaign);
 
 }  // namespace proofmass::coordinator

@@ -5,7 +5,9 @@
 #include <string_view>
 
 #include "coordinator/charts/svg.hpp"
+#include "coordinator/report/html_table.hpp"
 #include "coordinator/report/review_charts.hpp"
+#include "coordinator/report/review_tables.hpp"
 #include "core/campaign/model.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -176,8 +178,7 @@ std::string review_html(const Review& review) {
       navigation, content, markup_text(review.database));
 }
 
-std::string live_results_html(const Store& store, const Campaign& campaign) {
-  const Review review = read_live_review(store, campaign);
+std::string live_results_html(const Review& review) {
   return "<h3>Accuracy so far</h3>\n" + html_table(review_accuracy_table(review)) +
          "<h3>Errors so far</h3>\n<div class=\"overview\">\n" +
          figure_of(magnitude_overview(review)) + "</div>\n";

@@ -212,10 +212,24 @@ TEST_F(PageSiteTest, TellsProgramsOfOneCampaign) {
   const json campaign = json_of("/api/campaigns/a");
   EXPECT_EQ(campaign["campaign"]["num_runs"], 100);
   EXPECT_EQ(campaign["last_event_id"], 20);
-  EXPECT_THAT(
-      keys_of(campaign),
-      UnorderedElementsAreArray({"api_version", "campaign", "details_age_s", "failure",
-                                 "ends_without_estimate", "given_up", "losses", "last_event_id"}));
+  EXPECT_THAT(keys_of(campaign),
+              UnorderedElementsAreArray({"api_version", "campaign", "details_age_s", "failure",
+                                         "ends_without_estimate", "given_up", "losses", "accuracy",
+                                         "last_event_id"}));
+  EXPECT_TRUE(campaign["accuracy"].is_null());  // Nothing was read yet.
+}
+
+TEST_F(PageSiteTest, TellsProgramsTheAccuracySoFar) {
+  details.results = std::make_shared<const CampaignResults>(
+      CampaignResults{.json = R"([{"parameter":"a_c12","worst":0.25}])", .num_runs = 7});
+  const json accuracy = json_of("/api/campaigns/a")["accuracy"];
+  EXPECT_EQ(accuracy["num_runs"], 7);
+  EXPECT_TRUE(accuracy["failure"].is_null());
+  EXPECT_EQ(accuracy["parameters"][0]["worst"], 0.25);
+  details.results = std::make_shared<const CampaignResults>(CampaignResults{.failure = "locked"});
+  const json failed = json_of("/api/campaigns/a")["accuracy"];
+  EXPECT_EQ(failed["failure"], "locked");
+  EXPECT_TRUE(failed["parameters"].empty());
 }
 
 TEST_F(PageSiteTest, TellsProgramsTheEventsAfterOne) {

@@ -185,9 +185,9 @@ TEST(CampaignPage, ShowsTheNewestEventsPageByPage) {
   const auto page = [&](const std::string& target) {
     return campaign_page(campaign_snapshot("a", 1, 2), details, *parse_target(target), {}).live;
   };
-  EXPECT_THAT(page("/"), HasSubstr("<td class=\"text\">e300</td>"));
-  EXPECT_THAT(page("/"), Not(HasSubstr("<td class=\"text\">e250</td>")));
-  EXPECT_THAT(page("/?events=2"), HasSubstr("<td class=\"text\">e250</td>"));
+  EXPECT_THAT(page("/"), HasSubstr("<td class=\"words\">e300</td>"));
+  EXPECT_THAT(page("/"), Not(HasSubstr("<td class=\"words\">e250</td>")));
+  EXPECT_THAT(page("/?events=2"), HasSubstr("<td class=\"words\">e250</td>"));
   EXPECT_THAT(page("/?events=4"), HasSubstr("showing 151–200 of 200 events"));
   EXPECT_THAT(page("/"), HasSubstr("100 older events"));
 }

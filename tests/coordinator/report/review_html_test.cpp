@@ -8,6 +8,7 @@
 
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/report/review_markdown.hpp"
+#include "coordinator/report/review_tables.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"
 
@@ -109,7 +110,7 @@ TEST_F(ReviewHtml, IsTheSameEachTime) {
 
 TEST_F(ReviewHtml, HasAFragmentForALivePage) {
   const Store store = store_with(40);
-  const std::string html = live_results_html(store, test::campaign_of(40));
+  const std::string html = live_results_html(read_live_review(store, test::campaign_of(40)));
   EXPECT_EQ(test::malformed_part(html), "");
   EXPECT_THAT(html, AllOf(HasSubstr("id=\"accuracy\""), HasSubstr("id=\"errors-title\""),
                           Not(HasSubstr("<html"))));
