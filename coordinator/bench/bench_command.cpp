@@ -1,6 +1,7 @@
 #include "coordinator/bench/bench_command.hpp"
 
 #include <fmt/format.h>
+#include <time.h>
 
 #include <algorithm>
 #include <chrono>
@@ -10,10 +11,12 @@
 #include <thread>
 #include <vector>
 
+#include "coordinator/bench/bench_campaigns.hpp"
 #include "coordinator/bench/bench_parts.hpp"
 #include "coordinator/bench/bench_report.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
+#include "core/campaign/model.hpp"
 #include "core/microscope/session/session_signals.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -27,7 +30,24 @@ constexpr std::uint64_t bench_runs_max = 1'000'000;
 struct BenchOptions {
   OutputFormat format = OutputFormat::text;
   std::uint64_t num_runs = batch_lanes;  ///< Of each instruction set but `scalar`, which takes one.
+  bool has_campaigns = false;
 };
+
+/// Time of this process.
+double processor_s() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+template <typename Work>
+SpentTime spent_on(const Work& work) {
+  const auto start = std::chrono::steady_clock::now();
+  const double processor_start_s = processor_s();
+  work();
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  return {.wall_s = elapsed.count(), .processor_s = processor_s() - processor_start_s};
+}
 
 Machine this_machine() {
   std::ifstream file("/proc/cpuinfo");
@@ -64,34 +84,56 @@ std::vector<RunResult> simulate(const RunPlan& plan, std::uint64_t num_runs, Ins
   return results;
 }
 
+/// Adds the time of the runs to `spent`.
 SetCost measure_set(const MicroscopeCampaign& campaign, const RunPlan& plan, std::uint64_t num_runs,
-                    InstructionSet set, std::vector<RunResult>& known) {
-  const auto start = std::chrono::steady_clock::now();
-  const std::vector<RunResult> results = simulate(plan, num_runs, set);
-  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-  return {.set = set,
-          .run_s = elapsed.count() / static_cast<double>(num_runs),
-          .noise = measure_noise(campaign, set),
-          .has_reference_bits = agree_with_known(results, known)};
+                    InstructionSet set, std::vector<RunResult>& known, SpentTime& spent) {
+  SetCost cost;
+  cost.set = set;
+  std::vector<RunResult> results;
+  const auto time_of = [&](std::uint64_t count) {
+    const SpentTime time = spent_on([&] { results = simulate(plan, count, set); });
+    cost.has_reference_bits = agree_with_known(results, known) && cost.has_reference_bits;
+    spent.wall_s += time.wall_s;
+    spent.processor_s += time.processor_s;
+    return time.processor_s;
+  };
+  cost.single_s = time_of(1);
+  cost.run_s = num_runs == 1 ? cost.single_s : time_of(num_runs) / static_cast<double>(num_runs);
+  cost.noise = measure_noise(campaign, set);
+  return cost;
 }
 
-BenchFigures measure(const MicroscopeCampaign& campaign, std::uint64_t num_runs) {
+StartCost measure_start(const MicroscopeCampaign& campaign) {
+  const SpentTime digest = spent_on([] { (void)model().reference_digest(best_instruction_set()); });
+  const SpentTime prepare = spent_on([&] { const RunPlan plan(campaign); });
+  return {.digest_s = digest.processor_s, .prepare_s = prepare.processor_s};
+}
+
+BenchFigures measure(const MicroscopeCampaign& campaign, const BenchOptions& options) {
   const RunPlan plan(campaign);
   BenchFigures figures{.machine = this_machine(),
-                       .num_runs = num_runs,
+                       .num_runs = options.num_runs,
                        .num_orbits = plan.num_orbits(),
                        .num_steps = num_steps_of_a_run(campaign),
                        .sets = {},
-                       .scalar_step = measure_step_parts(campaign)};
+                       .scalar_step = measure_step_parts(campaign),
+                       .start = measure_start(campaign),
+                       .spent = {},
+                       .campaigns = {}};
   std::vector<RunResult> known;
   for (const InstructionSet set : available_instruction_sets()) {
     // One scalar run is long enough to be timed.
-    const std::uint64_t count = set == InstructionSet::scalar ? 1 : num_runs;
-    figures.sets.push_back(measure_set(campaign, plan, count, set, known));
+    const std::uint64_t count = set == InstructionSet::scalar ? 1 : options.num_runs;
+    figures.sets.push_back(measure_set(campaign, plan, count, set, known, figures.spent));
   }
   const SetCost& scalar = figures.sets.front();
   figures.scalar_step.noise_ns = scalar.noise.step_ns;
   figures.scalar_step.whole_ns = 1e9 * scalar.run_s / static_cast<double>(figures.num_steps);
+  if (options.has_campaigns) {
+    for (const std::uint64_t num_runs : {std::uint64_t{100}, std::uint64_t{1000}}) {
+      figures.campaigns.push_back(measure_campaign(num_runs));
+    }
+  }
   return figures;
 }
 
@@ -99,7 +141,7 @@ BenchFigures measure(const MicroscopeCampaign& campaign, std::uint64_t num_runs)
 /// instruction set that it has, compares their results and prints both.
 /// @return An ExitCode: exit_cannot_be_done if results differ.
 int run_bench(const BenchOptions& options) {
-  const BenchFigures figures = measure(MicroscopeCampaign{}, options.num_runs);
+  const BenchFigures figures = measure(MicroscopeCampaign{}, options);
   const bool is_json = options.format == OutputFormat::json;
   fmt::print("{}", is_json ? bench_json(figures) : bench_table(figures));
   if (all_bits_agree(figures)) return exit_done;
@@ -115,6 +157,8 @@ void add_bench_command(CLI::App& app, Command& chosen) {
   command.add_option("--runs", options.num_runs, "Runs of each instruction set")
       ->check(wire::in_range(std::uint64_t{1}, bench_runs_max))
       ->capture_default_str();
+  command.add_flag("--campaigns", options.has_campaigns,
+                   "Also run campaigns of 100 and 1,000 runs on all\nprocessors");
   add_json_flag(command, options.format);
 }
 

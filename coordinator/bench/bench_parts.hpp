@@ -17,12 +17,34 @@ struct NoiseCost {
   double step_ns = 0.0;     ///< All noise of one step of one run.
 };
 
+/// What the same work took on the clock, and of a processor.
+struct SpentTime {
+  double wall_s = 0.0;
+  double processor_s = 0.0;
+};
+
 /// What a run costs with one instruction set, on one core.
 struct SetCost {
   InstructionSet set = InstructionSet::scalar;
-  double run_s = 0.0;  ///< In batches, a run's share of its batch; > 0.
+  /// Processor time in batches, a run's share of its batch; > 0.
+  double run_s = 0.0;
+  /// Processor time of a batch of one run, for which a set may have a kernel of its own.
+  double single_s = 0.0;
   NoiseCost noise;
   bool has_reference_bits = true;  ///< Its results are those of the sets before.
+};
+
+/// What passes in a worker and a coordinator before the first sample of a campaign.
+struct StartCost {
+  double digest_s = 0.0;   ///< Of the reference digest, by the fastest set.
+  double prepare_s = 0.0;  ///< Of what the runs of a campaign share.
+};
+
+/// A campaign on all processors, from the start of the program to its tables.
+struct CampaignCost {
+  std::uint64_t num_runs = 0;
+  double wall_s = 0.0;
+  double compute_s = 0.0;  ///< Of all runs, as the database has it.
 };
 
 /// What the parts of a step of one scalar run cost, each measured alone: their sum is not `whole`.
@@ -50,6 +72,9 @@ struct BenchFigures {
   std::uint64_t num_steps = 0;  ///< Of a run: samples, settling included.
   std::vector<SetCost> sets;    ///< `scalar` first.
   StepCost scalar_step;
+  StartCost start;
+  SpentTime spent;                      ///< On the runs of all sets.
+  std::vector<CampaignCost> campaigns;  ///< Empty if they were not asked for.
 };
 
 /// Measures noise alone, for one run; for a set with lanes, of a full batch.

@@ -50,6 +50,63 @@ std::string sets_table(const BenchFigures& figures) {
   return text + "bound: time of the noise alone ÷ time of the run; bits: of all results\n";
 }
 
+/// Part of the time that other programs, or other machines on this one, had the processor; below
+/// 2 % it is none.
+double shared_fraction(const SpentTime& spent) {
+  constexpr double fraction_min = 0.02;
+  if (spent.wall_s <= 0.0) return 0.0;
+  const double fraction = 1.0 - spent.processor_s / spent.wall_s;
+  return fraction < fraction_min ? 0.0 : fraction;
+}
+
+std::string shared_line(const SpentTime& spent) {
+  const double fraction = shared_fraction(spent);
+  if (fraction <= 0.0) return "Shared     no: the processor was free\n";
+  return fmt::format("Shared     {:.0f} % of the time went to others; figures are processor time\n",
+                     100.0 * fraction);
+}
+
+/// A batch of one run beside one of as many as a batch holds.
+std::string widths_table(const BenchFigures& figures) {
+  std::string text = fmt::format("Batches\n\n{:<8}{:>13}{:>14}{:>9}\n{}\n", "set", "of 1 run, s",
+                                 "of 16 runs, s", "ratio", horizontal_rule(44));
+  for (const SetCost& cost : figures.sets) {
+    if (cost.set == InstructionSet::scalar) continue;
+    const double full_s = cost.run_s * static_cast<double>(batch_lanes);
+    text += fmt::format("{}{}{}{}\n", left_aligned(name_of(cost.set), 8),
+                        right_aligned(measured_figure(cost.single_s), 13),
+                        right_aligned(measured_figure(full_s), 14),
+                        right_aligned(measured_figure(cost.single_s / full_s), 9));
+  }
+  return text;
+}
+
+std::string start_lines(const StartCost& start) {
+  return fmt::format("Start      reference digest {} s, preparing the campaign {} s\n",
+                     measured_figure(start.digest_s), measured_figure(start.prepare_s));
+}
+
+/// Time of all runs over that of all processors.
+double efficiency(const BenchFigures& figures, const CampaignCost& campaign) {
+  return campaign.compute_s / (figures.machine.num_processors * campaign.wall_s);
+}
+
+std::string campaigns_table(const BenchFigures& figures) {
+  if (figures.campaigns.empty()) return "";
+  std::string text = fmt::format(
+      "\nCampaigns on all {} processors, from the start of the program to its tables\n\n"
+      "{:>6}{:>10}{:>10}{:>13}\n{}\n",
+      figures.machine.num_processors, "runs", "s", "runs/s", "efficiency", horizontal_rule(39));
+  for (const CampaignCost& campaign : figures.campaigns) {
+    text += fmt::format(
+        "{:>6}{}{}{}\n", campaign.num_runs, right_aligned(measured_figure(campaign.wall_s), 10),
+        right_aligned(measured_figure(static_cast<double>(campaign.num_runs) / campaign.wall_s),
+                      10),
+        right_aligned(measured_figure(efficiency(figures, campaign)), 13));
+  }
+  return text + "efficiency: time of all runs ÷ (processors × time of the campaign)\n";
+}
+
 std::array<std::pair<std::string_view, double>, 5> rows_of(const StepCost& step) {
   return {{{"noise", step.noise_ns},
            {"shared signals", step.shared_signals_ns},
@@ -82,6 +139,7 @@ using Json = nlohmann::ordered_json;
 Json json_of(const BenchFigures& figures, const SetCost& cost) {
   return {{"set", name_of(cost.set)},
           {"run_s", cost.run_s},
+          {"single_s", cost.single_s},
           {"runs_per_s", 1.0 / cost.run_s},
           {"steps_per_s", steps_per_s(figures, cost)},
           {"ratio_to_scalar", ratio_to_scalar(figures, cost)},
@@ -99,10 +157,12 @@ std::string bench_table(const BenchFigures& figures) {
       "Processor  {}, {} processors; one is used\n"
       "Build      {}, {}\n"
       "Model      {}\n"
-      "Runs       {} a set, scalar 1; of {} orbits and {} steps\n\n{}\n{}",
+      "{}{}"
+      "Runs       {} a set, scalar 1; of {} orbits and {} steps\n\n{}\n{}\n{}{}",
       machine.processor, machine.num_processors, machine.build_type, machine.compiler,
-      model_version, figures.num_runs, figures.num_orbits, figures.num_steps, sets_table(figures),
-      step_table(figures.scalar_step));
+      model_version, shared_line(figures.spent), start_lines(figures.start), figures.num_runs,
+      figures.num_orbits, figures.num_steps, sets_table(figures), widths_table(figures),
+      step_table(figures.scalar_step), campaigns_table(figures));
 }
 
 std::string bench_json(const BenchFigures& figures) {
@@ -116,11 +176,21 @@ std::string bench_json(const BenchFigures& figures) {
             {"num_orbits", figures.num_orbits},
             {"num_steps", figures.num_steps},
             {"all_bits_agree", all_bits_agree(figures)},
+            {"shared_fraction", shared_fraction(figures.spent)},
+            {"digest_s", figures.start.digest_s},
+            {"prepare_s", figures.start.prepare_s},
             {"sets", Json::array()},
-            {"scalar_step", Json::object()}};
+            {"scalar_step", Json::object()},
+            {"campaigns", Json::array()}};
   for (const SetCost& cost : figures.sets) json["sets"].push_back(json_of(figures, cost));
   for (const auto& [name, ns] : rows_of(figures.scalar_step)) {
     json["scalar_step"][key_of(name) + "_ns"] = ns;
+  }
+  for (const CampaignCost& campaign : figures.campaigns) {
+    json["campaigns"].push_back({{"num_runs", campaign.num_runs},
+                                 {"wall_s", campaign.wall_s},
+                                 {"compute_s", campaign.compute_s},
+                                 {"efficiency", efficiency(figures, campaign)}});
   }
   return json.dump(2) + "\n";
 }

@@ -21,15 +21,20 @@ BenchFigures figures() {
           .num_steps = 4'000'000,
           .sets = {{.set = InstructionSet::scalar,
                     .run_s = 2.0,
+                    .single_s = 2.0,
                     .noise = NoiseCost{.deviate_ns = 8.5, .step_ns = 250.0}},
                    {.set = InstructionSet::avx512,
                     .run_s = 0.125,
+                    .single_s = 1.0,
                     .noise = NoiseCost{.deviate_ns = 0.5, .step_ns = 8.0}}},
           .scalar_step = {.noise_ns = 250.0,
                           .shared_signals_ns = 75.0,
                           .dynamics_ns = 100.0,
                           .estimation_ns = 25.0,
-                          .whole_ns = 500.0}};
+                          .whole_ns = 500.0},
+          .start = {.digest_s = 0.125, .prepare_s = 0.0625},
+          .spent = {.wall_s = 8.0, .processor_s = 6.0},
+          .campaigns = {{.num_runs = 100, .wall_s = 5.0, .compute_s = 16.0}}};
 }
 
 TEST(BenchTable, ShowsSetsAndParts) {
@@ -38,13 +43,21 @@ TEST(BenchTable, ShowsSetsAndParts) {
       "Build      Release, GCC 12.2.0\n"
       "Model      " +
       std::string(model_version) +
-      "\nRuns       16 a set, scalar 1; of 140 orbits and 4000000 steps\n"
+      "\nShared     25 % of the time went to others; figures are processor time\n"
+      "Start      reference digest 0.125 s, preparing the campaign 0.0625 s\n"
+      "Runs       16 a set, scalar 1; of 140 orbits and 4000000 steps\n"
       R"(
 set         s/run   runs/s   steps/s  ÷ scalar │ ns/deviate    bound │ bits
 ───────────────────────────────────────────────┼─────────────────────┼──────────
 scalar       2.00    0.500   2.0e+06      1.00 │       8.50    0.500 │ reference
 avx512      0.125     8.00   3.2e+07      16.0 │      0.500    0.256 │ same
 bound: time of the noise alone ÷ time of the run; bits: of all results
+
+Batches
+
+set       of 1 run, s of 16 runs, s    ratio
+────────────────────────────────────────────
+avx512           1.00          2.00    0.500
 
 A step of a scalar run; parts are measured alone and need not add up
 
@@ -55,6 +68,13 @@ shared signals      75.0     15 %
 dynamics             100     20 %
 estimation          25.0      5 %
 whole                500    100 %
+
+Campaigns on all 4 processors, from the start of the program to its tables
+
+  runs         s    runs/s   efficiency
+───────────────────────────────────────
+   100      5.00      20.0        0.800
+efficiency: time of all runs ÷ (processors × time of the campaign)
 )";
   EXPECT_EQ(bench_table(figures()), expected);
 }
@@ -96,6 +116,11 @@ TEST(BenchJson, HoldsTheSameWithUnitsInItsNames) {
   EXPECT_EQ(json["num_orbits"], 140);
   EXPECT_EQ(json["num_steps"], 4'000'000);
   EXPECT_EQ(json["all_bits_agree"], true);
+  EXPECT_EQ(json["shared_fraction"], 0.25);
+  EXPECT_EQ(json["digest_s"], 0.125);
+  EXPECT_EQ(json["prepare_s"], 0.0625);
+  ASSERT_EQ(json["campaigns"].size(), 1U);
+  EXPECT_EQ(json["campaigns"][0]["efficiency"], 0.8);
   EXPECT_EQ(json["scalar_step"], nlohmann::json({{"noise_ns", 250.0},
                                                  {"shared_signals_ns", 75.0},
                                                  {"dynamics_ns", 100.0},
@@ -108,6 +133,7 @@ TEST(BenchJson, HoldsEachSetAndNullForWhatWasNotMeasured) {
   ASSERT_EQ(json["sets"].size(), 2U);
   EXPECT_EQ(json["sets"][0], nlohmann::json({{"set", "scalar"},
                                              {"run_s", 2.0},
+                                             {"single_s", 2.0},
                                              {"runs_per_s", 0.5},
                                              {"steps_per_s", 2e6},
                                              {"ratio_to_scalar", 1.0},
@@ -117,6 +143,7 @@ TEST(BenchJson, HoldsEachSetAndNullForWhatWasNotMeasured) {
                                              {"has_reference_bits", true}}));
   EXPECT_EQ(json["sets"][1], nlohmann::json({{"set", "avx512"},
                                              {"run_s", 0.125},
+                                             {"single_s", 1.0},
                                              {"runs_per_s", 8.0},
                                              {"steps_per_s", 3.2e7},
                                              {"ratio_to_scalar", 16.0},

@@ -1,0 +1,82 @@
+#include "coordinator/bench/bench_campaigns.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <filesystem>
+#include <string>
+#include <system_error>
+
+#include "coordinator/store/store.hpp"
+#include "core/campaign/model.hpp"
+#include "core/error.hpp"
+#include "proto/link/start_program.hpp"
+#include "proto/link/whole_file.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+/// A directory that is removed with all that is in it.
+class ScratchDirectory {
+ public:
+  ScratchDirectory() {
+    std::string pattern =
+        (std::filesystem::temp_directory_path() / "proofmass-bench-XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr) {
+      throw Error(fmt::format("directory = {} (cannot be made: {})", pattern,
+                              std::generic_category().message(errno)));
+    }
+    path_ = pattern;
+  }
+  ~ScratchDirectory() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  ScratchDirectory(const ScratchDirectory&) = delete;
+  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// @return True if it ended with code 0.
+bool run_to_end(const std::vector<std::string>& arguments) {
+  const int nowhere = open("/dev/null", O_RDWR | O_CLOEXEC);
+  if (nowhere < 0) throw Error("/dev/null (cannot be opened)");
+  const pid_t child =
+      wire::start_program({.arguments = arguments, .descriptors = {nowhere, nowhere, 2}});
+  close(nowhere);
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+}  // namespace
+
+CampaignCost measure_campaign(std::uint64_t num_runs) {
+  const ScratchDirectory directory;
+  const std::filesystem::path file = directory.path() / "bench.toml";
+  const std::filesystem::path database = directory.path() / "bench.db";
+  constexpr mode_t mode = 0600;
+  wire::write_whole_file("campaign file", file, model().example(), mode, wire::IfExists::refuse);
+  const auto start = std::chrono::steady_clock::now();
+  const bool is_done =
+      run_to_end({wire::program_beside_this("proofmass").string(), "run", file.string(), "--db",
+                  database.string(), "--runs", std::to_string(num_runs), "--quiet"});
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  if (!is_done)
+    throw Error(fmt::format("campaign of {} runs (did not end with exit code 0)", num_runs));
+  return {.num_runs = num_runs,
+          .wall_s = elapsed.count(),
+          .compute_s = Store::open_read_only(database).execution().compute_s};
+}
+
+}  // namespace proofmass::coordinator
