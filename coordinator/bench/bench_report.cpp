@@ -66,19 +66,21 @@ std::string shared_line(const SpentTime& spent) {
                      100.0 * fraction);
 }
 
-/// A batch of one run beside one of as many as a batch holds.
+/// A batch of one run beside a full one; nothing if the runs did not fill their batches.
 std::string widths_table(const BenchFigures& figures) {
-  std::string text = fmt::format("Batches\n\n{:<8}{:>13}{:>14}{:>9}\n{}\n", "set", "of 1 run, s",
-                                 "of 16 runs, s", "ratio", horizontal_rule(44));
+  if (figures.num_runs % batch_lanes != 0) return "";
+  std::string text =
+      fmt::format("Batches\n\n{:<8}{:>10}{:>12}{:>9}\n{}\n", "set", "1 run, s",
+                  fmt::format("{} runs, s", batch_lanes), "ratio", horizontal_rule(39));
   for (const SetCost& cost : figures.sets) {
     if (cost.set == InstructionSet::scalar) continue;
     const double full_s = cost.run_s * static_cast<double>(batch_lanes);
     text += fmt::format("{}{}{}{}\n", left_aligned(name_of(cost.set), 8),
-                        right_aligned(measured_figure(cost.single_s), 13),
-                        right_aligned(measured_figure(full_s), 14),
+                        right_aligned(measured_figure(cost.single_s), 10),
+                        right_aligned(measured_figure(full_s), 12),
                         right_aligned(measured_figure(cost.single_s / full_s), 9));
   }
-  return text;
+  return text + "\n";
 }
 
 std::string start_lines(const StartCost& start) {
@@ -158,7 +160,7 @@ std::string bench_table(const BenchFigures& figures) {
       "Build      {}, {}\n"
       "Model      {}\n"
       "{}{}"
-      "Runs       {} a set, scalar 1; of {} orbits and {} steps\n\n{}\n{}\n{}{}",
+      "Runs       {} a set, scalar 1; of {} orbits and {} steps\n\n{}\n{}{}{}",
       machine.processor, machine.num_processors, machine.build_type, machine.compiler,
       model_version, shared_line(figures.spent), start_lines(figures.start), figures.num_runs,
       figures.num_orbits, figures.num_steps, sets_table(figures), widths_table(figures),

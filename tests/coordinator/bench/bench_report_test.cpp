@@ -55,9 +55,9 @@ bound: time of the noise alone ÷ time of the run; bits: of all results
 
 Batches
 
-set       of 1 run, s of 16 runs, s    ratio
-────────────────────────────────────────────
-avx512           1.00          2.00    0.500
+set       1 run, s  16 runs, s    ratio
+───────────────────────────────────────
+avx512        1.00        2.00    0.500
 
 A step of a scalar run; parts are measured alone and need not add up
 
@@ -103,6 +103,19 @@ TEST(BenchTable, FitsInto80Columns) {
       EXPECT_LE(width, 80) << line;
     }
   }
+}
+
+// Four runs take a batch that may be a narrow one: nothing is known of a full one.
+TEST(BenchTable, ComparesOnlyFullBatches) {
+  BenchFigures of_few = figures();
+  of_few.num_runs = 4;
+  EXPECT_EQ(bench_table(of_few).find("Batches"), std::string::npos);
+}
+
+TEST(BenchTable, SaysThatTheProcessorWasFree) {
+  BenchFigures free = figures();
+  free.spent = {.wall_s = 8.0, .processor_s = 7.9};
+  EXPECT_NE(bench_table(free).find("\nShared     no: the processor was free\n"), std::string::npos);
 }
 
 TEST(BenchJson, HoldsTheSameWithUnitsInItsNames) {
