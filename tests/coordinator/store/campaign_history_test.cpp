@@ -9,8 +9,8 @@ namespace proofmass::coordinator {
 namespace {
 
 using test::delivery_of;
+using test::lost_runs;
 using test::result_of;
-using test::session_1;
 using ::testing::ElementsAre;
 
 class CampaignHistoryTest : public test::StoreTest {
@@ -24,14 +24,6 @@ class CampaignHistoryTest : public test::StoreTest {
     Delivery delivery = delivery_of(run);
     delivery.result = result_of(run, status);
     return delivery;
-  }
-  static LostRuns lost(std::uint64_t first, std::uint64_t count, wire::LossReason reason,
-                       bool is_blamed) {
-    return {.runs = {{first}, count},
-            .attempt = {1},
-            .worker = session_1,
-            .reason = reason,
-            .is_blamed = is_blamed};
   }
 
   Store store;
@@ -54,8 +46,9 @@ TEST_F(CampaignHistoryTest, HasTheEventsAfterOne) {
 }
 
 TEST_F(CampaignHistoryTest, CountsLossesByReason) {
-  write({lost(0, 10, wire::LossReason::silent, false), lost(10, 5, wire::LossReason::silent, false),
-         lost(20, 1, wire::LossReason::crashed, true)});
+  write({lost_runs(0, 10, wire::LossReason::silent, false),
+         lost_runs(10, 5, wire::LossReason::silent, false),
+         lost_runs(20, 1, wire::LossReason::crashed, true)});
   const std::vector<LossCount> losses = CampaignHistory(file()).losses();
   ASSERT_EQ(losses.size(), 2U);
   EXPECT_EQ(losses[0].reason, "silent");
@@ -80,7 +73,7 @@ TEST_F(CampaignHistoryTest, CountsHowRunsEndedWithoutAnEstimate) {
 
 TEST_F(CampaignHistoryTest, NamesRunsThatWereGivenUp) {
   for (const std::uint64_t run : {7U, 3U, 5U}) {
-    write({lost(run, 1, wire::LossReason::crashed, true), GivenUpRun{{run}}});
+    write({lost_runs(run, 1, wire::LossReason::crashed, true), GivenUpRun{{run}}});
   }
   const std::vector<GivenUpRecord> runs = CampaignHistory(file()).given_up(2);
   ASSERT_EQ(runs.size(), 2U);
@@ -114,7 +107,7 @@ TEST_F(CampaignHistoryTest, HasTheNewestAttemptsAndCountsTheOthers) {
   std::vector<Entry> entries;
   for (std::uint64_t run = 0; run < 20; ++run) entries.emplace_back(delivery_of(run));
   for (std::uint64_t i = 0; i < 5; ++i) {
-    entries.emplace_back(lost(50 + i, 1, wire::LossReason::silent, false));
+    entries.emplace_back(lost_runs(50 + i, 1, wire::LossReason::silent, false));
   }
   write(entries);
   test::change(file(), "UPDATE delivery SET received_unix_s = 1000 + run_index");

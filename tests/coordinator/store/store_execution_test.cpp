@@ -6,6 +6,7 @@ namespace proofmass::coordinator {
 namespace {
 
 using test::delivery_of;
+using test::lost_runs;
 using test::session_1;
 
 /// A campaign whose workers, results and losses are known.
@@ -29,14 +30,6 @@ class StoreExecution : public test::StoreTest {
     delivery.attempt = {attempt};
     delivery.compute_s = compute_s;
     return delivery;
-  }
-  static LostRuns lost(std::uint64_t first, std::uint64_t count, wire::LossReason reason,
-                       bool is_blamed) {
-    return {.runs = {{first}, count},
-            .attempt = {1},
-            .worker = session_1,
-            .reason = reason,
-            .is_blamed = is_blamed};
   }
 
   Store store;
@@ -73,9 +66,10 @@ TEST_F(StoreExecution, SharesTheTimeAmongHosts) {
 }
 
 TEST_F(StoreExecution, CountsLossesByReasonAndBlame) {
-  write({lost(0, 10, wire::LossReason::silent, false), lost(10, 5, wire::LossReason::silent, false),
-         lost(20, 1, wire::LossReason::crashed, true),
-         lost(21, 2, wire::LossReason::crashed, false)});
+  write({lost_runs(0, 10, wire::LossReason::silent, false),
+         lost_runs(10, 5, wire::LossReason::silent, false),
+         lost_runs(20, 1, wire::LossReason::crashed, true),
+         lost_runs(21, 2, wire::LossReason::crashed, false)});
   const std::vector<LossShare> losses = store.execution().losses;
   ASSERT_EQ(losses.size(), 3U);
   EXPECT_EQ(losses[0].reason, "silent");

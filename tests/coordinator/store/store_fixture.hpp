@@ -102,6 +102,16 @@ inline coordinator::Delivery wrong_delivery_of(std::uint64_t run) {
   return delivery;
 }
 
+/// Runs that worker_1() lost at their first attempt.
+inline coordinator::LostRuns lost_runs(std::uint64_t first, std::uint64_t count,
+                                       wire::LossReason reason, bool is_blamed) {
+  return {.runs = {{first}, count},
+          .attempt = {1},
+          .worker = session_1,
+          .reason = reason,
+          .is_blamed = is_blamed};
+}
+
 inline std::vector<coordinator::Delivery> deliveries_of(std::uint64_t first, std::uint64_t end) {
   std::vector<coordinator::Delivery> deliveries;
   for (std::uint64_t run = first; run < end; ++run) deliveries.push_back(delivery_of(run));
