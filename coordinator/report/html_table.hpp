@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "coordinator/report/review_tables.hpp"
@@ -13,31 +14,31 @@ struct HtmlColumn {
   std::string title = {};  ///< Markup.
   bool is_text = false;
   std::string sort = {};  ///< `ascending` or `descending` if the rows are in this column's order.
-  std::string group =
-      {};  ///< Plain heading above this column and its neighbours with the same one.
+  /// Plain text above this column and those beside it that have the same.
+  std::string group = {};
 };
 
+/// A cell, made from its markup; most need nothing else.
 struct HtmlCell {
   std::string markup;
-  bool is_text = false;              ///< Also in a column of numbers.
+  bool is_text = false;              ///< Stands left although its column holds numbers.
   std::optional<double> value = {};  ///< In full precision, for programs that read the page.
 
-  // Most cells are markup and nothing else.
   HtmlCell(std::string cell_markup) : markup(std::move(cell_markup)) {}
 };
 
+/// The first cell is the heading of the row.
 using HtmlRow = std::vector<HtmlCell>;
 
-/// A table as markup: a region that scrolls by itself where the window is narrow. The first cell of
-/// a row is its heading.
 struct HtmlTable {
   std::string name;  ///< Plain text.
-  std::string id =
-      {};  ///< If there is one, the name is seen as a caption; else screen readers know.
+  /// With an id the name is shown as a caption; without, only screen readers tell it.
+  std::string id = {};
   std::vector<HtmlColumn> columns;
   std::vector<HtmlRow> rows;
 };
 
+/// The table as markup, in a region that scrolls by itself where the window is narrow.
 [[nodiscard]] std::string html_table(const HtmlTable& table);
 
 /// A table of a report with its caption and notes.

@@ -2,10 +2,16 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <condition_variable>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
+
+#include "core/campaign/model.hpp"
+#include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -106,6 +112,25 @@ TEST_F(DetailReaderTest, KeepsABoundedNumberOfCampaigns) {
   }
   const auto now = std::chrono::steady_clock::now();
   EXPECT_EQ(reader.details("first", {.file = "first.db"}, now).events, nullptr);
+}
+
+using DatabaseResults = test::StoreTest;
+
+// Errors of these results grow with the run: the last one is the worst.
+TEST_F(DatabaseResults, AreReadForPeopleAndForPrograms) {
+  Store store =
+      Store::create(file(), test::campaign_of(3), canonical_definition(test::campaign_of(3)));
+  std::vector<Entry> entries{test::worker_1()};
+  for (const Delivery& delivery : test::deliveries_of(0, 3)) entries.emplace_back(delivery);
+  (void)store.write(entries);
+  const CampaignResults results = database_sources().read_results(file());
+  EXPECT_EQ(results.failure, "");
+  EXPECT_EQ(results.num_runs, 3U);
+  EXPECT_THAT(results.html, testing::HasSubstr("Accuracy so far"));
+  const auto parameters = nlohmann::json::parse(results.json);
+  ASSERT_EQ(parameters.size(), model().results().quantities.size());
+  EXPECT_EQ(parameters[0]["worst"], std::abs(test::result_of(2).error(0)));
+  EXPECT_EQ(parameters[0]["worst_run"], 2);
 }
 
 TEST(DatabaseSources, SayWhyAFileCannotBeRead) {
