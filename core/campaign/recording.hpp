@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/signal/line_weights.hpp"
+
 namespace proofmass {
 
 // The time series of a run. No simulation keeps them: Plan::replay() computes a run again and
@@ -40,11 +42,24 @@ struct RecordedFrame {
   std::string meaning;  ///< A phrase for people.
 };
 
+/// What a model expects of a signal of a session: lines, which its estimation fits, over noise.
+struct ExpectedSpectrum {
+  std::size_t session = 0;  ///< Index in Recording::sessions.
+  std::size_t value = 0;    ///< The signal: index in RecordedSample::values.
+  /// The first is of the lines that the estimate uses, as it fits them; the others are of those
+  /// fitted beside them. Each is of a record with as many samples as the session.
+  std::vector<LineFit> fits;
+  /// One-sided PSD of the noise at a frequency above 0 in Hz, unit²/Hz; 0 if there is none.
+  std::function<double(double)> noise_psd;
+  std::string noise_meaning;  ///< What is noise here, and what is left out: a sentence for people.
+};
+
 /// What a replay of any run of a campaign passes on.
 struct Recording {
   std::vector<RecordedFrame> frames;
   std::vector<SignalGroup> groups;        ///< The order of the values of a sample is theirs.
   std::vector<RecordedSession> sessions;  ///< In the order in which they are simulated.
+  std::vector<ExpectedSpectrum> spectra;  ///< In the order of their sessions; may be none.
 };
 
 /// One sample of a replay. The values live during the call only.

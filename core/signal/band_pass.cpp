@@ -21,6 +21,12 @@ Biquad section(double k, double b0, double b1, double b2) {
           (1.0 - std::numbers::sqrt2 * k + k * k) / norm};
 }
 
+/// @param delay  z⁻¹.
+std::complex<double> response(const Biquad& filter, std::complex<double> delay) {
+  return (filter.b0 + delay * (filter.b1 + delay * filter.b2)) /
+         (1.0 + delay * (filter.a1 + delay * filter.a2));
+}
+
 }  // namespace
 
 Biquad butterworth_low_pass(double corner_hz, double sample_period_s) {
@@ -35,6 +41,12 @@ Biquad butterworth_high_pass(double corner_hz, double sample_period_s) {
 BandPass band_pass(double low_corner_hz, double high_corner_hz, double sample_period_s) {
   return {butterworth_high_pass(low_corner_hz, sample_period_s),
           butterworth_low_pass(high_corner_hz, sample_period_s)};
+}
+
+std::complex<double> response(const BandPass& filter, double frequency_hz, double sample_period_s) {
+  const auto [sine, cosine] = sincos_turns(frequency_hz * sample_period_s);
+  const std::complex<double> delay(cosine, -sine);
+  return response(filter.high_pass, delay) * response(filter.low_pass, delay);
 }
 
 }  // namespace proofmass

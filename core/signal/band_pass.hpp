@@ -1,5 +1,7 @@
 #pragma once
 
+#include <complex>
+
 namespace proofmass {
 
 /// Second-order recursive filter y = (b0 + b1 z⁻¹ + b2 z⁻²)/(1 + a1 z⁻¹ + a2 z⁻²) x.
@@ -20,6 +22,14 @@ struct BandPass {
 
 [[nodiscard]] BandPass band_pass(double low_corner_hz, double high_corner_hz,
                                  double sample_period_s);
+
+/// Leaves every signal as it is.
+inline constexpr BandPass no_filter{{1.0, 0.0, 0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0, 0.0}};
+
+/// What becomes of cos 2πft + i sin 2πft: the filter's factor, for a frequency below half the
+/// sampling rate.
+[[nodiscard]] std::complex<double> response(const BandPass& filter, double frequency_hz,
+                                            double sample_period_s);
 
 /// Memory of a Biquad (transposed direct form II).
 struct BiquadState {

@@ -121,6 +121,18 @@ TEST(BandPass, IsTheProductOfItsSections) {
   }
 }
 
+TEST(BandPass, KnowsItsResponse) {
+  const double line = 2.0 / 5950.0;
+  const BandPass filter = band_pass(line / 3.0, line * 3.0, period_s);
+  for (const double ratio : {0.1, 0.5, 1.0, 3.0, 20.0, 5000.0}) {
+    const double frequency = ratio * line;
+    const Complex expected = band_pass_response(frequency, line / 3.0, line * 3.0);
+    EXPECT_LT(std::abs(Complex(response(filter, frequency, period_s)) - expected),
+              response_tolerance(line / 3.0))
+        << ratio;
+  }
+}
+
 // Driven with a sine, the settled output is |H| sin(ωt + arg H).
 TEST(BandPass, AnswersASineWithItsGainAndPhase) {
   constexpr double low = 3.3e-3;

@@ -162,6 +162,7 @@ class OscillatorPlan final : public Plan {
     recording_.sessions = {{.name = "steady_state",
                             .sample_period_s = 1.0 / (samples_per_period * drive_hz),
                             .num_samples = num_samples()}};
+    recording_.spectra = {expected_reading()};
   }
 
   [[nodiscard]] std::vector<RunResult> simulate_batch(
@@ -186,6 +187,21 @@ class OscillatorPlan final : public Plan {
  private:
   [[nodiscard]] std::uint32_t num_samples() const {
     return static_cast<std::uint32_t>(num_orbits()) * samples_per_period;
+  }
+
+  /// The drive's line over white noise: 2σ²T at all frequencies.
+  [[nodiscard]] ExpectedSpectrum expected_reading() const {
+    const double drive_hz = campaign_.oscillator.drive_hz, sigma = campaign_.oscillator.noise_m_s2;
+    const double period_s = recording_.sessions[0].sample_period_s;
+    LineFit fit{.num_samples = num_samples(),
+                .num_dropped = num_samples() / 10,
+                .sample_period_s = period_s,
+                .filter = band_pass(drive_hz / 3.0, drive_hz * 3.0, period_s),
+                .fit_hz = {drive_hz},
+                .known_hz = {}};
+    return {.fits = {std::move(fit)},
+            .noise_psd = [density = 2.0 * sigma * sigma * period_s](double) { return density; },
+            .noise_meaning = "The noise model is white."};
   }
 
   /// @param sink  Gets each sample if there is one.

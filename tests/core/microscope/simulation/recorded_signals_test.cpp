@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/microscope/simulation/run.hpp"
+#include "core/signal/noise_shape.hpp"
 
 namespace proofmass {
 namespace {
@@ -29,7 +30,8 @@ void expect_name(const std::string& name, std::set<std::string>& names) {
 
 // Names become those of datasets, of their fields and of files.
 TEST(RecordedSignals, HaveNamesOfTheirOwnAndKnownFrames) {
-  const Recording recording = recording_of(short_campaign().scenario);
+  const RunPlan plan(short_campaign());
+  const Recording& recording = plan.recording();
   std::set<std::string> frames{""}, groups, sessions;
   for (const RecordedFrame& frame : recording.frames) expect_name(frame.name, frames);
   for (const RecordedSession& session : recording.sessions) expect_name(session.name, sessions);
@@ -84,6 +86,56 @@ TEST(Replay, PassesTheRecordsAndReturnsTheResultOfTheRun) {
   EXPECT_EQ(replayed.estimate, simulated.estimate);
   EXPECT_EQ(replayed.health, simulated.health);
   EXPECT_EQ(replayed.status, RunStatus::completed);
+}
+
+/// Name of the signal at an index of RecordedSample::values.
+std::string name_of_value(const Recording& recording, std::size_t value) {
+  for (const SignalGroup& group : recording.groups) {
+    if (value < group.signals.size()) return group.name + "/" + group.signals[value].name;
+    value -= group.signals.size();
+  }
+  return "";
+}
+
+// The fits together have each line of the session once, those that are fitted first.
+TEST(RecordedSignals, ExpectTheLinesOfEachSession) {
+  const MicroscopeCampaign campaign = short_campaign();
+  const RunPlan plan(campaign);
+  const Recording& recording = plan.recording();
+  ASSERT_EQ(recording.spectra.size(), campaign.scenario.sessions.size());
+  for (std::size_t i = 0; i < recording.spectra.size(); ++i) {
+    const ExpectedSpectrum& expected = recording.spectra[i];
+    EXPECT_EQ(expected.session, i);
+    EXPECT_EQ(name_of_value(recording, expected.value), "modes/differential_x");
+    const Session& session = campaign.scenario.sessions[i];
+    std::vector<LineMultiple> lines = session.fit_lines;
+    lines.insert(lines.end(), session.known_lines.begin(), session.known_lines.end());
+    std::vector<double> expected_hz, fitted_hz;
+    for (const LineMultiple& line : lines) {
+      expected_hz.push_back(line_frequency_hz(session, line, campaign.scenario.orbit.period_s));
+    }
+    EXPECT_EQ(expected.fits.front().fit_hz.size(), session.fit_lines.size());
+    for (const LineFit& fit : expected.fits) {
+      EXPECT_EQ(fit.num_samples, recording.sessions[i].num_samples);
+      EXPECT_EQ(fit.fit_hz.size() + fit.known_hz.size(), lines.size());
+      fitted_hz.insert(fitted_hz.end(), fit.fit_hz.begin(), fit.fit_hz.end());
+    }
+    EXPECT_EQ(fitted_hz, expected_hz) << session.name;
+  }
+}
+
+// Half the difference of two independent sensors has half the power of one; the filter that makes
+// their noise keeps within 0.5 dB, a factor of 1.122, of the density that it is asked to have.
+TEST(RecordedSignals, ExpectTheNoiseOfHalfADifference) {
+  MicroscopeCampaign campaign = short_campaign();
+  campaign.scenario.noise.scale = 3.0;
+  const RunPlan plan(campaign);
+  for (const double frequency_hz : {1e-4, 1e-3, 1e-2, 1e-1}) {
+    const double asked = 0.5 * 9.0 * nominal_psd(campaign.scenario.noise.linear_x, frequency_hz);
+    const double ratio = plan.recording().spectra[4].noise_psd(frequency_hz) / asked;
+    EXPECT_GT(ratio, 1.0 / 1.122) << frequency_hz;
+    EXPECT_LT(ratio, 1.122) << frequency_hz;
+  }
 }
 
 }  // namespace
