@@ -280,7 +280,8 @@ std::string wrapped(const std::string& text, std::size_t indent) {
   while (stream >> word) {
     const bool is_first = column == indent;
     if (!is_first && column + 1 + display_width(word) > report_width) {
-      lines += "\n" + std::string(indent, ' ');
+      lines += '\n';
+      lines.append(indent, ' ');
       column = indent;
     } else if (!is_first) {
       lines += " ";

@@ -43,6 +43,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
                 .figures = {},
                 .matrix = {},
                 .causes = {},
+                .spectra = {},
                 .execution = {},
                 .stop = {}};
   review.num_given_up = num_runs_in(store.given_up_runs());
@@ -63,6 +64,14 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
 }
 
 }  // namespace
+
+std::optional<RunIndex> worst_run_of(const Review& review) {
+  for (const MatrixRow& row : review.matrix) {
+    if (row.answer.requirement.subject != Requirement::Subject::all_objectives) continue;
+    if (row.worst) return row.worst->run;
+  }
+  return std::nullopt;
+}
 
 Review read_review(const Store& store, const Campaign& campaign, std::string_view database,
                    std::vector<StatedRequirement> stated, WithCauses with_causes) {

@@ -8,11 +8,13 @@
 #include "coordinator/report/causes.hpp"
 #include "coordinator/report/error_figures.hpp"
 #include "coordinator/report/read_results.hpp"
+#include "coordinator/report/run_spectra.hpp"
 #include "coordinator/report/verification_matrix.hpp"
 #include "coordinator/store/execution.hpp"
 #include "coordinator/store/records.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
+#include "core/runs.hpp"
 
 namespace proofmass::coordinator {
 
@@ -42,9 +44,14 @@ struct Review {
   std::vector<QuantityFigures> figures;  ///< Of each quantity.
   std::vector<MatrixRow> matrix;         ///< That of all objectives together is the last one.
   std::optional<Causes> causes;          ///< Empty if runs are too few, or not asked for.
+  std::optional<RunSpectra> spectra;     ///< Of worst_run_of(); empty if not asked for.
   Execution execution;
   std::string stop;  ///< See stop_text().
 };
+
+/// The run with the largest |error| of any quantity beside its objective; none if no run has an
+/// estimate or no quantity has an objective.
+[[nodiscard]] std::optional<RunIndex> worst_run_of(const Review& review);
 
 enum class WithCauses : std::uint8_t { no, yes };
 

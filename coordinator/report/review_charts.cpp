@@ -187,9 +187,15 @@ std::vector<NamedPicture> review_pictures(const Review& review) {
   }
   if (auto chart = budget_chart(review)) pictures.push_back({"budget", *std::move(chart)});
   if (auto map = cause_map(review)) pictures.push_back({"causes", *std::move(map)});
+  if (!review.spectra) return pictures;
+  std::vector<Chart> spectra = spectrum_charts(*review.spectra);
+  for (std::size_t i = 0; i < spectra.size(); ++i) {
+    pictures.push_back({spectrum_name(review.spectra->sessions[i].session), std::move(spectra[i])});
+  }
   return pictures;
 }
 
 bool needs_causes(std::string_view name) { return name == "causes"; }
+bool needs_spectra(std::string_view name) { return name.starts_with(spectrum_name("")); }
 
 }  // namespace proofmass::coordinator

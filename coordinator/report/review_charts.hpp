@@ -40,6 +40,13 @@ namespace proofmass::coordinator {
 /// Nothing without causes.
 [[nodiscard]] std::optional<HeatMap> cause_map(const Review& review);
 
+/// One for each session with a spectrum: measured, without the fitted lines, and of the noise
+/// model.
+[[nodiscard]] std::vector<Chart> spectrum_charts(const RunSpectra& spectra);
+
+/// `spectrum:a_c13`, the name of a session's chart.
+[[nodiscard]] std::string spectrum_name(std::string_view session);
+
 /// A chart with the name by which `proofmass plot` knows it: `histogram:a_c12`.
 struct NamedPicture {
   std::string name;
@@ -51,5 +58,7 @@ struct NamedPicture {
 
 /// True if a chart of this name needs Review::causes.
 [[nodiscard]] bool needs_causes(std::string_view name);
+/// True if it needs Review::spectra.
+[[nodiscard]] bool needs_spectra(std::string_view name);
 
 }  // namespace proofmass::coordinator

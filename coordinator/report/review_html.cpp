@@ -117,6 +117,24 @@ std::string causes_markup(const Review& review) {
   return html + table_or_nothing(cause_table(review));
 }
 
+std::string spectra_markup(const Review& review) {
+  if (!review.spectra) return "";
+  const RunSpectra& spectra = *review.spectra;
+  std::string html;
+  for (const std::string& reason : spectra.reasons) {
+    html += fmt::format("<p>{}</p>\n", markup_text(reason));
+  }
+  if (spectra.sessions.empty()) return html;
+  html += fmt::format(
+      "<p>Of run {}, which is the farthest off of all runs, simulated again bit for bit. Without "
+      "the "
+      "lines that the session fits, noise is left, and lines that it does not fit. {}</p>\n<div "
+      "class=\"charts\">\n",
+      spectra.run.value, markup_text(spectra.sessions.front().noise_meaning));
+  for (const Chart& chart : spectrum_charts(spectra)) html += figure_of(chart);
+  return html + "</div>\n" + html_table(spectrum_table(spectra));
+}
+
 std::string execution_markup(const Review& review) {
   std::string html = html_table(identity_table(review)) + html_table(execution_table(review)) +
                      table_or_nothing(host_table(review)) + "<h3>How to reproduce it</h3>\n<ul>\n";
@@ -134,6 +152,7 @@ std::vector<Section> sections_of(const Review& review) {
           {"characteristics", "Operating characteristics", characteristics_markup(review)},
           {"budget-section", "Budget", budget_markup(review)},
           {"causes-section", "Causes of the errors", causes_markup(review)},
+          {"spectra-section", "Spectra of the worst run", spectra_markup(review)},
           {"how", "How it was run", execution_markup(review)}};
 }
 

@@ -51,6 +51,9 @@ inline constexpr std::string_view interpretation = "mixed";
 /// The sums that explain the errors. No rows without causes.
 [[nodiscard]] ReviewTable cause_table(const Review& review);
 
+/// The lines that the estimates use, and the noise about them. No rows without spectra.
+[[nodiscard]] ReviewTable spectrum_table(const RunSpectra& spectra);
+
 /// What was run: identity, counts, digest.
 [[nodiscard]] ReviewTable identity_table(const Review& review);
 

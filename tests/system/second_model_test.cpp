@@ -227,6 +227,37 @@ TEST_F(SecondModel, IsReplayedToTheBit) {
   EXPECT_TRUE(std::filesystem::exists(path("worst") / worst)) << rows;
 }
 
+// White noise, and a line whose amplitude the run itself estimates: both fits have the noise of
+// one sample, σ √(2/N), in each of cosine and sine, of which four together are allowed.
+TEST_F(SecondModel, HasTheSpectrumOfItsWorstRunInTheReport) {
+  run("a");
+  ASSERT_EQ(proofmass("html", {"report", "a.db", "--html", "-"}), 0) << errors_of("html");
+  const std::string html = output_of("html");
+  std::smatch match;
+  ASSERT_TRUE(std::regex_search(html, match, std::regex("noise is ([0-9.]+) ± ([0-9.]+) times")));
+  EXPECT_NEAR(std::stod(match[1]), 1.0, 4.0 * std::stod(match[2]) + 0.01);
+  const std::regex line(
+      ">steady_state</th><td data-value=\"0.01\">10.0</td><td data-value=\"([^\"]+)\">");
+  ASSERT_TRUE(std::regex_search(html, match, line));
+  const double amplitude =
+      number("a",
+             "SELECT sqrt(estimate_in_phase_m_s2 * estimate_in_phase_m_s2 + "
+             "estimate_quadrature_m_s2 * estimate_quadrature_m_s2) FROM run_result JOIN "
+             "worst_runs USING (run_index) WHERE parameter = 'in_phase' AND place = 1");
+  EXPECT_NEAR(std::stod(match[1]), amplitude, 4.0 * 1e-9 * std::sqrt(2.0 / 16000.0));
+}
+
+TEST_F(SecondModel, HasNoSpectrumOfASessionThatIsTooLong) {
+  ASSERT_EQ(proofmass("a", {"run", "example.toml", "--db", "a.db", "--runs", "1", "--workers", "1",
+                            "--set", "sensor.periods=600000"}),
+            0)
+      << errors_of("a");
+  ASSERT_EQ(proofmass("html", {"report", "a.db", "--html", "-"}), 0) << errors_of("html");
+  EXPECT_THAT(output_of("html"),
+              HasSubstr("Session steady_state has 9600000 samples, and spectra are computed of "
+                        "8388608 at most."));
+}
+
 TEST_F(SecondModel, IsSwept) {
   ASSERT_EQ(proofmass("sweep", {"sweep", "example.toml", "--vary", "sensor.noise_m_s2=1e-9,1e-8",
                                 "--runs", "32", "--directory", "swept"}),

@@ -9,11 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/archive/replayed_spectra.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/charts/svg.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output_file.hpp"
 #include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/store.hpp"
@@ -106,22 +108,42 @@ void write_picture(const Picture& picture, const PlotOptions& options) {
       options.if_there == IfThere::replace ? wire::IfExists::replace : wire::IfExists::refuse);
 }
 
+/// The spectra are not computed: to tell their names, no run has to be simulated.
+void print_names(const Review& review, const Campaign& campaign) {
+  std::string names;
+  for (const NamedPicture& named : review_pictures(review)) names += named.name + "\n";
+  for (const std::string& name : spectrum_names(campaign.prepare()->recording())) {
+    names += name + "\n";
+  }
+  print_lines(names);
+}
+
+/// @throws ArchiveError if the worst run has no spectra.
+void add_spectra(const Store& store, Review& review, const IsStopped& is_stopped) {
+  review.spectra = worst_run_spectra(store, review, is_stopped);
+  if (review.spectra->sessions.empty()) throw ArchiveError(review.spectra->reasons.front());
+}
+
 int plot(const PlotOptions& options) {
   check_plot_arguments(options);
   const Store store = Store::open_read_only(options.database);
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
   const bool are_causes_needed = options.is_list || needs_causes(options.chart);
-  const Review review = read_review(store, *campaign, options.database.filename().string(), {},
-                                    are_causes_needed ? WithCauses::yes : WithCauses::no);
-  const std::vector<NamedPicture> pictures = review_pictures(review);
+  Review review = read_review(store, *campaign, options.database.filename().string(), {},
+                              are_causes_needed ? WithCauses::yes : WithCauses::no);
   if (options.is_list) {
-    std::string names;
-    for (const NamedPicture& named : pictures) names += named.name + "\n";
-    print_lines(names);
+    print_names(review, *campaign);
     return exit_done;
   }
-  write_picture(chosen_picture(pictures, options.chart), options);
-  return exit_done;
+  const auto write = [&] {
+    write_picture(chosen_picture(review_pictures(review), options.chart), options);
+    return exit_done;
+  };
+  if (!needs_spectra(options.chart)) return write();
+  return run_until_stopped([&](const IsStopped& is_stopped) {
+    add_spectra(store, review, is_stopped);
+    return write();
+  });
 }
 
 }  // namespace
@@ -129,7 +151,7 @@ int plot(const PlotOptions& options) {
 void add_plot(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<PlotOptions>(
       app, chosen, "plot", "Draw a chart of the review report as a picture", plot);
-  command.footer(exit_codes_text({}));
+  command.footer(exit_codes_text({exit_interrupted}));
   add_database(command, options.database);
   command.add_option("--chart", options.chart,
                      "Which one, as in errors or histogram:a_c12; see\n--list");

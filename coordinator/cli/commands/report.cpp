@@ -9,12 +9,14 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/archive/replayed_spectra.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/campaign_file/requirements_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output_file.hpp"
 #include "coordinator/cli/remote_answer.hpp"
 #include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/report/report_json.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/report/review_html.hpp"
@@ -103,9 +105,9 @@ void write_document(const std::filesystem::path& file, IfThere if_there, const s
       if_there == IfThere::replace ? wire::IfExists::replace : wire::IfExists::refuse);
 }
 
-/// @return True if all requirements that were asked for are met.
-bool write_documents(const ReportOptions& options, const Store& store, const Campaign& campaign,
-                     const std::vector<StatedRequirement>& stated) {
+/// @return What print_report() returns.
+int write_documents(const ReportOptions& options, const Store& store, const Campaign& campaign,
+                    const std::vector<StatedRequirement>& stated) {
   std::optional<Review> review;
   try {
     review =
@@ -113,13 +115,20 @@ bool write_documents(const ReportOptions& options, const Store& store, const Cam
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }
-  if (!options.html.empty()) write_document(options.html, options.if_there, review_html(*review));
-  if (!options.markdown.empty()) {
-    write_document(options.markdown, options.if_there, review_markdown(*review));
-  }
-  const std::span<const MatrixRow> rows(review->matrix);
-  return std::ranges::all_of(rows.first(stated.size()), [](const MatrixRow& row) {
-    return row.answer.check.verdict == Verdict::met;
+  const auto write = [&] {
+    if (!options.html.empty()) write_document(options.html, options.if_there, review_html(*review));
+    if (!options.markdown.empty()) {
+      write_document(options.markdown, options.if_there, review_markdown(*review));
+    }
+    const std::span<const MatrixRow> rows(review->matrix);
+    return exit_code_of(std::ranges::all_of(rows.first(stated.size()), [](const MatrixRow& row) {
+      return row.answer.check.verdict == Verdict::met;
+    }));
+  };
+  if (options.html.empty()) return write();
+  return run_until_stopped([&](const IsStopped& is_stopped) {
+    review->spectra = worst_run_spectra(store, *review, is_stopped);
+    return write();
   });
 }
 
@@ -133,8 +142,8 @@ int print_report(const ReportOptions& options) {
   const Store store = Store::open_read_only(options.database);
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
   if (options.has_document()) {
-    const bool are_met = write_documents(options, store, *campaign, stated);
-    if (options.format != OutputFormat::json) return exit_code_of(are_met);
+    const int exit_code = write_documents(options, store, *campaign, stated);
+    if (options.format != OutputFormat::json || exit_code == exit_interrupted) return exit_code;
   }
   const std::vector<RequirementAnswer> answers = answers_of(store, *campaign, stated);
   if (options.format == OutputFormat::json) {
@@ -152,7 +161,7 @@ int print_report(const ReportOptions& options) {
 void add_report(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<ReportOptions>(
       app, chosen, "report", "Print the tables of a database", print_report);
-  command.footer(exit_codes_text({exit_not_met}));
+  command.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   add_database(command, options.database);
   command.add_option("--requirement", options.requirements,
                      "Answer whether this requirement is met, as in\n"

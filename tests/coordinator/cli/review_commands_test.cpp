@@ -132,6 +132,20 @@ TEST_F(ReviewCommands, ListAllCharts) {
   const std::string names = test::answer_of({"plot", database_, "--list"}).output;
   EXPECT_THAT(names, StartsWith("errors\nconvergence\nhistogram:a_c11_delta_x\n"));
   EXPECT_THAT(names, HasSubstr("\nbudget\n"));
+  EXPECT_THAT(names, HasSubstr("\nspectrum:a_c13\n"));
+}
+
+// The results of this file are made up: a replay finds others.
+TEST_F(ReviewCommands, SayWhyTheWorstRunHasNoSpectra) {
+  const std::string reason =
+      "A replay of run 59 does not give the stored result: 23 of its values differ. proofmass "
+      "verify tells more.";
+  const test::Answer html = test::answer_of({"report", database_, "--html", "-"});
+  EXPECT_THAT(html.output, HasSubstr("<p>" + reason + "</p>"));
+  const test::Answer refused =
+      test::answer_of({"plot", database_, "--chart", "spectrum:a_c13", "--output", "-"});
+  EXPECT_EQ(refused.exit_code, exit_cannot_be_done);
+  EXPECT_EQ(refused.error, reason);
 }
 
 TEST_F(ReviewCommands, RefuseAChartThatIsNone) {

@@ -149,5 +149,64 @@ TEST(ShellWord, IsOneArgument) {
   EXPECT_EQ(shell_word(""), "''");
 }
 
+/// Spectra of a session with a line of amplitude 3e-9 m/s².
+RunSpectra some_spectra() {
+  SessionSpectrum spectrum{.session = "a_c13",
+                           .meaning = "difference <x>",
+                           .unit = "m/s²",
+                           .points = {},
+                           .lines = {{2e-3, 3e-9, 4e-7, true}, {5e-3, 1e-10, 1e-8, false}},
+                           .noise_ratio = NoiseRatio{1.04, 0.03},
+                           .noise_meaning = "It is white & quiet."};
+  for (double frequency_hz = 1e-4; frequency_hz < 1.0; frequency_hz *= 1.1) {
+    spectrum.points.push_back({frequency_hz, 2e-9, 2e-9, 2e-9});
+  }
+  return {.run = RunIndex{7}, .sessions = {spectrum}, .reasons = {test::hostile_text}};
+}
+
+TEST_F(ReviewHtml, ShowsTheSpectraOfTheWorstRun) {
+  const Store store = store_with(20);
+  Review review = review_of(store, 20);
+  EXPECT_THAT(review_html(review), Not(HasSubstr("Spectra of the worst run")));
+  review.spectra = some_spectra();
+  const std::string html = review_html(review);
+  EXPECT_EQ(test::malformed_part(as_xml(html)), "");
+  EXPECT_THAT(
+      html, AllOf(HasSubstr("<h2 id=\"spectra-section-title\">Spectra of the worst run"),
+                  HasSubstr("a_c13: difference &lt;x&gt;"), HasSubstr("m/s²/√Hz"),
+                  HasSubstr("an amplitude of 3e-9 m/s²."),
+                  HasSubstr("<td data-value=\"3e-09\">3e-09</td>"), HasSubstr(">1.04 ± 0.03</td>"),
+                  HasSubstr("It is white &amp; quiet."), Not(HasSubstr("<script>"))));
+  review.spectra->sessions.clear();
+  const std::string reasons = review_html(review);
+  EXPECT_THAT(reasons, AllOf(HasSubstr("&lt;script&gt;"), Not(HasSubstr("bit for bit"))));
+}
+
+// One line of measured densities, one of what is left, one of the model; lines of the estimate and
+// others apart.
+TEST_F(ReviewHtml, DrawsASpectrumInFiveLayers) {
+  const std::vector<Chart> charts = spectrum_charts(some_spectra());
+  ASSERT_EQ(charts.size(), 1U);
+  ASSERT_EQ(charts[0].layers.size(), 5U);
+  for (const std::size_t i : {0U, 1U, 2U}) {
+    EXPECT_EQ(std::get<Line>(charts[0].layers[i]).points.size(), 97U);
+  }
+  const auto& used = std::get<Markers>(charts[0].layers[3]);
+  const auto& others = std::get<Markers>(charts[0].layers[4]);
+  ASSERT_EQ(used.points.size(), 1U);
+  ASSERT_EQ(others.points.size(), 1U);
+  EXPECT_EQ(used.points[0].y, 4e-7);
+  EXPECT_EQ(others.points[0].x, 5e-3);
+}
+
+TEST_F(ReviewHtml, KnowsTheWorstRun) {
+  const Store store = store_with(20);
+  Review review = review_of(store, 20);
+  ASSERT_TRUE(worst_run_of(review).has_value());
+  EXPECT_EQ(*worst_run_of(review), RunIndex{19});
+  review.matrix.pop_back();  // All objectives together.
+  EXPECT_FALSE(worst_run_of(review).has_value());
+}
+
 }  // namespace
 }  // namespace proofmass::coordinator
