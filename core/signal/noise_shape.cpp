@@ -10,7 +10,7 @@
 namespace proofmass {
 namespace {
 
-using Complex = std::complex<double>;
+using Complex = ComplexDouble;
 
 constexpr double pole_ratio = 8.0;         // Between corners of the 1/f sum.
 constexpr double lowest_corner_hz = 6e-6;  // A factor 3 below the lowest frequency that matters.
@@ -56,7 +56,7 @@ void add_rise(const SensorNoise& noise, double sample_period_s, RationalSpectrum
   } else {
     const double limit = angle_per_hz * noise.rise_limit_hz;
     spectrum.u = Complex(0.0, limit * limit);
-    spectrum.v = std::conj(spectrum.u);
+    spectrum.v = conjugate(spectrum.u);
     spectrum.rise = level * limit * limit * limit * limit;
   }
 }
@@ -64,12 +64,12 @@ void add_rise(const SensorNoise& noise, double sample_period_s, RationalSpectrum
 /// Numerator polynomial of the spectrum at x.
 Complex numerator(const RationalSpectrum& spectrum, Complex x) {
   Complex denominators = 1.0;
-  for (const double pole : spectrum.pole) denominators *= x + pole;
+  for (const double pole : spectrum.pole) denominators = denominators * (x + pole);
   Complex sum = denominators;
   for (std::size_t i = 0; i < spectrum.pole.size(); ++i) {
     Complex term = spectrum.weight[i];
     for (std::size_t j = 0; j < spectrum.pole.size(); ++j) {
-      if (j != i) term *= x + spectrum.pole[j];
+      if (j != i) term = term * (x + spectrum.pole[j]);
     }
     sum += term;
   }
@@ -93,10 +93,10 @@ std::vector<Complex> spectrum_zeros(const RationalSpectrum& spectrum) {
     for (std::size_t i = 0; i < zeros.size(); ++i) {
       Complex move = numerator(spectrum, zeros[i]) / leading;
       for (std::size_t j = 0; j < zeros.size(); ++j) {
-        if (j != i) move /= zeros[i] - zeros[j];
+        if (j != i) move = move / (zeros[i] - zeros[j]);
       }
-      zeros[i] -= move;
-      largest_move = std::max(largest_move, std::norm(move) / std::norm(zeros[i]));
+      zeros[i] = zeros[i] - move;
+      largest_move = std::max(largest_move, norm(move) / norm(zeros[i]));
     }
     if (largest_move < 1e-28) return zeros;
   }
@@ -105,7 +105,7 @@ std::vector<Complex> spectrum_zeros(const RationalSpectrum& spectrum) {
 
 /// Principal square root. The C library's own may differ in the last bit from machine to machine.
 Complex square_root(Complex x) {
-  const double modulus = std::sqrt(std::norm(x));
+  const double modulus = std::sqrt(norm(x));
   const double large = std::sqrt(0.5 * (modulus + std::abs(x.real())));
   if (large == 0.0) return 0.0;
   const double small = 0.5 * std::abs(x.imag()) / large;
@@ -120,7 +120,7 @@ Complex inside_distance(Complex x) {
   const Complex root = square_root(u * u - x);
   const Complex one = root + u;
   const Complex other = u - root;
-  return std::norm(1.0 - one) <= 1.0 ? one : other;
+  return norm(1.0 - one) <= 1.0 ? one : other;
 }
 
 struct ZerosAndPoles {
@@ -134,14 +134,14 @@ ZerosAndPoles factorise(const RationalSpectrum& spectrum) {
   Complex gain_squared = 1.0 + spectrum.rise;
   for (const Complex x : spectrum_zeros(spectrum)) {
     filter.zero.push_back(1.0 - inside_distance(x));
-    gain_squared /= filter.zero.back();
+    gain_squared = gain_squared / filter.zero.back();
   }
   for (const double x : spectrum.pole) filter.pole.push_back(1.0 - inside_distance(-x));
   if (spectrum.has_rise) {
     filter.pole.push_back(1.0 - inside_distance(spectrum.u));
     filter.pole.push_back(1.0 - inside_distance(spectrum.v));
   }
-  for (const Complex pole : filter.pole) gain_squared *= pole;
+  for (const Complex pole : filter.pole) gain_squared = gain_squared * pole;
   filter.gain = std::sqrt(gain_squared.real());
   return filter;
 }
@@ -151,8 +151,8 @@ Complex partial_fraction(const ZerosAndPoles& filter, std::size_t i) {
   const Complex p = filter.pole[i];
   Complex c = filter.gain;
   for (std::size_t j = 0; j < filter.pole.size(); ++j) {
-    c *= p - filter.zero[j];
-    if (j != i) c /= p - filter.pole[j];
+    c = c * (p - filter.zero[j]);
+    if (j != i) c = c / (p - filter.pole[j]);
   }
   return c;
 }
@@ -174,7 +174,7 @@ Eigen::MatrixXd stationary_covariance(const NoiseShape& shape) {
   }
   if (shape.has_pair) {
     const Complex square = 1.0 / (1.0 - shape.pair_pole * shape.pair_pole);  // E[S²]
-    const double modulus = 1.0 / (1.0 - std::norm(shape.pair_pole));         // E[|S|²]
+    const double modulus = 1.0 / (1.0 - norm(shape.pair_pole));              // E[|S|²]
     covariance(num_real, num_real) = 0.5 * (modulus + square.real());
     covariance(num_real + 1, num_real + 1) = 0.5 * (modulus - square.real());
     covariance(num_real, num_real + 1) = covariance(num_real + 1, num_real) = 0.5 * square.imag();
@@ -241,9 +241,9 @@ double NoiseShape::psd(double frequency_hz, double sample_period_s) const {
   }
   if (has_pair) {
     response += pair_coefficient * delay / (1.0 - pair_pole * delay) +
-                std::conj(pair_coefficient) * delay / (1.0 - std::conj(pair_pole) * delay);
+                conjugate(pair_coefficient) * delay / (1.0 - conjugate(pair_pole) * delay);
   }
-  return std::norm(response) * 2.0 * sample_period_s;
+  return norm(response) * 2.0 * sample_period_s;
 }
 
 }  // namespace proofmass

@@ -1,9 +1,10 @@
 #pragma once
 
 #include <array>
-#include <complex>
 #include <cstddef>
 #include <vector>
+
+#include "core/math/complex.hpp"
 
 namespace proofmass {
 
@@ -31,8 +32,8 @@ struct NoiseShape {
   std::array<double, num_poles_max> pole{};
   std::array<double, num_poles_max> coefficient{};
   bool has_pair = false;
-  std::complex<double> pair_pole;
-  std::complex<double> pair_coefficient;
+  ComplexDouble pair_pole;
+  ComplexDouble pair_coefficient;
   /// Lower Cholesky factor of the stationary covariance of (s₁ … sₙ, Re S, Im S), rows first.
   std::vector<double> start_factor;
 

@@ -15,7 +15,7 @@ NoiseShape scaled_shape(const SensorNoise& noise, double scale, double sample_pe
   NoiseShape shape = shape_noise(noise, sample_period_s);
   shape.gain *= scale;
   for (double& coefficient : shape.coefficient) coefficient *= scale;
-  shape.pair_coefficient *= scale;
+  shape.pair_coefficient = scale * shape.pair_coefficient;
   return shape;
 }
 
