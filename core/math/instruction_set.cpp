@@ -6,9 +6,19 @@
 namespace proofmass {
 
 std::string_view name_of(InstructionSet set) {
-  static constexpr std::array<std::string_view, 4> names{"scalar", "sse4", "avx2", "avx512"};
+  static constexpr std::array<std::string_view, 5> names{"scalar", "sse4", "avx2", "avx512",
+                                                         "neon"};
   return names[static_cast<std::size_t>(set) - 1];
 }
+
+#if defined(__aarch64__)
+
+// Every processor of ARM64 has NEON.
+std::vector<InstructionSet> available_instruction_sets() {
+  return {InstructionSet::scalar, InstructionSet::neon};
+}
+
+#else
 
 std::vector<InstructionSet> available_instruction_sets() {
   std::vector<InstructionSet> sets{InstructionSet::scalar};
@@ -23,6 +33,8 @@ std::vector<InstructionSet> available_instruction_sets() {
   sets.push_back(InstructionSet::avx512);
   return sets;
 }
+
+#endif
 
 InstructionSet best_instruction_set() { return available_instruction_sets().back(); }
 

@@ -74,7 +74,17 @@ HWY_INLINE Batch sqrt(const Batch& a) {
 HWY_INLINE Batch magnitude(const Batch& a) {
   return map(a, [](V x) HWY_ATTR { return hn::Abs(x); });
 }
-// The instructions yield the second operand if the first is not a number, as the functions of
+#if HWY_ARCH_ARM
+// The instructions for the larger and the smaller of two numbers yield the first operand if the
+// second is not a number, which the functions of core/math/vector3.hpp do not.
+HWY_INLINE Batch larger(const Batch& a, const Batch& b) {
+  return map(a, b, [](V x, V y) HWY_ATTR { return hn::IfThenElse(hn::Gt(x, y), x, y); });
+}
+HWY_INLINE Batch smaller(const Batch& a, const Batch& b) {
+  return map(a, b, [](V x, V y) HWY_ATTR { return hn::IfThenElse(hn::Lt(x, y), x, y); });
+}
+#else
+// The instructions yield the second operand if either is not a number, as the functions of
 // core/math/vector3.hpp do.
 HWY_INLINE Batch larger(const Batch& a, const Batch& b) {
   return map(a, b, [](V x, V y) HWY_ATTR { return hn::Max(x, y); });
@@ -82,6 +92,7 @@ HWY_INLINE Batch larger(const Batch& a, const Batch& b) {
 HWY_INLINE Batch smaller(const Batch& a, const Batch& b) {
   return map(a, b, [](V x, V y) HWY_ATTR { return hn::Min(x, y); });
 }
+#endif
 HWY_INLINE bool is_any_above(const Batch& a, double limit) {
   auto above = hn::Gt(a.part[0], hn::Set(Doubles(), limit));
   for (std::size_t i = 1; i < num_vectors; ++i) {

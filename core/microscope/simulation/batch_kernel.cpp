@@ -4,6 +4,20 @@
 
 namespace proofmass {
 
+#if defined(__aarch64__)
+
+BatchKernel batch_kernel(InstructionSet set, std::size_t /*num_runs*/) {
+  PROOFMASS_EXPECT(set == InstructionSet::neon);
+  return record_batch_neon;
+}
+
+BatchNoiseKernel batch_noise_kernel(InstructionSet set) {
+  PROOFMASS_EXPECT(set == InstructionSet::neon);
+  return make_noise_neon;
+}
+
+#else
+
 BatchKernel batch_kernel(InstructionSet set, std::size_t num_runs) {
   PROOFMASS_EXPECT(set != InstructionSet::scalar);
   if (set == InstructionSet::sse4) return record_batch_sse4;
@@ -19,5 +33,7 @@ BatchNoiseKernel batch_noise_kernel(InstructionSet set) {
   if (set == InstructionSet::avx2) return make_noise_avx2;
   return make_noise_avx512;
 }
+
+#endif
 
 }  // namespace proofmass

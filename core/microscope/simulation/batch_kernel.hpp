@@ -35,13 +35,16 @@ using BatchKernel = void (*)(const BatchSession& session,
                              std::span<SessionOutcome, batch_lanes> outcomes);
 
 // One for each instruction set that has more than one lane; compiled with that set's flags, to be
-// called only where available_instruction_sets() holds it.
+// called only where available_instruction_sets() holds it. Those of other processors than the one
+// that the program is built for are not defined.
 void record_batch_sse4(const BatchSession& session,
                        std::span<SessionOutcome, batch_lanes> outcomes);
 void record_batch_avx2(const BatchSession& session,
                        std::span<SessionOutcome, batch_lanes> outcomes);
 void record_batch_avx512(const BatchSession& session,
                          std::span<SessionOutcome, batch_lanes> outcomes);
+void record_batch_neon(const BatchSession& session,
+                       std::span<SessionOutcome, batch_lanes> outcomes);
 // For groups of half as many runs: 4 and 8.
 void record_batch_avx2_narrow(const BatchSession& session,
                               std::span<SessionOutcome, batch_lanes> outcomes);
@@ -63,6 +66,7 @@ using BatchNoiseKernel = double (*)(const BatchSession& session, std::size_t num
 double make_noise_sse4(const BatchSession& session, std::size_t num_samples, NoiseWork work);
 double make_noise_avx2(const BatchSession& session, std::size_t num_samples, NoiseWork work);
 double make_noise_avx512(const BatchSession& session, std::size_t num_samples, NoiseWork work);
+double make_noise_neon(const BatchSession& session, std::size_t num_samples, NoiseWork work);
 double make_noise_avx2_narrow(const BatchSession& session, std::size_t num_samples, NoiseWork work);
 double make_noise_avx512_narrow(const BatchSession& session, std::size_t num_samples,
                                 NoiseWork work);
