@@ -214,23 +214,5 @@ TEST(Batch, ReportsItsOrbits) {
   EXPECT_EQ(last, plan.num_orbits());
 }
 
-// The same bits from another compiler option, optimisation level or processor: this number was made
-// by the release build and changes only with the model, together with model_version.
-TEST(Batch, HasTheRecordedBits) {
-  const RunPlan plan(short_campaign());
-  constexpr std::uint64_t recorded = 0x5436680384b7c7c7ULL;
-  for (const InstructionSet set : available_instruction_sets()) {
-    for (const std::size_t count : {std::size_t{1}, batch_lanes / 2 + 1}) {
-      if (set == InstructionSet::scalar && count > 1) continue;
-      std::uint64_t hash = 14695981039346656037ULL;  // FNV-1a over the 64-bit words.
-      const std::vector<RunResult> results = plan.simulate_batch(requests_from(0, count), set);
-      for (const double value : results[0].estimate) {
-        hash = (hash ^ std::bit_cast<std::uint64_t>(value)) * 1099511628211ULL;
-      }
-      EXPECT_EQ(hash, recorded) << name_of(set) << " " << count << std::hex << " 0x" << hash;
-    }
-  }
-}
-
 }  // namespace
 }  // namespace proofmass
