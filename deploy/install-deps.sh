@@ -14,7 +14,7 @@ packages=(
   libutfcpp-dev libboost-dev
 )
 test_packages=(
-  libgtest-dev libgmock-dev libbenchmark-dev qemu-user clang-format
+  libgtest-dev libgmock-dev libbenchmark-dev qemu-user g++-aarch64-linux-gnu clang-format
   iproute2 iptables faketime python3-scipy python3-mpmath python3-h5py
   python3-numpy python3-pandas python3-matplotlib
   sshfs openssh-sftp-server busybox-static
