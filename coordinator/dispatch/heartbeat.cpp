@@ -299,8 +299,8 @@ void note_progress(State& state, Worker& worker, const wire::Heartbeat& heartbea
 }
 
 const wire::ComputedBatch* hung_batch(const State& state, const Worker& worker, TimePoint now) {
-  // Of a worker that is not heard, nothing is known.
-  if (now - worker.heard_at >= state.config.suspect_after) return nullptr;
+  // Only heartbeats tell how far batches are: without them nothing is known, whatever else arrives.
+  if (now - worker.heartbeat_at >= state.config.suspect_after) return nullptr;
   for (const Progress& progress : worker.computing) {
     if (now - progress.advanced_at >= patience(state, progress.batch.campaign)) {
       return &progress.batch;

@@ -344,6 +344,20 @@ TEST_F(BlameTest, OfAWorkerThatIsSilentNothingIsKnown) {
   outbox.forget();
 }
 
+TEST_F(BlameTest, OfAWorkerWhoseHeartbeatsDoNotArriveNothingIsKnown) {
+  add_campaign(one, 10);
+  add_worker(first, 2);
+  campaign(one).orbit_time_s = 0.1;
+  for (int i = 0; i < 10; ++i, now += 5s) {
+    heartbeat(first, {held(one, {{0}, 2})}, {batch({{0}, 1}, 5)});
+  }
+  now += 20s;
+  deliver(first, one, {1});
+  on_tick(state, now, outbox);
+  EXPECT_TRUE(state.workers.contains(first));
+  outbox.forget();
+}
+
 TEST_F(BlameTest, TheTimeOfAnOrbitIsLearnedFromHeartbeats) {
   add_campaign(one, 10);
   add_worker(first);
