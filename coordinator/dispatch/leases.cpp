@@ -14,6 +14,13 @@
 namespace proofmass::coordinator::detail {
 namespace {
 
+/// For the worker of a lease of which the remaining runs have changed.
+void note_slots(State& state, Worker& worker, std::uint64_t num_before, std::uint64_t num_now) {
+  state.num_idle_slots -= num_idle_slots(worker);
+  worker.num_slots_lent_for += num_now - num_before;
+  state.num_idle_slots += num_idle_slots(worker);
+}
+
 /// A copy becomes the first lease of its run.
 void promote_copy(State& state, CampaignId id, RunIndex run, LeaseId copy) {
   const Lease& old = state.leases.at(copy);
@@ -117,6 +124,8 @@ Attempt after(Attempt attempt) {
 
 LeaseId open_lease(State& state, Lease lease) {
   PROOFMASS_EXPECT(!lease.remaining.empty());
+  lease.num_runs = lease.remaining.size();
+  lease.num_slots = std::max(lease.num_slots, lease.num_runs);
   const LeaseId id{state.next_lease++};
   CampaignState& campaign = state.campaigns.at(lease.campaign);
   for (const RunRange& range : lease.remaining.ranges()) {
@@ -135,7 +144,8 @@ LeaseId open_lease(State& state, Lease lease) {
     }
   }
   Worker& worker = state.workers.at(lease.worker);
-  worker.num_lent += lease.remaining.size();
+  worker.num_lent += lease.num_runs;
+  note_slots(state, worker, 0, lease.num_slots);
   if (lease.is_alone) worker.num_alone += lease.remaining.size();
   worker.leases.insert(id);
   state.leases.emplace(id, std::move(lease));
@@ -148,6 +158,7 @@ void take_off(State& state, LeaseId id, RunRange runs) {
   Lease& lease = found->second;
   CampaignState& campaign = state.campaigns.at(lease.campaign);
   const std::uint64_t size_before = lease.remaining.size();
+  const std::uint64_t num_slots_before = num_slots_taken(lease);
   lease.remaining.remove(runs);
   PROOFMASS_EXPECT(size_before - lease.remaining.size() == runs.count);
   if (lease.kind == LeaseKind::first) {
@@ -163,6 +174,7 @@ void take_off(State& state, LeaseId id, RunRange runs) {
   }
   Worker& worker = state.workers.at(lease.worker);
   worker.num_lent -= runs.count;
+  note_slots(state, worker, num_slots_before, num_slots_taken(lease));
   if (lease.is_alone) worker.num_alone -= runs.count;
   if (!lease.remaining.empty()) return;
   worker.leases.erase(id);
@@ -270,6 +282,7 @@ void remove_worker(State& state, WorkerId id, LossReason reason, const RunsByCam
     lose(state, lease_id, runs, reason, guilty == blamed.end() ? RunSet() : guilty->second, outbox);
   }
   state.num_slots -= worker.num_slots;
+  state.num_idle_slots -= num_idle_slots(worker);
   const auto found = state.hosts.find(worker.host);
   Host& host = found->second;
   --host.num_workers;

@@ -1,13 +1,16 @@
 #include "coordinator/dispatch/lending.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "coordinator/dispatch/blame.hpp"
 #include "coordinator/dispatch/leases.hpp"
+#include "core/campaign/model.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -19,10 +22,28 @@ std::uint64_t num_waiting(const CampaignState& campaign) {
   return count;
 }
 
+/// Slots of all workers, those that are still to come included.
+std::uint64_t num_slots_in_all(const State& state) {
+  return std::max(state.num_slots, state.config.num_slots_expected);
+}
+
 double run_time_s(const CampaignState& campaign, CampaignId id, const Worker& worker) {
   const auto own = worker.run_time_s.find(id);
   return own != worker.run_time_s.end() ? own->second : campaign.run_time_s;
 }
+
+/// Runs of all campaigns that wait, or somewhat more than `count_max` if they are more than that.
+std::uint64_t num_waiting_in_all(const State& state, std::uint64_t count_max) {
+  std::uint64_t count = 0;
+  for (const CampaignId id : state.served) {
+    const CampaignState& campaign = state.campaigns.at(id);
+    if (is_lent(campaign) && !is_backed_up(state, campaign)) count += num_waiting(campaign);
+    if (count > count_max) break;
+  }
+  return count;
+}
+
+std::uint64_t ratio_rounded_up(std::uint64_t a, std::uint64_t b) { return (a + b - 1) / b; }
 
 /// Rounds that all workers may have without more results than the memory should hold.
 std::uint64_t rounds_with_room(const State& state, const CampaignState& campaign) {
@@ -87,6 +108,60 @@ RunSet take_first(RunSet& runs, std::uint64_t count_max) {
   return taken;
 }
 
+/// Runs that a worker lacks, and the slots that they are for.
+struct Share {
+  std::uint64_t num_runs = 0;
+  std::uint64_t num_slots = 0;
+
+  /// Of the slots, for so many of the runs.
+  [[nodiscard]] std::uint64_t slots_for(std::uint64_t count) const {
+    return ratio_rounded_up(count * num_slots, num_runs);
+  }
+};
+
+/// Slots that will soon want what waits: those that are idle, and those that have been computing
+/// for half of the usual time of a run; before that time is known, no slot that was lent a run.
+std::uint64_t num_slots_sharing(State& state, double time_s, TimePoint now) {
+  if (time_s > 0.0) {
+    state.lately_lent.forget_before(
+        now - std::chrono::duration_cast<Duration>(std::chrono::duration<double>(time_s / 2.0)));
+  }
+  const std::uint64_t num_in_all = num_slots_in_all(state);
+  const std::uint64_t num_to_come = num_in_all - state.num_slots;
+  const std::uint64_t num_lately = std::min(num_in_all, state.lately_lent.num_slots());
+  return std::max(num_in_all - num_lately, state.num_idle_slots + num_to_come);
+}
+
+/// A worker's part, by its idle slots, of the last runs: those that would fill at most half of the
+/// slots that share them. A batch of half as many runs takes about half of the time. It is at least
+/// a quarter of a run in each slot, as batches of less than that take no less time.
+/// @return Nothing if these are not the last runs.
+std::optional<Share> share_of_last(State& state, CampaignId id, const CampaignState& campaign,
+                                   const Worker& worker, TimePoint now) {
+  const std::uint64_t num_sharing = num_slots_sharing(state, run_time_s(campaign, id, worker), now);
+  const std::uint64_t count = num_waiting_in_all(state, num_sharing);
+  if (count == 0 || 2 * count > num_sharing) return std::nullopt;
+  const std::uint64_t num_idle = num_idle_slots(worker);
+  const std::uint64_t part = ratio_rounded_up(num_waiting(campaign) * num_idle, num_sharing);
+  return Share{.num_runs = std::max(part, ratio_rounded_up(num_idle, 4)), .num_slots = num_idle};
+}
+
+/// What a worker is to be lent of a campaign; nothing if it has enough.
+Share share_of(State& state, CampaignId id, const CampaignState& campaign, const Worker& worker,
+               TimePoint now) {
+  const std::uint64_t limit =
+      std::min<std::uint64_t>(worker.num_runs_max, share_of_intake(state, id, campaign, worker));
+  if (auto share = share_of_last(state, id, campaign, worker, now)) {
+    share->num_runs = std::min(share->num_runs, limit - std::min(limit, worker.num_lent));
+    return *share;
+  }
+  const std::uint64_t rounds = rounds_wanted(state, id, campaign, worker);
+  const std::uint64_t wanted = std::min(worker.num_slots * rounds, limit);
+  if (has_enough(worker, wanted)) return {};
+  const std::uint64_t num_missing = wanted - worker.num_lent;
+  return {.num_runs = num_missing, .num_slots = num_missing};
+}
+
 /// One worker that is being lent runs of one campaign.
 struct Borrower {
   State& state;
@@ -95,6 +170,7 @@ struct Borrower {
   CampaignId campaign_id;
   CampaignState& campaign;
   std::uint64_t wanted;
+  Share share;
   TimePoint now;
   Outbox& outbox;
 
@@ -104,11 +180,15 @@ struct Borrower {
             .worker = id,
             .attempt = attempt,
             .known_as = attempt,
+            .num_slots = share.slots_for(runs.size()),
             .remaining = std::move(runs),
             .lent_at = now,
             .audited = {}};
   }
-  void open(Lease lease) const { send_lease(state, open_lease(state, std::move(lease)), outbox); }
+  void open(Lease lease) const {
+    state.lately_lent.add(now, lease.num_slots);
+    send_lease(state, open_lease(state, std::move(lease)), outbox);
+  }
 };
 
 /// Runs that were lent before come first, so that a campaign's early runs do not wait for its end.
@@ -168,6 +248,7 @@ bool lend_suspect(const Borrower& borrower) {
   campaign.pending_suspects.erase(found);
   Lease lease = borrower.lease_of(RunSet(RunRange{run, 1}), attempt);
   lease.is_alone = true;
+  lease.num_slots = 1;
   borrower.open(std::move(lease));
   return true;
 }
@@ -177,14 +258,20 @@ bool lend_of(State& state, WorkerId id, CampaignId campaign_id, TimePoint now, O
   CampaignState& campaign = state.campaigns.at(campaign_id);
   if (!is_lent(campaign) || is_backed_up(state, campaign)) return false;
   Worker& worker = state.workers.at(id);
-  const std::uint64_t wanted = std::min<std::uint64_t>(
-      {worker.num_slots * rounds_wanted(state, campaign_id, campaign, worker), worker.num_runs_max,
-       share_of_intake(state, campaign_id, campaign, worker)});
-  if (has_enough(worker, wanted)) return true;
-  const Borrower borrower{state, id, worker, campaign_id, campaign, wanted, now, outbox};
+  const Share share = share_of(state, campaign_id, campaign, worker, now);
+  if (share.num_runs == 0) return true;
+  const std::uint64_t wanted = worker.num_lent + share.num_runs;
+  const Borrower borrower{state, id, worker, campaign_id, campaign, wanted, share, now, outbox};
   lend_pending(borrower);
   lend_audits(borrower);
   return lend_suspect(borrower) || borrower.missing() == 0;
+}
+
+/// A batch of a lease has the same part in its runs as in its slots.
+std::uint32_t batch_runs_max(const Lease& lease) {
+  if (lease.num_runs >= lease.num_slots) return 0;
+  const std::uint64_t batch_size = model().batch_size();
+  return static_cast<std::uint32_t>(ratio_rounded_up(lease.num_runs * batch_size, lease.num_slots));
 }
 
 bool has_runs_to_lend(const State& state) {
@@ -243,6 +330,7 @@ void send_lease(const State& state, LeaseId id, Outbox& outbox) {
                                              .runs = runs,
                                              .attempt = lease.attempt,
                                              .is_alone = lease.is_alone,
+                                             .batch_runs_max = batch_runs_max(lease),
                                              .table_values = table_values(campaign, runs)});
   }
 }

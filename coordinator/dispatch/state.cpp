@@ -20,6 +20,25 @@ State initial_state(const DispatchConfig& config, std::set<SessionId> awaited, T
   return state;
 }
 
+void LentSlots::add(TimePoint now, std::uint64_t num_slots) {
+  if (lent_.size() == times_max) forget_first();
+  lent_.emplace_back(now, num_slots);
+  num_slots_ += num_slots;
+}
+
+void LentSlots::forget_before(TimePoint time) {
+  while (!lent_.empty() && lent_.front().first < time) forget_first();
+}
+
+void LentSlots::forget_first() {
+  num_slots_ -= lent_.front().second;
+  lent_.pop_front();
+}
+
+std::uint64_t num_slots_taken(const Lease& lease) {
+  return (lease.remaining.size() * lease.num_slots + lease.num_runs - 1) / lease.num_runs;
+}
+
 std::uint64_t num_settled(const CampaignState& campaign) {
   return campaign.committed.size() + campaign.given_up.size() + campaign.elsewhere.size();
 }

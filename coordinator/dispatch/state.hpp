@@ -1,12 +1,15 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "coordinator/dispatch/run_set.hpp"
@@ -50,6 +53,9 @@ struct DispatchConfig {
   /// than a message and its answer ever take while the worker is not suspect.
   Duration arrival_max = std::chrono::seconds(12);
   double lease_work_s = 1.5;  ///< Work that a slot is lent at a time, once run times are known.
+  /// Slots of all workers that are known to come: the first ones to register then leave the others
+  /// their part of a small campaign.
+  std::uint64_t num_slots_expected = 0;
   /// Runs of a campaign that are lent or on their way to the store: near that many, workers get no
   /// more than two rounds; with half of it on the way to the store, nothing. A disk that is slower
   /// than the workers must not fill the memory.
@@ -94,6 +100,7 @@ struct Worker {
   TimePoint heartbeat_at;                ///< ... which arrived then.
   std::uint32_t num_runs_max = 0;  ///< Its credit: most unfinished runs that it wants to hold.
   std::uint64_t num_lent = 0;      ///< Runs on its leases, as far as the coordinator knows.
+  std::uint64_t num_slots_lent_for = 0;  ///< Of its leases; more than slots if runs wait there.
   std::uint64_t num_orbits_done = 0;
   std::uint64_t num_results = 0;
   std::vector<Progress> computing;  ///< As the newest heartbeat has it.
@@ -127,10 +134,21 @@ struct Lease {
   LeaseKind kind = LeaseKind::first;
   bool is_alone = false;      ///< Of one run, which is suspected.
   bool is_retracted = false;  ///< The worker is asked, at each heartbeat, to give back what it can.
+  std::uint64_t num_runs = 0;  ///< In `remaining` when it was opened.
+  /// Slots that these were lent for: at least one a run, and more for the last runs of a campaign.
+  std::uint64_t num_slots = 0;
   RunSet remaining;
   TimePoint lent_at;
   WorkerId audited;  ///< Of an audit: whose results are compared; 0 if not known.
 };
+
+/// Slots that the remaining runs of a lease take.
+[[nodiscard]] std::uint64_t num_slots_taken(const Lease& lease);
+
+/// Slots of a worker for which no runs are lent to it.
+[[nodiscard]] constexpr std::uint64_t num_idle_slots(const Worker& worker) {
+  return worker.num_slots - std::min<std::uint64_t>(worker.num_slots, worker.num_slots_lent_for);
+}
 
 /// Whether a campaign's runs are lent.
 using Phase = wire::CampaignPhase;
@@ -230,6 +248,21 @@ struct Host {
   TimePoint left_at;  ///< Its last worker was heard then, if it has none.
 };
 
+/// Slots for which runs were lent, and when; at most so many times.
+class LentSlots {
+ public:
+  void add(TimePoint now, std::uint64_t num_slots);
+  void forget_before(TimePoint time);
+  [[nodiscard]] std::uint64_t num_slots() const { return num_slots_; }
+
+ private:
+  void forget_first();
+
+  static constexpr std::size_t times_max = 8192;
+  std::deque<std::pair<TimePoint, std::uint64_t>> lent_;  ///< In the order of time.
+  std::uint64_t num_slots_ = 0;
+};
+
 /// All that the dispatch knows. Only the events change it: the functions
 /// on_...() of campaigns.hpp, results.hpp and workers.hpp.
 struct State {
@@ -243,8 +276,10 @@ struct State {
   std::map<WorkerId, Worker> workers;
   std::map<LeaseId, Lease> leases;
   std::uint64_t next_lease = 1;
-  std::uint64_t num_slots = 0;  ///< Of all workers.
-  std::set<WorkerId> hungry;    ///< Workers that were lent less than they would take.
+  std::uint64_t num_slots = 0;       ///< Of all workers.
+  std::uint64_t num_idle_slots = 0;  ///< Those among them that are idle.
+  LentSlots lately_lent;      ///< What was longer ago than half of a run takes may be missing.
+  std::set<WorkerId> hungry;  ///< Workers that were lent less than they would take.
   std::map<HostId, Host> hosts;
   std::set<HostId> quarantined;  ///< Hosts that are lent nothing.
   /// Sessions that should be attached and have not said yet what they hold.

@@ -75,6 +75,7 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   worker.heartbeat_at = now;
   worker.retracted_at = now - state.config.heartbeat_interval;
   state.num_slots += worker.num_slots;
+  state.num_idle_slots += worker.num_slots;
   ++state.hosts[host].num_workers;
   limit_hosts(state, host.key);
   outbox.log({.kind = "worker_registered",

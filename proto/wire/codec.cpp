@@ -103,6 +103,7 @@ void write(const RunLease& lease, proto::Envelope& envelope) {
   message.set_num_runs(static_cast<std::uint32_t>(lease.runs.count));
   message.set_attempt(lease.attempt.value);
   message.set_is_alone(lease.is_alone);
+  message.set_batch_runs_max(lease.batch_runs_max);
   message.mutable_table_values()->Assign(lease.table_values.begin(), lease.table_values.end());
 }
 

@@ -147,6 +147,7 @@ Message read(const proto::RunLease& message) {
                   .runs = {.first = {message.first_run()}, .count = message.num_runs()},
                   .attempt = checked_attempt(message.attempt()),
                   .is_alone = message.is_alone(),
+                  .batch_runs_max = message.batch_runs_max(),
                   .table_values = {values.begin(), values.end()}};
 }
 

@@ -172,6 +172,9 @@ struct RunLease {
   Attempt attempt;
   /// The runs may have crashed a worker: compute each in a batch of its own.
   bool is_alone = false;
+  /// Runs of a batch that begins with one of these, at most; 0: as many as the worker can compute
+  /// together. The last runs of a campaign end sooner in more and smaller batches.
+  std::uint32_t batch_runs_max = 0;
   std::vector<double> table_values;  ///< Shape [runs.count, table quantities].
 };
 

@@ -339,6 +339,7 @@ std::string coordinator_messages() {
                      .runs = runs,
                      .attempt = {1},
                      .is_alone = true,
+                     .batch_runs_max = 7,
                      .table_values = {0.5, 0.25}});
   add(wire::Retract{.campaign = fuzz_campaign, .ranges = {runs}});
   add(wire::ResultAck{.campaign = fuzz_campaign, .runs = {{3}, {4}}});

@@ -11,6 +11,7 @@ void RunQueue::add(const wire::RunLease& lease) {
   for (std::uint64_t run = lease.runs.first.value; run < lease.runs.end(); ++run) {
     runs_.push_back({.campaign = lease.campaign,
                      .is_alone = lease.is_alone,
+                     .batch_runs_max = lease.batch_runs_max,
                      .request = {.run = {run}, .table_values = {values, values + width}}});
     values += width;
   }
@@ -26,6 +27,9 @@ Assignment RunQueue::take(std::size_t count_max, const IsReady& is_ready) {
       continue;
     }
     const bool is_alone = run->is_alone;
+    if (assignment.requests.empty() && run->batch_runs_max > 0) {
+      count_max = std::min<std::size_t>(count_max, run->batch_runs_max);
+    }
     assignment.requests.push_back(std::move(run->request));
     run = runs_.erase(run);
     if (is_alone) break;

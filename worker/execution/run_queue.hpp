@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <list>
 #include <span>
@@ -26,7 +27,8 @@ class RunQueue {
 
   /// Removes the first run whose campaign is ready, and the next ones of that campaign, whatever
   /// lease they are of; fewer than `count_max` if there are no more, none if no campaign is ready.
-  /// A run that is to be alone is.
+  /// A run that is to be alone is. If the lease of the first run wants smaller batches, this is
+  /// one.
   [[nodiscard]] Assignment take(std::size_t count_max, const IsReady& is_ready);
 
   /// Removes those of the runs that are here and returns them in ascending order.
@@ -42,6 +44,7 @@ class RunQueue {
   struct Waiting {
     wire::CampaignId campaign;
     bool is_alone = false;
+    std::uint32_t batch_runs_max = 0;
     RunRequest request;
   };
 

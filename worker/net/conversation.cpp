@@ -151,7 +151,8 @@ void Conversation::handle(const wire::RunLease& lease, const wire::Header&, Time
   }
   if (!agrees_on_table(lease.campaign, width)) return;
   for (const RunRange& runs : ranges) {
-    wire::RunLease part{lease.campaign, runs, lease.attempt, lease.is_alone, {}};
+    wire::RunLease part = lease;
+    part.runs = runs;
     part.table_values = values_of(lease, runs, width);
     execution_.submit(std::move(part));
     for (const RunIndex run : indices_of(std::array{runs}))

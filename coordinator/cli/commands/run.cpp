@@ -68,12 +68,12 @@ std::vector<RunRange> runs_beside(RunRange part, std::uint64_t num_runs) {
   return runs.ranges();
 }
 
-/// No more than there are batches: runs of one batch take no longer than one of them.
+/// No more than there are quarters of batches: the runs of one take no longer than one of them.
 std::uint64_t num_workers(const RunOptions& options, std::uint64_t num_runs_missing) {
   const unsigned num_processors = std::max(1U, std::thread::hardware_concurrency());
-  const std::uint64_t num_batches =
-      (num_runs_missing + model().batch_size() - 1) / model().batch_size();
-  return std::min<std::uint64_t>(options.num_workers.value_or(num_processors), num_batches);
+  const std::uint64_t quarter = (model().batch_size() + 3) / 4;
+  const std::uint64_t num_quarters = (num_runs_missing + quarter - 1) / quarter;
+  return std::min<std::uint64_t>(options.num_workers.value_or(num_processors), num_quarters);
 }
 
 /// The file of a campaign that asks for more runs until its stop rule is reached.
@@ -106,6 +106,7 @@ ServiceConfig service_config(const PrivateEndpoint& endpoint, std::uint64_t num_
   config.version = PROOFMASS_VERSION;
   config.dispatch.reference_digest = model().reference_digest(best_instruction_set());
   config.dispatch.reattach_wait = Duration::zero();  // Workers of the last time ended with it.
+  config.dispatch.num_slots_expected = num_workers * model().batch_size();
   // All workers may die at once, and runs must be found guilty before the machine is.
   config.dispatch.crashes_per_host_max =
       config.dispatch.crashes_per_run_max * static_cast<std::uint32_t>(num_workers + 1);

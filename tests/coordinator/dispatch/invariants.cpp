@@ -103,6 +103,7 @@ void check_index(const CampaignState& campaign, const Counted& counted) {
 void check_lease(const State& state, LeaseId id, const Lease& lease) {
   PROOFMASS_EXPECT(id.value >= 1 && id.value < state.next_lease);
   PROOFMASS_EXPECT(!lease.remaining.empty());
+  PROOFMASS_EXPECT(lease.num_slots >= lease.num_runs && lease.num_runs >= lease.remaining.size());
   PROOFMASS_EXPECT(!lease.is_alone || lease.remaining.size() == 1);
   PROOFMASS_EXPECT(lease.known_as <= lease.attempt);
   PROOFMASS_EXPECT(state.workers.at(lease.worker).leases.contains(id));
@@ -112,21 +113,26 @@ void check_lease(const State& state, LeaseId id, const Lease& lease) {
 
 void check_workers(const State& state) {
   std::uint64_t num_slots = 0;
+  std::uint64_t num_idle = 0;
   std::map<HostId, std::uint32_t> num_workers;
   for (const auto& [id, worker] : state.workers) {
     std::uint64_t num_lent = 0;
     std::uint64_t num_alone = 0;
+    std::uint64_t num_slots_lent_for = 0;
     for (const LeaseId lease_id : worker.leases) {
       const Lease& lease = state.leases.at(lease_id);
       PROOFMASS_EXPECT(lease.worker == id);
       num_lent += lease.remaining.size();
       if (lease.is_alone) num_alone += lease.remaining.size();
+      num_slots_lent_for += num_slots_taken(lease);
     }
+    PROOFMASS_EXPECT(worker.num_slots_lent_for == num_slots_lent_for);
     PROOFMASS_EXPECT(worker.num_lent == num_lent && worker.num_alone == num_alone);
     num_slots += worker.num_slots;
+    num_idle += num_idle_slots(worker);
     ++num_workers[worker.host];
   }
-  PROOFMASS_EXPECT(state.num_slots == num_slots);
+  PROOFMASS_EXPECT(state.num_slots == num_slots && state.num_idle_slots == num_idle);
   for (const auto& [name, host] : state.hosts) {
     PROOFMASS_EXPECT(host.num_workers == num_workers[name]);
   }

@@ -110,6 +110,84 @@ TEST_F(LendingTest, FillsAllSlotsOfAWorker) {
   EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 4}));
 }
 
+TEST_F(LendingTest, SharesTheLastRunsAmongAllWorkers) {
+  for (const WorkerId id : {first, second, third}) add_worker(id, 32);
+  add_campaign(one, 40);
+  const auto lease = outbox.take_sent<wire::RunLease>(first);
+  EXPECT_EQ(lease.runs, (RunRange{{0}, 14}));
+  EXPECT_EQ(lease.batch_runs_max, 7U) << "as there are two threads";
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{14}, 13}));
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(third).runs, (RunRange{{27}, 13}));
+}
+
+TEST_F(LendingTest, SharesNoRunsThatFillMoreThanHalfOfTheSlots) {
+  for (const WorkerId id : {first, second, third}) add_worker(id, 16);
+  add_campaign(one, 25);
+  const auto lease = outbox.take_sent<wire::RunLease>(first);
+  EXPECT_EQ(lease.runs, (RunRange{{0}, 16}));
+  EXPECT_EQ(lease.batch_runs_max, 0U);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{16}, 5}));
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(third).runs, (RunRange{{21}, 4}));
+}
+
+TEST_F(LendingTest, GivesAQuarterOfARoundOfTheLastRunsAtLeast) {
+  for (const WorkerId id : {first, second, third}) add_worker(id, 16);
+  add_campaign(one, 6);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 4}));
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{4}, 2}));
+}
+
+TEST_F(LendingTest, LeavesTheLastRunsToWorkersThatAreStillToCome) {
+  state.config.num_slots_expected = 64;
+  add_campaign(one, 20);
+  add_worker(first, 16);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 5}));
+}
+
+TEST_F(LendingTest, SharesNothingWhileAnotherCampaignHasRuns) {
+  for (const WorkerId id : {first, second}) add_worker(id, 16);
+  state.is_lending = false;
+  add_campaign(one, 8);
+  add_campaign(two, 100);
+  state.is_lending = true;
+  heartbeat(first);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 8}));
+  const auto lease = outbox.take_sent<wire::RunLease>(first);
+  EXPECT_EQ(lease.campaign, two);
+  EXPECT_EQ(lease.runs, (RunRange{{0}, 8}));
+  heartbeat(second);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{8}, 16}));
+}
+
+// The other thread of the worker computes eight runs and has no room for more.
+TEST_F(LendingTest, GivesTheLastRunsToAnIdleThread) {
+  add_worker(first, 32);
+  add_worker(second, 16);
+  add_campaign(one, 23);
+  outbox.forget();
+  EXPECT_EQ(runs_held_text(state, first), "0..15");
+  deliver(first, one, {0, 1, 2, 3, 4, 5, 6, 7});
+  EXPECT_EQ(state.num_idle_slots, 16U);
+  on_bye(state, second, {}, now, outbox);
+  outbox.forget();
+  EXPECT_EQ(runs_held_text(state, first), "8..22");
+  EXPECT_EQ(state.num_idle_slots, 0U);
+}
+
+// Slots that were lent runs long ago will be idle soon. Those that were lent some just now will
+// not.
+TEST_F(LendingTest, SharesTheLastRunsAmongWorkersThatWillSoonBeIdle) {
+  for (const WorkerId id : {first, second}) add_worker(id, 16);
+  add_campaign(one, 46);
+  outbox.forget();
+  now += std::chrono::seconds(600);
+  complete(first, one, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15});
+  EXPECT_EQ(runs_held_text(state, first), "32..38");
+  now += std::chrono::seconds(600);
+  complete(first, one, {32, 33, 34, 35, 36, 37, 38});
+  EXPECT_EQ(runs_held_text(state, first), "39..42");
+}
+
 TEST_F(LendingTest, SendsTheTableValuesOfTheRuns) {
   MicroscopeCampaign definition;
   definition.num_runs = 3;

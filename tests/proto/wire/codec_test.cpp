@@ -193,9 +193,11 @@ TEST(Codec, KeepsALeaseWithItsTableValues) {
                           .runs = {.first = {100}, .count = 5},
                           .attempt = {2},
                           .is_alone = true,
+                          .batch_runs_max = 7,
                           .table_values = {hard_numbers.begin(), hard_numbers.end()}});
   EXPECT_EQ(lease.campaign, CampaignId{9});
   EXPECT_TRUE(lease.is_alone);
+  EXPECT_EQ(lease.batch_runs_max, 7U);
   EXPECT_EQ(lease.runs, (RunRange{.first = {100}, .count = 5}));
   EXPECT_EQ(lease.attempt, Attempt{2});
   ASSERT_EQ(lease.table_values.size(), hard_numbers.size());

@@ -73,6 +73,28 @@ TEST(RunQueue, LeavesARunThatIsToBeAloneAlone) {
   EXPECT_EQ(indices(queue.take(16, always)), Indices{6});
 }
 
+TEST(RunQueue, MakesSmallerBatchesOfALeaseThatWantsThem) {
+  RunQueue queue;
+  wire::RunLease last = lease(1, 0, 5);
+  last.batch_runs_max = 2;
+  queue.add(last);
+  queue.add(lease(1, 7, 6));
+  EXPECT_EQ(indices(queue.take(4, always)), (Indices{0, 1}));
+  EXPECT_EQ(indices(queue.take(1, always)), Indices{2});
+  EXPECT_EQ(indices(queue.take(4, always)), (Indices{3, 4}));
+  EXPECT_EQ(indices(queue.take(4, always)), (Indices{7, 8, 9, 10}));
+  queue.add(last);
+  EXPECT_EQ(indices(queue.take(4, always)), (Indices{11, 12, 0, 1})) << "as the first run's lease";
+}
+
+TEST(RunQueue, MakesNoLargerBatchesThanTheWorkerCanWhateverALeaseWants) {
+  RunQueue queue;
+  wire::RunLease hostile = lease(1, 0, 5);
+  hostile.batch_runs_max = 0xffffffff;
+  queue.add(hostile);
+  EXPECT_EQ(indices(queue.take(4, always)), (Indices{0, 1, 2, 3}));
+}
+
 TEST(RunQueue, HandsEachRunItsTableValues) {
   RunQueue queue;
   wire::RunLease two = lease(1, 0, 2);

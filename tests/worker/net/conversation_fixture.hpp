@@ -37,7 +37,8 @@ class FakeExecution final : public Execution {
         if (lease.campaign == campaign && std::ranges::any_of(ranges, has_run)) {
           dropped.push_back(run);
         } else {
-          waiting.push_back({lease.campaign, {run, 1}, lease.attempt, lease.is_alone, {}});
+          waiting.push_back(
+              {lease.campaign, {run, 1}, lease.attempt, lease.is_alone, lease.batch_runs_max, {}});
         }
       }
     }

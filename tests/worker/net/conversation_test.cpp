@@ -209,12 +209,14 @@ TEST_F(ConversationTest, TakesFromALeaseWhatItDoesNotHold) {
   receive(lease(3, 1));
   wire::RunLease all = lease(0, 6, 2);
   all.is_alone = true;
+  all.batch_runs_max = 7;
   receive(all);
   ASSERT_EQ(execution.waiting.size(), 4U);
   EXPECT_EQ(execution.waiting[1].runs, (RunRange{{0}, 1}));
   EXPECT_EQ(execution.waiting[2].runs, (RunRange{{2}, 1}));
   EXPECT_EQ(execution.waiting[3].runs, (RunRange{{4}, 2}));
   EXPECT_TRUE(execution.waiting[3].is_alone);
+  EXPECT_EQ(execution.waiting[3].batch_runs_max, 7U);
 }
 
 TEST_F(ConversationTest, HandsOverTheTableValuesOfTheRunsThatItTakes) {
