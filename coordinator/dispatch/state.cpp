@@ -48,6 +48,10 @@ bool is_finished(const CampaignState& campaign) {
          campaign.audits.empty() && campaign.num_comparing == 0;
 }
 
+bool expects_no_result(const CampaignState& campaign) {
+  return campaign.pending.empty() && campaign.pending_suspects.empty() && campaign.lent.empty();
+}
+
 bool is_quiet(const State& state) {
   if (!state.leases.empty()) return false;
   for (const auto& [id, campaign] : state.campaigns) {

@@ -305,6 +305,9 @@ struct State {
 /// True if every run is settled, and every audit done.
 [[nodiscard]] bool is_finished(const CampaignState& campaign);
 
+/// True if no run of the campaign waits or is lent: all results have come.
+[[nodiscard]] bool expects_no_result(const CampaignState& campaign);
+
 /// True if no result is expected or on its way to the store any more.
 [[nodiscard]] bool is_quiet(const State& state);
 

@@ -130,7 +130,9 @@ class Service::Impl final : public Outbox {
   }
 
   void store(WorkerId worker, wire::LeasedResult result) override {
-    writer_.deliver(result.campaign, delivery_of(worker, std::move(result)));
+    const CampaignId campaign = result.campaign;
+    writer_.deliver(campaign, delivery_of(worker, std::move(result)));
+    if (expects_no_result(state_.campaigns.at(campaign))) writer_.hurry(campaign);
   }
 
   void compare(WorkerId worker, wire::LeasedResult result) override {
@@ -386,8 +388,8 @@ class Service::Impl final : public Outbox {
       std::visit([this](const auto& content) { complete(content); }, completion);
     }
     for (const auto& [id, campaign] : state_.campaigns) note_unstored(id, campaign);
+    campaign_service_.review();  // Statistics are made while the workers end.
     if (!leaves_workers) dismiss_workers();
-    campaign_service_.review();
     settle_background();
     if (!leaves_workers) history_.end_all(LossReason::drained);
   }

@@ -65,6 +65,7 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
                  std::string_view definition, const std::function<void(Database&)>& fill) {
   Database database(draft, Access::create);
   detail::configure(database);
+  database.execute("PRAGMA synchronous = OFF");  // It is made durable before it gets its name.
   Transaction transaction(database);
   detail::migrate(database);
   detail::insert_campaign(database, campaign, definition);

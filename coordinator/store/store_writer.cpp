@@ -410,6 +410,14 @@ void StoreWriter::set_control(wire::CampaignId campaign, const CampaignControl& 
   impl_->add(campaign, control);
 }
 
+void StoreWriter::hurry(wire::CampaignId campaign) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->file(campaign).waiting.hurry();
+  }
+  impl_->changed.notify_one();
+}
+
 void StoreWriter::retry_given_up(wire::CampaignId campaign) { impl_->add(campaign, RetriedRuns{}); }
 
 std::vector<Completion> StoreWriter::take_completions() {

@@ -17,7 +17,7 @@ namespace proofmass::coordinator {
 
 /// Settings of a StoreWriter.
 struct WriterConfig {
-  std::size_t commit_runs_max = 256;  ///< Results for which a commit waits ...
+  std::size_t commit_runs_max = 256;  ///< Results for which a commit waits if more may come ...
   std::chrono::steady_clock::duration commit_after = std::chrono::milliseconds(50);  ///< ... or so.
   /// What nobody waits for, such as events and losses, causes a commit of its own after this time.
   std::chrono::steady_clock::duration record_after = std::chrono::seconds(1);
@@ -119,6 +119,8 @@ class StoreWriter {
 
   /// Stores a result: leads to Committed with its run.
   void deliver(wire::CampaignId campaign, Delivery delivery);
+  /// No more results will come soon: those that were delivered are committed at once.
+  void hurry(wire::CampaignId campaign);
   /// Compares a second result of a run: leads to Compared.
   /// @pre A result of this run is stored, or was handed to deliver().
   void compare(wire::CampaignId campaign, Delivery delivery);

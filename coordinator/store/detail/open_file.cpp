@@ -44,6 +44,7 @@ void WaitingEntries::take(std::size_t num_max, std::vector<Entry>& entries, Time
   num_records_ -= static_cast<std::size_t>(std::count_if(entries_.begin(), end, is_record));
   std::move(entries_.begin(), end, std::back_inserter(entries));
   entries_.erase(entries_.begin(), end);
+  if (num_results_ == 0) is_hurried_ = false;
   waiting_since_ = entries_.empty() ? std::nullopt : std::optional(now);
   urgent_since_ = num_urgent_ == 0 ? std::nullopt : std::optional(now);
   if (num_dropped_ == 0) return;
@@ -60,7 +61,8 @@ std::optional<TimePoint> due_time(const OpenFile& file, const CommitTimes& times
   const TimePoint due = *since + times.record_after;
   const std::optional<TimePoint> urgent_since = file.waiting.urgent_since();
   if (!urgent_since) return due;
-  if (file.waiting.num_results() >= times.commit_runs_max) return urgent_since;
+  const bool is_complete = file.waiting.num_results() >= times.commit_runs_max;
+  if (is_complete || file.waiting.is_hurried()) return urgent_since;
   return std::min(due, *urgent_since + times.commit_after);
 }
 

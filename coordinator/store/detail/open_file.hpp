@@ -27,11 +27,15 @@ class WaitingEntries {
 
   void add(Entry entry, TimePoint now);
 
+  /// No more results will come soon: those that wait need not wait for others.
+  void hurry() { is_hurried_ = num_results_ > 0; }
+
   /// Moves up to `num_max` entries to the end of `entries`, and what was dropped as an event.
   void take(std::size_t num_max, std::vector<Entry>& entries, TimePoint now);
 
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   [[nodiscard]] std::size_t num_results() const { return num_results_; }
+  [[nodiscard]] bool is_hurried() const { return is_hurried_; }
   /// Since when the oldest one waits, roughly; nothing if none does.
   [[nodiscard]] std::optional<TimePoint> waiting_since() const { return waiting_since_; }
   /// The same of those that are urgent: results, and how the campaign is to be served.
@@ -41,6 +45,7 @@ class WaitingEntries {
   std::size_t num_records_max_;
   std::deque<Entry> entries_;
   std::size_t num_results_ = 0;  ///< Of the entries, those that a worker waits for.
+  bool is_hurried_ = false;
   std::size_t num_urgent_ = 0;   ///< Those, and how the campaign is to be served.
   std::size_t num_records_ = 0;  ///< Losses and events among them.
   std::uint64_t num_dropped_ = 0;

@@ -47,6 +47,15 @@ TEST_F(ServiceWorkers, AreLentOnlyWhatIsMissing) {
   EXPECT_EQ(PlayingWorker(endpoint.address(), 1002).borrow().runs.first, RunIndex{1});
 }
 
+TEST_F(ServiceWorkers, WaitForNoCommitWithOthersOnceAllResultsAreThere) {
+  config.writer.commit_after = std::chrono::hours(1);
+  config.writer.record_after = std::chrono::hours(1);
+  start({test::campaign_of("a", 1)});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  EXPECT_THAT(worker.receive<wire::ResultAck>().runs, ElementsAre(RunIndex{0}));
+}
+
 TEST_F(ServiceWorkers, HearTheEpochOfEachCoordinator) {
   start({test::campaign_of("a", 3)});
   PlayingWorker worker(endpoint.address());

@@ -53,6 +53,16 @@ TEST_F(StoreWriterTest, CommitsAFewResultsAfterAWhile) {
   wait_for("committed 7");
 }
 
+TEST_F(StoreWriterTest, CommitsAtOnceWhatNoMoreResultsFollow) {
+  StoreWriter& writer = start(patient_config());
+  writer.open(id, create());
+  writer.hurry(id);
+  writer.deliver(id, delivery_of(7));
+  EXPECT_THAT(take_completions(), IsEmpty()) << "there was nothing to hurry with";
+  writer.hurry(id);
+  wait_for("committed 7");
+}
+
 TEST_F(StoreWriterTest, WritesMoreThanFitsIntoOneTransaction) {
   constexpr std::uint64_t num_runs = 20'000;
   StoreWriter& writer = start();
