@@ -50,6 +50,10 @@ void WorkerProcesses::start(const std::string& name) {
   processes_.push_back({.name = name, .process_id = process_id});
 }
 
+void WorkerProcesses::start_local(std::uint64_t count) {
+  for (std::uint64_t i = 1; i <= count; ++i) start(fmt::format("local-{}", i));
+}
+
 std::vector<WorkerProcesses::Exit> WorkerProcesses::take_exits() {
   std::vector<Exit> exits;
   std::erase_if(processes_, [&](const Process& process) {
@@ -79,15 +83,8 @@ void WorkerProcesses::wait_until_ended(int milliseconds_max) {
   }
 }
 
-LocalWorkers::LocalWorkers(Service& service, ProgressDisplay& display)
-    : service_(service),
-      display_(display),
-      processes_(wire::program_beside_this("proofmass-worker"), service.workers_endpoint()),
-      host_(wire::host_name()) {}
-
-void LocalWorkers::start(std::uint64_t num_workers) {
-  for (std::uint64_t i = 1; i <= num_workers; ++i) processes_.start(fmt::format("local-{}", i));
-}
+LocalWorkers::LocalWorkers(Service& service, ProgressDisplay& display, WorkerProcesses& processes)
+    : service_(service), display_(display), processes_(processes), host_(wire::host_name()) {}
 
 void LocalWorkers::replace_dead() {
   for (const WorkerProcesses::Exit& exit : processes_.take_exits()) replace(exit);

@@ -34,6 +34,8 @@ class WorkerProcesses {
 
   /// @throws Error if the process cannot be made.
   void start(const std::string& name);
+  /// Starts `local-1`, `local-2` and so on.
+  void start_local(std::uint64_t count);
 
   /// Those that have ended since the last call; does not wait.
   [[nodiscard]] std::vector<Exit> take_exits();
@@ -53,13 +55,11 @@ class WorkerProcesses {
   std::uint64_t num_oom_kills_;  ///< As the kernel counted them when last looked at.
 };
 
-/// The local workers of a campaign: starts them, and others in the place of those that die.
+/// The local workers of a campaign: starts others in the place of those that die.
 class LocalWorkers {
  public:
-  /// @param service, display  Outlive this object.
-  LocalWorkers(Service& service, ProgressDisplay& display);
-
-  void start(std::uint64_t num_workers);
+  /// @param service, display, processes  Outlive this object.
+  LocalWorkers(Service& service, ProgressDisplay& display, WorkerProcesses& processes);
 
   /// @throws Error if workers end again and again without finishing a run, unless that is the fault
   ///         of single runs, which the dispatch finds out.
@@ -71,7 +71,7 @@ class LocalWorkers {
 
   Service& service_;
   ProgressDisplay& display_;
-  WorkerProcesses processes_;
+  WorkerProcesses& processes_;
   std::string host_;
   int num_failures_ = 0;  ///< In a row, without a finished run.
   std::uint64_t num_done_at_failure_ = 0;

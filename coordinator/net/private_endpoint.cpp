@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 #include <stdlib.h>
 #include <sys/file.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -121,6 +123,25 @@ PrivateEndpoint::~PrivateEndpoint() {
 
 std::string PrivateEndpoint::address() const {
   return "ipc://" + (directory_ / socket_name).string();
+}
+
+int PrivateEndpoint::listen() const {
+  const std::string path = (directory_ / socket_name).string();
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  PROOFMASS_EXPECT(path.size() < sizeof address.sun_path);
+  path.copy(address.sun_path, path.size());
+  const int listener = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (listener < 0) fail(path);
+  // The interface of sockets takes addresses of all families as this type.
+  const auto* const any = reinterpret_cast<const sockaddr*>(&address);
+  if (bind(listener, any, sizeof address) == 0 && ::listen(listener, SOMAXCONN) == 0) {
+    return listener;
+  }
+  const int error = errno;
+  close(listener);
+  errno = error;
+  fail(path);
 }
 
 }  // namespace proofmass::coordinator

@@ -20,6 +20,11 @@ class PrivateEndpoint {
 
   [[nodiscard]] std::string address() const;
 
+  /// A socket that listens at the address: whoever connects waits until it is served, by a service
+  /// that takes the descriptor over (ServiceConfig).
+  /// @throws Error if there can be none.
+  [[nodiscard]] int listen() const;
+
  private:
   std::filesystem::path directory_;
   int lock_ = -1;  ///< Descriptor of the lock in the directory.

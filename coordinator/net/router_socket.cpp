@@ -43,9 +43,10 @@ struct RouterSocket::Received {
 
 RouterSocket::RouterSocket(zmq::context_t& context, std::string_view option,
                            const std::string& endpoint, const wire::ServerSecurity& security,
-                           const std::optional<wire::FaultPlan>& faults)
+                           const std::optional<wire::FaultPlan>& faults,
+                           std::optional<int> listener)
     : context_(context), option_(option), security_(security) {
-  bind(endpoint);
+  bind(endpoint, listener);
   endpoint_ = socket_->get(zmq::sockopt::last_endpoint);
   if (!faults) return;
   faults_.emplace(Faults{{*faults, wire::FaultyLink::Direction::sending},
@@ -104,7 +105,7 @@ bool RouterSocket::open() {
   const std::lock_guard lock(mutex_);
   if (socket_ != nullptr) return true;
   try {
-    bind(endpoint_);
+    bind(endpoint_, std::nullopt);
     return true;
   } catch (const Error&) {
   } catch (const zmq::error_t&) {  // No descriptor left, for one.
@@ -114,9 +115,9 @@ bool RouterSocket::open() {
   return false;
 }
 
-void RouterSocket::bind(const std::string& endpoint) {
-  socket_ =
-      std::make_unique<zmq::socket_t>(wire::make_router(context_, option_, endpoint, security_));
+void RouterSocket::bind(const std::string& endpoint, std::optional<int> listener) {
+  socket_ = std::make_unique<zmq::socket_t>(
+      wire::make_router(context_, option_, endpoint, security_, listener));
   const int kinds = ZMQ_EVENT_CLOSED | (security_.keys ? failed_handshakes : 0);
   events_ = std::make_unique<wire::SocketEvents>(context_, socket_->handle(), kinds);
 }

@@ -31,9 +31,11 @@ class RouterSocket {
   ///
   /// @param option  Name of the option that the endpoint comes from, for messages.
   /// @param faults  What shall go wrong with the messages, for tests of this program.
+  /// @param listener  As for wire::make_router().
   /// @throws Error as wire::make_router() does.
   RouterSocket(zmq::context_t& context, std::string_view option, const std::string& endpoint,
-               const wire::ServerSecurity& security, const std::optional<wire::FaultPlan>& faults);
+               const wire::ServerSecurity& security, const std::optional<wire::FaultPlan>& faults,
+               std::optional<int> listener = std::nullopt);
   ~RouterSocket();
   RouterSocket(const RouterSocket&) = delete;
   RouterSocket& operator=(const RouterSocket&) = delete;
@@ -71,7 +73,7 @@ class RouterSocket {
     std::map<std::string, Address> addresses;  ///< Of those whose messages are delayed.
   };
 
-  void bind(const std::string& endpoint);
+  void bind(const std::string& endpoint, std::optional<int> listener);
   void wait_for_unbound();
   [[nodiscard]] std::optional<Received> next();
   void pass_due(TimePoint now, const std::function<void(const Incoming&)>& handle);

@@ -53,7 +53,10 @@ struct CampaignNotice {
 
 /// Settings of a service.
 struct ServiceConfig {
-  std::string workers_endpoint;                 ///< Where workers connect; the port may be `*`.
+  std::string workers_endpoint;  ///< Where workers connect; the port may be `*`.
+  /// A socket that listens there already, for workers that are started before the service. The
+  /// service takes it over.
+  std::optional<int> workers_listener;
   std::optional<std::string> clients_endpoint;  ///< Where clients connect; none are served without.
   /// Directory with coordinator.key and the lists of authorized keys. Without it, every peer that
   /// reaches the addresses is served.

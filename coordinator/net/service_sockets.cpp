@@ -33,9 +33,9 @@ ServiceSockets::ServiceSockets(const ServiceConfig& config, Log log)
     : log_(std::move(log)), context_(std::make_unique<zmq::context_t>()) {
   check_endpoints(config);
   if (config.keys) authenticator_ = std::make_unique<Authenticator>(*context_, *config.keys, log_);
-  workers_ =
-      std::make_unique<RouterSocket>(*context_, "bind", config.workers_endpoint,
-                                     security_of(config, wire::Domain::workers), config.faults);
+  workers_ = std::make_unique<RouterSocket>(*context_, "bind", config.workers_endpoint,
+                                            security_of(config, wire::Domain::workers),
+                                            config.faults, config.workers_listener);
   if (config.clients_endpoint) {
     clients_ =
         std::make_unique<RouterSocket>(*context_, "bind-clients", *config.clients_endpoint,

@@ -68,7 +68,8 @@ void enforce_domain(zmq::socket_t& socket) {
 }  // namespace
 
 zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
-                          const std::string& endpoint, const ServerSecurity& security) {
+                          const std::string& endpoint, const ServerSecurity& security,
+                          std::optional<int> listener) {
   zmq::socket_t socket(context, zmq::socket_type::router);
   limit(socket, router_message_size_max, linger_of_router);
   socket.set(zmq::sockopt::router_mandatory, true);
@@ -79,6 +80,7 @@ zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
     enforce_domain(socket);
   }
   socket.set(zmq::sockopt::ipv6, may_be_ipv6(endpoint, EndpointUse::bind));
+  if (listener) socket.set(zmq::sockopt::use_fd, *listener);
   try {
     socket.bind(endpoint);
   } catch (const zmq::error_t& error) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -24,10 +25,12 @@ namespace proofmass::wire {
 ///
 /// @param option    Name of the option that the endpoint comes from, for the message.
 /// @param endpoint  check_endpoint() holds; the port may be `*`.
+/// @param listener  A socket that listens there already and that this one takes over; none: one is
+///                  made.
 /// @throws Error reading `option = endpoint (reason)` if it cannot be bound.
 [[nodiscard]] zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
-                                        const std::string& endpoint,
-                                        const ServerSecurity& security);
+                                        const std::string& endpoint, const ServerSecurity& security,
+                                        std::optional<int> listener = std::nullopt);
 
 /// A DEALER, not connected yet: a ConnectionMonitor connects it.
 [[nodiscard]] zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& security);

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <optional>
 #include <span>
@@ -36,6 +37,7 @@
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
+#include "proto/link/start_program.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -95,21 +97,37 @@ class GrowingFile final : public CampaignFiles {
   }
 };
 
+/// What takes time before the first run, and does not need the database: that of a new campaign is
+/// made meanwhile, which waits for the disk.
+struct RunStart {
+  explicit RunStart(std::uint64_t worker_count) : num_workers(worker_count) {
+    workers->start_local(num_workers);
+  }
+
+  std::uint64_t num_workers;
+  std::future<std::uint64_t> reference_digest = std::async(
+      std::launch::async, [] { return model().reference_digest(best_instruction_set()); });
+  PrivateEndpoint endpoint;
+  int listener = endpoint.listen();
+  std::unique_ptr<WorkerProcesses> workers = std::make_unique<WorkerProcesses>(
+      wire::program_beside_this("proofmass-worker"), endpoint.address());
+};
+
 /// The service of one campaign for the workers of this process.
-ServiceConfig service_config(const PrivateEndpoint& endpoint, std::uint64_t num_workers,
-                             CampaignFiles& files) {
+ServiceConfig service_config(RunStart& start, CampaignFiles& files) {
   ServiceConfig config;
   config.files = &files;
-  config.workers_endpoint = endpoint.address();
+  config.workers_endpoint = start.endpoint.address();
+  config.workers_listener = start.listener;
   config.end = ServiceEnd::when_done;
   config.given_up = GivenUpRuns::retry;
   config.version = PROOFMASS_VERSION;
-  config.dispatch.reference_digest = model().reference_digest(best_instruction_set());
+  config.dispatch.reference_digest = start.reference_digest.get();
   config.dispatch.reattach_wait = Duration::zero();  // Workers of the last time ended with it.
-  config.dispatch.num_slots_expected = num_workers * model().batch_size();
+  config.dispatch.num_slots_expected = start.num_workers * model().batch_size();
   // All workers may die at once, and runs must be found guilty before the machine is.
   config.dispatch.crashes_per_host_max =
-      config.dispatch.crashes_per_run_max * static_cast<std::uint32_t>(num_workers + 1);
+      config.dispatch.crashes_per_run_max * static_cast<std::uint32_t>(start.num_workers + 1);
   return config;
 }
 
@@ -171,7 +189,9 @@ struct Outcome {
 };
 
 /// Computes the missing runs, up to `num_runs` in all.
-Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOptions& options) {
+/// @param start  Null if nothing has begun yet.
+Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOptions& options,
+                std::unique_ptr<RunStart> start) {
   const bool is_decided =
       options.stop.rule.empty() || campaign.store.control().phase == wire::CampaignPhase::finished;
   if (num_missing(campaign.store, options) == 0 && is_decided) {
@@ -182,18 +202,20 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
   const std::uint64_t num_finished_beside =
       num_runs_in(campaign.store.finished_runs()) - num_finished_now;
   if (options.part) campaign.elsewhere = runs_beside(part, num_runs);
+  if (start == nullptr) {
+    start = std::make_unique<RunStart>(num_workers(options, part.count - num_finished_now));
+  }
   make_active(campaign.store, options);
   const SignalThread signals;
   const std::atomic<StopRequest>& stop = catch_stop_signals(OnTerminate::stop_now);
   ProgressDisplay display(options.is_quiet ? DisplayMode::quiet : display_mode_for(stderr), stderr);
-  const PrivateEndpoint endpoint;
   GrowingFile file;
-  const std::uint64_t num_local = num_workers(options, part.count - num_finished_now);
   std::vector<ServedCampaign> campaigns;
   campaigns.push_back(std::move(campaign));
-  const ServiceConfig config = service_config(endpoint, num_local, file);
+  const ServiceConfig config = service_config(*start, file);
   Service service(std::move(campaigns), config, log_to(display));
-  LocalWorkers workers(service, display);
+  const std::unique_ptr<WorkerProcesses> processes = std::move(start->workers);
+  LocalWorkers workers(service, display, *processes);
   StorageNotes storage(display, config.writer.retry_after);
   const auto show = [&] {
     const wire::CampaignStatus status = service.campaigns().front();
@@ -202,7 +224,6 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
                                 : out_of(status, num_runs));
   };
   std::unique_ptr<Page> page = begin_page(options, display);
-  workers.start(num_local);
   service.run(stop, [&] {
     if (page) page->on_turn(service);
     if (stop == StopRequest::none && !service.is_done()) workers.replace_dead();
@@ -330,9 +351,13 @@ int run_campaign(const RunOptions& options) {
   check_part(options, *campaign);
   (void)page_config_of(options.page);  // Before any file is made.
   const std::filesystem::path database = database_of(options);
-  Outcome outcome =
-      compute(open_or_create(*campaign, stop_plan_of(options, campaign->num_runs), database),
-              campaign->num_runs, options);
+  const std::uint64_t num_runs = campaign->num_runs;
+  std::unique_ptr<RunStart> start;
+  if (!std::filesystem::exists(database)) {
+    start = std::make_unique<RunStart>(num_workers(options, part_of(options, num_runs).count));
+  }
+  Outcome outcome = compute(open_or_create(*campaign, stop_plan_of(options, num_runs), database),
+                            num_runs, options, std::move(start));
   if (!outcome.is_done) return end_interrupted(outcome.store, *campaign, options);
   update_statistics(outcome.store, *campaign);
   require_in_place(outcome.store, database);

@@ -9,6 +9,7 @@
 #include <zmq.hpp>
 
 #include "coordinator/net/authentication/refusal_log.hpp"
+#include "coordinator/net/private_endpoint.hpp"
 #include "proto/link/connection_monitor.hpp"
 #include "proto/link/keys.hpp"
 #include "proto/link/socket.hpp"
@@ -64,6 +65,25 @@ TEST_F(RouterSocketTest, IsBoundToTheSameAddressAgainAndPeersComeBack) {
     EXPECT_FALSE(router.send(sender, "to one of before", Clock::now()));
     EXPECT_EQ(received(router, say("after")), "after");
   }
+}
+
+// A peer that connected before there was a router is served, and comes back to an address that was
+// bound again.
+TEST_F(RouterSocketTest, TakesOverASocketThatListensAlready) {
+  const PrivateEndpoint private_endpoint;
+  const int listener = private_endpoint.listen();
+  zmq::socket_t dealer = wire::make_dealer(peers_context, {});
+  wire::SocketEvents events(peers_context, dealer.handle(), ZMQ_EVENT_CONNECTED);
+  dealer.connect(private_endpoint.address());
+  const auto deadline = Clock::now() + std::chrono::seconds(20);
+  while (!events.take() && Clock::now() < deadline) std::this_thread::yield();
+  RouterSocket router(context, "bind", private_endpoint.address(), {}, {}, listener);
+  EXPECT_EQ(router.endpoint(), private_endpoint.address());
+  const auto say = [&dealer] { dealer.send(zmq::str_buffer("text"), zmq::send_flags::dontwait); };
+  EXPECT_EQ(received(router, say), "text");
+  router.close();
+  ASSERT_TRUE(router.open());
+  EXPECT_EQ(received(router, say), "text");
 }
 
 TEST_F(RouterSocketTest, SaysThatItsAddressCannotBeHadNow) {
