@@ -1,8 +1,9 @@
 #!/bin/bash
-# Unpacks Debian's arm64 packages of the libraries that core, its tests and the worker are built with
-# into a directory, for deploy/arm64/toolchain.cmake: make-sysroot.sh DIRECTORY. Does nothing if the
-# directory has been made from the same list of packages. Needs apt on Debian 12, and neither root nor
-# a change to the architectures of this machine's dpkg: apt works in a state directory of its own.
+# make-sysroot.sh DIRECTORY: unpacks Debian's arm64 packages of the libraries that core, its tests
+# and the worker are built with into a directory, for deploy/arm64/toolchain.cmake. Does nothing if
+# the directory has been made from the same list of packages. Needs apt on Debian 12, and neither
+# root nor a change to the architectures of this machine's dpkg: apt works in a state directory of
+# its own.
 set -euo pipefail
 
 packages=(

@@ -5,8 +5,8 @@
 - a campaign that a worker of this machine and an emulated ARM64 worker compute has the digest of
   `proofmass run` on this machine.
 
-Needs Debian's g++-aarch64-linux-gnu and qemu-user, and a mirror for the libraries. Exit code 0 if all
-holds, 1 if not; 77 if it cannot run, but 1 if the environment has CI.
+Needs Debian's g++-aarch64-linux-gnu and qemu-user, and a mirror for the libraries. Exit code 0 if
+all holds, 1 if not; 77 if it cannot run, but 1 if the environment has CI.
 """
 
 import argparse
@@ -25,8 +25,8 @@ SOURCE = Path(__file__).resolve().parents[2]
 NEEDED = ("aarch64-linux-gnu-g++", "qemu-aarch64")
 NUM_RUNS = 48
 SHORTEN = {"orbits": 1, "sample_period_s": 1, "runs": NUM_RUNS}
-# The emulated processor takes half a minute for all kernels of a batch, whose bits the digest of the
-# campaign depends on as well.
+# A batch takes the emulated processor longer than everything else. The reference digest passes
+# through the same kernel.
 QUICK = "--gtest_filter=-Batch.*"
 PATIENCE_S = 300
 MACHINE_ARM64 = 183  # EM_AARCH64, in the header of a program.
@@ -55,8 +55,8 @@ class Stopwatch:
 
 
 def configure(directory, sysroot):
-    subprocess.run(["cmake", "--preset", "arm64", "-B", directory, f"-DPROOFMASS_SYSROOT={sysroot}"],
-                   cwd=SOURCE, stdout=subprocess.DEVNULL, check=True)
+    command = ["cmake", "--preset", "arm64", "-B", directory, f"-DPROOFMASS_SYSROOT={sysroot}"]
+    subprocess.run(command, cwd=SOURCE, stdout=subprocess.DEVNULL, check=True)
 
 
 def build(directory, target):
@@ -67,7 +67,7 @@ def build(directory, target):
 def check_is_for_arm64(program):
     header = program.read_bytes()[:20]
     machine = int.from_bytes(header[18:20], "little")
-    check(machine == MACHINE_ARM64, f"machine = {machine} (must be {MACHINE_ARM64}) in {program}")
+    check(machine == MACHINE_ARM64, f"machine = {machine} (must be {MACHINE_ARM64}): {program}")
 
 
 def check_recorded_bits(emulator, program):
@@ -95,7 +95,8 @@ class Campaign:
 
     def start(self, name, *words):
         with open(self.directory / f"{name}.log", "wb") as log:
-            self.processes[name] = subprocess.Popen(words, cwd=self.directory, stdout=log, stderr=log)
+            self.processes[name] = subprocess.Popen(words, cwd=self.directory, stdout=log,
+                                                    stderr=log)
 
     def start_worker(self, name, *program):
         self.start(name, *program, "--connect", self.endpoint, "--name", name, "--threads", "1")
@@ -111,8 +112,8 @@ class Campaign:
     def wait_for_runs_of(self, worker):
         end = time.monotonic() + PATIENCE_S
         while self.num_runs_of(worker) == 0:
-            check(time.monotonic() < end, f"the worker {worker} delivered nothing in {PATIENCE_S} s")
-            check(self.processes[worker].poll() is None, f"the worker {worker} ended")
+            check(time.monotonic() < end, f"{worker} delivered nothing in {PATIENCE_S} s")
+            check(self.processes[worker].poll() is None, f"{worker} ended")
             time.sleep(0.2)
 
     def digest(self, file):
@@ -127,13 +128,14 @@ class Campaign:
 def check_campaign(campaign, arm64_worker):
     """The emulated worker is much slower than the other one, which would compute its runs as well:
     the fast one comes when the slow one has delivered."""
-    campaign.start("coordinator", campaign.programs / "proofmass-coordinator", "--directory", "served",
-                   "--bind", campaign.endpoint, "--exit-when-done", "short.toml")
+    campaign.start("coordinator", campaign.programs / "proofmass-coordinator", "--directory",
+                   "served", "--bind", campaign.endpoint, "--exit-when-done", "short.toml")
     campaign.start_worker("arm64", *arm64_worker)
     campaign.wait_for_runs_of("arm64")
     campaign.start_worker("native", campaign.programs / "proofmass-worker")
     for name, process in campaign.processes.items():
-        check(process.wait(PATIENCE_S) == 0, f"exit code = {process.returncode} (must be 0) of {name}")
+        code = process.wait(PATIENCE_S)
+        check(code == 0, f"exit code = {code} (must be 0) of {name}")
     num_runs = {worker: campaign.num_runs_of(worker) for worker in ("arm64", "native")}
     print(f"runs = {num_runs}")
     check(all(num_runs.values()), "both workers must have computed runs")
@@ -150,7 +152,7 @@ def main():
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--programs", required=True, type=Path, help="directory of the programs")
-    parser.add_argument("--build", required=True, type=Path, help="directory for what is built here")
+    parser.add_argument("--build", required=True, type=Path, help="directory to build in")
     arguments = parser.parse_args()
     programs, directory = arguments.programs.resolve(), arguments.build.resolve()
     for program in NEEDED:
