@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <span>
@@ -107,6 +108,31 @@ TEST(NoiseShape, HasTheRecordedBits) {
 TEST(ReferenceDigest, HasTheRecordedBits) {
   const std::uint64_t digest = reference_digest(best_instruction_set());
   EXPECT_EQ(digest, 0x95adcc848c136a3eU) << std::hex << " 0x" << digest;
+}
+
+// Without a range that ends it, the run grows beyond all numbers.
+TEST(LostRun, HasTheRecordedBits) {
+  MicroscopeCampaign campaign;
+  campaign.scenario.simulation.sample_period_s = 1.0;
+  campaign.scenario.simulation.settling_s = 100.0;
+  campaign.scenario.sensor.range_m_s2 = 1e300;
+  for (Session& session : campaign.scenario.sessions) session.num_orbits = 1;
+  const auto gain = std::ranges::find(drawn_names(), "thruster_scale_error.x");
+  campaign.dispersions.at(static_cast<std::size_t>(gain - drawn_names().begin())).law = Law::table;
+  campaign.num_runs = 1;
+  campaign.table_columns = {{50.0}};
+  const std::vector<RunRequest> requests{{RunIndex{0}, campaign.table_values(RunIndex{0})}};
+  const RunPlan plan(campaign);
+  for (const InstructionSet set : {InstructionSet::scalar, best_instruction_set()}) {
+    const RunResult result = plan.simulate_batch(requests, set)[0];
+    EXPECT_EQ(result.status, RunStatus::lost) << name_of(set);
+    Hash hash;
+    hash.add(result.loss.cause);
+    hash.add(result.loss.session);
+    hash.add(result.health);
+    EXPECT_EQ(hash.value(), 0x96a9e2e9d4ce8466U)
+        << name_of(set) << std::hex << " 0x" << hash.value();
+  }
 }
 
 /// Hash of the estimates of run 0 in a campaign whose sessions are cut to one orbit after a short
