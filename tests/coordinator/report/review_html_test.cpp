@@ -171,12 +171,12 @@ TEST_F(ReviewHtml, ShowsTheSpectraOfTheWorstRun) {
   review.spectra = some_spectra();
   const std::string html = review_html(review);
   EXPECT_EQ(test::malformed_part(as_xml(html)), "");
-  EXPECT_THAT(
-      html, AllOf(HasSubstr("<h2 id=\"spectra-section-title\">Spectra of the worst run"),
-                  HasSubstr("a_c13: difference &lt;x&gt;"), HasSubstr("m/s²/√Hz"),
-                  HasSubstr("an amplitude of 3e-9 m/s²."),
-                  HasSubstr("<td data-value=\"3e-09\">3e-09</td>"), HasSubstr(">1.04 ± 0.03</td>"),
-                  HasSubstr("It is white &amp; quiet."), Not(HasSubstr("<script>"))));
+  EXPECT_THAT(html, AllOf(HasSubstr("<h2 id=\"spectra-section-title\">Spectra of the worst run"),
+                          HasSubstr("a_c13: difference &lt;x&gt;"), HasSubstr("m/s²/√Hz"),
+                          HasSubstr("an amplitude of 3×10⁻⁹ m/s²."),
+                          HasSubstr("<td data-value=\"3e-09\">3.0e-09</td>"),
+                          HasSubstr(">1.04 ± 0.03</td>"), HasSubstr("It is white &amp; quiet."),
+                          Not(HasSubstr("<script>"))));
   review.spectra->sessions.clear();
   const std::string reasons = review_html(review);
   EXPECT_THAT(reasons, AllOf(HasSubstr("&lt;script&gt;"), Not(HasSubstr("bit for bit"))));
