@@ -72,7 +72,7 @@ struct DetailSources {
 [[nodiscard]] DetailSources database_sources();
 
 /// When something is read again whose reading ended at `ended_at` and took so much processor time:
-/// not before 2 s, nor before eighty times that time. So reading takes 1.25 % of a core at most.
+/// not before 2 s, nor before eighty times that time. So it takes 1.25 % of a core at most.
 [[nodiscard]] TimePoint next_reading(TimePoint ended_at, Duration cpu_time);
 
 /// Reads the databases of those campaigns at which somebody looks, in one thread of low priority.
