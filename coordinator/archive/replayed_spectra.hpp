@@ -19,8 +19,8 @@ inline constexpr std::size_t num_spectrum_samples_max = std::size_t{1} << 23;
 
 /// The spectra that the model describes of a run (Recording::spectra), from a replay of it.
 ///
-/// Bands have 24 to a decade; what is within two bins of a line stands alone. None come of a run
-/// whose replay differs from the stored result, or that has no result: the reasons say so.
+/// A decade has 24 points; each bin within two of a fitted line has a point of its own. If the
+/// replay differs from the stored result there are none, and the reasons say so.
 /// @throws as Replay::run() and Replay::stored_result().
 [[nodiscard]] RunSpectra replayed_spectra(const Replay& replay, RunIndex run,
                                           const IsStopped& is_stopped);

@@ -196,6 +196,5 @@ std::vector<NamedPicture> review_pictures(const Review& review) {
 }
 
 bool needs_causes(std::string_view name) { return name == "causes"; }
-bool needs_spectra(std::string_view name) { return name.starts_with(spectrum_name("")); }
 
 }  // namespace proofmass::coordinator

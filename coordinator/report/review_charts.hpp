@@ -58,7 +58,5 @@ struct NamedPicture {
 
 /// True if a chart of this name needs Review::causes.
 [[nodiscard]] bool needs_causes(std::string_view name);
-/// True if it needs Review::spectra.
-[[nodiscard]] bool needs_spectra(std::string_view name);
 
 }  // namespace proofmass::coordinator

@@ -126,10 +126,10 @@ std::string spectra_markup(const Review& review) {
   }
   if (spectra.sessions.empty()) return html;
   html += fmt::format(
-      "<p>Of run {}, which is the farthest off of all runs, simulated again bit for bit. Without "
-      "the "
-      "lines that the session fits, noise is left, and lines that it does not fit. {}</p>\n<div "
-      "class=\"charts\">\n",
+      "<p>Run {} has the largest error of all runs beside its objective. It was simulated again, "
+      "bit "
+      "for bit. Without the fitted lines, noise is left, and lines that the session does not fit. "
+      "{}</p>\n<div class=\"charts\">\n",
       spectra.run.value, markup_text(spectra.sessions.front().noise_meaning));
   for (const Chart& chart : spectrum_charts(spectra)) html += figure_of(chart);
   return html + "</div>\n" + html_table(spectrum_table(spectra));

@@ -45,7 +45,7 @@ std::string spectrum_description(const SessionSpectrum& spectrum, RunIndex run) 
                         figure_text(line.frequency_hz), figure_text(line.amplitude), spectrum.unit);
   }
   if (spectrum.noise_ratio) {
-    text += fmt::format(" Around it the power of the noise is {} times that of its model.",
+    text += fmt::format(" Near these lines the power of the noise is {} times that of its model.",
                         ratio_text(*spectrum.noise_ratio));
   }
   return text;

@@ -118,10 +118,19 @@ void print_names(const Review& review, const Campaign& campaign) {
   print_lines(names);
 }
 
-/// @throws ArchiveError if the worst run has no spectra.
-void add_spectra(const Store& store, Review& review, const IsStopped& is_stopped) {
+/// Those of the worst run, which is simulated for them.
+/// @throws ArchiveError if it has no spectrum of that name.
+void add_spectra(const Store& store, const std::string& chart, Review& review,
+                 const IsStopped& is_stopped) {
   review.spectra = worst_run_spectra(store, review, is_stopped);
-  if (review.spectra->sessions.empty()) throw ArchiveError(review.spectra->reasons.front());
+  const RunSpectra& spectra = *review.spectra;
+  if (std::ranges::any_of(spectra.sessions, [&](const SessionSpectrum& spectrum) {
+        return spectrum_name(spectrum.session) == chart;
+      })) {
+    return;
+  }
+  throw ArchiveError(
+      fmt::format("chart = {} ({})", wire::visible_text(chart), fmt::join(spectra.reasons, " ")));
 }
 
 int plot(const PlotOptions& options) {
@@ -139,9 +148,10 @@ int plot(const PlotOptions& options) {
     write_picture(chosen_picture(review_pictures(review), options.chart), options);
     return exit_done;
   };
-  if (!needs_spectra(options.chart)) return write();
+  const std::vector<std::string> spectra = spectrum_names(campaign->prepare()->recording());
+  if (std::ranges::find(spectra, options.chart) == spectra.end()) return write();
   return run_until_stopped([&](const IsStopped& is_stopped) {
-    add_spectra(store, review, is_stopped);
+    add_spectra(store, options.chart, review, is_stopped);
     return write();
   });
 }

@@ -147,7 +147,10 @@ TEST_F(ReviewCommands, SayWhyTheWorstRunHasNoSpectra) {
   const test::Answer refused =
       test::answer_of({"plot", database_, "--chart", "spectrum:a_c13", "--output", "-"});
   EXPECT_EQ(refused.exit_code, exit_cannot_be_done);
-  EXPECT_EQ(refused.error, reason);
+  EXPECT_EQ(refused.error, "chart = spectrum:a_c13 (" + reason + ")");
+  EXPECT_EQ(
+      test::answer_of({"plot", database_, "--chart", "spectrum:a_c99", "--output", "-"}).error,
+      "chart = spectrum:a_c99 (is none of this campaign; --list names all)");
 }
 
 TEST_F(ReviewCommands, RefuseAChartThatIsNone) {
