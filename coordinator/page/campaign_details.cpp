@@ -11,17 +11,13 @@
 #include <exception>
 #include <utility>
 
-#include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/report/report_json.hpp"
-#include "coordinator/report/review.hpp"
-#include "coordinator/report/review_html.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
 constexpr std::chrono::seconds reading_interval_min(2);
-constexpr int reading_share = 80;
+constexpr int reading_share = 150;
 constexpr int reading_niceness = 10;
 
 std::shared_ptr<const CampaignEvents> read_events_of(const std::filesystem::path& file,
@@ -45,19 +41,23 @@ std::shared_ptr<const CampaignEvents> read_events_of(const std::filesystem::path
   return now;
 }
 
-CampaignResults read_results_of(const std::filesystem::path& file) {
-  CampaignResults results;
+std::shared_ptr<const CampaignResults> read_results_of(const std::filesystem::path& file,
+                                                       const CampaignResults* before) {
+  auto now = std::make_shared<CampaignResults>();
+  if (before != nullptr) now->reading = before->reading;
   try {
     const Store store = Store::open_read_only(file);
-    const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
-    results.num_runs = num_runs_in(store.finished_runs());
-    const Review review = read_live_review(store, *campaign);
-    results.html = live_results_html(review);
-    results.json = accuracy_json(*campaign, review.results.statistics);
+    const bool goes_on = now->reading != nullptr && now->reading->is_of(store);
+    ResultsReading reading = goes_on ? *now->reading : ResultsReading(store);
+    reading.read_further(store, page_results_a_reading);
+    now->html = reading.results().html();
+    now->json = reading.results().json();
+    now->num_runs = reading.num_read();
+    now->reading = std::make_shared<const ResultsReading>(std::move(reading));
   } catch (const std::exception& error) {
-    results.failure = error.what();
+    now->failure = error.what();
   }
-  return results;
+  return now;
 }
 
 void become_unimportant() {
@@ -134,8 +134,10 @@ std::optional<DetailReader::Choice> DetailReader::choose(TimePoint now,
   for (const auto& [name, watched] : watched_) {
     if (now - watched.asked_at >= wanted_for) continue;
     consider(name, Part::events, watched.events_due);
-    const std::pair counts(watched.campaign.num_finished, watched.campaign.num_given_up);
-    if (watched.results_of != counts) consider(name, Part::results, watched.results_due);
+    const CampaignResults* const results = watched.details.results.get();
+    if (results == nullptr || results->num_runs < watched.campaign.num_finished) {
+      consider(name, Part::results, watched.results_due);
+    }
   }
   return choice;
 }
@@ -151,7 +153,7 @@ void DetailReader::read(const Choice& choice, std::unique_lock<std::mutex>& lock
   if (choice.part == Part::events) {
     events = sources_.read_events(campaign.file, before.events.get());
   } else {
-    results = std::make_shared<const CampaignResults>(sources_.read_results(campaign.file));
+    results = sources_.read_results(campaign.file, before.results.get());
   }
   const TimePoint due = next_reading(steady_now(), cpu_time_of_thread() - cpu_before);
   lock.lock();
@@ -167,7 +169,6 @@ void DetailReader::read(const Choice& choice, std::unique_lock<std::mutex>& lock
   watched.details.results = std::move(results);
   watched.details.results_at = began_at;
   watched.results_due = due;
-  watched.results_of = std::pair(campaign.num_finished, campaign.num_given_up);
 }
 
 void DetailReader::work() {

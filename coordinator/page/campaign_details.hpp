@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "coordinator/dispatch/state.hpp"
+#include "coordinator/page/results_reading.hpp"
 #include "coordinator/store/campaign_history.hpp"
 
 namespace proofmass::coordinator {
@@ -25,6 +26,8 @@ inline constexpr std::size_t page_events_max = 10'000;
 inline constexpr std::size_t page_attempts_max = 5'000;
 inline constexpr std::size_t page_losses_max = 1'000;
 inline constexpr std::size_t page_given_up_max = 100;
+/// Results that are read at a time: about 20 ms of a core.
+inline constexpr std::uint64_t page_results_a_reading = 16'384;
 
 /// What happened to a campaign, as its database has it.
 struct CampaignEvents {
@@ -36,12 +39,13 @@ struct CampaignEvents {
   std::string failure = {};  ///< Why the database could not be read; empty if it could.
 };
 
-/// What the results of a campaign yield.
+/// What those results of a campaign yield that were read so far.
 struct CampaignResults {
-  std::string html = {};       ///< Sections of a page.
-  std::string json = {};       ///< Of accuracy_json(); empty if they could not be read.
-  std::uint64_t num_runs = 0;  ///< Finished runs when they were read, at least.
-  std::string failure = {};    ///< Likewise.
+  std::string html = {};       ///< Of LiveResults; empty if they could not be read.
+  std::string json = {};       ///< Likewise.
+  std::uint64_t num_runs = 0;  ///< Finished runs that were read.
+  std::string failure = {};    ///< Why they could not be read; empty if they could.
+  std::shared_ptr<const ResultsReading> reading = {};  ///< What the next reading goes on from.
 };
 
 /// What was read, and when. Parts are null before they were read for the first time.
@@ -55,24 +59,24 @@ struct CampaignDetails {
 /// What is known of a campaign without looking into its database.
 struct DetailSubject {
   std::filesystem::path file = {};
-  std::uint64_t num_finished = 0;  ///< Results are read again only if this changes, ...
-  std::uint64_t num_given_up = 0;  ///< ... or this.
+  std::uint64_t num_finished = 0;  ///< Results are read while fewer than these were.
 };
 
-/// How campaign databases are read.
+/// How campaign databases are read: each time further than before.
 struct DetailSources {
   /// @param before  What was read of the file last time; null at first.
-  std::function<std::shared_ptr<const CampaignEvents>(const std::filesystem::path&,
-                                                      const CampaignEvents* before)>
-      read_events;
-  std::function<CampaignResults(const std::filesystem::path&)> read_results;
+  template <typename Part>
+  using ReadPart = std::function<std::shared_ptr<const Part>(const std::filesystem::path&,
+                                                             const Part* before)>;
+  ReadPart<CampaignEvents> read_events;
+  ReadPart<CampaignResults> read_results;  ///< Some results at a time.
 };
 
 /// Those of a coordinator.
 [[nodiscard]] DetailSources database_sources();
 
 /// When something is read again whose reading ended at `ended_at` and took so much processor time:
-/// not before 2 s, nor before eighty times that time. So it takes 1.25 % of a core at most.
+/// not before 2 s, nor before 150 times that time. So it takes 0.67 % of a core at most.
 [[nodiscard]] TimePoint next_reading(TimePoint ended_at, Duration cpu_time);
 
 /// Reads the databases of those campaigns at which somebody looks, in one thread of low priority.
@@ -98,7 +102,6 @@ class DetailReader {
     CampaignDetails details;
     TimePoint events_due{};
     TimePoint results_due{};
-    std::optional<std::pair<std::uint64_t, std::uint64_t>> results_of;  ///< Counts when read.
   };
   enum class Part : std::uint8_t { events, results };
   struct Choice {

@@ -39,16 +39,17 @@ std::string reading_line(TimePoint read_at, TimePoint now) {
   return fmt::format("{} ago", duration_text(seconds(now - read_at)));
 }
 
-std::string results_of(const CampaignDetails& details, TimePoint now) {
+std::string results_of(const CampaignDetails& details, std::uint64_t num_done, TimePoint now) {
   if (details.results == nullptr) return "<p class=\"note\">The results are being read.</p>\n";
   const CampaignResults& results = *details.results;
   if (!results.failure.empty()) {
     return notes_list({"the results cannot be shown: " + results.failure});
   }
   return fmt::format(
-      "<section><h2>Results</h2>\n<p class=\"note\">as of {} finished runs, read "
+      "<section><h2>Results</h2>\n<p class=\"note\">{} of {} finished runs, read "
       "{}</p>\n{}</section>\n",
-      grouped(results.num_runs), reading_line(details.results_at, now), results.html);
+      grouped(results.num_runs), grouped(std::max(num_done, results.num_runs)),
+      reading_line(details.results_at, now), results.html);
 }
 
 std::string ends_table(const CampaignEvents& events) {
@@ -164,7 +165,7 @@ PageContent campaign_page(const CampaignSnapshot& campaign, const CampaignDetail
           .to_root = "../",
           .live = fmt::format("<p class=\"large\">{}</p>\n",
                               progress_bar(status.num_done, status.num_runs, "progress")) +
-                  facts_of(campaign) + notes_list(notes_about(status)) + results_of(details, now) +
+                  facts_of(campaign) + notes_list(notes_about(status)) + results_of(details, status.num_done, now) +
                   history_of(details, campaign, request)};
 }
 

@@ -124,8 +124,7 @@ std::optional<HttpAnswer> PageSite::about_campaign(const PageRequest& request,
   const TimePoint now = sources_.now();
   const CampaignDetails details = sources_.details(name,
                                                    {.file = found->file,
-                                                    .num_finished = found->status.num_done,
-                                                    .num_given_up = found->status.num_given_up},
+                                                    .num_finished = found->status.num_done},
                                                    now);
   // A page shows what there is, and the rest two seconds later; a program wants all at once.
   if (!is_api) return campaign_html(*found, details, request, now);

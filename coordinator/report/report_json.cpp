@@ -33,6 +33,7 @@ Json bounds_of(const std::optional<Interval>& interval) {
 Json percentiles_of(const AccuracyStatistic& accuracy) {
   Json json = Json::array();
   for (const PercentileStatistic& percentile : accuracy.percentiles) {
+    if (percentile.level == 0.0) continue;  // Not computed, see RunningStatistics.
     json.push_back({{"level", percentile.level},
                     {"value", percentile.value},
                     {"interval", bounds_of(percentile.interval)}});
@@ -70,8 +71,7 @@ Json statistics_of(const AccuracyStatistic& accuracy, std::uint64_t num_runs) {
   return json;
 }
 
-Json parameters_of(const Campaign& campaign, const CampaignStatistics& statistics) {
-  const std::vector<double> objectives = campaign.objectives();
+Json parameters_of(const std::vector<double>& objectives, const CampaignStatistics& statistics) {
   const std::vector<Quantity>& quantities = model().results().quantities;
   Json json = Json::array();
   for (std::size_t i = 0; i < quantities.size(); ++i) {
@@ -178,7 +178,7 @@ std::string report_json(const Store& store, const Campaign& campaign,
             {"num_lost", statistics.num_lost},
             {"num_given_up", num_given_up},
             {"confidence", default_confidence},
-            {"parameters", parameters_of(campaign, statistics)},
+            {"parameters", parameters_of(campaign.objectives(), statistics)},
             {"all_objectives",
              {{"num_within", statistics.num_within_objectives},
               {"num_runs", statistics.num_runs + num_given_up},
@@ -192,8 +192,9 @@ std::string report_json(const Store& store, const Campaign& campaign,
   return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-std::string accuracy_json(const Campaign& campaign, const CampaignStatistics& statistics) {
-  return parameters_of(campaign, statistics).dump();
+std::string accuracy_json(const std::vector<double>& objectives,
+                          const CampaignStatistics& statistics) {
+  return parameters_of(objectives, statistics).dump();
 }
 
 }  // namespace proofmass::coordinator

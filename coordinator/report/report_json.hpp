@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/report/stated_requirement.hpp"
@@ -21,7 +22,8 @@ namespace proofmass::coordinator {
                                       std::span<const StatedRequirement> stated);
 
 /// The statistics of each quantity, a JSON array: the key `parameters` of report_json().
-[[nodiscard]] std::string accuracy_json(const Campaign& campaign,
+/// @param objectives  Of each quantity, SI.
+[[nodiscard]] std::string accuracy_json(const std::vector<double>& objectives,
                                         const CampaignStatistics& statistics);
 
 }  // namespace proofmass::coordinator

@@ -1,7 +1,6 @@
 #include "coordinator/report/review.hpp"
 
 #include <array>
-#include <span>
 #include <utility>
 
 #include "coordinator/report/summarise.hpp"
@@ -30,10 +29,8 @@ MissingEstimates missing_of(const CampaignStatistics& statistics, std::uint64_t 
           .num_given_up = num_given_up};
 }
 
-enum class WithChecks : std::uint8_t { no, yes };
-
 Review read_of_one_state(const Store& store, const Campaign& campaign,
-                         std::vector<StatedRequirement> stated, WithChecks with_checks) {
+                         std::vector<StatedRequirement> stated) {
   Review review{.database = {},
                 .identity = identity_of(store),
                 .results = {},
@@ -50,16 +47,12 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
   FigurePasses figures(review.objectives.size(), num_runs_in(store.finished_runs()));
   MatrixPasses matrix(std::move(stated), review.objectives, review.num_given_up);
   const std::array<ResultPasses*, 2> further{&figures, &matrix};
-  if (with_checks == WithChecks::yes) {
-    CheckedResults checked = read_checked_results(store, campaign, further);
-    review.results = std::move(checked.results);
-    review.digest_check = checked.check;
-  } else {
-    review.results = read_results(store, campaign, std::span(further).first(1));
-  }
+  CheckedResults checked = read_checked_results(store, campaign, further);
+  review.results = std::move(checked.results);
+  review.digest_check = checked.check;
   review.missing = missing_of(review.results.statistics, review.num_given_up);
   review.figures = figures.figures();
-  if (with_checks == WithChecks::yes) review.matrix = matrix.rows();
+  review.matrix = matrix.rows();
   return review;
 }
 
@@ -78,18 +71,12 @@ Review read_review(const Store& store, const Campaign& campaign, std::string_vie
   Review review;
   stated = matrix_requirements(std::move(stated), campaign.objectives());
   store.read_one_state([&] {
-    review = read_of_one_state(store, campaign, std::move(stated), WithChecks::yes);
+    review = read_of_one_state(store, campaign, std::move(stated));
     if (with_causes == WithCauses::yes) review.causes = find_causes(store, campaign);
     review.execution = store.execution();
     review.stop = stop_text(store);
   });
   review.database = std::string(database);
-  return review;
-}
-
-Review read_live_review(const Store& store, const Campaign& campaign) {
-  Review review;
-  store.read_one_state([&] { review = read_of_one_state(store, campaign, {}, WithChecks::no); });
   return review;
 }
 

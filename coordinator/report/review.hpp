@@ -66,11 +66,4 @@ enum class WithCauses : std::uint8_t { no, yes };
                                  std::string_view database, std::vector<StatedRequirement> stated,
                                  WithCauses with_causes);
 
-/// The same of results as they are, finished or not, without what takes long or looks for damage:
-/// neither stored digest nor stop checks are compared, there are no causes, and nothing is written.
-///
-/// Takes 5 µs of a core for each finished run, 5 s for a million: call it in the background, and
-/// not for each viewer.
-[[nodiscard]] Review read_live_review(const Store& store, const Campaign& campaign);
-
 }  // namespace proofmass::coordinator

@@ -197,10 +197,4 @@ std::string review_html(const Review& review) {
       navigation, content, markup_text(review.database));
 }
 
-std::string live_results_html(const Review& review) {
-  return "<h3>Accuracy so far</h3>\n" + html_table(review_accuracy_table(review)) +
-         "<h3>Errors so far</h3>\n<div class=\"overview\">\n" +
-         figure_of(magnitude_overview(review)) + "</div>\n";
-}
-
 }  // namespace proofmass::coordinator

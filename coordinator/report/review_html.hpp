@@ -10,9 +10,4 @@ namespace proofmass::coordinator {
 /// and allows none. It begins with the verification matrix. The same bytes for the same review.
 [[nodiscard]] std::string review_html(const Review& review);
 
-/// What a campaign's results tell so far, as a fragment of HTML for a page with review_style(): the
-/// accuracy table and the histograms of |error|. Headings are of level 3.
-/// @param review  Of read_live_review().
-[[nodiscard]] std::string live_results_html(const Review& review);
-
 }  // namespace proofmass::coordinator

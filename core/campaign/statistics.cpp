@@ -7,6 +7,25 @@
 #include "core/error.hpp"
 
 namespace proofmass {
+namespace {
+
+/// What follows from moments and extremes; without percentiles.
+AccuracyStatistic accuracy_of(const ErrorExtremes& extremes, const Moments& magnitudes,
+                              const Moments& errors) {
+  return {.worst = extremes.worst.value_or(0.0),
+          .worst_run = extremes.worst_run,
+          .mean = magnitudes.mean,
+          .standard_deviation = magnitudes.standard_deviation,
+          .num_beyond_objective = extremes.num_beyond,
+          .beyond_objective = probability_interval(static_cast<double>(extremes.num_beyond),
+                                                   static_cast<double>(magnitudes.count),
+                                                   default_confidence),
+          .mean_interval = mean_interval(magnitudes, default_confidence),
+          .deviation_interval = {},
+          .error = error_statistic(errors)};
+}
+
+}  // namespace
 
 std::optional<Interval> CampaignStatistics::within_objectives(std::uint64_t num_given_up) const {
   const std::uint64_t num_draws = num_runs + num_given_up;
@@ -36,6 +55,57 @@ std::vector<double> CampaignStatistics::mean_errors() const {
   return errors;
 }
 
+void CampaignStatistics::count(const RunResult& result) {
+  ++num_runs;
+  if (result.status == RunStatus::not_converged) ++num_not_converged;
+  if (result.status == RunStatus::not_finite) ++num_not_finite;
+  if (result.status == RunStatus::no_draw) ++num_no_draw;
+  if (result.status == RunStatus::lost) ++num_lost;
+  if (result.has_estimate()) ++num_estimated;
+}
+
+bool ErrorExtremes::add(RunIndex run, double magnitude, double objective) {
+  if (!worst || magnitude > *worst || (magnitude == *worst && run < worst_run)) {
+    worst = magnitude;
+    worst_run = run;
+  }
+  if (magnitude <= objective) return true;
+  ++num_beyond;
+  return false;
+}
+
+RunningStatistics::RunningStatistics(std::vector<double> objectives)
+    : objectives_(std::move(objectives)) {}
+
+void RunningStatistics::add(const RunResult& result) {
+  counts_.count(result);
+  if (!result.has_estimate()) return;
+  bool is_within = true;
+  for (std::size_t i = 0; i < objectives_.size(); ++i) {
+    const double error = result.error(i);
+    const double magnitude = std::abs(error);
+    if (i == quantities_.size()) {
+      quantities_.push_back({.errors = MomentSums(error), .magnitudes = MomentSums(magnitude)});
+    }
+    Quantity& quantity = quantities_[i];
+    quantity.errors.add(error);
+    quantity.magnitudes.add(magnitude);
+    if (!quantity.extremes.add(result.run, magnitude, objectives_[i])) is_within = false;
+  }
+  if (is_within) ++counts_.num_within_objectives;
+}
+
+CampaignStatistics RunningStatistics::statistics() const {
+  CampaignStatistics statistics = counts_;
+  statistics.accuracy.resize(objectives_.size());
+  for (std::size_t i = 0; i < quantities_.size(); ++i) {
+    const Quantity& quantity = quantities_[i];
+    statistics.accuracy[i] =
+        accuracy_of(quantity.extremes, quantity.magnitudes.moments(), quantity.errors.moments());
+  }
+  return statistics;
+}
+
 StatisticsPasses::StatisticsPasses(std::vector<double> objectives, std::size_t num_kept_max)
     : objectives_(std::move(objectives)) {
   const ValuePasses::Wanted of_magnitudes{
@@ -44,14 +114,14 @@ StatisticsPasses::StatisticsPasses(std::vector<double> objectives, std::size_t n
   for (std::size_t i = 0; i < objectives_.size(); ++i) {
     quantities_.push_back({.errors = ValuePasses({}, num_kept_max),
                            .magnitudes = ValuePasses(of_magnitudes, num_kept_max),
-                           .worst_run = {}});
+                           .extremes = {}});
   }
 }
 
 void StatisticsPasses::add(const RunResult& result) {
   PROOFMASS_EXPECT(!last_run_ || *last_run_ < result.run);
   last_run_ = result.run;
-  if (is_first_pass_) count(result);
+  if (is_first_pass_) counts_.count(result);
   if (!result.has_estimate()) return;
   bool is_within = true;
   for (std::size_t i = 0; i < quantities_.size(); ++i) {
@@ -61,24 +131,9 @@ void StatisticsPasses::add(const RunResult& result) {
     quantity.errors.add(error);
     quantity.magnitudes.add(magnitude);
     if (!is_first_pass_) continue;
-    if (counts_.num_estimated == 1 || magnitude > quantity.worst) {
-      quantity.worst = magnitude;
-      quantity.worst_run = result.run;
-    }
-    if (magnitude <= objectives_[i]) continue;
-    ++quantity.num_beyond;
-    is_within = false;
+    if (!quantity.extremes.add(result.run, magnitude, objectives_[i])) is_within = false;
   }
   if (is_first_pass_ && is_within) ++counts_.num_within_objectives;
-}
-
-void StatisticsPasses::count(const RunResult& result) {
-  ++counts_.num_runs;
-  if (result.status == RunStatus::not_converged) ++counts_.num_not_converged;
-  if (result.status == RunStatus::not_finite) ++counts_.num_not_finite;
-  if (result.status == RunStatus::no_draw) ++counts_.num_no_draw;
-  if (result.status == RunStatus::lost) ++counts_.num_lost;
-  if (result.has_estimate()) ++counts_.num_estimated;
 }
 
 bool StatisticsPasses::end_pass() {
@@ -103,18 +158,9 @@ CampaignStatistics StatisticsPasses::statistics() const {
 }
 
 AccuracyStatistic StatisticsPasses::accuracy(const QuantityPasses& quantity) const {
-  const Moments& about = quantity.magnitudes.moments();
-  AccuracyStatistic accuracy{.worst = quantity.worst,
-                             .worst_run = quantity.worst_run,
-                             .mean = about.mean,
-                             .standard_deviation = about.standard_deviation,
-                             .num_beyond_objective = quantity.num_beyond,
-                             .beyond_objective = probability_interval(
-                                 static_cast<double>(quantity.num_beyond),
-                                 static_cast<double>(counts_.num_estimated), default_confidence),
-                             .mean_interval = mean_interval(about, default_confidence),
-                             .deviation_interval = quantity.magnitudes.deviation_interval(),
-                             .error = error_statistic(quantity.errors.moments())};
+  AccuracyStatistic accuracy = accuracy_of(quantity.extremes, quantity.magnitudes.moments(),
+                                           quantity.errors.moments());
+  accuracy.deviation_interval = quantity.magnitudes.deviation_interval();
   for (std::size_t i = 0; i < percentile_levels.size(); ++i) {
     const double level = percentile_levels[i];
     accuracy.percentiles[i] = {.level = level,

@@ -73,6 +73,46 @@ struct CampaignStatistics {
   [[nodiscard]] std::vector<double> worst_errors() const;
   /// The mean |error| of each quantity, SI.
   [[nodiscard]] std::vector<double> mean_errors() const;
+
+  /// Counts a finished run by its status.
+  void count(const RunResult& result);
+};
+
+/// The largest |error| of a quantity, and the runs beyond its objective.
+struct ErrorExtremes {
+  std::optional<double> worst;  ///< SI; empty before the first run.
+  RunIndex worst_run;           ///< Of equal ones the first run, whatever their order.
+  std::uint64_t num_beyond = 0;
+
+  /// @return Whether |error| = `magnitude` is within the objective.
+  bool add(RunIndex run, double magnitude, double objective);
+};
+
+/// Statistics of results that are seen once, in any order, and added while others are yet to come:
+/// what CampaignStatistics has, but for the percentiles and the interval of the standard deviation
+/// by the bootstrap, which need all results at once. Memory is fixed; a copy costs little.
+///
+/// Moments are corrected sums about the first value instead of the mean: they agree with those of
+/// StatisticsPasses to 1e-11 of the worst |error| unless the first value is an extreme outlier.
+class RunningStatistics {
+ public:
+  /// @param objectives  As for StatisticsPasses.
+  explicit RunningStatistics(std::vector<double> objectives);
+
+  /// @pre The run was not added before.
+  void add(const RunResult& result);
+  [[nodiscard]] CampaignStatistics statistics() const;
+
+ private:
+  struct Quantity {
+    MomentSums errors;      ///< estimate − truth.
+    MomentSums magnitudes;  ///< |estimate − truth|.
+    ErrorExtremes extremes = {};
+  };
+
+  std::vector<double> objectives_;
+  CampaignStatistics counts_;
+  std::vector<Quantity> quantities_;  ///< Empty before the first run with an estimate.
 };
 
 /// Computes the statistics of a campaign's results in one pass over them, or in several if they are
@@ -98,12 +138,9 @@ class StatisticsPasses {
   struct QuantityPasses {
     ValuePasses errors;      ///< estimate − truth.
     ValuePasses magnitudes;  ///< |estimate − truth|.
-    double worst = 0.0;
-    RunIndex worst_run;
-    std::uint64_t num_beyond = 0;
+    ErrorExtremes extremes;
   };
 
-  void count(const RunResult& result);
   [[nodiscard]] AccuracyStatistic accuracy(const QuantityPasses& quantity) const;
 
   std::vector<double> objectives_;

@@ -224,7 +224,7 @@ def compute_campaign(programs, coordinator):
 def pages_of(coordinator, database):
     page = coordinator.url + "campaigns/hardy2013"
     wait_until("all results on the page",
-               lambda: f"as of {NUM_RUNS} finished runs" in get(page)[1])
+               lambda: f"{NUM_RUNS} of {NUM_RUNS} finished runs" in get(page)[1])
     connection = sqlite3.connect(f"file:{database}?mode=ro", uri=True)
     (num_results,) = connection.execute("SELECT count(*) FROM run_result").fetchone()
     connection.close()

@@ -18,12 +18,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(NextReading, ComesAfterTwoSecondsOrFiftyTimesWhatTheLastTook) {
+TEST(NextReading, ComesAfterTwoSecondsOrHundredAndFiftyTimesWhatTheLastTook) {
   const TimePoint ended{1000s};
   EXPECT_EQ(next_reading(ended, 0s), ended + 2s);
-  EXPECT_EQ(next_reading(ended, 20ms), ended + 2s);
-  EXPECT_EQ(next_reading(ended, 100ms), ended + 8s);
-  EXPECT_EQ(next_reading(ended, 8s), ended + 640s);
+  EXPECT_EQ(next_reading(ended, 10ms), ended + 2s);
+  EXPECT_EQ(next_reading(ended, 100ms), ended + 15s);
+  EXPECT_EQ(next_reading(ended, 8s), ended + 1200s);
 }
 
 /// A reader whose databases are played; counts how often each is read.
@@ -39,9 +39,12 @@ class DetailReaderTest : public ::testing::Test {
                   return events;
                 },
             .read_results =
-                [this](const std::filesystem::path& file) {
+                [this](const std::filesystem::path& file, const CampaignResults* before) {
                   note("results " + file.string());
-                  return CampaignResults{.html = "<p>" + file.string() + "</p>"};
+                  auto results = std::make_shared<CampaignResults>();
+                  results->html = "<p>" + file.string() + "</p>";
+                  results->num_runs = (before == nullptr ? 0 : before->num_runs) + 5;
+                  return results;
                 }};
   }
   void note(const std::string& what) {
@@ -97,6 +100,17 @@ TEST_F(DetailReaderTest, ReadsEventsFurtherAndResultsOnlyIfThereAreMore) {
   EXPECT_GE(whole(reader, "a", subject).events->events.size(), 2U);
 }
 
+// A part of five results at a time.
+TEST_F(DetailReaderTest, ReadsResultsFurtherUntilItHasThoseThatAreFinished) {
+  DetailReader reader(sources());
+  const DetailSubject subject{.file = "a.db", .num_finished = 7};
+  (void)whole(reader, "a", subject);
+  wait_for("results a.db", 2);
+  wait_for("events a.db", 3);
+  EXPECT_EQ(count_of("results a.db"), 2);
+  EXPECT_EQ(whole(reader, "a", subject).results->num_runs, 10U);
+}
+
 TEST_F(DetailReaderTest, BeginsAnewWithAnotherFileOfThatName) {
   DetailReader reader(sources());
   (void)whole(reader, "a", {.file = "a.db"});
@@ -123,11 +137,11 @@ TEST_F(DatabaseResults, AreReadForPeopleAndForPrograms) {
   std::vector<Entry> entries{test::worker_1()};
   for (const Delivery& delivery : test::deliveries_of(0, 3)) entries.emplace_back(delivery);
   (void)store.write(entries);
-  const CampaignResults results = database_sources().read_results(file());
-  EXPECT_EQ(results.failure, "");
-  EXPECT_EQ(results.num_runs, 3U);
-  EXPECT_THAT(results.html, testing::HasSubstr("Accuracy so far"));
-  const auto parameters = nlohmann::json::parse(results.json);
+  const auto results = database_sources().read_results(file(), nullptr);
+  EXPECT_EQ(results->failure, "");
+  EXPECT_EQ(results->num_runs, 3U);
+  EXPECT_THAT(results->html, testing::HasSubstr("Accuracy so far"));
+  const auto parameters = nlohmann::json::parse(results->json);
   ASSERT_EQ(parameters.size(), model().results().quantities.size());
   EXPECT_EQ(parameters[0]["worst"], std::abs(test::result_of(2).error(0)));
   EXPECT_EQ(parameters[0]["worst_run"], 2);
@@ -137,7 +151,8 @@ TEST(DatabaseSources, SayWhyAFileCannotBeRead) {
   const DetailSources sources = database_sources();
   EXPECT_THAT(sources.read_events("/nowhere/a.db", nullptr)->failure,
               testing::HasSubstr("/nowhere/a.db"));
-  EXPECT_THAT(sources.read_results("/nowhere/a.db").failure, testing::HasSubstr("/nowhere/a.db"));
+  EXPECT_THAT(sources.read_results("/nowhere/a.db", nullptr)->failure,
+              testing::HasSubstr("/nowhere/a.db"));
 }
 
 }  // namespace

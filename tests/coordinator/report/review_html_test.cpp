@@ -108,14 +108,6 @@ TEST_F(ReviewHtml, IsTheSameEachTime) {
   EXPECT_EQ(review_html(review_of(store, 40)), review_html(review_of(store, 40)));
 }
 
-TEST_F(ReviewHtml, HasAFragmentForALivePage) {
-  const Store store = store_with(40);
-  const std::string html = live_results_html(read_live_review(store, test::campaign_of(40)));
-  EXPECT_EQ(test::malformed_part(html), "");
-  EXPECT_THAT(html, AllOf(HasSubstr("id=\"accuracy\""), HasSubstr("id=\"errors-title\""),
-                          Not(HasSubstr("<html"))));
-}
-
 TEST_F(ReviewHtml, NamesItsCharts) {
   const Store store = store_with(40);
   std::vector<std::string> names;

@@ -1,0 +1,50 @@
+#include "coordinator/report/live_results.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "coordinator/charts/svg.hpp"
+#include "coordinator/report/html_table.hpp"
+#include "coordinator/report/report_json.hpp"
+#include "coordinator/report/review.hpp"
+#include "coordinator/report/review_charts.hpp"
+#include "coordinator/report/review_tables.hpp"
+
+namespace proofmass::coordinator {
+
+LiveResults::LiveResults(std::vector<double> objectives)
+    : objectives_(std::move(objectives)),
+      statistics_(objectives_),
+      magnitudes_(objectives_.size()) {}
+
+void LiveResults::add(const RunResult& result) {
+  statistics_.add(result);
+  if (!result.has_estimate()) return;
+  for (std::size_t i = 0; i < magnitudes_.size(); ++i) {
+    magnitudes_[i].add(std::abs(result.error(i)));
+  }
+}
+
+std::string LiveResults::html() const {
+  Review review;
+  review.objectives = objectives_;
+  review.results.statistics = statistics();
+  for (std::size_t i = 0; i < magnitudes_.size(); ++i) {
+    QuantityFigures figures{
+        .magnitudes = magnitudes_[i].histogram(), .errors = {}, .worst = {}, .convergence = {}};
+    const AccuracyStatistic& accuracy = review.results.statistics.accuracy[i];
+    if (review.results.statistics.num_estimated > 0) {
+      figures.worst.push_back({.run = accuracy.worst_run, .magnitude = accuracy.worst});
+    }
+    review.figures.push_back(std::move(figures));
+  }
+  return "<h3>Accuracy so far</h3>\n" + html_table(review_accuracy_table(review)) +
+         "<h3>Errors so far</h3>\n<div class=\"overview\">\n" +
+         "<figure>\n" +
+         svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n</div>\n";
+}
+
+std::string LiveResults::json() const { return accuracy_json(objectives_, statistics()); }
+
+}  // namespace proofmass::coordinator

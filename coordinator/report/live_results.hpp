@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "coordinator/report/error_bins.hpp"
+#include "core/campaign/run_result.hpp"
+#include "core/campaign/statistics.hpp"
+
+namespace proofmass::coordinator {
+
+/// What the results of a campaign tell while they come: each is seen once, in any order. Memory is
+/// 17 kB a quantity, so that a copy costs little.
+class LiveResults {
+ public:
+  /// @param objectives  Largest acceptable |error| of each quantity, SI.
+  explicit LiveResults(std::vector<double> objectives);
+
+  /// @param result  Its numbers are in range; the run was not added before.
+  void add(const RunResult& result);
+
+  [[nodiscard]] CampaignStatistics statistics() const { return statistics_.statistics(); }
+
+  /// A fragment of HTML for a page with review_style(): the accuracy table and the histograms of
+  /// |error| of a review report. Headings are of level 3.
+  [[nodiscard]] std::string html() const;
+  /// The statistics of each quantity, a JSON array: the key `parameters` of report_json(), where
+  /// what RunningStatistics lack is null or an empty list.
+  [[nodiscard]] std::string json() const;
+
+ private:
+  std::vector<double> objectives_;
+  RunningStatistics statistics_;
+  std::vector<MagnitudeBins> magnitudes_;  ///< Of each quantity.
+};
+
+}  // namespace proofmass::coordinator

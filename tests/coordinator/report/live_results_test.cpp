@@ -1,0 +1,66 @@
+#include "coordinator/report/live_results.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "coordinator/report/review_tables.hpp"
+#include "core/campaign/model.hpp"
+#include "proto/text/visible_text.hpp"
+#include "tests/coordinator/charts/markup_reading.hpp"
+#include "tests/coordinator/report/review_fixture.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// Results of a database, one after the other.
+class LiveResultsTest : public test::ReviewTest {
+ protected:
+  static LiveResults results_in(const Store& store) {
+    LiveResults results(test::campaign_of(1).objectives());
+    store.for_each_result([&](const RunResult& result) { results.add(result); });
+    return results;
+  }
+};
+
+// A review reads the same results in passes, and its statistics are of another method.
+TEST_F(LiveResultsTest, ShowTheTableOfAReview) {
+  const Store store = store_with(150);
+  const std::string html = results_in(store).html();
+  EXPECT_EQ(test::malformed_part(html), "");
+  EXPECT_THAT(html, AllOf(HasSubstr("id=\"accuracy\""), HasSubstr("id=\"errors-title\""),
+                          Not(HasSubstr("<html"))));
+  for (const auto& row : review_accuracy_table(review_of(store, 150)).rows) {
+    for (const auto& cell : row) {
+      EXPECT_THAT(html, HasSubstr(">" + wire::markup_text(cell.text) + "<"));
+    }
+  }
+  EXPECT_THAT(html, HasSubstr("50 runs exceed the objective"));  // 101 to 150 % of it.
+}
+
+TEST_F(LiveResultsTest, TellProgramsWhatOnePassCannotKnow) {
+  const auto parameters = nlohmann::json::parse(results_in(store_with(40)).json());
+  ASSERT_EQ(parameters.size(), model().results().quantities.size());
+  const auto& first = parameters[0];
+  EXPECT_EQ(first["worst_run"], 39);
+  EXPECT_DOUBLE_EQ(first["mean"], 0.205 * first["objective"].get<double>());  // 1 to 40 %.
+  EXPECT_TRUE(first["mean_interval"].is_array());
+  EXPECT_TRUE(first["percentiles"].empty());
+  EXPECT_TRUE(first["standard_deviation_interval"].is_null());
+}
+
+TEST(LiveResults, AreEmptyAtFirst) {
+  const LiveResults results(test::campaign_of(1).objectives());
+  EXPECT_EQ(test::malformed_part(results.html()), "");
+  EXPECT_THAT(results.html(), HasSubstr("no data"));
+  EXPECT_TRUE(nlohmann::json::parse(results.json())[0]["worst"].is_null());
+}
+
+}  // namespace
+}  // namespace proofmass::coordinator
