@@ -165,7 +165,8 @@ PageContent campaign_page(const CampaignSnapshot& campaign, const CampaignDetail
           .to_root = "../",
           .live = fmt::format("<p class=\"large\">{}</p>\n",
                               progress_bar(status.num_done, status.num_runs, "progress")) +
-                  facts_of(campaign) + notes_list(notes_about(status)) + results_of(details, status.num_done, now) +
+                  facts_of(campaign) + notes_list(notes_about(status)) +
+                  results_of(details, status.num_done, now) +
                   history_of(details, campaign, request)};
 }
 

@@ -31,27 +31,32 @@ inline constexpr BandPass no_filter{{1.0, 0.0, 0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0
 [[nodiscard]] std::complex<double> response(const BandPass& filter, double frequency_hz,
                                             double sample_period_s);
 
-/// Memory of a Biquad (transposed direct form II).
-struct BiquadState {
-  double s1 = 0.0;
-  double s2 = 0.0;
+/// Memory of a Biquad (transposed direct form II), of one signal or of those in a vector T.
+template <typename T>
+struct BiquadStateOf {
+  T s1{};
+  T s2{};
 
-  double advance(const Biquad& filter, double x) {
-    const double y = filter.b0 * x + s1;
+  T advance(const Biquad& filter, T x) {
+    const T y = filter.b0 * x + s1;
     s1 = filter.b1 * x - filter.a1 * y + s2;
     s2 = filter.b2 * x - filter.a2 * y;
     return y;
   }
 };
 
-/// Memory of a BandPass.
-struct BandPassState {
-  BiquadState high_pass;
-  BiquadState low_pass;
+/// Memory of a BandPass, likewise.
+template <typename T>
+struct BandPassStateOf {
+  BiquadStateOf<T> high_pass;
+  BiquadStateOf<T> low_pass;
 
-  double advance(const BandPass& filter, double x) {
+  T advance(const BandPass& filter, T x) {
     return low_pass.advance(filter.low_pass, high_pass.advance(filter.high_pass, x));
   }
 };
+
+using BiquadState = BiquadStateOf<double>;
+using BandPassState = BandPassStateOf<double>;
 
 }  // namespace proofmass

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 #include "core/error.hpp"
 #include "core/math/elementary.hpp"
@@ -129,43 +130,52 @@ Rotations rotations(const std::vector<double>& lines_hz, double sample_period_s,
   return lines;
 }
 
-/// Filters Φ (ΦᵀΦ)⁻¹ backwards from the end of [first, first + num_samples) to its start.
-template <std::size_t num_outputs>
-void filter_backwards(const LineFit& fit, std::span<Rotation> lines, const double* coefficients,
-                      std::size_t first, std::size_t num_samples, BandPassState* states,
-                      double* weights) {
-  const BandPass filter = fit.filter;
-  std::array<BandPassState, num_outputs> state;
-  std::copy_n(states, num_outputs, state.begin());
+}  // namespace
+
+/// Filters Φ (ΦᵀΦ)⁻¹ backwards from the end of a block to its start.
+template <std::size_t num_fit_lines>
+void LineWeights::filter_backwards(std::size_t block, States& states, double* weights) const {
+  constexpr std::size_t num_outputs = 2 * num_fit_lines;
+  const auto load = [](const double* from) {
+    Pair pair;
+    std::memcpy(&pair, from, sizeof(pair));
+    return pair;
+  };
+  const BandPass filter = fit_.filter;
+  const std::size_t first = block * block_size;
+  const std::size_t num_samples = samples_in(block);
+  Rotations rotating = rotations(lines_hz_, fit_.sample_period_s, first + num_samples - 1);
+  const auto lines = std::span(rotating).first(lines_hz_.size());
+  std::array<BandPassStateOf<Pair>, num_fit_lines> state;
+  std::copy_n(states.begin(), num_fit_lines, state.begin());
   for (std::size_t k = num_samples; k-- > 0;) {
-    std::array<double, num_outputs> row{};
-    const double* coefficient = coefficients;
+    std::array<Pair, num_fit_lines> row{};
+    const double* coefficient = coefficients_.data();
     for (auto& [now, step] : lines) {
-      for (std::size_t i = 0; i < num_outputs; ++i) {
-        row[i] += now.cosine * coefficient[i] + now.sine * coefficient[num_outputs + i];
+      for (std::size_t i = 0; i < num_fit_lines; ++i) {
+        row[i] += now.cosine * load(coefficient + 2 * i) +
+                  now.sine * load(coefficient + num_outputs + 2 * i);
       }
       coefficient += 2 * num_outputs;
       now = {now.sine * step.cosine - now.cosine * step.sine,
              now.cosine * step.cosine + now.sine * step.sine};
     }
-    const double kept = first + k >= fit.num_dropped ? 1.0 : 0.0;
-    for (std::size_t i = 0; i < num_outputs; ++i) {
-      weights[k * num_outputs + i] = state[i].advance(filter, kept * row[i]);
+    const double kept = first + k >= fit_.num_dropped ? 1.0 : 0.0;
+    for (std::size_t i = 0; i < num_fit_lines; ++i) {
+      const Pair output = state[i].advance(filter, kept * row[i]);
+      std::memcpy(weights + k * num_outputs + 2 * i, &output, sizeof(output));
     }
   }
-  std::copy_n(state.begin(), num_outputs, states);
+  std::copy_n(state.begin(), num_fit_lines, states.begin());
 }
-
-}  // namespace
 
 void LineWeights::run_backwards(std::size_t block, States& states,
                                 std::span<double> weights) const {
-  const std::size_t first = block * block_size;
-  const std::size_t num_samples = samples_in(block);
-  Rotations lines = rotations(lines_hz_, fit_.sample_period_s, first + num_samples - 1);
-  const auto run = num_fit_lines() == 1 ? filter_backwards<2> : filter_backwards<4>;
-  run(fit_, std::span(lines).first(lines_hz_.size()), coefficients_.data(), first, num_samples,
-      states.data(), weights.data());
+  if (num_fit_lines() == 1) {
+    filter_backwards<1>(block, states, weights.data());
+  } else {
+    filter_backwards<2>(block, states, weights.data());
+  }
 }
 
 void LineWeights::refine(const Marks& coarse, std::size_t stretch, Marks& fine,

@@ -50,10 +50,13 @@ class LineWeights {
  private:
   friend class WeightReader;
 
-  /// Filter memory of each output (cosine and sine of one or two fit lines), running backwards.
-  using States = std::array<BandPassState, 4>;
+  /// The two outputs of a fit line, cosine and sine: a vector that every processor has.
+  using Pair [[gnu::vector_size(16)]] = double;
+  /// Filter memory of one or two fit lines, running backwards.
+  using States = std::array<BandPassStateOf<Pair>, 2>;
 
-  static constexpr std::size_t num_marks_max = 128;
+  /// As many as a record of 20 orbits at 4 Hz has blocks, so that its weights take one pass.
+  static constexpr std::size_t num_marks_max = 256;
 
   /// States at the ends of the stretches into which consecutive blocks are cut. Their number has a
   /// bound, so that the memory does not grow with the record.
@@ -70,6 +73,8 @@ class LineWeights {
   };
 
   void solve_design();
+  template <std::size_t num_fit_lines>
+  void filter_backwards(std::size_t block, States& states, double* weights) const;
   void run_backwards(std::size_t block, States& states, std::span<double> weights) const;
   /// Marks of one stretch of coarser ones.
   void refine(const Marks& coarse, std::size_t stretch, Marks& fine,
@@ -96,8 +101,8 @@ class WeightReader {
   void fill_block(std::size_t block, std::span<double> weights);
 
  private:
-  /// Enough for 128⁴ blocks, 4,000 years at 4 Hz.
-  static constexpr std::size_t num_levels = 3;
+  /// Enough for 256³ blocks, 270 years at 4 Hz.
+  static constexpr std::size_t num_levels = 2;
 
   const LineWeights& weights_;
   std::array<LineWeights::Marks, num_levels> levels_;  ///< Each of one stretch of that before it.

@@ -184,13 +184,13 @@ TEST(LineWeights, PhasorOfASineIsTheFiltersGainTimesItsAmplitude) {
 }
 
 // A record of so many blocks that their states are found in three steps; summed as it goes, for its
-// 34 million samples. The frequency and its product with the time are each rounded by ε/2 at most,
+// 136 million samples. The frequency and its product with the time are each rounded by ε/2 at most,
 // so that a phase after so many turns is known to ε of them.
-TEST(LineWeights, PhasorOfASineIsTheFiltersGainAfterAHundredDays) {
+TEST(LineWeights, PhasorOfASineIsTheFiltersGainAfterAYear) {
   constexpr double line_hz = 0.01;
-  constexpr std::size_t num_turns = 84'000;
+  constexpr std::size_t num_turns = 340'000;
   const LineWeights weights(line_fit(400 * num_turns, 7000, line_hz));
-  ASSERT_GT(weights.num_blocks(), 128U * 128U);
+  ASSERT_GT(weights.num_blocks(), 256U * 256U);
   WeightReader reader(weights);
   std::vector<double> values(2 * LineWeights::block_size);
   const std::vector<double> cycle = sine_record(400, line_hz, 3.0, 0.4);
@@ -256,12 +256,12 @@ std::vector<double> block_of(const LineWeights& weights, std::size_t block) {
 }
 
 TEST(LineWeights, AreTheSameBlockByBlockInAnyOrder) {
-  const LineWeights weights(line_fit(300 * LineWeights::block_size + 5, 400, 9.88e-3));
-  ASSERT_EQ(weights.num_blocks(), 301U);  // Three in a stretch.
-  EXPECT_EQ(weights.samples_in(300), 5U);
+  const LineWeights weights(line_fit(700 * LineWeights::block_size + 5, 400, 9.88e-3));
+  ASSERT_EQ(weights.num_blocks(), 701U);  // Three in a stretch.
+  EXPECT_EQ(weights.samples_in(700), 5U);
   WeightReader reader(weights);
   std::vector<double> values(2 * LineWeights::block_size);
-  for (const std::size_t block : {0U, 1U, 2U, 3U, 300U, 299U, 150U, 0U, 2U, 1U}) {
+  for (const std::size_t block : {0U, 1U, 2U, 3U, 700U, 699U, 350U, 0U, 2U, 1U}) {
     reader.fill_block(block, values);
     const std::vector<double> alone = block_of(weights, block);
     EXPECT_TRUE(std::equal(alone.begin(), alone.end(), values.begin())) << block;
