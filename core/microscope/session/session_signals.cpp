@@ -40,7 +40,10 @@ SessionSignals::SessionSignals(const Scenario& scenario, const Session& session,
   environment_.begin_session(static_cast<double>(num_record_) * sample_period_s_);
   num_excitations_ = session.excitations.size();
   PROOFMASS_EXPECT(num_excitations_ <= num_excitations_max);
-  for (std::size_t i = 0; i < num_excitations_; ++i) excitations_[i] = session.excitations[i];
+  for (std::size_t i = 0; i < num_excitations_; ++i) {
+    excitations_[i] = session.excitations[i];
+    if (excitations_[i].kind == ExcitationKind::attitude) commands_attitude_ = true;
+  }
 }
 
 SessionSignals::Reference SessionSignals::reference_at_start() const {
@@ -77,9 +80,11 @@ void SessionSignals::advance(const SamplePhases& phases, SharedSample& sample) {
   if (turns_environment_) [[unlikely]]
     turn(reference.attitude_IR, sample.external_S);
   if (num_excitations_ > 0) excite(phases, sample);
-  commanded_.correct(gains_, sample.attitude_command_S_rad);
-  sample.commanded = commanded_;
-  commanded_.predict(gains_, {}, sample.omega_IR_R);
+  if (commands_attitude_) {
+    commanded_.correct(gains_, sample.attitude_command_S_rad);
+    sample.commanded = commanded_;
+    commanded_.predict(gains_, {}, sample.omega_IR_R);
+  }
   ++next_;
 }
 

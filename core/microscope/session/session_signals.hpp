@@ -120,6 +120,7 @@ class SessionSignals {
   std::int64_t next_;
   std::size_t num_excitations_ = 0;
   std::array<Excitation, num_excitations_max> excitations_{};
+  bool commands_attitude_ = false;  ///< Otherwise commanded_ is 0 and remains so.
   AttitudeEstimator<double> commanded_;
 };
 
