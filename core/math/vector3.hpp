@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <limits>
 
@@ -94,6 +95,12 @@ PROOFMASS_INLINE Vector3<T> clamped(const Vector3<T>& a, const T& limit) {
 template <typename T>
 PROOFMASS_INLINE Vector3<T> broadcast(const Vector3<double>& a) {
   return {T(a.x), T(a.y), T(a.z)};
+}
+/// One of which each lane has its own already.
+template <typename T>
+  requires(!std::same_as<T, double>)
+PROOFMASS_INLINE const Vector3<T>& broadcast(const Vector3<T>& a) {
+  return a;
 }
 
 /// A 3 × 3 matrix, rows first.

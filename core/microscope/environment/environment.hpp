@@ -45,10 +45,12 @@ struct EnvironmentConfig {
 
 /// Non-gravitational accelerations of the satellite from outside. The name of a variable says the
 /// frame of both vectors: `external_S`.
-struct ExternalAcceleration {
-  Vector3<double> linear_m_s2;     ///< Γ_ext of the satellite's centre of mass.
-  Vector3<double> angular_rad_s2;  ///< Ω̇ that external torques cause.
+template <typename T>
+struct ExternalAccelerationOf {
+  Vector3<T> linear_m_s2;     ///< Γ_ext of the satellite's centre of mass.
+  Vector3<T> angular_rad_s2;  ///< Ω̇ that external torques cause.
 };
+using ExternalAcceleration = ExternalAccelerationOf<double>;
 
 /// A row of an environment file, whose columns the fields are named after. In S.
 struct EnvironmentRow {

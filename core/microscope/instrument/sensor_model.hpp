@@ -23,7 +23,7 @@ struct SensorConfig {
 template <typename T>
 struct SatelliteMotion {
   Vector3<T> acceleration_S;  ///< Γ_sat: non-gravitational acceleration of O_sat, m/s².
-  double gradient_s2 = 0.0;   ///< μ/r³; the same for every lane.
+  T gradient_s2{};            ///< μ/r³.
   Vector3<T> radial_S;        ///< û: unit vector from the Earth's centre to the satellite.
   Vector3<T> omega_IS_S;      ///< Ω, rad/s.
   Vector3<T> omega_dot_IS_S;  ///< Ω̇, rad/s².
@@ -34,11 +34,13 @@ enum class TestMasses : std::uint8_t { at_rest, moving };
 
 /// Factors of the motion q_S(t) = motion_direction_S·(position, velocity, acceleration) that a
 /// session commands of a test mass. All are 0 where no mass moves.
-struct MassMotionPhase {
-  double position_m = 0.0;         ///< Δ_TM sin(2π f t).
-  double velocity_m_s = 0.0;       ///< Its first derivative.
-  double acceleration_m_s2 = 0.0;  ///< Its second.
+template <typename T>
+struct MassMotionPhaseOf {
+  T position_m{};         ///< Δ_TM sin(2π f t).
+  T velocity_m_s{};       ///< Its first derivative.
+  T acceleration_m_s2{};  ///< Its second.
 };
+using MassMotionPhase = MassMotionPhaseOf<double>;
 
 /// Constants of a sensor and its mass during a session.
 template <typename T>
@@ -57,10 +59,10 @@ struct SensorModel {
 ///
 /// @tparam masses  `at_rest` only with a motion that is 0; then it makes no difference to the
 /// value.
-template <TestMasses masses = TestMasses::moving, typename T>
+template <TestMasses masses = TestMasses::moving, typename T, typename Shared>
 PROOFMASS_INLINE Vector3<T> kinematic_acceleration(const SensorModel<T>& sensor,
                                                    const SatelliteMotion<T>& satellite,
-                                                   const MassMotionPhase& motion) {
+                                                   const MassMotionPhaseOf<Shared>& motion) {
   Vector3<T> r_S = sensor.rest_position_S_m;
   if constexpr (masses == TestMasses::moving) {
     r_S += T(motion.position_m) * sensor.motion_direction_S;

@@ -13,11 +13,11 @@ namespace proofmass {
 /// [T] v = (μ/r³)(3 û(û·v) − v), s⁻² times the unit of v. Earth is a point mass, and the next
 /// order, |v|/r, is left out: 1e-10 for a test mass.
 ///
-/// @param gradient_s2  μ/r³; the same for every lane.
+/// @param gradient_s2  μ/r³, for every lane the same (a double) or its own.
 /// @param radial_F     û, unit vector from the Earth's centre to the satellite.
 /// @param v_F          From the satellite's centre of mass to the point at which [T] acts.
-template <typename T>
-PROOFMASS_INLINE Vector3<T> gravity_gradient(double gradient_s2, const Vector3<T>& radial_F,
+template <typename T, typename Gradient>
+PROOFMASS_INLINE Vector3<T> gravity_gradient(const Gradient& gradient_s2, const Vector3<T>& radial_F,
                                              const Vector3<T>& v_F) {
   const T along = T(3.0) * dot(radial_F, v_F);
   return T(gradient_s2) * (along * radial_F - v_F);
@@ -36,8 +36,8 @@ PROOFMASS_INLINE Vector3<T> inertia_gradient(const Vector3<T>& omega_IF_F,
 
 /// The matrix [T] − [In] itself, s⁻²; arguments as above. It multiplies components in F and yields
 /// components in F. [In] = ΩΩᵀ − |Ω|² + [Ω̇∧], whose last part is antisymmetric.
-template <typename T>
-PROOFMASS_INLINE Matrix3<T> gradient_matrix(double gradient_s2, const Vector3<T>& radial_F,
+template <typename T, typename Gradient>
+PROOFMASS_INLINE Matrix3<T> gradient_matrix(const Gradient& gradient_s2, const Vector3<T>& radial_F,
                                             const Vector3<T>& omega_IF_F,
                                             const Vector3<T>& omega_dot_IF_F) {
   const T g = T(gradient_s2);

@@ -19,22 +19,25 @@
 namespace proofmass {
 
 /// What every run of a campaign sees alike at one sample of a session. R is the reference frame
-/// that the attitude loop holds: I turned about Y at the session's spin rate.
-struct SharedSample {
-  double gradient_s2 = 0.0;        ///< μ/r³.
-  Vector3<double> radial_I;        ///< û: unit vector from the Earth's centre to the satellite.
-  Vector3<double> radial_R;        ///< The same vector.
-  Quaternion<double> attitude_IR;  ///< Of the reference.
-  Vector3<double> omega_IR_R;      ///< Of the reference, rad/s; constant.
+/// that the attitude loop holds: I turned about Y at the session's spin rate. T holds a number of each
+/// lane where lanes are in different sessions.
+template <typename T>
+struct SharedSampleOf {
+  T gradient_s2{};            ///< μ/r³.
+  Vector3<T> radial_I;        ///< û: unit vector from the Earth's centre to the satellite.
+  Vector3<T> radial_R;        ///< The same vector.
+  Quaternion<T> attitude_IR;  ///< Of the reference.
+  Vector3<T> omega_IR_R;      ///< Of the reference, rad/s; constant.
   /// Of a harmonic environment the components in R: what tilts S against R leaves them unchanged.
-  ExternalAcceleration external_S;
-  Vector3<double> drag_free_command_S_m_s2;  ///< C_cal, added to the drag-free loop's input.
-  Vector3<double> attitude_command_S_rad;    ///< Added to the star tracker's output.
+  ExternalAccelerationOf<T> external_S;
+  Vector3<T> drag_free_command_S_m_s2;  ///< C_cal, added to the drag-free loop's input.
+  Vector3<T> attitude_command_S_rad;    ///< Added to the star tracker's output.
   /// What the attitude command alone makes of the on-board estimate, which is linear: the ground
   /// takes it out again.
-  AttitudeEstimator<double> commanded;
-  MassMotionPhase mass_motion;  ///< Of the moving test masses.
+  AttitudeEstimator<T> commanded;
+  MassMotionPhaseOf<T> mass_motion;  ///< Of the moving test masses.
 };
+using SharedSample = SharedSampleOf<double>;
 
 /// The sines and cosines of a sample: functions of its time alone, which a batch computes for many
 /// samples at once.

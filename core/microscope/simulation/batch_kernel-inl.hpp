@@ -13,59 +13,16 @@
 #include <utility>
 
 #include "core/microscope/simulation/batch-inl.hpp"
+#include "core/microscope/simulation/batch_gather-inl.hpp"
 #include "core/microscope/simulation/batch_kernel.hpp"
 #include "core/microscope/simulation/batch_noise-inl.hpp"
 #include "core/microscope/simulation/batch_signals-inl.hpp"
+#if PROOFMASS_KERNEL_VECTORS == 1
+#include "core/microscope/simulation/batch_mixed-inl.hpp"
+#endif
 
 namespace proofmass {
 namespace {
-
-/// Gathers one number of each lane.
-template <typename Get>
-HWY_INLINE Batch gather(const Get& get) {
-  alignas(64) double values[num_lanes];
-  for (std::size_t lane = 0; lane < num_lanes; ++lane) values[lane] = get(lane);
-  return load(values);
-}
-
-template <typename Get>
-HWY_INLINE Vector3<Batch> gather_vector(const Get& get) {
-  return {gather([&](std::size_t lane) { return get(lane).x; }),
-          gather([&](std::size_t lane) { return get(lane).y; }),
-          gather([&](std::size_t lane) { return get(lane).z; })};
-}
-
-template <typename Get>
-HWY_INLINE Matrix3<Batch> gather_matrix(const Get& get) {
-  return {{{gather_vector([&](std::size_t lane) { return get(lane).row[0]; }),
-            gather_vector([&](std::size_t lane) { return get(lane).row[1]; }),
-            gather_vector([&](std::size_t lane) { return get(lane).row[2]; })}}};
-}
-
-using ConstantsOfLanes = std::span<const LoopConstants<double>, num_lanes>;
-
-HWY_INLINE SensorModel<Batch> gather_sensor(ConstantsOfLanes constants, std::size_t k) {
-  const auto sensor = [&](std::size_t lane) -> const SensorModel<double>& {
-    return constants[lane].sensors[k];
-  };
-  return {gather_vector([&](std::size_t lane) { return sensor(lane).rest_position_S_m; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).motion_direction_S; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).parasitic_K_m_s2; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).offset_K_m_s2; }),
-          gather_matrix([&](std::size_t lane) { return sensor(lane).sensitivity_KS; }),
-          gather_vector([&](std::size_t lane) { return sensor(lane).quadratic_s2_m; })};
-}
-
-HWY_INLINE LoopConstants<Batch> gather_constants(ConstantsOfLanes of) {
-  return {{gather_sensor(of, 0), gather_sensor(of, 1)},
-          {gather([&](std::size_t lane) { return of[lane].drag_free_weight[0]; }),
-           gather([&](std::size_t lane) { return of[lane].drag_free_weight[1]; })},
-          gather_vector([&](std::size_t lane) { return of[lane].subtracted_bias_S_m_s2; }),
-          gather_matrix([&](std::size_t lane) { return of[lane].thrust_matrix; }),
-          gather_vector([&](std::size_t lane) { return of[lane].angular_bias_S_rad_s2; }),
-          gather_vector([&](std::size_t lane) { return of[lane].star_tracker_bias_S_rad; }),
-          of[0].sensor_range_m_s2};
-}
 
 HWY_INLINE NoiseStates<Batch> gather_states(
     std::span<const NoiseStates<double>, num_lanes> states) {
@@ -90,12 +47,13 @@ HWY_INLINE std::span<T, num_lanes> lanes_of(std::span<T, batch_lanes> all, std::
   return all.subspan(first_lane).template first<num_lanes>();
 }
 
-HWY_INLINE BatchNoise make_noise(const BatchSession& session, std::size_t first_lane) {
-  return {session, first_lane,
+HWY_INLINE BatchNoise<SharedStreams> make_noise(const BatchSession& session,
+                                                std::size_t first_lane) {
+  return {session, SharedStreams(*session.streams), first_lane,
           gather_states(lanes_of(std::span(session.noise_states), first_lane))};
 }
 
-using Group = LaneGroup<Batch, BatchNoise>;
+using Group = LaneGroup<Batch, BatchNoise<SharedStreams>>;
 
 template <std::size_t... g>
 HWY_INLINE std::array<Group, num_groups> make_groups(const BatchSession& session,
@@ -181,11 +139,18 @@ void PROOFMASS_NAME(record_batch_,
   }
 }
 
+#if PROOFMASS_KERNEL_VECTORS == 1
+void PROOFMASS_NAME(record_mixed_, PROOFMASS_KERNEL_SET)(std::span<const BatchSession> sessions,
+                                                         std::span<SessionOutcomes> outcomes) {
+  MixedLanes(sessions, outcomes).run();
+}
+#endif
+
 double PROOFMASS_NAME(make_noise_, PROOFMASS_KERNEL_SET)(const BatchSession& session,
                                                          std::size_t num_samples, NoiseWork work) {
   Batch sum;
   for (std::size_t first_lane = 0; first_lane < batch_lanes; first_lane += num_lanes) {
-    BatchNoise noise = make_noise(session, first_lane);
+    auto noise = make_noise(session, first_lane);
     for (std::size_t k = 0; k < num_samples; ++k) {
       if (work == NoiseWork::deviates) {
         sum = sum + noise.next_deviate();

@@ -6,6 +6,8 @@ namespace proofmass {
 
 #if defined(__aarch64__)
 
+MixedKernel mixed_kernel(InstructionSet /*set*/, std::size_t /*num_runs*/) { return nullptr; }
+
 BatchKernel batch_kernel(InstructionSet set, std::size_t /*num_runs*/) {
   PROOFMASS_EXPECT(set == InstructionSet::neon);
   return record_batch_neon;
@@ -17,6 +19,12 @@ BatchNoiseKernel batch_noise_kernel(InstructionSet set) {
 }
 
 #else
+
+MixedKernel mixed_kernel(InstructionSet set, std::size_t num_runs) {
+  if (set == InstructionSet::avx2 && num_runs <= 2) return record_mixed_avx2_narrow;
+  if (set == InstructionSet::avx512 && num_runs <= 4) return record_mixed_avx512_narrow;
+  return nullptr;
+}
 
 BatchKernel batch_kernel(InstructionSet set, std::size_t num_runs) {
   PROOFMASS_EXPECT(set != InstructionSet::scalar);

@@ -29,10 +29,21 @@ struct BatchSession {
   const void* progress_context = nullptr;
 };
 
+using SessionOutcomes = std::array<SessionOutcome, batch_lanes>;  ///< Of each lane.
+
 /// record_session() for batch_lanes runs at once, into one outcome a lane, the same bits as for
 /// each alone.
 using BatchKernel = void (*)(const BatchSession& session,
                              std::span<SessionOutcome, batch_lanes> outcomes);
+
+/// The same for several sessions of the same runs, which are computed side by side as far as there
+/// are lanes, into the outcomes of each session.
+///
+/// @param sessions  Of the same runs, noise, gains and settling; the first one's progress is called
+///                  with the record samples done in all of them. They begin in this order: the
+///                  longest first takes the least time.
+using MixedKernel = void (*)(std::span<const BatchSession> sessions,
+                             std::span<SessionOutcomes> outcomes);
 
 // One for each instruction set that has more than one lane; compiled with that set's flags, to be
 // called only where available_instruction_sets() holds it. Those of other processors than the one
@@ -51,7 +62,16 @@ void record_batch_avx2_narrow(const BatchSession& session,
 void record_batch_avx512_narrow(const BatchSession& session,
                                 std::span<SessionOutcome, batch_lanes> outcomes);
 
-/// The kernel that takes the least time for so many runs.
+void record_mixed_avx2_narrow(std::span<const BatchSession> sessions,
+                              std::span<SessionOutcomes> outcomes);
+void record_mixed_avx512_narrow(std::span<const BatchSession> sessions,
+                                std::span<SessionOutcomes> outcomes);
+
+/// The kernel that computes several sessions of so few runs side by side; null if the set has none,
+/// or no lanes for a second session.
+[[nodiscard]] MixedKernel mixed_kernel(InstructionSet set, std::size_t num_runs);
+
+/// The kernel that takes the least time for so many runs, one session after the other.
 /// @pre set is not `scalar`; 1 ≤ num_runs ≤ batch_lanes.
 [[nodiscard]] BatchKernel batch_kernel(InstructionSet set, std::size_t num_runs);
 

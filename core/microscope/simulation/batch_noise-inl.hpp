@@ -17,6 +17,21 @@ struct WordBatch {
   hn::Vec<Words> part[num_vectors];
 };
 
+/// Streams and block of a group whose lanes are in the same session.
+class SharedStreams {
+ public:
+  HWY_INLINE explicit SharedStreams(const NoiseStreams& streams) : streams_(streams) {}
+  HWY_INLINE hn::Vec<Words> stream(std::size_t channel) const {
+    return hn::Set(Words(), std::uint64_t{streams_[channel]});
+  }
+  HWY_INLINE hn::Vec<Words> block() const { return hn::Set(Words(), std::uint64_t{block_}); }
+  HWY_INLINE void next_block() { ++block_; }
+
+ private:
+  const NoiseStreams& streams_;
+  std::uint32_t block_ = 0;
+};
+
 /// Philox4x32-10 [Salmon2011] of counters (block, stream, run) for each run; what is above 32 bits
 /// of a word means nothing.
 ///
@@ -42,8 +57,8 @@ class BatchPhilox {
   }
 
   /// Goes to a block of every stream.
-  HWY_INLINE void begin(std::uint32_t block) {
-    block_product_ = hn::Set(Words(), std::uint64_t{first_factor} * block);
+  HWY_INLINE void begin(hn::Vec<Words> block) {
+    block_product_ = multiply(first_factor, block);
     for (std::size_t i = 0; i < num_vectors; ++i) {
       const auto c2 = hn::Xor3(high(block_product_), run_high_.part[i], key_[0][1]);
       const auto product = multiply(second_factor, c2);
@@ -54,7 +69,7 @@ class BatchPhilox {
   }
 
   /// The words of two pairs of deviates: those that make radii, and those that make angles.
-  HWY_INLINE void make(std::uint32_t stream, std::uint32_t (&radius_words)[2][num_lanes],
+  HWY_INLINE void make(hn::Vec<Words> stream, std::uint32_t (&radius_words)[2][num_lanes],
                        std::uint32_t (&angle_words)[2][num_lanes]) const {
     State states[num_vectors];
     for (std::size_t i = 0; i < num_vectors; ++i) states[i] = make_vector(stream, i);
@@ -88,9 +103,8 @@ class BatchPhilox {
     }
   }
 
-  HWY_INLINE State make_vector(std::uint32_t stream, std::size_t i) const {
-    const auto stream_word = hn::Set(Words(), std::uint64_t{stream});
-    const auto second = multiply(first_factor, hn::Xor(run_word_.part[i], stream_word));
+  HWY_INLINE State make_vector(W stream, std::size_t i) const {
+    const auto second = multiply(first_factor, hn::Xor(run_word_.part[i], stream));
     const auto c2 = hn::Xor3(high(second), block_product_, key_[1][1]);
     const auto third = multiply(second_factor, c2);
     State state{.c0 = hn::Xor3(high(third), c1_.part[i], key_[2][0]),
@@ -181,13 +195,15 @@ HWY_INLINE F radius(hn::Vec<UnsignedWords> word) {
 }
 
 /// SessionNoise for a group of runs.
+template <typename Streams>
 class BatchNoise {
  public:
+  /// @param session     Of these runs, with the noise of all their sessions.
   /// @param first_lane  Of the group, in the session's lanes.
-  HWY_INLINE BatchNoise(const BatchSession& session, std::size_t first_lane,
+  HWY_INLINE BatchNoise(const BatchSession& session, const Streams& streams, std::size_t first_lane,
                         const NoiseStates<Batch>& states)
       : model_(*session.noise),
-        streams_(*session.streams),
+        streams_(streams),
         philox_(philox_of(session, first_lane)),
         states_(states) {}
 
@@ -199,6 +215,9 @@ class BatchNoise {
     }
     return block_[next_in_block_++];
   }
+
+  HWY_INLINE Streams& streams() { return streams_; }
+  HWY_INLINE NoiseStates<Batch>& states() { return states_; }
 
   /// Makes a sample's deviates for all channels and returns that of the first.
   HWY_INLINE Batch next_deviate() {
@@ -236,9 +255,9 @@ class BatchNoise {
   HWY_NOINLINE void make_deviates() {
     alignas(64) std::uint32_t radius_words[num_noise_channels][2][num_lanes];
     alignas(64) std::uint32_t angle_words[num_noise_channels][2][num_lanes];
-    philox_.begin(num_blocks_);
+    philox_.begin(streams_.block());
     for (std::size_t channel = 0; channel < num_noise_channels; ++channel) {
-      philox_.make(streams_[channel], radius_words[channel], angle_words[channel]);
+      philox_.make(streams_.stream(channel), radius_words[channel], angle_words[channel]);
     }
     const Floats floats;
     const UnsignedWords unsigned_words;
@@ -255,7 +274,7 @@ class BatchNoise {
       hn::Store(hn::Mul(r, cosine), floats, &cosines_[0][0][0] + i);
       hn::Store(hn::Mul(r, sine), floats, &sines_[0][0][0] + i);
     }
-    ++num_blocks_;
+    streams_.next_block();
     next_in_block_ = 0;
   }
 
@@ -269,14 +288,13 @@ class BatchNoise {
   }
 
   const NoiseModel& model_;
-  const NoiseStreams& streams_;
+  Streams streams_;
   BatchPhilox philox_;
   NoiseStates<Batch> states_;
   /// Deviates of samples 0 and 2, and of samples 1 and 3 of a block, by channel.
   alignas(64) float cosines_[num_noise_channels][2][num_lanes];
   alignas(64) float sines_[num_noise_channels][2][num_lanes];
   OfSamples<SampleNoise<Batch>> block_;
-  std::uint32_t num_blocks_ = 0;
   std::size_t next_in_block_ = samples_per_noise_block;
 };
 

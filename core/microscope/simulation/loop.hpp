@@ -83,12 +83,13 @@ struct Loop {
   }
 
   /// With Γ_sat = Γ_propu + Γ_ext.
+  template <typename Shared>
   PROOFMASS_INLINE SatelliteMotion<T> motion(const LoopConstants<T>& constants,
-                                             const SharedSample& shared,
+                                             const SharedSampleOf<Shared>& shared,
                                              const SampleNoise<T>& noise) const {
     return {
         .acceleration_S = thrust_S(constants, noise) + broadcast<T>(shared.external_S.linear_m_s2),
-        .gradient_s2 = shared.gradient_s2,
+        .gradient_s2 = T(shared.gradient_s2),
         .radial_S = to_target(attitude_IS, broadcast<T>(shared.radial_I)),
         .omega_IS_S = omega_IS_S,
         .omega_dot_IS_S =
@@ -96,15 +97,17 @@ struct Loop {
   }
 
   /// True angles from the reference to the satellite, rad.
-  PROOFMASS_INLINE Vector3<T> angle_RS_S(const SharedSample& shared) const {
+  template <typename Shared>
+  PROOFMASS_INLINE Vector3<T> angle_RS_S(const SharedSampleOf<Shared>& shared) const {
     const Quaternion<T> reference_IR{T(shared.attitude_IR.scalar),
                                      broadcast<T>(shared.attitude_IR.vector)};
     return error_angles(conjugate(reference_IR) * attitude_IS);
   }
 
   /// The fused angles that the star tracker reports, with what the session adds to them, rad.
+  template <typename Shared>
   PROOFMASS_INLINE Vector3<T> star_tracker_RS_S(const LoopConstants<T>& constants,
-                                                const SharedSample& shared,
+                                                const SharedSampleOf<Shared>& shared,
                                                 const SampleNoise<T>& noise) const {
     return angle_RS_S(shared) + constants.star_tracker_bias_S_rad + noise.star_tracker_S +
            broadcast<T>(shared.attitude_command_S_rad);
@@ -112,15 +115,15 @@ struct Loop {
 
   /// Advances by one sample.
   ///
-  /// @param shared  Of this sample; what all runs have in common.
+  /// @param shared  Of this sample; what all runs have in common, or each lane its own.
   /// @param noise   Of this sample; its scale is in it already.
   /// @tparam masses  `at_rest` only in a session that moves no test mass.
   /// @returns What instrument and estimator report at this sample.
-  template <TestMasses masses = TestMasses::moving>
+  template <TestMasses masses = TestMasses::moving, typename Shared>
   PROOFMASS_INLINE Observation<T> advance(const LoopConstants<T>& constants,
                                           const DragFreeGains& drag_free_gains,
                                           const AttitudeGains& attitude_gains,
-                                          const SharedSample& shared, const SampleNoise<T>& noise,
+                                          const SharedSampleOf<Shared>& shared, const SampleNoise<T>& noise,
                                           Watch watch = Watch::yes) {
     const SatelliteMotion<T> satellite = motion(constants, shared, noise);
 

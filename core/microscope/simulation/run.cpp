@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -28,13 +32,10 @@ void append_lines(const SignalSums<double>& sums, std::size_t num_lines, Session
 
 template <typename Noise>
 SessionHealth to_health(const LaneGroup<double, Noise>& run) {
-  const LoopMonitor<double>& monitor = run.monitor;
-  return {.acceleration_m_s2 = run.loop.largest_acceleration,
-          .attitude_rad = run.loop.largest_angle,
-          .quadratic_squares = monitor.quadratic.squares,
-          .common_squares = monitor.common_square.squares,
-          .sensor_squares = {monitor.sensor_square[0].squares, monitor.sensor_square[1].squares},
-          .residual = monitor.residual};
+  SessionHealth health{.acceleration_m_s2 = run.loop.largest_acceleration,
+                       .attitude_rad = run.loop.largest_angle};
+  set_monitored(run.monitor, health);
+  return health;
 }
 
 /// What is known of a run before it is simulated.
@@ -200,32 +201,84 @@ struct RunPlan::Impl {
     record.health[i].is_quiet = is_quiet(i);
   }
 
-  void record_session_batch(std::size_t i, std::span<const Lane> lanes, BatchKernel kernel,
-                            const SessionProgress& progress,
-                            std::vector<RunRecord>& records) const {
-    const Scenario& scenario = campaign.scenario;
-    const Session& session = scenario.sessions[i];
-    SessionSignals signals(scenario, session, orbit, environment);
-    const NoiseStreams streams = noise_streams(session.name);
-    Readers readers(*this, i);
-    BatchSession batch{.signals = &signals,
-                       .setup = setup(i, readers),
-                       .noise = &noise,
-                       .streams = &streams,
-                       .seed = campaign.seed,
-                       .num_runs = lanes.size(),
-                       .weights_buffer = readers.buffer,
-                       .progress = SessionProgress::report_to,
-                       .progress_context = &progress};
-    for (std::size_t l = 0; l < batch_lanes; ++l) {
-      const Lane& lane = lanes[std::min(l, lanes.size() - 1)];
-      batch.runs[l] = lane.run;
-      batch.constants[l] = make_loop_constants(lane.instrument, scenario, session);
-      batch.noise_states[l] = stationary_states(noise, campaign.seed, lane.run, session.name);
+  /// A session of a batch, with all that it is computed from.
+  struct SessionOfBatch {
+    SessionOfBatch(const Impl& impl, std::size_t i, std::span<const Lane> lanes,
+                   const SessionProgress& progress)
+        : signals(impl.campaign.scenario, impl.campaign.scenario.sessions[i], impl.orbit,
+                  impl.environment),
+          streams(noise_streams(impl.campaign.scenario.sessions[i].name)),
+          readers(impl, i),
+          batch{.signals = &signals,
+                .setup = impl.setup(i, readers),
+                .noise = &impl.noise,
+                .streams = &streams,
+                .seed = impl.campaign.seed,
+                .num_runs = lanes.size(),
+                .weights_buffer = readers.buffer,
+                .progress = SessionProgress::report_to,
+                .progress_context = &progress} {
+      const Session& session = impl.campaign.scenario.sessions[i];
+      for (std::size_t l = 0; l < batch_lanes; ++l) {
+        const Lane& lane = lanes[std::min(l, lanes.size() - 1)];
+        batch.runs[l] = lane.run;
+        batch.constants[l] =
+            make_loop_constants(lane.instrument, impl.campaign.scenario, session);
+        batch.noise_states[l] =
+            stationary_states(impl.noise, impl.campaign.seed, lane.run, session.name);
+      }
     }
-    std::array<SessionOutcome, batch_lanes> outcomes{};
-    kernel(batch, outcomes);
+    SessionOfBatch(const SessionOfBatch&) = delete;
+    SessionOfBatch& operator=(const SessionOfBatch&) = delete;
+
+    SessionSignals signals;
+    NoiseStreams streams;
+    Readers readers;
+    BatchSession batch;
+  };
+
+  void keep_all(std::size_t i, std::span<const Lane> lanes, const SessionOutcomes& outcomes,
+                std::vector<RunRecord>& records) const {
     for (std::size_t l = 0; l < lanes.size(); ++l) keep(i, outcomes[l], records[lanes[l].index]);
+  }
+
+  /// One session after the other.
+  void record_in_turn(std::span<const Lane> lanes, BatchKernel kernel, SessionProgress& progress,
+                      std::vector<RunRecord>& records) const {
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      const auto session = std::make_unique<SessionOfBatch>(*this, i, lanes, progress);
+      SessionOutcomes outcomes{};
+      kernel(session->batch, outcomes);
+      keep_all(i, lanes, outcomes, records);
+      progress.end_session(i);
+    }
+  }
+
+  /// Several sessions side by side.
+  void record_side_by_side(std::span<const Lane> lanes, MixedKernel kernel,
+                           const SessionProgress& progress,
+                           std::vector<RunRecord>& records) const {
+    std::vector<std::size_t> order(weights.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::ranges::stable_sort(order, std::greater<>(),
+                             [&](std::size_t i) { return weights[i].num_samples(); });
+    std::deque<SessionOfBatch> sessions;
+    std::vector<BatchSession> batches;
+    for (const std::size_t i : order) {
+      batches.push_back(sessions.emplace_back(*this, i, lanes, progress).batch);
+    }
+    std::vector<SessionOutcomes> outcomes(order.size());
+    kernel(batches, outcomes);
+    for (std::size_t k = 0; k < order.size(); ++k) keep_all(order[k], lanes, outcomes[k], records);
+  }
+
+  /// Whether sessions may be computed side by side: the loops settle for a whole number of noise
+  /// blocks, and no known lines are recorded.
+  [[nodiscard]] bool may_be_mixed() const {
+    const Scenario& scenario = campaign.scenario;
+    const SessionSignals signals(scenario, scenario.sessions[0], orbit, environment);
+    return signals.num_settling() % std::int64_t{samples_per_noise_block} == 0 &&
+           std::ranges::all_of(known_weights, [](const auto& known) { return known.empty(); });
   }
 
   MicroscopeCampaign campaign;
@@ -325,9 +378,11 @@ std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> request
   }
   if (lanes.empty()) return records;
   SessionProgress sessions(impl_->campaign.scenario, progress);
-  for (std::size_t i = 0; i < impl_->weights.size(); ++i) {
-    impl_->record_session_batch(i, lanes, batch_kernel(set, lanes.size()), sessions, records);
-    sessions.end_session(i);
+  const MixedKernel mixed = mixed_kernel(set, lanes.size());
+  if (mixed != nullptr && impl_->may_be_mixed()) {
+    impl_->record_side_by_side(lanes, mixed, sessions, records);
+  } else {
+    impl_->record_in_turn(lanes, batch_kernel(set, lanes.size()), sessions, records);
   }
   return records;
 }

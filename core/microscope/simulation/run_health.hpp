@@ -47,8 +47,10 @@ struct LoopMonitor {
   std::array<std::array<T, 2>, 3> residual{};    ///< Γ_mes,c at f_EP, m/s²: [axis][cosine, sine].
 
   /// @param weights  Cosine's and sine's weight of this sample for the line at f_EP.
+  /// @tparam Weight   A double, or T where lanes are in different sessions.
+  template <typename Weight>
   PROOFMASS_INLINE void add(const std::array<SensorModel<T>, 2>& sensors,
-                            const Observation<T>& observation, const double* weights) {
+                            const Observation<T>& observation, const Weight* weights) {
     const T half = T(0.5);
     const Vector3<T>& m1 = observation.measured_K[0];
     const Vector3<T>& m2 = observation.measured_K[1];
@@ -86,6 +88,14 @@ struct SessionHealth {
   std::array<double, 2> sensor_squares{};           ///< Of sensor_square.
   std::array<std::array<double, 2>, 3> residual{};  ///< As in LoopMonitor.
 };
+
+/// Keeps what the monitor of a session has.
+inline void set_monitored(const LoopMonitor<double>& monitor, SessionHealth& health) {
+  health.quadratic_squares = monitor.quadratic.squares;
+  health.common_squares = monitor.common_square.squares;
+  health.sensor_squares = {monitor.sensor_square[0].squares, monitor.sensor_square[1].squares};
+  health.residual = monitor.residual;
+}
 
 /// What is kept of the sessions of a run, in the scenario's order.
 using HealthRecord = std::vector<SessionHealth>;

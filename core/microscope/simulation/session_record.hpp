@@ -18,15 +18,43 @@ namespace proofmass {
 template <typename T>
 using SignalSums = std::array<std::array<T, 2 * num_fit_lines_max>, num_signals>;
 
+/// The product that a session records.
+///
+/// @param common_x  Γ_mes,cx; the next two are Γ_mes,1x and Γ_mes,2x.
+/// @param g         Rows of [T̂] − [În].
+/// @param motion    Half the position of the moving masses, m.
+template <typename T>
+PROOFMASS_INLINE T product_signal(Product kind, const T& common_x, const T& sensor_1_x,
+                                  const T& sensor_2_x, const std::array<Vector3<T>, 3>& g,
+                                  const T& motion) {
+  switch (kind) {
+    case Product::none:
+      break;
+    case Product::common_squared:
+      return common_x * common_x;
+    case Product::sensor_1_squared:
+      return sensor_1_x * sensor_1_x;
+    case Product::sensor_2_squared:
+      return sensor_2_x * sensor_2_x;
+    case Product::modulated_yy:
+      return (g[1].y - g[0].x) * motion;
+    case Product::modulated_zz:
+      return (g[2].z - g[0].x) * motion;
+  }
+  return T(0.0);
+}
+
 /// The signals of one sample, in the order of `Signal`. They are what the ground can compute: from
 /// measurements, the estimated attitude, the orbit and the session's commands, not from the truth.
 ///
 /// Γ_mes,c and Γ_mes,d are half sum and half difference of components in the two sensors' frames
 /// ([Hardy2013] eq:common-diff). [T̂] − [În] is in the estimated frame S.
-template <typename T>
+///
+/// @param kind  The session's Product, or those of the lanes, for product_signal().
+template <typename T, typename Shared, typename Kind>
 PROOFMASS_INLINE std::array<T, num_signals> ground_signals(const Observation<T>& observation,
-                                                           const SharedSample& shared,
-                                                           Product kind) {
+                                                           const SharedSampleOf<Shared>& shared,
+                                                           const Kind& kind) {
   const Vector3<T>& m1 = observation.measured_K[0];
   const Vector3<T>& m2 = observation.measured_K[1];
   const T half = T(0.5);
@@ -45,27 +73,8 @@ PROOFMASS_INLINE std::array<T, num_signals> ground_signals(const Observation<T>&
   const auto [g] = gradient_matrix(shared.gradient_s2, radial_S, omega_IS_S,
                                    observation.measured_omega_dot_IS_S);
 
-  T product = T(0.0);
-  const T motion = T(0.5 * shared.mass_motion.position_m);
-  switch (kind) {
-    case Product::none:
-      break;
-    case Product::common_squared:
-      product = common.x * common.x;
-      break;
-    case Product::sensor_1_squared:
-      product = m1.x * m1.x;
-      break;
-    case Product::sensor_2_squared:
-      product = m2.x * m2.x;
-      break;
-    case Product::modulated_yy:
-      product = (g[1].y - g[0].x) * motion;
-      break;
-    case Product::modulated_zz:
-      product = (g[2].z - g[0].x) * motion;
-      break;
-  }
+  const T motion = T(0.5) * T(shared.mass_motion.position_m);
+  const T product = product_signal<T>(kind, common.x, m1.x, m2.x, g, motion);
   return {differential_x, common.x, common.y, common.z, g[0].x, g[0].y, g[0].z,
           product,        g[1].x,   g[1].y,   g[1].z,   g[2].x, g[2].y, g[2].z};
 }
@@ -101,8 +110,9 @@ PROOFMASS_INLINE void add_weighted(const std::array<T, num_signals>& values, con
 }
 
 /// Adds one sample's signals to the sums of every output.
-template <typename T>
-PROOFMASS_INLINE void add_sample(const std::array<T, num_signals>& values, const double* weights,
+/// @tparam Weight  A double, or T where lanes are in different sessions.
+template <typename T, typename Weight>
+PROOFMASS_INLINE void add_sample(const std::array<T, num_signals>& values, const Weight* weights,
                                  std::size_t num_outputs, Product product, SignalSet signals,
                                  SignalSums<T>& sums) {
   constexpr std::size_t product_index = index(Signal::product);
