@@ -134,7 +134,7 @@ std::uint64_t num_slots_sharing(State& state, double time_s, TimePoint now) {
 
 /// A worker's part, by its idle slots, of the last runs: those that would fill at most half of the
 /// slots that share them. A batch of half as many runs takes about half of the time. It is at least
-/// a quarter of a run in each slot, as batches of less than that take no less time.
+/// an eighth of a run in each slot, as batches of less than that take hardly less time.
 /// @return Nothing if these are not the last runs.
 std::optional<Share> share_of_last(State& state, CampaignId id, const CampaignState& campaign,
                                    const Worker& worker, TimePoint now) {
@@ -143,7 +143,7 @@ std::optional<Share> share_of_last(State& state, CampaignId id, const CampaignSt
   if (count == 0 || 2 * count > num_sharing) return std::nullopt;
   const std::uint64_t num_idle = num_idle_slots(worker);
   const std::uint64_t part = ratio_rounded_up(num_waiting(campaign) * num_idle, num_sharing);
-  return Share{.num_runs = std::max(part, ratio_rounded_up(num_idle, 4)), .num_slots = num_idle};
+  return Share{.num_runs = std::max(part, ratio_rounded_up(num_idle, 8)), .num_slots = num_idle};
 }
 
 /// What a worker is to be lent of a campaign; nothing if it has enough.

@@ -98,8 +98,8 @@ PROOFMASS_INLINE Vector3<T> broadcast(const Vector3<double>& a) {
 }
 /// One of which each lane has its own already.
 template <typename T>
-  requires(!std::same_as<T, double>)
-PROOFMASS_INLINE const Vector3<T>& broadcast(const Vector3<T>& a) {
+requires(!std::same_as<T, double>)
+    PROOFMASS_INLINE const Vector3<T>& broadcast(const Vector3<T>& a) {
   return a;
 }
 

@@ -17,8 +17,8 @@ namespace proofmass {
 /// @param radial_F     û, unit vector from the Earth's centre to the satellite.
 /// @param v_F          From the satellite's centre of mass to the point at which [T] acts.
 template <typename T, typename Gradient>
-PROOFMASS_INLINE Vector3<T> gravity_gradient(const Gradient& gradient_s2, const Vector3<T>& radial_F,
-                                             const Vector3<T>& v_F) {
+PROOFMASS_INLINE Vector3<T> gravity_gradient(const Gradient& gradient_s2,
+                                             const Vector3<T>& radial_F, const Vector3<T>& v_F) {
   const T along = T(3.0) * dot(radial_F, v_F);
   return T(gradient_s2) * (along * radial_F - v_F);
 }

@@ -19,8 +19,8 @@
 namespace proofmass {
 
 /// What every run of a campaign sees alike at one sample of a session. R is the reference frame
-/// that the attitude loop holds: I turned about Y at the session's spin rate. T holds a number of each
-/// lane where lanes are in different sessions.
+/// that the attitude loop holds: I turned about Y at the session's spin rate. Where lanes are in
+/// different sessions, T holds a number of each.
 template <typename T>
 struct SharedSampleOf {
   T gradient_s2{};            ///< μ/r³.

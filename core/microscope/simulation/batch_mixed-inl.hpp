@@ -231,8 +231,7 @@ class MixedLanes {
 
   static void begin_block(Seat& seat) {
     seat.num_done = 0;
-    seat.weights =
-        fill_block(seat.session->setup, seat.block, seat.session->weights_buffer);
+    seat.weights = fill_block(seat.session->setup, seat.block, seat.session->weights_buffer);
   }
 
   /// Of the next samples; 0 in lanes that record nothing.
@@ -260,9 +259,10 @@ class MixedLanes {
   HWY_INLINE void next_shared(SharedSampleOf<Batch>& shared) {
     for (std::size_t s = 0; s < num_seats_; ++s) {
       Seat& seat = seats_[s];
-      if (seat.session == nullptr) continue;  // The last one stays.
+      if (seat.session == nullptr) continue;  // The last one will do.
       const SharedSample& sample = seat.signals->next();
-      for_lanes_of(s, [&](std::size_t lane, std::size_t /*run*/) { put_lane(shared, sample, lane); });
+      for_lanes_of(s,
+                   [&](std::size_t lane, std::size_t /*run*/) { put_lane(shared, sample, lane); });
     }
   }
 
@@ -271,9 +271,8 @@ class MixedLanes {
     for (std::size_t k = 0; k < num_samples; ++k) {
       next_shared(shared_);
       const bool is_watched = (num_samples_ + k) % samples_per_noise_block == 0;
-      const auto observation =
-          loop_.advance(constants_, setup.drag_free, setup.attitude, shared_, noise_.next(),
-                        is_watched ? Watch::yes : Watch::no);
+      const auto observation = loop_.advance(constants_, setup.drag_free, setup.attitude, shared_,
+                                             noise_.next(), is_watched ? Watch::yes : Watch::no);
       if (!is_any_recording_) continue;
       const auto values = ground_signals(observation, shared_, products_);
       // Any product stands for those of the lanes.

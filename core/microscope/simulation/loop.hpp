@@ -123,8 +123,8 @@ struct Loop {
   PROOFMASS_INLINE Observation<T> advance(const LoopConstants<T>& constants,
                                           const DragFreeGains& drag_free_gains,
                                           const AttitudeGains& attitude_gains,
-                                          const SharedSampleOf<Shared>& shared, const SampleNoise<T>& noise,
-                                          Watch watch = Watch::yes) {
+                                          const SharedSampleOf<Shared>& shared,
+                                          const SampleNoise<T>& noise, Watch watch = Watch::yes) {
     const SatelliteMotion<T> satellite = motion(constants, shared, noise);
 
     Observation<T> observation;

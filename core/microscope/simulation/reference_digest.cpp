@@ -36,8 +36,9 @@ std::uint64_t reference_digest(InstructionSet set) {
   const RunPlan plan(reference_campaign());
   std::uint64_t hash = fnv1a_basis;
   const auto add = [&](double value) { hash = fnv1a(hash, std::bit_cast<std::uint64_t>(value)); };
-  // The first count is for the kernels of full batches, the second for narrow ones.
-  for (const std::size_t count : {batch_lanes / 2 + 1, std::size_t{3}}) {
+  // For the kernels of full batches, of narrow ones and of sessions side by side.
+  for (const std::size_t count :
+       {batch_lanes / 2 + 1, batch_lanes / 2, std::size_t{3}, std::size_t{1}}) {
     for (const RunResult& result : results(plan, set, count)) {
       for (const double value : result.truth) add(value);
       for (const double value : result.estimate) add(value);

@@ -222,8 +222,7 @@ struct RunPlan::Impl {
       for (std::size_t l = 0; l < batch_lanes; ++l) {
         const Lane& lane = lanes[std::min(l, lanes.size() - 1)];
         batch.runs[l] = lane.run;
-        batch.constants[l] =
-            make_loop_constants(lane.instrument, impl.campaign.scenario, session);
+        batch.constants[l] = make_loop_constants(lane.instrument, impl.campaign.scenario, session);
         batch.noise_states[l] =
             stationary_states(impl.noise, impl.campaign.seed, lane.run, session.name);
       }
@@ -256,8 +255,7 @@ struct RunPlan::Impl {
 
   /// Several sessions side by side.
   void record_side_by_side(std::span<const Lane> lanes, MixedKernel kernel,
-                           const SessionProgress& progress,
-                           std::vector<RunRecord>& records) const {
+                           const SessionProgress& progress, std::vector<RunRecord>& records) const {
     std::vector<std::size_t> order(weights.size());
     std::iota(order.begin(), order.end(), 0U);
     std::ranges::stable_sort(order, std::greater<>(),

@@ -130,11 +130,11 @@ TEST_F(LendingTest, SharesNoRunsThatFillMoreThanHalfOfTheSlots) {
   EXPECT_EQ(outbox.take_sent<wire::RunLease>(third).runs, (RunRange{{21}, 4}));
 }
 
-TEST_F(LendingTest, GivesAQuarterOfARoundOfTheLastRunsAtLeast) {
+TEST_F(LendingTest, GivesAnEighthOfARoundOfTheLastRunsAtLeast) {
   for (const WorkerId id : {first, second, third}) add_worker(id, 16);
-  add_campaign(one, 6);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 4}));
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{4}, 2}));
+  add_campaign(one, 3);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 2}));
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).runs, (RunRange{{2}, 1}));
 }
 
 TEST_F(LendingTest, LeavesTheLastRunsToWorkersThatAreStillToCome) {

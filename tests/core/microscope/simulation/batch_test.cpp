@@ -66,8 +66,12 @@ std::vector<RunRequest> filled(const std::vector<RunRequest>& requests) {
   return full;
 }
 
-/// Compares every run of a batch on every instruction set with the same run alone, in a batch that
-/// may be narrow and in a full one.
+std::vector<RunRequest> first_of(const std::vector<RunRequest>& requests, std::size_t count) {
+  return {requests.begin(), requests.begin() + static_cast<std::ptrdiff_t>(count)};
+}
+
+/// Compares every run of a batch on every instruction set with the same run alone: in that batch,
+/// in a full one, and in those of one and two runs, whose sessions are computed side by side.
 void expect_batch_equals_scalar(const MicroscopeCampaign& campaign,
                                 const std::vector<RunRequest>& requests) {
   campaign.validate();
@@ -78,7 +82,8 @@ void expect_batch_equals_scalar(const MicroscopeCampaign& campaign,
   }
   for (const InstructionSet set : available_instruction_sets()) {
     if (set == InstructionSet::scalar) continue;
-    for (const std::vector<RunRequest>& batch : {requests, filled(requests)}) {
+    for (const std::vector<RunRequest>& batch :
+         {requests, filled(requests), first_of(requests, 1), first_of(requests, 2)}) {
       const std::vector<RunResult> results = plan.simulate_batch(batch, set);
       ASSERT_EQ(results.size(), batch.size());
       for (std::size_t i = 0; i < results.size(); ++i) {
@@ -105,6 +110,30 @@ TEST(Batch, EqualsTheScalarReferenceForAnyNumberOfRuns) {
       }
     }
   }
+}
+
+// Sessions begin and end at different times, and no record is a multiple of four samples long:
+// lanes that wait for the next session go on idle.
+TEST(Batch, EqualsTheScalarReferenceWithSessionsOfDifferentLengths) {
+  MicroscopeCampaign campaign = short_campaign();
+  campaign.scenario.orbit.period_s = 5900.3;
+  for (std::size_t i = 0; i < campaign.scenario.sessions.size(); ++i) {
+    campaign.scenario.sessions[i].num_orbits = 1 + static_cast<int>(i * i % 4);
+  }
+  expect_batch_equals_scalar(campaign, requests_from(0, 4));
+}
+
+TEST(Batch, EqualsTheScalarReferenceIfLoopsDoNotSettle) {
+  MicroscopeCampaign campaign = short_campaign();
+  campaign.scenario.simulation.settling_s = 0.0;
+  expect_batch_equals_scalar(campaign, requests_from(0, 3));
+}
+
+// Then sessions are not computed side by side.
+TEST(Batch, EqualsTheScalarReferenceIfLoopsSettleForAnOddNumberOfSamples) {
+  MicroscopeCampaign campaign = short_campaign();
+  campaign.scenario.simulation.settling_s = 100.25;
+  expect_batch_equals_scalar(campaign, requests_from(0, 3));
 }
 
 TEST(Batch, TakesRunsFromAnywhereInAnyOrder) {
