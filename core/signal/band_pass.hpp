@@ -2,6 +2,8 @@
 
 #include <complex>
 
+#include "core/math/inline.hpp"
+
 namespace proofmass {
 
 /// Second-order recursive filter y = (b0 + b1 z⁻¹ + b2 z⁻²)/(1 + a1 z⁻¹ + a2 z⁻²) x.
@@ -37,11 +39,17 @@ struct BiquadStateOf {
   T s1{};
   T s2{};
 
-  T advance(const Biquad& filter, T x) {
-    const T y = filter.b0 * x + s1;
-    s1 = filter.b1 * x - filter.a1 * y + s2;
-    s2 = filter.b2 * x - filter.a2 * y;
-    return y;
+  /// Replaces the next sample of the signal by that of the filtered one.
+  PROOFMASS_INLINE void filter(const Biquad& filter, T& signal) {
+    const T x = signal;
+    signal = filter.b0 * x + s1;
+    s1 = filter.b1 * x - filter.a1 * signal + s2;
+    s2 = filter.b2 * x - filter.a2 * signal;
+  }
+  /// The next sample of the filtered signal.
+  [[nodiscard]] T advance(const Biquad& filter, T x) {
+    this->filter(filter, x);
+    return x;
   }
 };
 
@@ -51,8 +59,15 @@ struct BandPassStateOf {
   BiquadStateOf<T> high_pass;
   BiquadStateOf<T> low_pass;
 
-  T advance(const BandPass& filter, T x) {
-    return low_pass.advance(filter.low_pass, high_pass.advance(filter.high_pass, x));
+  /// Replaces the next sample of the signal by that of the filtered one.
+  PROOFMASS_INLINE void filter(const BandPass& filter, T& signal) {
+    high_pass.filter(filter.high_pass, signal);
+    low_pass.filter(filter.low_pass, signal);
+  }
+  /// The next sample of the filtered signal.
+  [[nodiscard]] T advance(const BandPass& filter, T x) {
+    this->filter(filter, x);
+    return x;
   }
 };
 

@@ -50,10 +50,8 @@ class LineWeights {
  private:
   friend class WeightReader;
 
-  /// The two outputs of a fit line, cosine and sine: a vector that every processor has.
-  using Pair [[gnu::vector_size(16)]] = double;
-  /// Filter memory of one or two fit lines, running backwards.
-  using States = std::array<BandPassStateOf<Pair>, 2>;
+  /// Filter memory of each output (cosine and sine of one or two fit lines), running backwards.
+  using States = std::array<BandPassState, 4>;
 
   /// As many as a record of 20 orbits at 4 Hz has blocks, so that its weights take one pass.
   static constexpr std::size_t num_marks_max = 256;
@@ -73,8 +71,6 @@ class LineWeights {
   };
 
   void solve_design();
-  template <std::size_t num_fit_lines>
-  void filter_backwards(std::size_t block, States& states, double* weights) const;
   void run_backwards(std::size_t block, States& states, std::span<double> weights) const;
   /// Marks of one stretch of coarser ones.
   void refine(const Marks& coarse, std::size_t stretch, Marks& fine,

@@ -34,7 +34,7 @@ SatelliteMotion<double> at_rest() {
 TEST(KinematicAcceleration, HoldsAMassAgainstTheGravityGradient) {
   SensorModel<double> sensor = perfect_sensor();
   sensor.rest_position_S_m = {3.0, 5.0, 0.0};
-  const Vector3<double> a = kinematic_acceleration(sensor, at_rest(), {});
+  const Vector3<double> a = kinematic_acceleration(sensor, at_rest(), MassMotionPhase{});
   EXPECT_DOUBLE_EQ(a.x, -2e-6 * 3.0);
   EXPECT_DOUBLE_EQ(a.y, 1e-6 * 5.0);
   EXPECT_DOUBLE_EQ(a.z, 0.0);
@@ -47,7 +47,7 @@ TEST(KinematicAcceleration, HoldsAMassOnACircleAgainstItsInertia) {
   satellite.gradient_s2 = 0.0;
   satellite.omega_IS_S = {0.0, 0.5, 0.0};
   satellite.omega_dot_IS_S = {0.0, 0.0, 0.25};
-  const Vector3<double> a = kinematic_acceleration(sensor, satellite, {});
+  const Vector3<double> a = kinematic_acceleration(sensor, satellite, MassMotionPhase{});
   EXPECT_DOUBLE_EQ(a.x, -0.5 * 0.5 * 2.0);  // Towards the centre.
   EXPECT_DOUBLE_EQ(a.y, 0.25 * 2.0);        // Along the growing speed.
   EXPECT_DOUBLE_EQ(a.z, 0.0);
@@ -69,7 +69,7 @@ TEST(KinematicAcceleration, IncludesTheMotionOfTheMassAndItsCoriolisTerm) {
 TEST(KinematicAcceleration, FollowsTheSatelliteAsAWhole) {
   SatelliteMotion<double> satellite = at_rest();
   satellite.acceleration_S = {1.0, 2.0, 3.0};
-  const Vector3<double> a = kinematic_acceleration(perfect_sensor(), satellite, {});
+  const Vector3<double> a = kinematic_acceleration(perfect_sensor(), satellite, MassMotionPhase{});
   EXPECT_EQ(a.x, 1.0);
   EXPECT_EQ(a.y, 2.0);
   EXPECT_EQ(a.z, 3.0);
