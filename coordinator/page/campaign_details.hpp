@@ -66,8 +66,8 @@ struct DetailSubject {
 struct DetailSources {
   /// @param before  What was read of the file last time; null at first.
   template <typename Part>
-  using ReadPart = std::function<std::shared_ptr<const Part>(const std::filesystem::path&,
-                                                             const Part* before)>;
+  using ReadPart =
+      std::function<std::shared_ptr<const Part>(const std::filesystem::path&, const Part* before)>;
   ReadPart<CampaignEvents> read_events;
   ReadPart<CampaignResults> read_results;  ///< Some results at a time.
 };

@@ -17,9 +17,9 @@ AccuracyStatistic accuracy_of(const ErrorExtremes& extremes, const Moments& magn
           .mean = magnitudes.mean,
           .standard_deviation = magnitudes.standard_deviation,
           .num_beyond_objective = extremes.num_beyond,
-          .beyond_objective = probability_interval(static_cast<double>(extremes.num_beyond),
-                                                   static_cast<double>(magnitudes.count),
-                                                   default_confidence),
+          .beyond_objective =
+              probability_interval(static_cast<double>(extremes.num_beyond),
+                                   static_cast<double>(magnitudes.count), default_confidence),
           .mean_interval = mean_interval(magnitudes, default_confidence),
           .deviation_interval = {},
           .error = error_statistic(errors)};
@@ -158,8 +158,8 @@ CampaignStatistics StatisticsPasses::statistics() const {
 }
 
 AccuracyStatistic StatisticsPasses::accuracy(const QuantityPasses& quantity) const {
-  AccuracyStatistic accuracy = accuracy_of(quantity.extremes, quantity.magnitudes.moments(),
-                                           quantity.errors.moments());
+  AccuracyStatistic accuracy =
+      accuracy_of(quantity.extremes, quantity.magnitudes.moments(), quantity.errors.moments());
   accuracy.deviation_interval = quantity.magnitudes.deviation_interval();
   for (std::size_t i = 0; i < percentile_levels.size(); ++i) {
     const double level = percentile_levels[i];
