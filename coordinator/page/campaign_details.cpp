@@ -18,6 +18,7 @@ namespace {
 
 constexpr std::chrono::seconds reading_interval_min(2);
 constexpr int reading_share = 150;
+constexpr int reading_share_of_all = 75;
 constexpr int reading_niceness = 10;
 
 std::shared_ptr<const CampaignEvents> read_events_of(const std::filesystem::path& file,
@@ -87,6 +88,10 @@ TimePoint next_reading(TimePoint ended_at, Duration cpu_time) {
   return ended_at + std::max<Duration>(reading_interval_min, reading_share * cpu_time);
 }
 
+TimePoint end_of_rest(TimePoint ended_at, Duration cpu_time) {
+  return ended_at + reading_share_of_all * cpu_time;
+}
+
 DetailReader::DetailReader(DetailSources sources)
     : sources_(std::move(sources)), thread_([this] { work(); }) {}
 
@@ -121,6 +126,10 @@ void DetailReader::forget_oldest() {
 std::optional<DetailReader::Choice> DetailReader::choose(TimePoint now,
                                                          TimePoint& look_again) const {
   look_again = now + wanted_for;
+  if (now < rests_until_) {
+    look_again = rests_until_;
+    return std::nullopt;
+  }
   std::optional<Choice> choice;
   TimePoint due_first = now;
   const auto consider = [&](const std::string& name, Part part, TimePoint due) {
@@ -155,8 +164,11 @@ void DetailReader::read(const Choice& choice, std::unique_lock<std::mutex>& lock
   } else {
     results = sources_.read_results(campaign.file, before.results.get());
   }
-  const TimePoint due = next_reading(steady_now(), cpu_time_of_thread() - cpu_before);
+  const TimePoint ended_at = steady_now();
+  const Duration cpu_time = cpu_time_of_thread() - cpu_before;
+  const TimePoint due = next_reading(ended_at, cpu_time);
   lock.lock();
+  rests_until_ = end_of_rest(ended_at, cpu_time);
   const auto found = watched_.find(choice.name);
   if (found == watched_.end() || found->second.campaign.file != campaign.file) return;
   Watched& watched = found->second;

@@ -93,7 +93,8 @@ struct ErrorExtremes {
 /// by the bootstrap, which need all results at once. Memory is fixed; a copy costs little.
 ///
 /// Moments are corrected sums about the first value instead of the mean: they agree with those of
-/// StatisticsPasses to 1e-11 of the worst |error| unless the first value is an extreme outlier.
+/// StatisticsPasses to 1e-11 of the worst |error| if the first value is within 10⁴ standard
+/// deviations of the mean: a standard deviation s loses ε D²/s, D being that distance.
 class RunningStatistics {
  public:
   /// @param objectives  As for StatisticsPasses.

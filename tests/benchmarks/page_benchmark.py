@@ -5,8 +5,8 @@ Usage: page_benchmark.py BIN_DIRECTORY [options]
 
 The workers are those of proofmass-swarm, see scale_benchmark.py. Five viewers ask for a page each two
 seconds, as its script does. Prints a line of JSON for each phase: processor time of the coordinator and of
-each of its threads. Exit code 1 if an answer took longer than 0.2 s or the page's threads cost more than
-2 % of a core.
+each of its threads. Exit code 1 if a page that was asked for alone took longer than 0.2 s, or if the page's
+threads cost more than 2 % of a core with five viewers, at rest or while runs are computed.
 """
 
 import argparse
@@ -141,13 +141,12 @@ def measure(fleet, options):
     resting = [watched(fleet, "at rest, nobody looks", options.watch_s, False),
                watched(fleet, "at rest, five viewers", options.watch_s, True)]
     worst = time_of_pages(fleet)
-    cost = cost_of_viewers(*resting)
-    say("cost", viewers_cores_at_rest=round(cost, 4),
-        viewers_cores_computing=round(cost_of_viewers(*computing), 4),
+    costs = {"viewers_cores_at_rest": cost_of_viewers(*resting),
+             "viewers_cores_computing": cost_of_viewers(*computing)}
+    say("cost", **{name: round(cost, 4) for name, cost in costs.items()},
         memory_mb_max=round(fleet.memory_mb_max()))
-    missed = []
-    if cost > VIEWERS_CORES_MAX:
-        missed.append(f"viewers_cores_at_rest = {cost:.4f} (limit {VIEWERS_CORES_MAX})")
+    missed = [f"{name} = {cost:.4f} (limit {VIEWERS_CORES_MAX})"
+              for name, cost in costs.items() if cost > VIEWERS_CORES_MAX]
     if worst > ANSWER_S_MAX:
         missed.append(f"seconds_max = {worst:.3f} (limit {ANSWER_S_MAX})")
     return missed

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <condition_variable>
+#include <ctime>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -24,6 +25,12 @@ TEST(NextReading, ComesAfterTwoSecondsOrHundredAndFiftyTimesWhatTheLastTook) {
   EXPECT_EQ(next_reading(ended, 10ms), ended + 2s);
   EXPECT_EQ(next_reading(ended, 100ms), ended + 15s);
   EXPECT_EQ(next_reading(ended, 8s), ended + 1200s);
+}
+
+TEST(EndOfRest, ComesAfterSeventyFiveTimesWhatTheLastTook) {
+  const TimePoint ended{1000s};
+  EXPECT_EQ(end_of_rest(ended, 0s), ended);
+  EXPECT_EQ(end_of_rest(ended, 40ms), ended + 3s);
 }
 
 /// A reader whose databases are played; counts how often each is read.
@@ -109,6 +116,41 @@ TEST_F(DetailReaderTest, ReadsResultsFurtherUntilItHasThoseThatAreFinished) {
   wait_for("events a.db", 3);
   EXPECT_EQ(count_of("results a.db"), 2);
   EXPECT_EQ(whole(reader, "a", subject).results->num_runs, 10U);
+}
+
+/// Uses so much time of the processor.
+void work_for(std::chrono::nanoseconds cpu_time) {
+  const auto used = [] {
+    timespec time{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+  };
+  const auto end = used() + cpu_time;
+  while (used() < end) {
+  }
+}
+
+// Another campaign is no reason to read earlier.
+TEST_F(DetailReaderTest, RestsAfterEachReadingWhateverIsNext) {
+  constexpr auto cpu_time = 5ms;
+  DetailSources played = sources();
+  std::vector<TimePoint> begun, ended;  // Of the reader's thread.
+  played.read_events = [&, read = played.read_events](const std::filesystem::path& file,
+                                                      const CampaignEvents* before) {
+    begun.push_back(std::chrono::steady_clock::now());
+    work_for(cpu_time);
+    ended.push_back(std::chrono::steady_clock::now());
+    return read(file, before);
+  };
+  {
+    DetailReader reader(played);
+    for (const std::string name : {"a", "b", "c"}) {
+      (void)reader.details(name, {.file = name + ".db"}, std::chrono::steady_clock::now());
+    }
+    for (const std::string name : {"a", "b", "c"}) wait_for("events " + name + ".db", 1);
+  }
+  ASSERT_GE(begun.size(), 3U);
+  for (std::size_t i = 1; i < begun.size(); ++i) EXPECT_GE(begun[i] - ended[i - 1], 75 * cpu_time);
 }
 
 TEST_F(DetailReaderTest, BeginsAnewWithAnotherFileOfThatName) {

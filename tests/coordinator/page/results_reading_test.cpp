@@ -1,10 +1,8 @@
 #include "coordinator/page/results_reading.hpp"
 
-#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
-#include <cmath>
 #include <cstdint>
-#include <initializer_list>
 #include <vector>
 
 #include "core/microscope/definition/campaign_definition.hpp"

@@ -89,6 +89,24 @@ TEST(RunningStatistics, AreThoseOfAllResultsInAnyOrder) {
   }
 }
 
+// The first run is 10⁴ standard deviations off, the worst that is promised.
+TEST(RunningStatistics, StandAFirstRunThatIsFarOff) {
+  test::StatisticsInMemory in_memory(wide_objectives());
+  RunningStatistics running(wide_objectives());
+  for (std::uint64_t run = 0; run < 3000; ++run) {
+    RunResult result = scattered_result_of(run);
+    if (run == 0) result.estimate.assign(num_parameters, 1.0);
+    in_memory.add(result);
+    running.add(result);
+  }
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    const AccuracyStatistic found = running.statistics().accuracy[i];
+    const AccuracyStatistic expected = in_memory.statistics().accuracy[i];
+    expect_close(found.mean, expected.mean, expected.worst);
+    expect_close(found.standard_deviation, expected.standard_deviation, expected.worst);
+  }
+}
+
 TEST(RunningStatistics, NameTheFirstOfEqualRuns) {
   RunningStatistics running(wide_objectives());
   for (const std::uint64_t run : {30U, 10U, 20U}) {
