@@ -7,8 +7,9 @@
 
 namespace proofmass::coordinator {
 
-/// Processor time of a batch of the campaign's runs on this machine, extrapolated from the orbits
-/// that its first half second takes. The orbits of all sessions cost about the same.
+/// Processor time of the campaign's first batch on this machine, which is a full one unless the
+/// campaign has fewer runs; extrapolated from the orbits that its first half second takes. The
+/// orbits of all sessions cost about the same.
 /// @param plan  The campaign's.
 [[nodiscard]] double measure_batch_s(const Campaign& campaign, const Plan& plan);
 
@@ -25,7 +26,7 @@ struct CostEstimate {
 [[nodiscard]] std::uint64_t num_cores_here();
 
 /// Of a campaign with so many runs, whose batches take so long. `run` gives each core one batch of
-/// runs at a time; an incomplete batch costs as much as a whole.
+/// runs at a time. The last batch counts as a whole one, which it costs at most.
 [[nodiscard]] CostEstimate estimated_cost(std::uint64_t num_runs, double batch_s);
 
 /// Two lines that begin with `Time      about` and `Disk      about`.

@@ -5,12 +5,13 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
-#include <sstream>
 #include <string>
 #include <vector>
 
+#include "coordinator/cli/cost_estimate.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/model.hpp"
 #include "core/microscope/campaign/results.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/program.hpp"
@@ -27,16 +28,6 @@ std::string without_figures(const std::string& text) {
       "[0-9]+ cores here\n");
   return std::regex_replace(std::regex_replace(text, time, "...\n"),
                             std::regex("about [0-9]+\\.[0-9] MB\n"), "...\n");
-}
-
-/// The time on one core in the output of `check`.
-double core_s_in(const std::string& text) {
-  std::istringstream stream(text.substr(text.find("Time      about ") + 16));
-  double total_s = 0.0, count = 0.0;
-  for (std::string unit; stream >> count >> unit;) {
-    total_s += count * (unit == "d" ? 86400.0 : unit == "h" ? 3600.0 : unit == "min" ? 60.0 : 1.0);
-  }
-  return total_s;
 }
 
 double disk_mb_in(const std::string& text) {
@@ -111,23 +102,29 @@ TEST_F(Check, CountsTheNumberOfRunsAsNoDifference) {
       << output;
 }
 
-// Both times are measured for half a second of processor time each, on a machine that other tests
-// use as well: they may differ by a factor of two.
-TEST_F(Check, EstimatesATimeInProportionToTheRuns) {
+/// Runs of a full batch.
+std::uint64_t batch_size() { return model().batch_size(); }
+
+// Three batches one after another on one core, side by side on all.
+TEST_F(Check, EstimatesTheTimeOfAllRuns) {
   const auto file = write("campaign.name = \"mine\"\n");
-  const double few_s = core_s_in(test::answer_of({"check", file, "--runs", "16000"}).output);
-  const double many_s = core_s_in(test::answer_of({"check", file, "--runs", "1600000"}).output);
-  EXPECT_GT(few_s, 1.0);
-  EXPECT_GT(many_s, 50.0 * few_s);
-  EXPECT_LT(many_s, 200.0 * few_s);
+  const std::string num_runs = std::to_string(3 * batch_size());
+  const auto json =
+      nlohmann::json::parse(test::answer_of({"check", file, "--runs", num_runs, "--json"}).output);
+  const auto num_cores = json["num_cores"].get<std::uint64_t>();
+  const std::uint64_t num_rounds = (3 + num_cores - 1) / num_cores;
+  EXPECT_DOUBLE_EQ(json["one_core_s"].get<double>() / json["all_cores_s"].get<double>(),
+                   3.0 / static_cast<double>(num_rounds));
 }
 
-// A batch costs the same with one run as with sixteen.
-TEST_F(Check, CountsAnIncompleteBatchAsAWhole) {
-  const auto file = write("campaign.name = \"mine\"\nnoise.scale = 0\n");
-  const double one_s = core_s_in(test::answer_of({"check", file, "--runs", "1"}).output);
-  const double sixteen_s = core_s_in(test::answer_of({"check", file, "--runs", "16"}).output);
-  EXPECT_LT(sixteen_s, 2.0 * one_s + 1.0);
+TEST(CostEstimate, CountsAnIncompleteBatchAsAWhole) {
+  const std::uint64_t num_at_once = batch_size() * num_cores_here();
+  EXPECT_EQ(estimated_cost(1, 2.5).one_core_s, 2.5);
+  EXPECT_EQ(estimated_cost(batch_size(), 2.5).one_core_s, 2.5);
+  EXPECT_EQ(estimated_cost(batch_size() + 1, 2.5).one_core_s, 5.0);
+  EXPECT_EQ(estimated_cost(100 * batch_size(), 2.5).one_core_s, 250.0);
+  EXPECT_EQ(estimated_cost(num_at_once, 2.5).all_cores_s, 2.5);
+  EXPECT_EQ(estimated_cost(num_at_once + 1, 2.5).all_cores_s, 5.0);
 }
 
 TEST_F(Check, EstimatesTheDiskThatADatabaseTakes) {
