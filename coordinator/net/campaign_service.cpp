@@ -211,7 +211,8 @@ std::vector<CampaignSnapshot> CampaignService::snapshots() const {
     const auto served = served_.find(id);
     const bool is_here = served != served_.end();
     snapshots.push_back(
-        {.status = status_of(id),
+        {.id = id,
+         .status = status_of(id),
          .file = is_here ? served->second.file : ended_.at(id).file,
          .num_waiting = is_here ? state_.campaigns.at(id).delivered.size() : std::uint64_t{0}});
   }

@@ -34,6 +34,7 @@ struct WorkerSnapshot {
 
 /// A campaign, served or ended.
 struct CampaignSnapshot {
+  wire::CampaignId id = {};  ///< Another campaign of the same name has another one.
   wire::CampaignStatus status = {};
   std::filesystem::path file = {};  ///< Its database.
   std::uint64_t num_waiting = 0;    ///< Results that were delivered and are not stored yet.

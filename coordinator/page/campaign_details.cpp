@@ -1,5 +1,6 @@
 #include "coordinator/page/campaign_details.hpp"
 
+#include <fmt/format.h>
 #include <pthread.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -9,6 +10,7 @@
 #include <algorithm>
 #include <ctime>
 #include <exception>
+#include <iterator>
 #include <utility>
 
 #include "coordinator/store/store.hpp"
@@ -20,18 +22,32 @@ constexpr std::chrono::seconds reading_interval_min(2);
 constexpr int reading_share = 150;
 constexpr int reading_share_of_all = 75;
 constexpr int reading_niceness = 10;
+constexpr std::chrono::seconds pause_without_memory(2);
 
-std::shared_ptr<const CampaignEvents> read_events_of(const std::filesystem::path& file,
-                                                     const CampaignEvents* before) {
-  auto now = std::make_shared<CampaignEvents>();
-  if (before != nullptr) now->events = before->events;
-  try {
-    const CampaignHistory history(file);
-    const std::uint64_t last = now->events.empty() ? 0 : now->events.back().id;
-    for (StoredEvent& event : history.events_after(last, page_events_max)) {
-      now->events.push_back(std::move(event));
+/// Goes on after the last event that is kept, or begins anew if that is not in the file.
+void append_events(const CampaignHistory& history, std::deque<StoredEvent>& events) {
+  std::vector<StoredEvent> found;
+  if (!events.empty()) {
+    found = history.events_after(events.back().id - 1, page_events_max);
+    if (found.empty() || found.front() != events.back()) {
+      events.clear();
+    } else {
+      events.pop_back();
     }
-    while (now->events.size() > page_events_max) now->events.pop_front();
+  }
+  if (events.empty()) found = history.events_after(0, page_events_max);
+  events.insert(events.end(), std::move_iterator(found.begin()), std::move_iterator(found.end()));
+  while (events.size() > page_events_max) events.pop_front();
+}
+
+std::shared_ptr<const CampaignEvents> read_events_of(const DetailSubject& campaign,
+                                                     const CampaignEvents* before) {
+  auto now = before == nullptr ? std::make_shared<CampaignEvents>()
+                               : std::make_shared<CampaignEvents>(*before);
+  now->failure.clear();
+  try {
+    const CampaignHistory history(campaign.file);
+    append_events(history, now->events);
     now->losses = history.losses();
     now->ends = history.ends_without_estimate();
     now->given_up = history.given_up(page_given_up_max);
@@ -42,14 +58,29 @@ std::shared_ptr<const CampaignEvents> read_events_of(const std::filesystem::path
   return now;
 }
 
-std::shared_ptr<const CampaignResults> read_results_of(const std::filesystem::path& file,
+std::uint64_t num_finished_in(const Store& store) {
+  std::uint64_t count = 0;
+  for (const RunRange& range : store.finished_runs()) count += range.count;
+  return count;
+}
+
+/// Whether the file has what was read before. To count its runs takes long, and is done only if the
+/// coordinator knows of fewer than were read.
+bool goes_on(const ResultsReading* reading, const Store& store, const DetailSubject& campaign) {
+  if (reading == nullptr || !reading->is_of(store)) return false;
+  return reading->num_read() <= campaign.num_finished ||
+         reading->num_read() <= num_finished_in(store);
+}
+
+std::shared_ptr<const CampaignResults> read_results_of(const DetailSubject& campaign,
                                                        const CampaignResults* before) {
-  auto now = std::make_shared<CampaignResults>();
-  if (before != nullptr) now->reading = before->reading;
+  auto now = before == nullptr ? std::make_shared<CampaignResults>()
+                               : std::make_shared<CampaignResults>(*before);
+  now->failure.clear();
   try {
-    const Store store = Store::open_read_only(file);
-    const bool goes_on = now->reading != nullptr && now->reading->is_of(store);
-    ResultsReading reading = goes_on ? *now->reading : ResultsReading(store);
+    const Store store = Store::open_read_only(campaign.file);
+    const bool is_further = goes_on(now->reading.get(), store, campaign);
+    ResultsReading reading = is_further ? *now->reading : ResultsReading(store);
     reading.read_further(store, page_results_a_reading);
     now->html = reading.results().html();
     now->json = reading.results().json();
@@ -77,6 +108,38 @@ Duration cpu_time_of_thread() {
 }
 
 TimePoint steady_now() { return std::chrono::steady_clock::now(); }
+
+bool is_wanted(TimePoint asked_at, TimePoint now) {
+  return now - asked_at < DetailReader::wanted_for;
+}
+
+bool is_same(const DetailSubject& a, const DetailSubject& b) {
+  return a.id == b.id && a.file == b.file;
+}
+
+/// Whether there is something to be read. There may be more results than are known to be finished,
+/// because a reading is newer than the number, or because the file is an older copy now.
+bool has_other_results(const CampaignResults* read, const DetailSubject& campaign) {
+  return read == nullptr || !read->failure.empty() || read->num_runs != campaign.num_finished;
+}
+
+/// What a reading that failed has is as old as before.
+template <typename Part>
+void take(std::shared_ptr<const Part> read, TimePoint began_at, std::shared_ptr<const Part>& part,
+          TimePoint& read_at) {
+  if (read->failure.empty() || part == nullptr) read_at = began_at;
+  part = std::move(read);
+}
+
+CampaignDetails without_room(TimePoint now) {
+  const std::string failure =
+      fmt::format("campaigns that are looked at = {} (must be fewer; try again in {} s)",
+                  DetailReader::num_campaigns_max, DetailReader::wanted_for.count());
+  auto events = std::make_shared<CampaignEvents>();
+  auto results = std::make_shared<CampaignResults>();
+  events->failure = results->failure = failure;
+  return {.events = events, .results = results, .events_at = now, .results_at = now};
+}
 
 }  // namespace
 
@@ -107,20 +170,22 @@ DetailReader::~DetailReader() {
 CampaignDetails DetailReader::details(const std::string& name, const DetailSubject& campaign,
                                       TimePoint now) {
   const std::lock_guard lock(mutex_);
+  if (!watched_.contains(name) && !make_room(now)) return without_room(now);
   Watched& watched = watched_[name];
-  if (watched.campaign.file != campaign.file) watched = {};  // Another one of that name.
+  if (!is_same(watched.campaign, campaign)) watched = {};  // Another one of that name.
   watched.campaign = campaign;
   watched.asked_at = now;
-  CampaignDetails details = watched.details;
-  forget_oldest();
   changed_.notify_all();
-  return details;
+  return watched.details;
 }
 
-void DetailReader::forget_oldest() {
-  if (watched_.size() <= num_campaigns_max) return;
-  watched_.erase(std::ranges::min_element(watched_, {},
-                                          [](const auto& item) { return item.second.asked_at; }));
+bool DetailReader::make_room(TimePoint now) {
+  if (watched_.size() < num_campaigns_max) return true;
+  const auto oldest =
+      std::ranges::min_element(watched_, {}, [](const auto& item) { return item.second.asked_at; });
+  if (is_wanted(oldest->second.asked_at, now)) return false;
+  watched_.erase(oldest);
+  return true;
 }
 
 std::optional<DetailReader::Choice> DetailReader::choose(TimePoint now,
@@ -141,10 +206,9 @@ std::optional<DetailReader::Choice> DetailReader::choose(TimePoint now,
     }
   };
   for (const auto& [name, watched] : watched_) {
-    if (now - watched.asked_at >= wanted_for) continue;
+    if (!is_wanted(watched.asked_at, now)) continue;
     consider(name, Part::events, watched.events_due);
-    const CampaignResults* const results = watched.details.results.get();
-    if (results == nullptr || results->num_runs < watched.campaign.num_finished) {
+    if (has_other_results(watched.details.results.get(), watched.campaign)) {
       consider(name, Part::results, watched.results_due);
     }
   }
@@ -160,9 +224,9 @@ void DetailReader::read(const Choice& choice, std::unique_lock<std::mutex>& lock
   std::shared_ptr<const CampaignEvents> events;
   std::shared_ptr<const CampaignResults> results;
   if (choice.part == Part::events) {
-    events = sources_.read_events(campaign.file, before.events.get());
+    events = sources_.read_events(campaign, before.events.get());
   } else {
-    results = sources_.read_results(campaign.file, before.results.get());
+    results = sources_.read_results(campaign, before.results.get());
   }
   const TimePoint ended_at = steady_now();
   const Duration cpu_time = cpu_time_of_thread() - cpu_before;
@@ -170,29 +234,37 @@ void DetailReader::read(const Choice& choice, std::unique_lock<std::mutex>& lock
   lock.lock();
   rests_until_ = end_of_rest(ended_at, cpu_time);
   const auto found = watched_.find(choice.name);
-  if (found == watched_.end() || found->second.campaign.file != campaign.file) return;
+  if (found == watched_.end() || !is_same(found->second.campaign, campaign)) return;
   Watched& watched = found->second;
   if (events != nullptr) {
-    watched.details.events = std::move(events);
-    watched.details.events_at = began_at;
     watched.events_due = due;
-    return;
+    take(std::move(events), began_at, watched.details.events, watched.details.events_at);
+  } else {
+    watched.results_due = due;
+    take(std::move(results), began_at, watched.details.results, watched.details.results_at);
   }
-  watched.details.results = std::move(results);
-  watched.details.results_at = began_at;
-  watched.results_due = due;
+}
+
+void DetailReader::read_next(std::unique_lock<std::mutex>& lock) {
+  TimePoint look_again{};
+  const std::optional<Choice> choice = choose(steady_now(), look_again);
+  if (choice) {
+    read(*choice, lock);
+  } else {
+    changed_.wait_until(lock, look_again);
+  }
 }
 
 void DetailReader::work() {
   become_unimportant();
   std::unique_lock lock(mutex_);
   while (!is_stopping_) {
-    TimePoint look_again{};
-    const std::optional<Choice> choice = choose(steady_now(), look_again);
-    if (choice) {
-      read(*choice, lock);
-    } else {
-      changed_.wait_until(lock, look_again);
+    try {
+      read_next(lock);
+    } catch (const std::exception&) {
+      // Memory is short: the page shows what it has.
+      if (!lock.owns_lock()) lock.lock();
+      rests_until_ = steady_now() + pause_without_memory;
     }
   }
 }

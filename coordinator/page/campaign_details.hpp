@@ -36,15 +36,15 @@ struct CampaignEvents {
   std::vector<EndCount> ends = {};           ///< Without an estimate.
   std::vector<GivenUpRecord> given_up = {};  ///< At most page_given_up_max.
   RecentAttempts attempts = {};
-  std::string failure = {};  ///< Why the database could not be read; empty if it could.
+  std::string failure = {};  ///< Why the last reading failed; the rest is of the one before.
 };
 
 /// What those results of a campaign yield that were read so far.
 struct CampaignResults {
-  std::string html = {};       ///< Of LiveResults; empty if they could not be read.
+  std::string html = {};       ///< Of LiveResults; empty before the first reading.
   std::string json = {};       ///< Likewise.
   std::uint64_t num_runs = 0;  ///< Finished runs that were read.
-  std::string failure = {};    ///< Why they could not be read; empty if they could.
+  std::string failure = {};    ///< Why the last reading failed; the rest is of the one before.
   std::shared_ptr<const ResultsReading> reading = {};  ///< What the next reading goes on from.
 };
 
@@ -58,21 +58,23 @@ struct CampaignDetails {
 
 /// What is known of a campaign without looking into its database.
 struct DetailSubject {
+  wire::CampaignId id = {};
   std::filesystem::path file = {};
-  std::uint64_t num_finished = 0;  ///< Results are read while fewer than these were.
+  std::uint64_t num_finished = 0;  ///< Results are read until these were.
 };
 
 /// How campaign databases are read: each time further than before.
 struct DetailSources {
-  /// @param before  What was read of the file last time; null at first.
+  /// @param before  What was read of the campaign last time; null at first.
   template <typename Part>
   using ReadPart =
-      std::function<std::shared_ptr<const Part>(const std::filesystem::path&, const Part* before)>;
+      std::function<std::shared_ptr<const Part>(const DetailSubject&, const Part* before)>;
   ReadPart<CampaignEvents> read_events;
   ReadPart<CampaignResults> read_results;  ///< Some results at a time.
 };
 
-/// Those of a coordinator.
+/// Those of a coordinator. A file that lacks what was read of it before is read anew from the
+/// beginning: it is an older copy, or another campaign has its place.
 [[nodiscard]] DetailSources database_sources();
 
 /// When something is read again whose reading ended at `ended_at` and took so much processor time:
@@ -84,18 +86,20 @@ struct DetailSources {
 [[nodiscard]] TimePoint end_of_rest(TimePoint ended_at, Duration cpu_time);
 
 /// Reads the databases of those campaigns at which somebody looks, in one thread of low priority.
-/// A campaign that nobody has asked for in the last minute is not read; at most 16 are kept.
+/// A campaign that nobody has asked for in the last minute is not read, and forgotten if another
+/// one needs its place.
 class DetailReader {
  public:
   static constexpr std::chrono::seconds wanted_for{60};
-  static constexpr std::size_t num_campaigns_max = 16;
+  static constexpr std::size_t num_campaigns_max = 64;
 
   explicit DetailReader(DetailSources sources);
   ~DetailReader();  ///< Waits until what is being read is read.
   DetailReader(const DetailReader&) = delete;
   DetailReader& operator=(const DetailReader&) = delete;
 
-  /// What was read of the campaign so far; asks for more. Never waits.
+  /// What was read of the campaign so far; asks for more. Never waits. If too many others are
+  /// wanted, both parts say so.
   [[nodiscard]] CampaignDetails details(const std::string& name, const DetailSubject& campaign,
                                         TimePoint now);
 
@@ -117,7 +121,9 @@ class DetailReader {
   /// What is to be read now, if anything, and otherwise when to look again.
   [[nodiscard]] std::optional<Choice> choose(TimePoint now, TimePoint& look_again) const;
   void read(const Choice& choice, std::unique_lock<std::mutex>& lock);
-  void forget_oldest();
+  void read_next(std::unique_lock<std::mutex>& lock);
+  /// @return Whether there is room for one more campaign.
+  [[nodiscard]] bool make_room(TimePoint now);
 
   DetailSources sources_;
   std::mutex mutex_;  ///< For what follows.

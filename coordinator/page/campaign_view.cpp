@@ -42,13 +42,15 @@ std::string reading_line(TimePoint read_at, TimePoint now) {
 std::string results_of(const CampaignDetails& details, std::uint64_t num_done, TimePoint now) {
   if (details.results == nullptr) return "<p class=\"note\">The results are being read.</p>\n";
   const CampaignResults& results = *details.results;
+  std::string notes;
   if (!results.failure.empty()) {
-    return notes_list({"the results cannot be shown: " + results.failure});
+    notes = notes_list({"the results cannot be read now: " + results.failure});
   }
+  if (results.html.empty()) return notes;
   return fmt::format(
-      "<section><h2>Results</h2>\n<p class=\"note\">{} of {} finished runs, read "
+      "{}<section><h2>Results</h2>\n<p class=\"note\">{} of {} finished runs, read "
       "{}</p>\n{}</section>\n",
-      grouped(results.num_runs), grouped(std::max(num_done, results.num_runs)),
+      notes, grouped(results.num_runs), grouped(std::max(num_done, results.num_runs)),
       reading_line(details.results_at, now), results.html);
 }
 

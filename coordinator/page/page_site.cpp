@@ -122,8 +122,8 @@ std::optional<HttpAnswer> PageSite::about_campaign(const PageRequest& request,
   const std::size_t num_parts = request.path.size() - name_at;
   if (found == campaigns.end() || num_parts > (is_api ? 2U : 1U)) return not_found();
   const TimePoint now = sources_.now();
-  const CampaignDetails details =
-      sources_.details(name, {.file = found->file, .num_finished = found->status.num_done}, now);
+  const CampaignDetails details = sources_.details(
+      name, {.id = found->id, .file = found->file, .num_finished = found->status.num_done}, now);
   // A page shows what there is, and the rest two seconds later; a program wants all at once.
   if (!is_api) return campaign_html(*found, details, request, now);
   if (details.events == nullptr && patience == Patience::left) return std::nullopt;

@@ -23,6 +23,8 @@ struct StoredEvent {
   std::string time_utc = {};  ///< As in `2024-02-29T12:00:10.123Z`.
   std::string kind = {};
   std::string text = {};
+
+  bool operator==(const StoredEvent&) const = default;
 };
 
 /// Losses with one reason: runs that came back without a result, and were lent again.

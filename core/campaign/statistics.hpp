@@ -93,8 +93,9 @@ struct ErrorExtremes {
 /// by the bootstrap, which need all results at once. Memory is fixed; a copy costs little.
 ///
 /// Moments are corrected sums about the first value instead of the mean: they agree with those of
-/// StatisticsPasses to 1e-11 of the worst |error| if the first value is within 10⁴ standard
-/// deviations of the mean: a standard deviation s loses ε D²/s, D being that distance.
+/// StatisticsPasses to 1e-11 of the worst |error|. A standard deviation s loses ε D²/s, D being the
+/// distance of the first value from the mean; as it is one of the n values, D < √n s, so that no
+/// more than ε √n D is lost.
 class RunningStatistics {
  public:
   /// @param objectives  As for StatisticsPasses.

@@ -5,7 +5,10 @@
 #include <cmath>
 #include <condition_variable>
 #include <ctime>
+#include <map>
+#include <memory>
 #include <mutex>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -38,18 +41,18 @@ class DetailReaderTest : public ::testing::Test {
  protected:
   DetailSources sources() {
     return {.read_events =
-                [this](const std::filesystem::path& file, const CampaignEvents* before) {
-                  note("events " + file.string());
+                [this](const DetailSubject& campaign, const CampaignEvents* before) {
+                  note("events " + campaign.file.string());
                   auto events = std::make_shared<CampaignEvents>();
                   events->events = before == nullptr ? decltype(events->events){} : before->events;
                   events->events.push_back({.id = events->events.size() + 1});
                   return events;
                 },
             .read_results =
-                [this](const std::filesystem::path& file, const CampaignResults* before) {
-                  note("results " + file.string());
+                [this](const DetailSubject& campaign, const CampaignResults* before) {
+                  note("results " + campaign.file.string());
                   auto results = std::make_shared<CampaignResults>();
-                  results->html = "<p>" + file.string() + "</p>";
+                  results->html = "<p>" + campaign.file.string() + "</p>";
                   results->num_runs = (before == nullptr ? 0 : before->num_runs) + 5;
                   return results;
                 }};
@@ -110,7 +113,7 @@ TEST_F(DetailReaderTest, ReadsEventsFurtherAndResultsOnlyIfThereAreMore) {
 // A part of five results at a time.
 TEST_F(DetailReaderTest, ReadsResultsFurtherUntilItHasThoseThatAreFinished) {
   DetailReader reader(sources());
-  const DetailSubject subject{.file = "a.db", .num_finished = 7};
+  const DetailSubject subject{.file = "a.db", .num_finished = 10};
   (void)whole(reader, "a", subject);
   wait_for("results a.db", 2);
   wait_for("events a.db", 3);
@@ -135,12 +138,12 @@ TEST_F(DetailReaderTest, RestsAfterEachReadingWhateverIsNext) {
   constexpr auto cpu_time = 5ms;
   DetailSources played = sources();
   std::vector<TimePoint> begun, ended;  // Of the reader's thread.
-  played.read_events = [&, read = played.read_events](const std::filesystem::path& file,
+  played.read_events = [&, read = played.read_events](const DetailSubject& campaign,
                                                       const CampaignEvents* before) {
     begun.push_back(std::chrono::steady_clock::now());
     work_for(cpu_time);
     ended.push_back(std::chrono::steady_clock::now());
-    return read(file, before);
+    return read(campaign, before);
   };
   {
     DetailReader reader(played);
@@ -159,27 +162,107 @@ TEST_F(DetailReaderTest, BeginsAnewWithAnotherFileOfThatName) {
   EXPECT_EQ(whole(reader, "a", {.file = "b.db"}).results->html, "<p>b.db</p>");
 }
 
-TEST_F(DetailReaderTest, KeepsABoundedNumberOfCampaigns) {
+TEST_F(DetailReaderTest, BeginsAnewWithAnotherCampaignInThatFile) {
   DetailReader reader(sources());
-  (void)whole(reader, "first", {.file = "first.db"});
-  for (std::size_t i = 0; i < DetailReader::num_campaigns_max; ++i) {
-    const std::string name = "c" + std::to_string(i);
-    (void)whole(reader, name, {.file = name + ".db"});
-  }
-  const auto now = std::chrono::steady_clock::now();
-  EXPECT_EQ(reader.details("first", {.file = "first.db"}, now).events, nullptr);
+  const DetailSubject first{.id = {1}, .file = "a.db", .num_finished = 5};
+  const DetailSubject second{.id = {2}, .file = "a.db", .num_finished = 5};
+  (void)whole(reader, "a", first);
+  EXPECT_EQ(reader.details("a", second, std::chrono::steady_clock::now()).results, nullptr);
+  EXPECT_EQ(whole(reader, "a", second).results->num_runs, 5U);
 }
 
-using DatabaseResults = test::StoreTest;
+// The file is an older copy now, or the number was older than the reading.
+TEST_F(DetailReaderTest, ReadsResultsAgainIfFewerAreFinishedThanItRead) {
+  DetailReader reader(sources());
+  (void)whole(reader, "a", {.file = "a.db", .num_finished = 5});
+  (void)reader.details("a", {.file = "a.db", .num_finished = 4}, std::chrono::steady_clock::now());
+  wait_for("results a.db", 2);
+}
 
-// Errors of these results grow with the run: the last one is the worst.
-TEST_F(DatabaseResults, AreReadForPeopleAndForPrograms) {
-  Store store =
-      Store::create(file(), test::campaign_of(3), canonical_definition(test::campaign_of(3)));
-  std::vector<Entry> entries{test::worker_1()};
-  for (const Delivery& delivery : test::deliveries_of(0, 3)) entries.emplace_back(delivery);
-  (void)store.write(entries);
-  const auto results = database_sources().read_results(file(), nullptr);
+TEST_F(DetailReaderTest, TriesAgainWhatCouldNotBeRead) {
+  DetailSources played = sources();
+  played.read_results = [this](const DetailSubject&, const CampaignResults* before) {
+    note("results");
+    auto results = std::make_shared<CampaignResults>();
+    if (before == nullptr) results->failure = "not now";
+    return results;
+  };
+  DetailReader reader(played);
+  EXPECT_EQ(whole(reader, "a", {}).results->failure, "not now");
+  wait_for("results", 2);
+}
+
+// As if memory were short in its own code.
+TEST_F(DetailReaderTest, GoesOnAfterAnException) {
+  DetailSources played = sources();
+  played.read_events = [this, read = played.read_events](const DetailSubject& campaign,
+                                                         const CampaignEvents* before) {
+    note("tried");
+    if (count_of("tried") == 1) throw std::bad_alloc();
+    return read(campaign, before);
+  };
+  DetailReader reader(played);
+  EXPECT_EQ(whole(reader, "a", {.file = "a.db"}).events->events.size(), 1U);
+}
+
+TEST_F(DetailReaderTest, KeepsABoundedNumberOfCampaigns) {
+  DetailReader reader(sources());
+  const auto now = std::chrono::steady_clock::now();
+  for (std::size_t i = 0; i < DetailReader::num_campaigns_max; ++i) {
+    const std::string name = "c" + std::to_string(i);
+    EXPECT_EQ(reader.details(name, {.file = name + ".db"}, now).events, nullptr);
+  }
+  const CampaignDetails none = reader.details("one more", {.file = "more.db"}, now + 1s);
+  EXPECT_EQ(none.events->failure,
+            "campaigns that are looked at = 64 (must be fewer; try again in 60 s)");
+  EXPECT_EQ(none.results->failure, none.events->failure);
+  // Those that were asked for before are still there, and one gives its place when it is not wanted
+  // any more.
+  EXPECT_EQ(reader.details("c0", {.file = "c0.db"}, now + 2s).results, nullptr);
+  EXPECT_EQ(reader.details("one more", {.file = "more.db"}, now + 61s).events, nullptr);
+}
+
+class DatabaseDetails : public test::StoreTest {
+ protected:
+  /// Errors of these results grow with the run: the last one is the worst.
+  Store made(std::uint64_t num_results) {
+    Store store =
+        Store::create(file(), test::campaign_of(9), canonical_definition(test::campaign_of(9)));
+    std::vector<Entry> entries{test::worker_1()};
+    for (const Delivery& delivery : test::deliveries_of(0, num_results)) {
+      entries.emplace_back(delivery);
+    }
+    for (const char* text : {"first", "second"}) {
+      entries.emplace_back(EventEntry{.kind = "kind", .text = text});
+    }
+    (void)store.write(entries);
+    return store;
+  }
+  void add(Store& store, std::uint64_t first_run, std::uint64_t end, const char* text) {
+    std::vector<Entry> entries{EventEntry{.kind = "kind", .text = text}};
+    for (const Delivery& delivery : test::deliveries_of(first_run, end)) {
+      entries.emplace_back(delivery);
+    }
+    (void)store.write(entries);
+  }
+  [[nodiscard]] std::shared_ptr<const CampaignResults> results_after(
+      std::uint64_t num_finished, const CampaignResults* before) const {
+    return sources_.read_results({.file = file(), .num_finished = num_finished}, before);
+  }
+  [[nodiscard]] std::vector<std::string> texts_after(const CampaignEvents* before) {
+    events_ = sources_.read_events({.file = file()}, before);
+    std::vector<std::string> texts;
+    for (const StoredEvent& event : events_->events) texts.push_back(event.text);
+    return texts;
+  }
+
+  const DetailSources sources_ = database_sources();
+  std::shared_ptr<const CampaignEvents> events_;
+};
+
+TEST_F(DatabaseDetails, AreForPeopleAndForPrograms) {
+  const Store store = made(3);
+  const auto results = results_after(3, nullptr);
   EXPECT_EQ(results->failure, "");
   EXPECT_EQ(results->num_runs, 3U);
   EXPECT_THAT(results->html, testing::HasSubstr("Accuracy so far"));
@@ -189,12 +272,65 @@ TEST_F(DatabaseResults, AreReadForPeopleAndForPrograms) {
   EXPECT_EQ(parameters[0]["worst_run"], 2);
 }
 
+TEST_F(DatabaseDetails, GoOnAfterWhatWasRead) {
+  Store store = made(3);
+  const auto results = results_after(3, nullptr);
+  EXPECT_THAT(texts_after(nullptr), testing::ElementsAre("first", "second"));
+  add(store, 3, 5, "third");
+  EXPECT_EQ(results_after(5, results.get())->num_runs, 5U);
+  const auto before = events_;
+  EXPECT_THAT(texts_after(before.get()), testing::ElementsAre("first", "second", "third"));
+}
+
+TEST_F(DatabaseDetails, AreThoseOfAnOlderCopyThatTookThePlaceOfTheFile) {
+  const std::filesystem::path copy = directory() / "copy.db";
+  std::shared_ptr<const CampaignResults> results;
+  {
+    Store store = made(3);
+    store.back_up(copy);
+    add(store, 3, 5, "third");
+    results = results_after(5, nullptr);
+    (void)texts_after(nullptr);
+    (void)store.rest();
+  }
+  const auto before = events_;
+  std::filesystem::rename(copy, file());
+  EXPECT_EQ(results_after(3, results.get())->num_runs, 3U);
+  EXPECT_THAT(texts_after(before.get()), testing::ElementsAre("first", "second"));
+}
+
+// Results that were read are newer than the number of those that are finished.
+TEST_F(DatabaseDetails, AreKeptIfTheFileHasThem) {
+  const Store store = made(3);
+  const auto results = results_after(3, nullptr);
+  const auto again = results_after(2, results.get());
+  EXPECT_EQ(again->num_runs, 3U);
+  EXPECT_EQ(again->failure, "");
+}
+
+TEST_F(DatabaseDetails, AreThoseOfBeforeIfTheFileCannotBeRead) {
+  std::shared_ptr<const CampaignResults> results;
+  {
+    Store store = made(3);
+    results = results_after(3, nullptr);
+    (void)texts_after(nullptr);
+    (void)store.rest();
+  }
+  const auto before = events_;
+  std::filesystem::rename(file(), directory() / "away.db");
+  const auto again = results_after(3, results.get());
+  EXPECT_THAT(again->failure, testing::HasSubstr("(does not exist)"));
+  EXPECT_EQ(again->num_runs, 3U);
+  EXPECT_EQ(again->json, results->json);
+  EXPECT_THAT(texts_after(before.get()), testing::ElementsAre("first", "second"));
+  EXPECT_THAT(events_->failure, testing::HasSubstr("(does not exist)"));
+}
+
 TEST(DatabaseSources, SayWhyAFileCannotBeRead) {
   const DetailSources sources = database_sources();
-  EXPECT_THAT(sources.read_events("/nowhere/a.db", nullptr)->failure,
-              testing::HasSubstr("/nowhere/a.db"));
-  EXPECT_THAT(sources.read_results("/nowhere/a.db", nullptr)->failure,
-              testing::HasSubstr("/nowhere/a.db"));
+  const DetailSubject nowhere{.file = "/nowhere/a.db"};
+  EXPECT_THAT(sources.read_events(nowhere, nullptr)->failure, testing::HasSubstr("/nowhere/a.db"));
+  EXPECT_THAT(sources.read_results(nowhere, nullptr)->failure, testing::HasSubstr("/nowhere/a.db"));
 }
 
 }  // namespace
