@@ -16,9 +16,9 @@ namespace {
 
 /// For the worker of a lease of which the remaining runs have changed.
 void note_slots(State& state, Worker& worker, std::uint64_t num_before, std::uint64_t num_now) {
-  state.num_idle_slots -= num_idle_slots(worker);
+  if (worker.is_served) state.num_idle_slots -= num_idle_slots(worker);
   worker.num_slots_lent_for += num_now - num_before;
-  state.num_idle_slots += num_idle_slots(worker);
+  if (worker.is_served) state.num_idle_slots += num_idle_slots(worker);
 }
 
 /// A copy becomes the first lease of its run.
@@ -116,6 +116,14 @@ void take_off_and_tell(State& state, LeaseId lease, RunIndex run, WorkerId by,
 }
 
 }  // namespace
+
+void set_served(State& state, Worker& worker, bool is_served) {
+  if (is_served == worker.is_served) return;
+  worker.is_served = is_served;
+  const std::uint64_t num_idle = num_idle_slots(worker);
+  state.num_served_slots += is_served ? worker.num_slots : -std::uint64_t{worker.num_slots};
+  state.num_idle_slots += is_served ? num_idle : -num_idle;
+}
 
 Attempt after(Attempt attempt) {
   constexpr std::uint32_t last = std::numeric_limits<std::uint32_t>::max();
@@ -273,7 +281,7 @@ void send_retract(WorkerId worker, CampaignId campaign, const RunSet& runs, Outb
 
 void remove_worker(State& state, WorkerId id, LossReason reason, const RunsByCampaign& blamed,
                    Outbox& outbox) {
-  const Worker& worker = state.workers.at(id);
+  Worker& worker = state.workers.at(id);
   while (!worker.leases.empty()) {
     const LeaseId lease_id = *worker.leases.begin();
     const Lease& lease = state.leases.at(lease_id);
@@ -281,8 +289,9 @@ void remove_worker(State& state, WorkerId id, LossReason reason, const RunsByCam
     const RunSet runs = lease.remaining;
     lose(state, lease_id, runs, reason, guilty == blamed.end() ? RunSet() : guilty->second, outbox);
   }
+  set_served(state, worker, false);
   state.num_slots -= worker.num_slots;
-  state.num_idle_slots -= num_idle_slots(worker);
+  state.num_slots_expected = 0;  // As many as were expected do not come.
   const auto found = state.hosts.find(worker.host);
   Host& host = found->second;
   --host.num_workers;

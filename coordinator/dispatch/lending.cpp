@@ -22,9 +22,9 @@ std::uint64_t num_waiting(const CampaignState& campaign) {
   return count;
 }
 
-/// Slots of all workers, those that are still to come included.
+/// Slots that may be lent runs, now or when they have come.
 std::uint64_t num_slots_in_all(const State& state) {
-  return std::max(state.num_slots, state.config.num_slots_expected);
+  return state.num_served_slots + state.num_slots_expected;
 }
 
 double run_time_s(const CampaignState& campaign, CampaignId id, const Worker& worker) {
@@ -64,7 +64,7 @@ std::uint64_t rounds_wanted(const State& state, CampaignId id, const CampaignSta
   const double by_time = std::ceil(state.config.lease_work_s / time_s);
   const auto rounds = static_cast<std::uint64_t>(
       std::clamp(by_time, 2.0, static_cast<double>(wire::runs_per_lease_max)));
-  const std::uint64_t slots = 2 * state.num_slots;
+  const std::uint64_t slots = 2 * state.num_served_slots;
   const std::uint64_t by_share = (num_waiting(campaign) + slots - 1) / slots;
   return std::max<std::uint64_t>(1,
                                  std::min({rounds, by_share, rounds_with_room(state, campaign)}));
@@ -127,9 +127,8 @@ std::uint64_t num_slots_sharing(State& state, double time_s, TimePoint now) {
         now - std::chrono::duration_cast<Duration>(std::chrono::duration<double>(time_s / 2.0)));
   }
   const std::uint64_t num_in_all = num_slots_in_all(state);
-  const std::uint64_t num_to_come = num_in_all - state.num_slots;
   const std::uint64_t num_lately = std::min(num_in_all, state.lately_lent.num_slots());
-  return std::max(num_in_all - num_lately, state.num_idle_slots + num_to_come);
+  return std::max(num_in_all - num_lately, state.num_idle_slots + state.num_slots_expected);
 }
 
 /// A worker's part, by its idle slots, of the last runs: those that would fill at most half of the
@@ -287,7 +286,8 @@ bool has_runs_to_lend(const State& state) {
 
 void lend(State& state, WorkerId id, TimePoint now, Outbox& outbox) {
   state.hungry.erase(id);
-  const Worker& worker = state.workers.at(id);
+  Worker& worker = state.workers.at(id);
+  set_served(state, worker, may_be_lent(state, worker, now));
   if (!state.is_lending || is_passed_over(state, worker, now)) return;
   if (worker.num_lent >= worker.num_runs_max) return;
   if (!is_reattaching(state, now)) {
@@ -307,6 +307,10 @@ void lend_to_hungry(State& state, TimePoint now, Outbox& outbox) {
 bool is_passed_over(const State& state, const Worker& worker, TimePoint now) {
   return worker.num_alone > 0 || now - worker.heard_at >= state.config.suspect_after ||
          state.quarantined.contains(worker.host);
+}
+
+bool may_be_lent(const State& state, const Worker& worker, TimePoint now) {
+  return worker.num_runs_max > 0 && !is_passed_over(state, worker, now);
 }
 
 bool is_reattaching(const State& state, TimePoint now) {

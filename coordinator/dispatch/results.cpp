@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -126,6 +127,26 @@ std::string broken_rule(const CampaignState& campaign, const wire::ResultBatch& 
   return {};
 }
 
+/// True if the run was lent together with fewer others than its slots have room for, to end sooner.
+bool is_of_short_batch(const State& state, const CampaignState& campaign, RunIndex run) {
+  const std::optional<LeaseId> id = campaign.lent.find(run);
+  if (!id) return false;
+  const Lease& lease = state.leases.at(*id);
+  return lease.num_runs < lease.num_slots;
+}
+
+/// Learns how long a run takes in its slot. Short batches say too little of it, unless nothing is
+/// known.
+void count_run_time(const State& state, Worker& worker, CampaignId id, CampaignState& campaign,
+                    const wire::ComputedRun& computed) {
+  const bool is_known = campaign.run_time_s > 0.0;
+  if (is_known && is_of_short_batch(state, campaign, computed.result.run)) return;
+  const double elapsed_s = std::max(computed.elapsed_s, 1e-9);  // 0 means that none is known.
+  double& own_s = worker.run_time_s[id];
+  own_s = running_mean(own_s, elapsed_s);
+  campaign.run_time_s = running_mean(campaign.run_time_s, elapsed_s);
+}
+
 /// The worker and its host can compute: what they show with every result.
 void count_results(State& state, Worker& worker, CampaignId id, const wire::ResultBatch& batch) {
   CampaignState& campaign = state.campaigns.at(id);
@@ -137,13 +158,10 @@ void count_results(State& state, Worker& worker, CampaignId id, const wire::Resu
   host.num_crashes = 0;
   host.num_results += num_results;
   worker.num_results += num_results;
-  double& own_s = worker.run_time_s[id];
   const auto unleased = worker.unleased.find(id);
   for (const wire::ComputedRun& computed : batch.results) {
     if (is_foreign(campaign, computed)) continue;
-    const double elapsed_s = std::max(computed.elapsed_s, 1e-9);  // 0 means that none is known.
-    own_s = running_mean(own_s, elapsed_s);
-    campaign.run_time_s = running_mean(campaign.run_time_s, elapsed_s);
+    count_run_time(state, worker, id, campaign, computed);
     if (unleased != worker.unleased.end()) unleased->second.remove(computed.result.run);
   }
   if (unleased != worker.unleased.end() && unleased->second.empty()) {

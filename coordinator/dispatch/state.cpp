@@ -15,6 +15,7 @@ State initial_state(const DispatchConfig& config, std::set<SessionId> awaited, T
   state.config = config;
   state.awaited = std::move(awaited);
   state.awaited_until = now + config.reattach_wait;
+  state.num_slots_expected = config.num_slots_expected;
   state.hello_allowance = config.hellos_per_s_max;
   state.hello_allowance_at = now;
   return state;

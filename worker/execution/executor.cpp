@@ -268,7 +268,11 @@ void Executor::finish(const Batch& batch, const std::vector<RunResult>& results)
     const std::lock_guard lock(mutex_);
     if (batch.is_dropped) return;
     batches_.erase(batch.number);
-    campaigns_.at(campaign).batch_time = elapsed;
+    KnownCampaign& known = campaigns_.at(campaign);
+    if (results.size() >= known.largest_batch) {
+      known.largest_batch = results.size();
+      known.batch_time = elapsed;
+    }
     for (const RunResult& result : results) {
       finished_.push_back(
           {.campaign = campaign,

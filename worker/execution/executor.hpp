@@ -78,7 +78,8 @@ class Executor final : public Execution {
         prepared;  ///< Shared with its batches; null until then.
     bool is_preparing = false;
     std::uint64_t used = 0;              ///< Grows with each use: the smallest is the longest ago.
-    std::optional<Duration> batch_time;  ///< Of the batch that finished last.
+    std::size_t largest_batch = 0;       ///< Runs of the largest batch so far.
+    std::optional<Duration> batch_time;  ///< Of the last one among those that were as large.
   };
 
   /// Runs that one thread computes together. The thread shares it with `batches_`, from which it is

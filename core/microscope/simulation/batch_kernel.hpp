@@ -24,7 +24,7 @@ struct BatchSession {
   std::array<LoopConstants<double>, batch_lanes> constants{};
   std::array<NoiseStates<double>, batch_lanes> noise_states{};
   std::span<double> weights_buffer;  ///< Room for a block of weights.
-  /// Called after each block with the number of record samples done.
+  /// Called with the number of record samples done, after each block or more often.
   void (*progress)(const void* context, std::size_t num_samples) = nullptr;
   const void* progress_context = nullptr;
 };
@@ -37,11 +37,13 @@ using BatchKernel = void (*)(const BatchSession& session,
                              std::span<SessionOutcome, batch_lanes> outcomes);
 
 /// The same for several sessions of the same runs, which are computed side by side as far as there
-/// are lanes, into the outcomes of each session.
+/// are lanes, into the outcomes of each session. Signals are summed whether or not the session
+/// records them.
 ///
 /// @param sessions  Of the same runs, noise, gains and settling; the first one's progress is called
-///                  with the record samples done in all of them. They begin in this order: the
-///                  longest first takes the least time.
+///                  with that part of the record samples of all of them that is the part of the
+///                  time that has passed. They begin in this order: the longest first takes the
+///                  least time.
 using MixedKernel = void (*)(std::span<const BatchSession> sessions,
                              std::span<SessionOutcomes> outcomes);
 

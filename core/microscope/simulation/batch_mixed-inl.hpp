@@ -126,6 +126,8 @@ class MixedLanes {
         outcomes_(outcomes),
         lanes_a_seat_(std::bit_ceil(sessions[0].num_runs)),
         num_seats_(std::min(num_lanes / lanes_a_seat_, sessions.size())),
+        num_steps_(steps_of(sessions, num_seats_)),
+        num_record_samples_(record_samples_of(sessions)),
         noise_(with_runs_in_seats(sessions[0], lanes_a_seat_), LaneStreams(), 0, {}) {
     for (std::size_t s = 0; s < num_seats_; ++s) begin_next(s);
   }
@@ -141,6 +143,7 @@ class MixedLanes {
       advance(num_samples);
       num_samples_ += num_samples;
       for (std::size_t s = 0; s < num_seats_; ++s) pass(s, num_samples);
+      report();
     }
   }
 
@@ -173,6 +176,33 @@ class MixedLanes {
       in_seats.runs[lane] = session.runs[lane % lanes_a_seat];
     }
     return in_seats;
+  }
+
+  /// Samples of a lane until all sessions have ended, each begun in the seat that is free first.
+  [[nodiscard]] static std::size_t steps_of(std::span<const BatchSession> sessions,
+                                            std::size_t num_seats) {
+    std::array<std::size_t, num_lanes> ends{};
+    std::size_t last = 0;
+    for (const BatchSession& session : sessions) {
+      std::size_t first_free = 0;
+      for (std::size_t s = 1; s < num_seats; ++s) {
+        if (ends[s] < ends[first_free]) first_free = s;
+      }
+      std::size_t& end = ends[first_free];
+      end += (samples_per_noise_block - end % samples_per_noise_block) % samples_per_noise_block;
+      end += static_cast<std::size_t>(session.signals->num_settling()) +
+             session.setup.reader->weights().num_samples();
+      last = std::max(last, end);
+    }
+    return last;
+  }
+
+  [[nodiscard]] static std::size_t record_samples_of(std::span<const BatchSession> sessions) {
+    std::size_t count = 0;
+    for (const BatchSession& session : sessions) {
+      count += session.setup.reader->weights().num_samples();
+    }
+    return count;
   }
 
   template <typename Function>
@@ -292,7 +322,6 @@ class MixedLanes {
       return;
     }
     seat.num_done += num_samples;
-    if (seat.is_recording) report(num_samples);
     if (seat.num_done < length(seat)) return;
     if (seat.is_recording) {
       end_block(s);
@@ -301,9 +330,13 @@ class MixedLanes {
     }
   }
 
-  void report(std::size_t num_samples) {
-    num_recorded_ += num_samples;
-    sessions_[0].progress(sessions_[0].progress_context, num_recorded_);
+  /// The time that is left follows from the part of the steps that is done: towards the end only
+  /// the longest session is left, and has all lanes' time.
+  void report() {
+    const double part = static_cast<double>(num_samples_) / static_cast<double>(num_steps_);
+    const auto done = static_cast<std::size_t>(part * static_cast<double>(num_record_samples_));
+    sessions_[0].progress(sessions_[0].progress_context,
+                          num_samples_ == num_steps_ ? num_record_samples_ : done);
   }
 
   void end_block(std::size_t s) {
@@ -341,10 +374,11 @@ class MixedLanes {
   std::span<SessionOutcomes> outcomes_;
   std::size_t lanes_a_seat_;
   std::size_t num_seats_;
+  std::size_t num_steps_;           ///< In all, as num_samples_ counts.
+  std::size_t num_record_samples_;  ///< Of the records of all sessions.
   std::size_t num_begun_ = 0;
   std::size_t num_ended_ = 0;
-  std::size_t num_samples_ = 0;   ///< Of every lane.
-  std::size_t num_recorded_ = 0;  ///< Of the records of all sessions.
+  std::size_t num_samples_ = 0;  ///< Of every lane.
   bool is_any_recording_ = false;
 
   std::array<Seat, num_lanes> seats_{};

@@ -21,8 +21,12 @@
 namespace proofmass {
 namespace {
 
-void append_lines(const SignalSums<double>& sums, std::size_t num_lines, SessionPhasors& phasors) {
-  for (std::size_t s = 0; s < num_signals; ++s) {
+/// Signals that are not recorded stay 0: where lanes are in different sessions they are summed,
+/// too.
+void append_lines(const SignalSums<double>& sums, SignalSet recorded, std::size_t num_lines,
+                  SessionPhasors& phasors) {
+  const std::size_t num_recorded = recorded == SignalSet::all ? num_signals : num_common_signals;
+  for (std::size_t s = 0; s < num_recorded; ++s) {
     for (std::size_t i = 0; i < num_lines; ++i) {
       phasors.amplitude[s][phasors.num_lines + i] = {sums[s][2 * i], sums[s][2 * i + 1]};
     }
@@ -192,10 +196,11 @@ struct RunPlan::Impl {
   /// Keeps what a session left of a run.
   void keep(std::size_t i, const SessionOutcome& outcome, RunRecord& record) const {
     SessionPhasors& phasors = record.phasors[i];
-    append_lines(outcome.sums, weights[i].num_fit_lines(), phasors);
+    const SignalSet recorded = method.needs(campaign.scenario.sessions[i]).signals;
+    append_lines(outcome.sums, recorded, weights[i].num_fit_lines(), phasors);
     phasors.num_fit_lines = phasors.num_lines;
     for (std::size_t k = 0; k < known_weights[i].size(); ++k) {
-      append_lines(outcome.known_sums[k], known_weights[i][k].num_fit_lines(), phasors);
+      append_lines(outcome.known_sums[k], recorded, known_weights[i][k].num_fit_lines(), phasors);
     }
     record.health[i] = outcome.health;
     record.health[i].is_quiet = is_quiet(i);
@@ -352,8 +357,14 @@ std::vector<RunResult> RunPlan::simulate_batch(std::span<const RunRequest> reque
   PROOFMASS_EXPECT(requests.size() <= batch_lanes);
   std::vector<RunResult> results;
   if (set == InstructionSet::scalar) {
-    for (const RunRequest& request : requests) {
-      results.push_back(simulate(request.run, request.table_values, progress));
+    const int num_orbits_a_run = num_orbits();
+    const auto num_runs = static_cast<int>(requests.size());
+    for (int i = 0; i < num_runs; ++i) {
+      const RunRequest& request = requests[static_cast<std::size_t>(i)];
+      const auto of_all = [&](int num_orbits_done) {
+        if (progress) progress((i * num_orbits_a_run + num_orbits_done) / num_runs);
+      };
+      results.push_back(simulate(request.run, request.table_values, of_all));
     }
     return results;
   }

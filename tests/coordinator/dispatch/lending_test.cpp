@@ -138,10 +138,43 @@ TEST_F(LendingTest, GivesAnEighthOfARoundOfTheLastRunsAtLeast) {
 }
 
 TEST_F(LendingTest, LeavesTheLastRunsToWorkersThatAreStillToCome) {
-  state.config.num_slots_expected = 64;
+  state.num_slots_expected = 64;
   add_campaign(one, 20);
   add_worker(first, 16);
   EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 5}));
+}
+
+// One wants nothing, one is silent, and one is on a host where workers crash.
+TEST_F(LendingTest, LeavesNoneOfTheLastRunsToWorkersThatAreLentNothing) {
+  constexpr WorkerId fourth{4};
+  add_worker(first, 16);
+  add_worker(second, 160);
+  add_worker(third, 160);
+  now += state.config.suspect_after;
+  add_worker(fourth, 160, "bad");
+  state.quarantined.insert(state.workers.at(fourth).host);
+  heartbeat(first);
+  heartbeat(second, {}, {}, 0);
+  on_tick(state, now, outbox);
+  add_campaign(one, 40);
+  const auto lease = outbox.take_sent<wire::RunLease>(first);
+  EXPECT_EQ(lease.runs, (RunRange{{0}, 16}));
+  EXPECT_EQ(lease.batch_runs_max, 0U);
+  heartbeat(third);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(third).runs, (RunRange{{16}, 24}))
+      << "it is heard again";
+}
+
+TEST_F(LendingTest, ExpectsNoMoreSlotsOnceAWorkerIsLost) {
+  state.num_slots_expected = 64;
+  add_worker(first, 16);
+  add_worker(second, 16);
+  EXPECT_EQ(state.num_slots_expected, 32U);
+  on_bye(state, second, {}, now, outbox);
+  outbox.forget();
+  EXPECT_EQ(state.num_slots_expected, 0U);
+  add_campaign(one, 20);
+  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 16}));
 }
 
 TEST_F(LendingTest, SharesNothingWhileAnotherCampaignHasRuns) {
@@ -186,6 +219,33 @@ TEST_F(LendingTest, SharesTheLastRunsAmongWorkersThatWillSoonBeIdle) {
   now += std::chrono::seconds(600);
   complete(first, one, {32, 33, 34, 35, 36, 37, 38});
   EXPECT_EQ(runs_held_text(state, first), "39..42");
+}
+
+// A batch of two runs takes less time than one of sixteen: a run would be taken for overdue.
+TEST_F(LendingTest, LearnsTheTimeOfARunFromBatchesThatAreNotShort) {
+  add_worker(first, 16);
+  add_campaign(one, 18);
+  outbox.forget();
+  const auto deliver_after = [&](std::uint64_t begin, std::uint64_t end, double elapsed_s) {
+    wire::ResultBatch batch{.campaign = one, .attempt = {1}, .results = {}};
+    for (std::uint64_t run = begin; run < end; ++run) {
+      batch.results.push_back(computed(run));
+      batch.results.back().elapsed_s = elapsed_s;
+    }
+    on_results(state, first, batch, now, outbox);
+    outbox.forget();
+  };
+  deliver_after(0, 16, 1000.0);
+  EXPECT_EQ(runs_held_text(state, first), "16..17");
+  deliver_after(16, 18, 300.0);
+  EXPECT_EQ(campaign(one).run_time_s, 1000.0);
+  add_campaign(two, 2);
+  outbox.forget();
+  wire::ResultBatch only{.campaign = two, .attempt = {1}, .results = {computed(0)}};
+  only.results[0].elapsed_s = 300.0;
+  on_results(state, first, only, now, outbox);
+  outbox.forget();
+  EXPECT_EQ(campaign(two).run_time_s, 300.0) << "nothing else is known";
 }
 
 TEST_F(LendingTest, SendsTheTableValuesOfTheRuns) {

@@ -164,6 +164,22 @@ TEST(Executor, GivesEachRunTheTimeOfItsBatchAndAShareOfIt) {
             runs[0].computed.elapsed_s);
 }
 
+// Smaller ones take less time, and say nothing of how long the next full one will take.
+TEST(Executor, KnowsTheTimeOfTheLastBatchAmongTheLargest) {
+  Bench bench(prepare_counting(1), {.num_threads = 1, .batch_size_max = 4});
+  const auto usual_s = [&] {
+    return std::chrono::duration<double>(*bench.executor.usual_batch_time()).count();
+  };
+  bench.executor.submit(lease(0, 1));
+  EXPECT_EQ(bench.wait_for(1)[0].computed.elapsed_s, usual_s());
+  bench.executor.submit(lease(10, 4));
+  const double full_s = bench.wait_for(4)[0].computed.elapsed_s;
+  EXPECT_EQ(full_s, usual_s());
+  bench.executor.submit(lease(20, 2));
+  (void)bench.wait_for(2);
+  EXPECT_EQ(full_s, usual_s());
+}
+
 // Both threads are inside a batch at the same time, or the second entry never comes.
 TEST(Executor, ComputesABatchOnEachThread) {
   Gate gate;

@@ -233,14 +233,39 @@ TEST(Batch, SaysWhichRunsHaveNoDraw) {
   }
 }
 
+// The estimation of the paper reads only some of what is recorded; another one may read all.
+TEST(Batch, RecordsWhatARunAloneRecords) {
+  const RunPlan plan(short_campaign());
+  for (const InstructionSet set : available_instruction_sets()) {
+    if (set == InstructionSet::scalar) continue;
+    for (const std::size_t count : {1U, 2U, 4U, 16U}) {
+      const std::vector<RunRecord> records = plan.record_batch(requests_from(0, count), set);
+      const RunRecord alone = plan.record(records.back().run, {});
+      ASSERT_EQ(records.back().phasors.size(), alone.phasors.size());
+      for (std::size_t s = 0; s < alone.phasors.size(); ++s) {
+        const SessionPhasors& found = records.back().phasors[s];
+        const SessionPhasors& expected = alone.phasors[s];
+        EXPECT_EQ(found.num_lines, expected.num_lines);
+        EXPECT_EQ(found.amplitude, expected.amplitude)
+            << fmt::format("{}, {} runs, session {}", name_of(set), count, s);
+      }
+    }
+  }
+}
+
 TEST(Batch, ReportsItsOrbits) {
   const RunPlan plan(short_campaign());
-  int last = 0;
-  (void)plan.simulate_batch(requests_from(0, 2), best_instruction_set(), [&last](int orbits) {
-    EXPECT_GE(orbits, last);
-    last = orbits;
-  });
-  EXPECT_EQ(last, plan.num_orbits());
+  for (const InstructionSet set : available_instruction_sets()) {
+    const std::size_t largest = set == InstructionSet::scalar ? 3 : batch_lanes;
+    for (const std::size_t count : {std::size_t{1}, std::size_t{2}, largest}) {
+      int last = 0;
+      (void)plan.simulate_batch(requests_from(0, count), set, [&last](int orbits) {
+        EXPECT_GE(orbits, last);
+        last = orbits;
+      });
+      EXPECT_EQ(last, plan.num_orbits()) << name_of(set) << ", " << count;
+    }
+  }
 }
 
 }  // namespace
