@@ -84,9 +84,7 @@ void add_work(CLI::App& app, Options& options) {
 }
 
 void add_process(CLI::App& app, Options& options) {
-  app.set_config("--config", "", "File with these options, as in\n`connect = \"tcp://a:5555\"`")
-      ->type_name(wire::file_type);
-  app.allow_config_extras(CLI::config_extras_mode::error);
+  wire::add_option_file(app, "File with these options, as in\n`connect = \"tcp://a:5555\"`");
   static const std::map<std::string, wire::LogFormat> formats{{"json", wire::LogFormat::json},
                                                               {"text", wire::LogFormat::text}};
   wire::add_choice(app, "--log-format", options.log_format, formats,

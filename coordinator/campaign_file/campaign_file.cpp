@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <set>
+#include <system_error>
 #include <utility>
 
 #include "coordinator/campaign_file/data_file.hpp"
@@ -71,7 +74,21 @@ class DataFilesIn final : public DataFiles {
   std::map<std::string, std::string> texts_;
 };
 
+/// A mistake that is made easily. Nothing is read from a pipe: it would be missing afterwards.
+bool is_database(const std::filesystem::path& file) {
+  constexpr std::string_view format{"SQLite format 3\0", 16};
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return false;
+  std::string beginning(format.size(), '\0');
+  std::ifstream(file, std::ios::binary).read(beginning.data(), std::ssize(beginning));
+  return beginning == format;
+}
+
 std::string read_campaign_text(const std::filesystem::path& file) {
+  if (is_database(file)) {
+    throw DefinitionError(fmt::format(
+        "campaign file = {} (is a campaign database; give the TOML file)", file.string()));
+  }
   try {
     return detail::read_text_file(file, campaign_file_size_max);
   } catch (const detail::UnreadableFile& error) {

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -96,9 +97,13 @@ constexpr std::string_view remedy = "give the campaign another name";
 
 void make_directory(const std::filesystem::path& directory) {
   std::error_code error;
+  if (std::filesystem::is_directory(directory, error)) return;
+  if (std::filesystem::exists(directory, error)) refuse(directory, "is not a directory");
   std::filesystem::create_directories(std::filesystem::absolute(directory).parent_path(), error);
-  if (mkdir(directory.c_str(), S_IRWXU) == 0 || std::filesystem::is_directory(directory)) return;
-  refuse(directory, std::strerror(errno));
+  if (!error && mkdir(directory.c_str(), S_IRWXU) != 0 && errno != EEXIST) {
+    error.assign(errno, std::generic_category());
+  }
+  if (error) refuse(directory, "cannot be created: " + error.message());
 }
 
 /// Kept until the process ends, however it does; the file stays and means nothing by itself.

@@ -273,10 +273,8 @@ int run_proofmass_coordinator(int argc, char** argv) {
       "proofmass-coordinator");
   app.footer(exit_codes_text({exit_interrupted}));
   app.set_version_flag("--version", "proofmass-coordinator " PROOFMASS_VERSION);
-  app.set_config("--config", "", "File with these options, as in\n`bind = \"tcp://*:5555\"`")
-      ->envname("PROOFMASS_CONFIG")
-      ->type_name(wire::file_type);
-  app.allow_config_extras(CLI::config_extras_mode::error);
+  wire::add_option_file(app, "File with these options, as in\n`bind = \"tcp://*:5555\"`",
+                        "PROOFMASS_CONFIG");
   ServeOptions options;
   bool ends_when_done = false;
   add_service(app, options, ends_when_done);

@@ -82,7 +82,7 @@ CostEstimate estimated_cost(std::uint64_t num_runs, double batch_s) {
 
 std::string cost_text(const CostEstimate& cost) {
   return fmt::format(
-      "Time      about {} of one core; about {} with `proofmass run` on the {} cores here\n"
+      "Time      about {} of one core; {} on the {} cores here\n"
       "Disk      about {:.1f} MB\n",
       duration_text(cost.one_core_s), duration_text(cost.all_cores_s), num_cores_here(),
       cost.disk_mb);

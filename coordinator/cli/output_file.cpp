@@ -1,11 +1,14 @@
 #include "coordinator/cli/output_file.hpp"
 
 #include <fmt/format.h>
+#include <sys/types.h>
 
 #include <system_error>
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/program.hpp"
+#include "core/error.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 
@@ -26,6 +29,24 @@ void check_output_file(const std::filesystem::path& output, IfThere if_there,
   if (has_campaign_mark(output)) {
     refuse_output(output, "is a campaign, which --force does not replace");
   }
+}
+
+void write_output_file(const std::filesystem::path& output, IfThere if_there,
+                       std::string_view text) {
+  constexpr mode_t mode = 0644;
+  wire::write_whole_file(
+      "output", output, text, mode,
+      if_there == IfThere::replace ? wire::IfExists::replace : wire::IfExists::refuse);
+}
+
+void check_new_file(std::string_view argument, const std::filesystem::path& file) {
+  std::error_code error;
+  if (std::filesystem::exists(file, error)) {
+    throw UsageError(fmt::format("{} = {} (exists already)", argument, file.string()));
+  }
+  const bool has_directory = std::filesystem::is_directory(directory_of(file), error);
+  if (has_directory || error == std::errc::permission_denied) return;  // Making it says more.
+  throw Error(fmt::format("{} = {} (its directory does not exist)", argument, file.string()));
 }
 
 }  // namespace proofmass::coordinator

@@ -17,4 +17,15 @@ namespace proofmass::coordinator {
 void check_output_file(const std::filesystem::path& output, IfThere if_there,
                        std::string_view remedy);
 
+/// Writes a file that is whole or not there at any time.
+/// @throws Error `output = path (reason)`.
+void write_output_file(const std::filesystem::path& output, IfThere if_there,
+                       std::string_view text);
+
+/// Checks that a file can be made which replaces nothing.
+/// @param argument  What names the file, for the message.
+/// @throws UsageError `argument = path (exists already)`, or Error if the directory that is to hold
+///         it does not exist.
+void check_new_file(std::string_view argument, const std::filesystem::path& file);
+
 }  // namespace proofmass::coordinator

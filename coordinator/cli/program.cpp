@@ -66,10 +66,7 @@ int run_proofmass(int argc, char** argv,
   app.footer(exit_codes_text({}));  // Of the commands, unless they say otherwise.
   app.set_version_flag("--version", "proofmass " PROOFMASS_VERSION);
   app.require_subcommand(1);
-  app.set_config("--config", "", "TOML file with options, a section a command")
-      ->envname("PROOFMASS_CONFIG")
-      ->type_name(wire::file_type);
-  app.allow_config_extras(CLI::config_extras_mode::error);
+  wire::add_option_file(app, "TOML file with options, a section a command", "PROOFMASS_CONFIG");
   Command chosen;
   for (const auto add : {add_run, add_sweep, add_init, add_check, add_keygen}) add(app, chosen);
   add_further_commands(app, chosen);

@@ -4,11 +4,16 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <optional>
 #include <set>
 #include <string_view>
+#include <system_error>
 
 #include "core/definition/definition_text.hpp"
+#include "proto/command_line/described_program.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -25,11 +30,33 @@ std::string with_nearest(std::string rule, std::string_view name,
   return nearest ? fmt::format("{}; nearest is {}", rule, *nearest) : rule;
 }
 
+std::set<std::string> command_names(const CLI::App& app) {
+  std::set<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) names.insert(command->get_name());
+  return names;
+}
+
+/// Of the options that --help lists, each behind the hyphens.
+std::set<std::string> option_names(const CLI::App& command, const std::string& hyphens) {
+  std::set<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_group().empty()) continue;
+    for (const std::string& name : option->get_lnames()) names.insert(hyphens + name);
+  }
+  return names;
+}
+
+/// Null if there is none of this name.
+const CLI::App* command_of(const CLI::App& app, const std::string& name) {
+  for (const CLI::App* command : app.get_subcommands({})) {
+    if (command->get_name() == name) return command;
+  }
+  return nullptr;
+}
+
 std::string refusal_of_command(const CLI::App& app, const std::string& name) {
-  std::set<std::string> commands;
-  for (const CLI::App* command : app.get_subcommands({})) commands.insert(command->get_name());
   return fmt::format("command = {} ({})", name,
-                     with_nearest("must be one that --help lists", name, commands));
+                     with_nearest("must be one that --help lists", name, command_names(app)));
 }
 
 const CLI::App& chosen_command(const CLI::App& app) {
@@ -71,27 +98,54 @@ std::string refusal_of_further(const CLI::App& app, const std::vector<std::strin
 
 /// @param name  Begins with a hyphen, and may have a value behind =.
 std::string refusal_of_option(const CLI::App& app, const std::string& name) {
-  const CLI::App& command = chosen_command(app);
-  std::set<std::string> options;
-  for (const CLI::Option* option : command.get_options()) {
-    for (const std::string& known : option->get_lnames()) options.insert("--" + known);
-  }
   return fmt::format("option = {} ({})", name,
                      with_nearest("must be one that --help lists",
-                                  std::string_view(name).substr(0, name.find('=')), options));
+                                  std::string_view(name).substr(0, name.find('=')),
+                                  option_names(chosen_command(app), "--")));
 }
 
-// What CLI11 says of arguments and option files, worded as everything else.
-std::string reworded(std::string text) {
-  const auto reword = [&](std::string_view begin, std::string_view end, std::string_view field,
-                          std::string_view rule) {
-    if (!text.starts_with(begin) || !text.ends_with(end)) return;
-    const std::size_t size = text.size() - begin.size() - end.size();
-    text = fmt::format("{} = {} ({})", field, text.substr(begin.size(), size), rule);
-  };
-  reword("INI was not able to parse ", "", "config", "is no option");
-  reword("", " was not readable (missing?)", "config", "cannot be read");
-  return text;
+/// `FILE:3` for the line of an option file that has what CLI11 calls `query.rows`, or `query.++`
+/// for the line `[query]`. FILE alone if no line is found.
+std::string place_in(const std::string& file, const std::string& item) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored)) return file;  // A pipe is read only once.
+  std::ifstream stream(file);
+  std::string line, section;
+  for (int number = 1; std::getline(stream, line); ++number) {
+    CLI::detail::trim(line);
+    std::string name = CLI::detail::trim_copy(line.substr(0, line.find_first_of("=#")));
+    if (line.starts_with('[') && line.ends_with(']')) {
+      section = line.substr(1, line.size() - 2) + ".";
+      name = "++";
+    }
+    if (item == section + name) return fmt::format("{}:{}", file, number);
+  }
+  return file;
+}
+
+/// @param item  `query.rows`, `query.++` for a section, or what was taken for an option.
+std::string rule_for_item(const CLI::App& app, const std::string& item) {
+  if (item.starts_with('[')) return item + " has no ]";
+  constexpr std::string_view section_end = ".++";
+  if (item.ends_with(section_end)) {
+    const std::string section = item.substr(0, item.size() - section_end.size());
+    return with_nearest(fmt::format("[{}] is no command", section), section, command_names(app));
+  }
+  const std::size_t point = item.find('.');
+  const CLI::App* const command =
+      point == item.npos ? &app : command_of(app, item.substr(0, point));
+  if (command == nullptr) return item + " is no option";
+  return with_nearest(item + " is no option", item.substr(point == item.npos ? 0 : point + 1),
+                      option_names(*command, ""));
+}
+
+/// What CLI11 says of an option file: that of the option `--config`.
+std::string refusal_of_file(const CLI::App& app, const std::string& text) {
+  constexpr std::string_view unknown = "INI was not able to parse ";
+  const auto file = app.get_config_ptr()->as<std::string>();
+  if (!text.starts_with(unknown)) return fmt::format("config = {} ({})", file, text);
+  const std::string item = text.substr(unknown.size());
+  return fmt::format("config = {} ({})", place_in(file, item), rule_for_item(app, item));
 }
 
 }  // namespace
@@ -102,6 +156,16 @@ CLI::Validator one_of(const std::vector<std::string>& words) {
     return fmt::format("{} (must be one of {})", text, fmt::join(words, ", "));
   };
   return CLI::Validator(check, "", "one_of");
+}
+
+void add_option_file(CLI::App& app, const std::string& description, const std::string& variable) {
+  // CLI11 reads the file before it looks at variables. As a required default it must be there.
+  const char* const file = variable.empty() ? nullptr : std::getenv(variable.c_str());
+  const bool has_file = file != nullptr && *file != '\0';
+  app.set_config("--config", has_file ? file : "", description, has_file)
+      ->envname(variable)
+      ->type_name(file_type);
+  app.allow_config_extras(CLI::config_extras_mode::error);
 }
 
 std::string refusal_of(const CLI::App& app, const CLI::ParseError& error) {
@@ -129,7 +193,11 @@ std::string refusal_of(const CLI::App& app, const CLI::ParseError& error) {
   if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr && text.ends_with(" missing")) {
     return fmt::format("option = {} (needs a value behind it)", text.substr(0, text.find(':')));
   }
-  return reworded(text);
+  if (dynamic_cast<const CLI::ConfigError*>(&error) != nullptr) return refusal_of_file(app, text);
+  if (dynamic_cast<const CLI::FileError*>(&error) != nullptr) {
+    return fmt::format("config = {} (cannot be read)", app.get_config_ptr()->as<std::string>());
+  }
+  return text;
 }
 
 }  // namespace proofmass::wire

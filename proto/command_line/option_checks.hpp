@@ -50,8 +50,15 @@ CLI::Option* add_choice(CLI::App& command, const std::string& name, Value& targe
       ->check(one_of(words));
 }
 
+/// Declares `--config`, which names a file with options. Options that the file should not have are
+/// errors.
+///
+/// @param variable  Environment variable that names the file where no argument does; none if empty.
+void add_option_file(CLI::App& app, const std::string& description,
+                     const std::string& variable = {});
+
 /// What to tell people whose arguments were refused: `option = value (rule)` where there is a
-/// value.
+/// value, `config = FILE:LINE (rule)` for a line of an option file.
 [[nodiscard]] std::string refusal_of(const CLI::App& app, const CLI::ParseError& error);
 
 }  // namespace proofmass::wire

@@ -213,7 +213,8 @@ TEST_F(ArchiveProcess, RefusesWhatMakesNoSense) {
   EXPECT_EQ(errors_of("config"), "proofmass: error: config = none.toml (cannot be read)\n");
   std::ofstream(path("options.toml")) << "[query]\nrows = 3\n";
   EXPECT_EQ(proofmass("option", {"--config", "options.toml", "list"}).wait(), 2);
-  EXPECT_EQ(errors_of("option"), "proofmass: error: config = query.rows (is no option)\n");
+  EXPECT_EQ(errors_of("option"),
+            "proofmass: error: config = options.toml:2 (query.rows is no option)\n");
   EXPECT_EQ(proofmass("none", {"verify", "none.db"}).wait(), 1);
   EXPECT_EQ(errors_of("none"), "proofmass: error: campaign database = none.db (does not exist)\n");
   EXPECT_EQ(proofmass("foreign", {"list", "short.toml"}).wait(), 1);

@@ -97,7 +97,7 @@ TEST_F(RemoteResults, EndAQueryThatTakesTooLong) {
 
 TEST_F(RemoteResults, AreAWholeDatabaseOnceFetched) {
   ASSERT_EQ(remote_command({"fetch", "hardy2013", "copy.db"}), 0) << errors_of("remote");
-  EXPECT_TRUE(output_of("remote").starts_with("wrote copy.db: 64 results, digest "));
+  EXPECT_TRUE(output_of("remote").starts_with("wrote copy.db: 64 results\nDigest "));
   EXPECT_EQ(stored_runs(path("copy.db")), stored_runs(path("served/hardy2013.db")));
   EXPECT_EQ(command("verify", {"verify", "copy.db"}), 0) << output_of("verify");
   EXPECT_EQ(remote_command({"fetch", "hardy2013", "copy.db"}), 2);
@@ -121,7 +121,7 @@ TEST_F(RemoteResults, GoOnWithAFetchThatWasInterrupted) {
 TEST_F(RemoteResults, SayThatACopyHasNoPlace) {
   EXPECT_EQ(remote_command({"fetch", "hardy2013", "missing/copy.db"}), 1);
   EXPECT_EQ(errors_of("remote"),
-            "proofmass: error: file = missing/copy.db.part (No such file or directory)\n");
+            "proofmass: error: file = missing/copy.db (its directory does not exist)\n");
 }
 
 TEST_F(RemoteResults, AreNotServedOnceArchivedAndReturnWithTheFile) {

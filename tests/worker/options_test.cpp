@@ -103,7 +103,8 @@ TEST(WorkerOptions, AreNotMistypedInAFile) {
   const test::ScratchDirectory directory;
   const std::string file = (directory / "worker.toml").string();
   std::ofstream(file) << "connect = \"ipc:///tmp/a\"\nthread = 2\n";
-  EXPECT_EQ(error_of({"--config", file}), "config = thread (is no option)");
+  EXPECT_EQ(error_of({"--config", file}),
+            "config = " + file + ":2 (thread is no option; nearest is threads)");
 }
 
 TEST(WorkerOptions, MustNameACoordinator) { EXPECT_EQ(error_of({}), "--connect is required"); }

@@ -1,10 +1,11 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <system_error>
+#include <string>
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/json_output.hpp"
+#include "coordinator/cli/output_file.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/store/store.hpp"
 
@@ -19,10 +20,7 @@ struct BackupOptions {
 
 int back_up_database(const BackupOptions& options) {
   const std::string destination = options.destination.string();
-  std::error_code ignored;
-  if (std::filesystem::exists(options.destination, ignored)) {
-    throw UsageError(fmt::format("destination = {} (exists already)", destination));
-  }
+  check_new_file("destination", options.destination);
   Store::open_read_only(options.database).back_up(options.destination);
   if (options.format == OutputFormat::json) {
     print_json({{"file", destination}});

@@ -14,6 +14,7 @@
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/output_file.hpp"
 #include "coordinator/cli/remote_answer.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/report/digest.hpp"
@@ -102,18 +103,15 @@ std::string summary_of(const std::filesystem::path& file, OutputFormat format) {
                                          {"is_digest_checked", is_checked}};
     return summary.dump(2, ' ', true) + "\n";
   }
-  return fmt::format("wrote {}: {} results, digest {}{}\n", file.string(), walked.num_results,
+  return fmt::format("wrote {}: {} results\nDigest {}\n{}", file.string(), walked.num_results,
                      walked.digest,
-                     is_checked ? "" : " (not checked: the campaign is not finished)");
+                     is_checked ? "" : "It was not checked: the campaign is not finished\n");
 }
 
 int fetch_database(const FetchOptions& options) {
   const std::string name = checked_campaign_name(options.campaign);
   const std::filesystem::path file = options.file.value_or(name + ".db");
-  std::error_code ignored;
-  if (std::filesystem::exists(file, ignored)) {
-    throw UsageError(fmt::format("file = {} (exists already)", file.string()));
-  }
+  check_new_file("file", file);
   return with_connection(options.client, [&](const Ask& ask) {
     ArrivedPart part(std::filesystem::path(file).concat(".part"));
     const auto answer = reply_of<wire::AnswerReply>(

@@ -1,11 +1,9 @@
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 
 #include "coordinator/cli/commands/commands.hpp"
+#include "coordinator/cli/output_file.hpp"
 #include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
@@ -13,19 +11,13 @@ namespace {
 
 struct InitOptions {
   std::filesystem::path file = "hardy2013.toml";
-  bool is_forced = false;  ///< Replaces an existing file.
+  IfThere if_there = IfThere::keep;
 };
 
 int write_example(const InitOptions& options) {
-  const std::string name = options.file.string();
-  if (!options.is_forced && std::filesystem::exists(options.file)) {
-    throw UsageError(fmt::format("{} exists (replace it with --force)", name));
-  }
-  std::ofstream stream(options.file, std::ios::binary | std::ios::trunc);
-  stream << model().example();
-  stream.close();
-  if (!stream) throw Error(fmt::format("{}: {}", name, std::strerror(errno)));
-  fmt::print("wrote {}\n", name);
+  check_output_file(options.file, options.if_there, "give another name");
+  write_output_file(options.file, options.if_there, model().example());
+  fmt::print("wrote {}\n", options.file.string());
   return exit_done;
 }
 
@@ -37,7 +29,7 @@ void add_init(CLI::App& app, Command& chosen) {
   command.add_option("FILE", options.file, "File to write")
       ->type_name(campaign_file_type)
       ->capture_default_str();
-  command.add_flag("--force", options.is_forced, "Replace an existing file");
+  add_force_flag(command, options.if_there);
 }
 
 }  // namespace proofmass::coordinator

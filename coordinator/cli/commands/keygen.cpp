@@ -124,12 +124,13 @@ void add_pair(const std::filesystem::path& directory, KeyRole role, const std::s
 void say_where_to_copy(const std::filesystem::path& directory, KeyRole role,
                        std::string_view name) {
   const bool is_renamed = name != to_text(role);
-  fmt::print("{0} needs a directory with two files, readable by its user alone:\n  {1}{2}\n  {3}\n",
-             role == KeyRole::worker ? "A host of workers (proofmass-worker --keys)"
-                                     : "A person who submits and watches (proofmass --keys)",
-             (directory / fmt::format("{}.key", name)).string(),
-             is_renamed ? fmt::format("  as {}.key", to_text(role)) : "",
-             (directory / "coordinator.pub").string());
+  fmt::print(
+      "{0} needs\na directory with two files, readable by its user alone:\n  {1}{2}\n  {3}\n",
+      role == KeyRole::worker ? "A host of workers (proofmass-worker --keys)"
+                              : "A person who submits and watches (proofmass --keys)",
+      (directory / fmt::format("{}.key", name)).string(),
+      is_renamed ? fmt::format("  as {}.key", to_text(role)) : "",
+      (directory / "coordinator.pub").string());
 }
 
 /// Makes a directory with the keys of a coordinator, of workers and of clients, and the lists of
@@ -147,8 +148,9 @@ int make_keys(const KeygenOptions& options) {
   if (options.worker || options.client) return exit_done;
   make_whole_set(directory);
   fmt::print(
-      "wrote {0}\nThe coordinator keeps it: proofmass-coordinator --keys {0}\n"
-      "It admits the keys in authorized_workers and authorized_clients.\n",
+      "wrote {0}\nKeep this directory on the coordinator's machine:\n"
+      "  proofmass-coordinator --keys {0}\n"
+      "The coordinator admits the keys in authorized_workers and authorized_clients.\n",
       directory.string());
   say_where_to_copy(directory, KeyRole::worker, to_text(KeyRole::worker));
   say_where_to_copy(directory, KeyRole::client, to_text(KeyRole::client));

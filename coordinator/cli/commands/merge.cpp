@@ -15,6 +15,7 @@
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/json_output.hpp"
+#include "coordinator/cli/output_file.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/dispatch/run_set.hpp"
@@ -125,6 +126,7 @@ void print_merged(const Store& whole, const std::vector<MergedPart>& parts,
 }
 
 int merge_databases(const MergeOptions& options) {
+  check_new_file("output", options.whole);
   return run_until_stopped([&](const IsStopped& is_stopped) {
     const LargestPart largest = largest_part(options.parts);
     for (const std::filesystem::path& part : options.parts) require_part(part, largest);

@@ -6,7 +6,9 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "coordinator/archive/replayed_spectra.hpp"
@@ -24,7 +26,6 @@
 #include "coordinator/store/store.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -89,6 +90,21 @@ int print_remote_report(const ReportOptions& options) {
 
 int exit_code_of(bool are_met) { return are_met ? exit_done : exit_not_met; }
 
+/// Two texts in one stream would be neither.
+void check_standard_output(const ReportOptions& options) {
+  std::string_view taker = options.format == OutputFormat::json ? "--json" : "";
+  const auto take = [&](const std::filesystem::path& file, std::string_view option) {
+    if (file != "-") return;
+    if (!taker.empty()) {
+      throw UsageError(
+          fmt::format("{} = - (standard output is already taken by {})", option.substr(2), taker));
+    }
+    taker = option;
+  };
+  take(options.html, "--html");
+  take(options.markdown, "--markdown");
+}
+
 void check_document(const std::filesystem::path& file, IfThere if_there) {
   if (file.empty() || file == "-") return;
   check_output_file(file, if_there, "- writes to standard output");
@@ -97,12 +113,9 @@ void check_document(const std::filesystem::path& file, IfThere if_there) {
 void write_document(const std::filesystem::path& file, IfThere if_there, const std::string& text) {
   if (file == "-") {
     write_standard_output(text);
-    return;
+  } else {
+    write_output_file(file, if_there, text);
   }
-  constexpr mode_t mode = 0644;
-  wire::write_whole_file(
-      "output", file, text, mode,
-      if_there == IfThere::replace ? wire::IfExists::replace : wire::IfExists::refuse);
 }
 
 /// @return What print_report() returns.
@@ -136,6 +149,7 @@ int write_documents(const ReportOptions& options, const Store& store, const Camp
 /// instead. JSON holds both. A document takes the place of the text.
 int print_report(const ReportOptions& options) {
   if (is_remote(options.connection)) return print_remote_report(options);
+  check_standard_output(options);
   check_document(options.html, options.if_there);
   check_document(options.markdown, options.if_there);
   const std::vector<StatedRequirement> stated = stated_in(options);

@@ -120,6 +120,13 @@ TEST(CampaignFileErrors, NameAFileThatCannotBeRead) {
   EXPECT_EQ(refusal(folder.path()), folder.path().string() + ": is a directory");
   const auto large = folder.write("large.toml", std::string(campaign_file_size_max + 1, '\n'));
   EXPECT_EQ(refusal(large), large.string() + ": is larger than 1048576 bytes");
+  for (const std::size_t size : {std::size_t{16}, campaign_file_size_max + 1}) {
+    std::string content("SQLite format 3\0", 16);  // https://www.sqlite.org/fileformat.html, 1.3
+    content.resize(size);
+    const auto database = folder.write("t.db", content);
+    EXPECT_EQ(refusal(database), "campaign file = " + database.string() +
+                                     " (is a campaign database; give the TOML file)");
+  }
 }
 
 // --- sessions ---

@@ -121,6 +121,13 @@ TEST_F(ArchiveCommands, DoNotBackUpOverAFile) {
   EXPECT_EQ(std::filesystem::file_size(copy), 4U);
 }
 
+TEST_F(ArchiveCommands, NeedADirectoryForABackup) {
+  const auto copy = directory_ / "none" / "copy.db";
+  const test::Answer answer = test::answer_of({"backup", database_, copy});
+  EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
+  EXPECT_EQ(answer.error, "destination = " + copy.string() + " (its directory does not exist)");
+}
+
 TEST_F(ArchiveCommands, DoNotExportOverAFile) {
   const auto output = directory_ / "a.csv";
   std::ofstream(output) << "mine";

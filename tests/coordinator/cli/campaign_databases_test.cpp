@@ -194,12 +194,20 @@ TEST_F(CampaignFolderTest, MayHaveAnotherCoordinatorAfterTheFirst) {
 }
 
 TEST_F(CampaignFolderTest, SaysWhyItCannotBeMade) {
-  std::ofstream(directory / "file") << "no directory";
-  try {
-    const CampaignFolder folder(directory / "file");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.what(), "directory = " + (directory / "file").string() + " (File exists)");
+  const auto reason = [](const std::filesystem::path& place) -> std::string {
+    try {
+      const CampaignFolder folder(place);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "made";
+  };
+  const auto file = directory / "file";
+  std::ofstream(file) << "no directory";
+  EXPECT_EQ(reason(file), "directory = " + file.string() + " (is not a directory)");
+  for (const auto& below : {file / "a", file / "a" / "b"}) {
+    EXPECT_EQ(reason(below),
+              "directory = " + below.string() + " (cannot be created: Not a directory)");
   }
 }
 

@@ -2,11 +2,14 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <filesystem>
+
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/program.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
+#include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -27,7 +30,8 @@ TEST(Init, ReplacesAFileOnlyIfItMust) {
   (void)test::answer_of({"init", file});
   const test::Answer answer = test::answer_of({"init", file});
   EXPECT_EQ(answer.exit_code, exit_wrong_usage);
-  EXPECT_EQ(answer.error, file.string() + " exists (replace it with --force)");
+  EXPECT_EQ(answer.error,
+            "output = " + file.string() + " (exists already; replace it with --force)");
   EXPECT_EQ(test::answer_of({"init", file, "--force"}).exit_code, exit_done);
 }
 
@@ -36,7 +40,21 @@ TEST(Init, SaysWhyAFileCannotBeWritten) {
   const auto file = directory / "none" / "a.toml";
   const test::Answer answer = test::answer_of({"init", file});
   EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
-  EXPECT_EQ(answer.error, file.string() + ": No such file or directory");
+  EXPECT_EQ(answer.error, "output = " + file.string() + " (No such file or directory)");
+}
+
+// An empty file would be taken for a campaign file at the next attempt.
+TEST(Init, LeavesNothingOnAFullDisk) {
+  const test::TemporaryDirectory directory;
+  const auto file = directory / "a.toml";
+  test::Answer answer;
+  {
+    const test::FileSizeLimit limit(4096);  // The file has more.
+    answer = test::answer_of({"init", file});
+  }
+  EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
+  EXPECT_EQ(answer.error, "output = " + file.string() + " (File too large)");
+  EXPECT_TRUE(std::filesystem::is_empty(file.parent_path()));
 }
 
 // Only what a command can end with.

@@ -80,14 +80,17 @@ TEST_F(Keygen, SaysWhatToCopyWhereAndNoSecret) {
   EXPECT_EQ(answer.exit_code, exit_done);
   const std::string path = directory_.string();
   EXPECT_EQ(answer.output,
-            "wrote " + path + "\nThe coordinator keeps it: proofmass-coordinator --keys " + path +
-                "\nIt admits the keys in authorized_workers and authorized_clients.\n"
-                "A host of workers (proofmass-worker --keys) needs a directory with two files, "
-                "readable by its user alone:\n  " +
+            "wrote " + path +
+                "\nKeep this directory on the coordinator's machine:\n"
+                "  proofmass-coordinator --keys " +
+                path +
+                "\nThe coordinator admits the keys in authorized_workers and authorized_clients.\n"
+                "A host of workers (proofmass-worker --keys) needs\n"
+                "a directory with two files, readable by its user alone:\n  " +
                 path + "/worker.key\n  " + path +
                 "/coordinator.pub\n"
-                "A person who submits and watches (proofmass --keys) needs a directory with two "
-                "files, readable by its user alone:\n  " +
+                "A person who submits and watches (proofmass --keys) needs\n"
+                "a directory with two files, readable by its user alone:\n  " +
                 path + "/client.key\n  " + path + "/coordinator.pub\n");
 }
 

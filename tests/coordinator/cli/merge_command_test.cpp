@@ -181,8 +181,16 @@ TEST_F(MergeCommand, RefusesToReplaceAFile) {
   (void)part("a.db", 0, 10);
   (void)part("whole.db", 0, 10);
   const Answer answer = merge({"a.db"});
+  EXPECT_EQ(answer.exit_code, exit_wrong_usage);
+  EXPECT_EQ(answer.error, "output = " + path("whole.db") + " (exists already)");
+}
+
+// Said before the parts are checked, which may take long: this one is not even there.
+TEST_F(MergeCommand, NeedsADirectoryForTheFile) {
+  const std::string whole = directory() / "none" / "whole.db";
+  const Answer answer = answer_of({"merge", whole, path("a.db")});
   EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
-  EXPECT_THAT(answer.error, HasSubstr("whole.db (exists already)"));
+  EXPECT_EQ(answer.error, "output = " + whole + " (its directory does not exist)");
 }
 
 class RangeOption : public test::StoreTest {

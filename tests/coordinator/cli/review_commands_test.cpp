@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
 
 #include "coordinator/cli/program.hpp"
 #include "coordinator/store/store.hpp"
@@ -76,6 +77,23 @@ TEST_F(ReviewCommands, ReplaceAFileOnlyByForce) {
   EXPECT_EQ(test::answer_of({"report", database_, "--html", output_, "--force"}).exit_code,
             exit_done);
   EXPECT_THAT(text_of_file(output_), StartsWith("<!DOCTYPE html>"));
+}
+
+TEST_F(ReviewCommands, WriteOneTextToStandardOutput) {
+  const auto misuse = [&](const std::vector<std::string>& outputs) {
+    std::vector<std::string> arguments{"report", database_};
+    arguments.insert(arguments.end(), outputs.begin(), outputs.end());
+    const test::Answer answer = test::answer_of(arguments);
+    EXPECT_EQ(answer.exit_code, exit_wrong_usage);
+    EXPECT_EQ(answer.output, "");
+    return answer.error;
+  };
+  EXPECT_EQ(misuse({"--html", "-", "--markdown", "-"}),
+            "markdown = - (standard output is already taken by --html)");
+  EXPECT_EQ(misuse({"--markdown", "-", "--json"}),
+            "markdown = - (standard output is already taken by --json)");
+  EXPECT_EQ(test::answer_of({"report", database_, "--html", output_, "--markdown", "-"}).exit_code,
+            exit_done);
 }
 
 TEST_F(ReviewCommands, TakeRequirementsOfAFile) {

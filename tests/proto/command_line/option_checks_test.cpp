@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
+
+#include "tests/proto/link/scratch_directory.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -95,6 +98,94 @@ TEST(Refusal, NamesAnUnknownOptionBeforeAMissingArgument) {
 
 TEST(Refusal, SaysThatAnOptionLacksItsValue) {
   EXPECT_EQ(refusal("run --runs"), "option = --runs (needs a value behind it)");
+}
+
+/// What a program with `watch --connect`, a hidden option and `list` says of this option file,
+/// which is FILE then.
+std::string refusal_of_file(const std::string& content) {
+  const test::ScratchDirectory directory;
+  const std::string file = directory / "options.toml";
+  test::write_text(file, content, 0644);
+  CLI::App app("", "program");
+  app.set_config("--config");
+  app.allow_config_extras(CLI::config_extras_mode::error);
+  std::string endpoint;
+  CLI::App* const watch = app.add_subcommand("watch", "");
+  watch->add_option("--connect", endpoint, "");
+  watch->add_option("--conec", endpoint, "")->group("");
+  app.add_subcommand("list", "");
+  std::string text;
+  try {
+    app.parse("--config " + file);
+  } catch (const CLI::ParseError& error) {
+    text = refusal_of(app, error);
+  }
+  if (const std::size_t place = text.find(file); place != text.npos) {
+    text.replace(place, file.size(), "FILE");
+  }
+  return text;
+}
+
+TEST(OptionFile, IsAcceptedIfItHasOptionsOnly) {
+  EXPECT_EQ(refusal_of_file("# mine\n[watch]\nconnect = \"ipc:///a\"\n"), "");
+  EXPECT_EQ(refusal_of_file("watch.connect = \"ipc:///a\"\n"), "");
+}
+
+TEST(OptionFile, IsRefusedWithTheLineAndTheNearestName) {
+  EXPECT_EQ(refusal_of_file("[list]\n\n[watch]\n# mine\nconect = \"ipc:///a\"\n"),
+            "config = FILE:5 (watch.conect is no option; nearest is connect)");
+  EXPECT_EQ(refusal_of_file("watch.conect = \"ipc:///a\"\n"),
+            "config = FILE:1 (watch.conect is no option; nearest is connect)");
+  EXPECT_EQ(refusal_of_file("\n[wach]\nconnect = \"ipc:///a\"\n"),
+            "config = FILE:2 ([wach] is no command; nearest is watch)");
+  EXPECT_EQ(refusal_of_file("connect = \"ipc:///a\"\n"), "config = FILE:1 (connect is no option)");
+  EXPECT_EQ(refusal_of_file("[watch]\nconnect to a\n"),
+            "config = FILE:2 (watch.connect to a is no option)");
+}
+
+TEST(OptionFile, IsRefusedIfASectionIsNotClosed) {
+  EXPECT_EQ(refusal_of_file("[watch\nconnect = \"ipc:///a\"\n"),
+            "config = FILE:1 ([watch has no ])");
+}
+
+/// The value of `--level` by these arguments and a variable that names the file; or why they are
+/// refused.
+std::string level_by(const std::string& variable, const std::string& arguments) {
+  setenv("PROOFMASS_TEST_CONFIG", variable.c_str(), 1);
+  CLI::App app("", "program");
+  add_option_file(app, "", "PROOFMASS_TEST_CONFIG");
+  std::string level = "none";
+  app.add_option("--level", level, "");
+  try {
+    app.parse(arguments);
+  } catch (const CLI::ParseError& error) {
+    level = refusal_of(app, error);
+  }
+  unsetenv("PROOFMASS_TEST_CONFIG");
+  return level;
+}
+
+TEST(OptionFile, IsNamedByAVariableUnlessAnArgumentNamesIt) {
+  const test::ScratchDirectory directory;
+  const std::string first = directory / "first.toml", second = directory / "second.toml";
+  test::write_text(first, "level = \"1\"\n", 0644);
+  test::write_text(second, "level = \"2\"\n", 0644);
+  EXPECT_EQ(level_by("", ""), "none");
+  EXPECT_EQ(level_by(first, ""), "1");
+  EXPECT_EQ(level_by(first, "--config " + second), "2");
+  EXPECT_EQ(level_by(first, "--level 3"), "3");
+  EXPECT_EQ(level_by("nowhere.toml", ""), "config = nowhere.toml (cannot be read)");
+}
+
+TEST(OptionFile, MustBeThere) {
+  CLI::App app("", "program");
+  app.set_config("--config");
+  try {
+    app.parse("--config nowhere.toml");
+    FAIL();
+  } catch (const CLI::ParseError& error) {
+    EXPECT_EQ(refusal_of(app, error), "config = nowhere.toml (cannot be read)");
+  }
 }
 
 TEST(Choice, SetsTheValueOfItsWord) {
