@@ -161,8 +161,9 @@ TEST_F(LendingTest, LeavesNoneOfTheLastRunsToWorkersThatAreLentNothing) {
   EXPECT_EQ(lease.runs, (RunRange{{0}, 16}));
   EXPECT_EQ(lease.batch_runs_max, 0U);
   heartbeat(third);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(third).runs, (RunRange{{16}, 24}))
-      << "it is heard again";
+  const auto second_lease = outbox.take_sent<wire::RunLease>(third);
+  EXPECT_EQ(second_lease.runs, (RunRange{{16}, 24}));
+  EXPECT_EQ(second_lease.batch_runs_max, 3U) << "its ten threads count again, as it is heard";
 }
 
 TEST_F(LendingTest, ExpectsNoMoreSlotsOnceAWorkerIsLost) {

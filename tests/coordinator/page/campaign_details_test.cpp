@@ -213,6 +213,7 @@ TEST_F(DetailReaderTest, KeepsABoundedNumberOfCampaigns) {
     EXPECT_EQ(reader.details(name, {.file = name + ".db"}, now).events, nullptr);
   }
   const CampaignDetails none = reader.details("one more", {.file = "more.db"}, now + 1s);
+  ASSERT_NE(none.events, nullptr);
   EXPECT_EQ(none.events->failure,
             "campaigns that are looked at = 64 (must be fewer; try again in 60 s)");
   EXPECT_EQ(none.results->failure, none.events->failure);
@@ -226,8 +227,8 @@ class DatabaseDetails : public test::StoreTest {
  protected:
   /// Errors of these results grow with the run: the last one is the worst.
   Store made(std::uint64_t num_results) {
-    Store store =
-        Store::create(file(), test::campaign_of(9), canonical_definition(test::campaign_of(9)));
+    const MicroscopeCampaign campaign = test::campaign_of(num_results + 9);
+    Store store = Store::create(file(), campaign, canonical_definition(campaign));
     std::vector<Entry> entries{test::worker_1()};
     for (const Delivery& delivery : test::deliveries_of(0, num_results)) {
       entries.emplace_back(delivery);
@@ -289,7 +290,8 @@ TEST_F(DatabaseDetails, AreThoseOfAnOlderCopyThatTookThePlaceOfTheFile) {
     Store store = made(3);
     store.back_up(copy);
     add(store, 3, 5, "third");
-    results = results_after(5, nullptr);
+    add(store, 5, 6, "fourth");
+    results = results_after(6, nullptr);
     (void)texts_after(nullptr);
     (void)store.rest();
   }
@@ -299,13 +301,15 @@ TEST_F(DatabaseDetails, AreThoseOfAnOlderCopyThatTookThePlaceOfTheFile) {
   EXPECT_THAT(texts_after(before.get()), testing::ElementsAre("first", "second"));
 }
 
-// Results that were read are newer than the number of those that are finished.
+// Results that were read are newer than the number of those that are finished. Begun anew, they
+// would be those of one reading.
 TEST_F(DatabaseDetails, AreKeptIfTheFileHasThem) {
-  const Store store = made(3);
-  const auto results = results_after(3, nullptr);
-  const auto again = results_after(2, results.get());
-  EXPECT_EQ(again->num_runs, 3U);
-  EXPECT_EQ(again->failure, "");
+  constexpr std::uint64_t num_results = page_results_a_reading + 100;
+  const Store store = made(num_results);
+  const auto part = results_after(num_results, nullptr);
+  const auto results = results_after(num_results, part.get());
+  EXPECT_EQ(results->num_runs, num_results);
+  EXPECT_EQ(results_after(num_results - 1, results.get())->num_runs, num_results);
 }
 
 TEST_F(DatabaseDetails, AreThoseOfBeforeIfTheFileCannotBeRead) {
