@@ -16,9 +16,9 @@ namespace {
 
 /// For the worker of a lease of which the remaining runs have changed.
 void note_slots(State& state, Worker& worker, std::uint64_t num_before, std::uint64_t num_now) {
-  if (worker.is_served) state.num_idle_slots -= num_idle_slots(worker);
+  if (worker.is_eligible) state.num_idle_slots -= num_idle_slots(worker);
   worker.num_slots_lent_for += num_now - num_before;
-  if (worker.is_served) state.num_idle_slots += num_idle_slots(worker);
+  if (worker.is_eligible) state.num_idle_slots += num_idle_slots(worker);
 }
 
 /// A copy becomes the first lease of its run.
@@ -117,12 +117,16 @@ void take_off_and_tell(State& state, LeaseId lease, RunIndex run, WorkerId by,
 
 }  // namespace
 
-void set_served(State& state, Worker& worker, bool is_served) {
-  if (is_served == worker.is_served) return;
-  worker.is_served = is_served;
-  const std::uint64_t num_idle = num_idle_slots(worker);
-  state.num_served_slots += is_served ? worker.num_slots : -std::uint64_t{worker.num_slots};
-  state.num_idle_slots += is_served ? num_idle : -num_idle;
+void set_eligible(State& state, Worker& worker, bool is_eligible) {
+  if (is_eligible == worker.is_eligible) return;
+  worker.is_eligible = is_eligible;
+  if (is_eligible) {
+    state.num_eligible_slots += worker.num_slots;
+    state.num_idle_slots += num_idle_slots(worker);
+  } else {
+    state.num_eligible_slots -= worker.num_slots;
+    state.num_idle_slots -= num_idle_slots(worker);
+  }
 }
 
 Attempt after(Attempt attempt) {
@@ -289,7 +293,7 @@ void remove_worker(State& state, WorkerId id, LossReason reason, const RunsByCam
     const RunSet runs = lease.remaining;
     lose(state, lease_id, runs, reason, guilty == blamed.end() ? RunSet() : guilty->second, outbox);
   }
-  set_served(state, worker, false);
+  set_eligible(state, worker, false);
   state.num_slots -= worker.num_slots;
   state.num_slots_expected = 0;  // As many as were expected do not come.
   const auto found = state.hosts.find(worker.host);

@@ -14,8 +14,8 @@ namespace proofmass::coordinator::detail {
 using RunsByCampaign = std::map<CampaignId, RunSet>;
 using RunsByWorker = std::map<WorkerId, RunSet>;
 
-/// Counts the slots of a worker among those that may be lent runs, or not any more.
-void set_served(State& state, Worker& worker, bool is_served);
+/// Notes whether the worker may be lent runs, and counts its slots accordingly.
+void set_eligible(State& state, Worker& worker, bool is_eligible);
 
 /// The next attempt. The largest one is followed by itself, because a worker may claim any number.
 [[nodiscard]] Attempt after(Attempt attempt);

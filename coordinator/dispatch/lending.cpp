@@ -24,7 +24,7 @@ std::uint64_t num_waiting(const CampaignState& campaign) {
 
 /// Slots that may be lent runs, now or when they have come.
 std::uint64_t num_slots_in_all(const State& state) {
-  return state.num_served_slots + state.num_slots_expected;
+  return state.num_eligible_slots + state.num_slots_expected;
 }
 
 double run_time_s(const CampaignState& campaign, CampaignId id, const Worker& worker) {
@@ -64,7 +64,7 @@ std::uint64_t rounds_wanted(const State& state, CampaignId id, const CampaignSta
   const double by_time = std::ceil(state.config.lease_work_s / time_s);
   const auto rounds = static_cast<std::uint64_t>(
       std::clamp(by_time, 2.0, static_cast<double>(wire::runs_per_lease_max)));
-  const std::uint64_t slots = 2 * state.num_served_slots;
+  const std::uint64_t slots = 2 * state.num_eligible_slots;
   const std::uint64_t by_share = (num_waiting(campaign) + slots - 1) / slots;
   return std::max<std::uint64_t>(1,
                                  std::min({rounds, by_share, rounds_with_room(state, campaign)}));
@@ -287,7 +287,7 @@ bool has_runs_to_lend(const State& state) {
 void lend(State& state, WorkerId id, TimePoint now, Outbox& outbox) {
   state.hungry.erase(id);
   Worker& worker = state.workers.at(id);
-  set_served(state, worker, may_be_lent(state, worker, now));
+  set_eligible(state, worker, may_be_lent(state, worker, now));
   if (!state.is_lending || is_passed_over(state, worker, now)) return;
   if (worker.num_lent >= worker.num_runs_max) return;
   if (!is_reattaching(state, now)) {

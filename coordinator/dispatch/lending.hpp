@@ -15,8 +15,8 @@ void lend_to_hungry(State& state, TimePoint now, Outbox& outbox);
 /// suspect.
 [[nodiscard]] bool is_passed_over(const State& state, const Worker& worker, TimePoint now);
 
-/// True if the worker wants runs, and is not passed over. Only the slots of such workers share what
-/// is to be lent.
+/// True if the worker wants runs, and is not passed over. Runs are shared among the slots of such
+/// workers.
 [[nodiscard]] bool may_be_lent(const State& state, const Worker& worker, TimePoint now);
 
 /// True if the coordinator still waits for workers that were registered before its restart to say

@@ -101,9 +101,8 @@ struct Worker {
   std::uint32_t num_runs_max = 0;  ///< Its credit: most unfinished runs that it wants to hold.
   std::uint64_t num_lent = 0;      ///< Runs on its leases, as far as the coordinator knows.
   std::uint64_t num_slots_lent_for = 0;  ///< Of its leases; more than slots if runs wait there.
-  /// Whether its slots are among those that State counts as served: it may be lent runs, as far as
-  /// the last tick, or the last look at it, found.
-  bool is_served = false;
+  /// Whether it may be lent runs, as the last tick or the last attempt to lend it some found it.
+  bool is_eligible = false;
   std::uint64_t num_orbits_done = 0;
   std::uint64_t num_results = 0;
   std::vector<Progress> computing;  ///< As the newest heartbeat has it.
@@ -280,7 +279,7 @@ struct State {
   std::map<LeaseId, Lease> leases;
   std::uint64_t next_lease = 1;
   std::uint64_t num_slots = 0;           ///< Of all workers.
-  std::uint64_t num_served_slots = 0;    ///< Of workers that may be lent runs ...
+  std::uint64_t num_eligible_slots = 0;  ///< Of eligible workers ...
   std::uint64_t num_idle_slots = 0;      ///< ... and those among them that are idle.
   std::uint64_t num_slots_expected = 0;  ///< Of workers that are still to come.
   LentSlots lately_lent;      ///< What was longer ago than half of a run takes may be missing.

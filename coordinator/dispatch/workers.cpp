@@ -76,7 +76,7 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   worker.retracted_at = now - state.config.heartbeat_interval;
   state.num_slots += worker.num_slots;
   state.num_slots_expected -= std::min<std::uint64_t>(state.num_slots_expected, worker.num_slots);
-  detail::set_served(state, worker, true);
+  detail::set_eligible(state, worker, true);
   ++state.hosts[host].num_workers;
   limit_hosts(state, host.key);
   outbox.log({.kind = "worker_registered",
@@ -332,7 +332,7 @@ void on_tick(State& state, TimePoint now, Outbox& outbox) {
   std::vector<WorkerId> silent;
   std::vector<std::pair<WorkerId, wire::ComputedBatch>> hung;
   for (auto& [id, worker] : state.workers) {
-    detail::set_served(state, worker, detail::may_be_lent(state, worker, now));
+    detail::set_eligible(state, worker, detail::may_be_lent(state, worker, now));
     if (now - worker.heard_at >= lost_after) {
       silent.push_back(id);
       continue;

@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdint>
 #include <vector>
 
 #include "core/microscope/simulation/run.hpp"
+#include "tests/support/microscope_results.hpp"
 
 namespace proofmass {
 namespace {
@@ -19,6 +22,27 @@ MicroscopeCampaign silent_campaign(Correction correction) {
   campaign.scenario.estimation.convergence = 1e-9;
   campaign.scenario.estimation.num_rounds_max = 50;
   return campaign;
+}
+
+/// Three tenths of the objectives: what README.md says of the campaign of `init` without noise.
+TEST(PaperCorrection, LeavesThreeTenthsOfAnObjectiveAtMostIn100Draws) {
+  MicroscopeCampaign campaign = hardy2013_campaign();
+  campaign.scenario.noise.scale = 0.0;
+  const RunPlan plan(campaign);
+  const std::vector<double> objectives = campaign.objectives();
+  for (std::uint64_t first = 0; first < 100; first += batch_lanes) {
+    std::vector<RunRequest> requests;
+    for (std::uint64_t run = first; run < std::min<std::uint64_t>(first + batch_lanes, 100);
+         ++run) {
+      requests.push_back({RunIndex{run}, {}});
+    }
+    for (const RunResult& result : plan.simulate_batch(requests, best_instruction_set())) {
+      ASSERT_EQ(result.status, RunStatus::completed);
+      for (std::size_t i = 0; i < objectives.size(); ++i) {
+        EXPECT_LT(std::abs(result.error(i)), 0.3 * objectives[i]) << result.run.value << ", " << i;
+      }
+    }
+  }
 }
 
 constexpr std::uint64_t num_runs = 4;

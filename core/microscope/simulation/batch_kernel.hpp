@@ -40,10 +40,9 @@ using BatchKernel = void (*)(const BatchSession& session,
 /// are lanes, into the outcomes of each session. Signals are summed whether or not the session
 /// records them.
 ///
-/// @param sessions  Of the same runs, noise, gains and settling; the first one's progress is called
-///                  with that part of the record samples of all of them that is the part of the
-///                  time that has passed. They begin in this order: the longest first takes the
-///                  least time.
+/// @param sessions  Of the same runs, noise, gains and settling. They begin in this order: the
+///                  longest first takes the least time. The progress of the first one is called for
+///                  all, with the samples of all records times the part of the work that is done.
 using MixedKernel = void (*)(std::span<const BatchSession> sessions,
                              std::span<SessionOutcomes> outcomes);
 

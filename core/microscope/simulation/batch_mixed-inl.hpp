@@ -330,8 +330,8 @@ class MixedLanes {
     }
   }
 
-  /// The time that is left follows from the part of the steps that is done: towards the end only
-  /// the longest session is left, and has all lanes' time.
+  /// Reports the part of the steps that is done. The samples recorded so far would promise too
+  /// much: towards the end, some seats idle, and a step records fewer.
   void report() {
     const double part = static_cast<double>(num_samples_) / static_cast<double>(num_steps_);
     const auto done = static_cast<std::size_t>(part * static_cast<double>(num_record_samples_));

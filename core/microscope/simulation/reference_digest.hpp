@@ -8,8 +8,8 @@ namespace proofmass {
 
 /// Digest of the results of a short fixed campaign: the same number from every sound build and
 /// processor of one model_version. A coordinator refuses workers that come to another one, before
-/// they compute anything that counts. Passes through every kernel of the set; takes 40 ms with the
-/// fastest one.
+/// they compute anything that counts. Passes through every kernel of the set; takes some 40 ms
+/// with AVX-512.
 ///
 /// @param set  One of available_instruction_sets().
 [[nodiscard]] std::uint64_t reference_digest(InstructionSet set);

@@ -113,7 +113,7 @@ void check_lease(const State& state, LeaseId id, const Lease& lease) {
 
 void check_workers(const State& state) {
   std::uint64_t num_slots = 0;
-  std::uint64_t num_served = 0;
+  std::uint64_t num_eligible = 0;
   std::uint64_t num_idle = 0;
   std::map<HostId, std::uint32_t> num_workers;
   for (const auto& [id, worker] : state.workers) {
@@ -130,14 +130,14 @@ void check_workers(const State& state) {
     PROOFMASS_EXPECT(worker.num_slots_lent_for == num_slots_lent_for);
     PROOFMASS_EXPECT(worker.num_lent == num_lent && worker.num_alone == num_alone);
     num_slots += worker.num_slots;
-    if (worker.is_served) {
-      num_served += worker.num_slots;
+    if (worker.is_eligible) {
+      num_eligible += worker.num_slots;
       num_idle += num_idle_slots(worker);
     }
     ++num_workers[worker.host];
   }
   PROOFMASS_EXPECT(state.num_slots == num_slots);
-  PROOFMASS_EXPECT(state.num_served_slots == num_served && state.num_idle_slots == num_idle);
+  PROOFMASS_EXPECT(state.num_eligible_slots == num_eligible && state.num_idle_slots == num_idle);
   for (const auto& [name, host] : state.hosts) {
     PROOFMASS_EXPECT(host.num_workers == num_workers[name]);
   }
