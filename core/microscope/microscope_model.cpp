@@ -7,6 +7,7 @@
 #include "core/microscope/campaign/budget.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/instrument/instrument.hpp"
 #include "core/microscope/simulation/reference_digest.hpp"
 #include "core/microscope/simulation/run.hpp"
@@ -76,7 +77,10 @@ class MicroscopeModel final : public Model {
  public:
   [[nodiscard]] std::string_view version() const override { return model_version; }
 
-  [[nodiscard]] const ResultSchema& results() const override { return microscope_results(); }
+  [[nodiscard]] const ResultSchema& results() const override {
+    static const ResultSchema results = results_of(estimation_methods());
+    return results;
+  }
 
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override {
     static const std::array<DrawnQuantity, num_drawn> drawn = make_drawn();

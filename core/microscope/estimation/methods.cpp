@@ -1,5 +1,6 @@
 #include "core/microscope/estimation/methods.hpp"
 
+#include <algorithm>
 #include <array>
 #include <span>
 
@@ -26,6 +27,15 @@ const EstimationMethodInfo& estimation_method(EstimationMethod method) {
   const auto position = static_cast<std::size_t>(method) - 1;
   PROOFMASS_EXPECT(position < methods.size());
   return methods[position];
+}
+
+std::span<const EstimationMethodInfo> estimation_methods() { return methods; }
+
+ResultSchema results_of(std::span<const EstimationMethodInfo> possible) {
+  ResultSchema schema = microscope_results();
+  if (std::ranges::none_of(possible, &EstimationMethodInfo::has_standard_errors)) return schema;
+  for (Quantity& quantity : schema.quantities) quantity.has_standard_error = true;
+  return schema;
 }
 
 std::span<const std::string_view> names_of(Correction) {

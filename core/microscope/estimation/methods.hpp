@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -22,8 +22,8 @@ struct Diagnostic {
 
 /// What a method makes of a run.
 struct Estimation {
-  ParameterArray values{};                          ///< SI.
-  std::optional<ParameterArray> standard_errors{};  ///< SI; nothing if the method has none.
+  ParameterArray values{};           ///< SI.
+  ParameterArray standard_errors{};  ///< SI; if the method has_standard_errors.
   std::uint32_t num_rounds = 0;
   bool converged = false;  ///< False if values still moved in the last allowed round.
   std::vector<Diagnostic> diagnostics{};
@@ -52,7 +52,16 @@ struct EstimationMethodInfo {
   /// @param records   Of scenario.sessions, with what `needs` asks for.
   /// @param scenario  For which `check` passed.
   Estimation (*estimate)(const RunPhasors& records, const Scenario& scenario);
+
+  bool has_standard_errors = false;
 };
+
+/// Those that a campaign file can name.
+[[nodiscard]] std::span<const EstimationMethodInfo> estimation_methods();
+
+/// What results are where these methods can be chosen: microscope_results(), with standard errors
+/// if one of the methods has them. Runs that another one estimates have none.
+[[nodiscard]] ResultSchema results_of(std::span<const EstimationMethodInfo> methods);
 
 /// The method that a scenario names.
 /// @pre Scenario::validate() passed.

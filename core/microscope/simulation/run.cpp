@@ -420,12 +420,16 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
                    .session = static_cast<std::uint32_t>(finding.loss.session)};
     return result;
   }
-  if (!are_in_range(found.values)) {
+  const bool has_errors = impl_->method.has_standard_errors;
+  if (!are_in_range(found.values) || (has_errors && !are_in_range(found.standard_errors))) {
     result.status = RunStatus::not_finite;
     return result;
   }
   result.status = found.converged ? RunStatus::completed : RunStatus::not_converged;
   result.estimate.assign(found.values.begin(), found.values.end());
+  if (has_errors) {
+    result.standard_error.assign(found.standard_errors.begin(), found.standard_errors.end());
+  }
   return result;
 }
 

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <functional>
+#include <vector>
 
 #include "core/microscope/session/session.hpp"
 #include "tests/support/microscope_results.hpp"
@@ -74,7 +77,6 @@ Estimation first_phasors(const RunPhasors& records, const Scenario& scenario) {
   for (std::size_t i = 0; i < num_parameters; ++i) {
     estimation.values[i] = records[i].amplitude[index(Signal::differential_x)][0].real();
   }
-  estimation.standard_errors = estimation.values;
   estimation.diagnostics = {{"sessions", static_cast<double>(records.size())}};
   return estimation;
 }
@@ -100,11 +102,43 @@ TEST(RunPlan, EstimatesByTheMethodThatItIsGiven) {
   const RunRecord other = RunPlan(campaign, method).record(RunIndex{0}, {});
   EXPECT_EQ(other.phasors[7].amplitude, record.phasors[0].amplitude);
   EXPECT_EQ(other.phasors[3].amplitude, record.phasors[3].amplitude);
+  EXPECT_TRUE(result.standard_error.empty());
   const Estimation estimation = plan.estimation(record);
-  EXPECT_EQ(estimation.standard_errors, estimation.values);
   EXPECT_EQ(estimation.diagnostics.at(0).value, 11.0);
   campaign.scenario.estimation.convergence = 0.7;
   EXPECT_EQ(RunPlan(campaign, method).simulate(RunIndex{0}, {}).status, RunStatus::not_converged);
+}
+
+Estimation errors_of_three(const RunPhasors& /*records*/, const Scenario& scenario) {
+  Estimation estimation{.num_rounds = 1, .converged = true};
+  estimation.standard_errors.fill(3.0);
+  if (scenario.estimation.convergence > 0.5) estimation.standard_errors.back() = HUGE_VAL;
+  return estimation;
+}
+
+// What a method says of its errors reaches the result; and the schema has a place for it.
+TEST(RunPlan, PassesStandardErrorsOnIfTheMethodHasThem) {
+  constexpr EstimationMethodInfo method{.name = "errors_of_three",
+                                        .needs = needs_of_test,
+                                        .check = refuse_nothing,
+                                        .estimate = errors_of_three,
+                                        .has_standard_errors = true};
+  MicroscopeCampaign campaign = short_campaign(1);
+  const RunResult result = RunPlan(campaign, method).simulate(RunIndex{0}, {});
+  EXPECT_EQ(result.status, RunStatus::completed);
+  EXPECT_EQ(result.standard_error, std::vector<double>(num_parameters, 3.0));
+  campaign.scenario.estimation.convergence = 0.7;
+  const RunResult unusable = RunPlan(campaign, method).simulate(RunIndex{0}, {});
+  EXPECT_EQ(unusable.status, RunStatus::not_finite);
+  EXPECT_TRUE(unusable.standard_error.empty());
+
+  const std::array with{*estimation_methods().begin(), method};
+  for (const Quantity& quantity : results_of(with).quantities) {
+    EXPECT_TRUE(quantity.has_standard_error) << quantity.name;
+  }
+  for (const Quantity& quantity : results_of(estimation_methods()).quantities) {
+    EXPECT_FALSE(quantity.has_standard_error) << quantity.name;
+  }
 }
 
 // Two sessions of a target, each with noise of its own, give an estimate between those of each.
