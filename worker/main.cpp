@@ -18,7 +18,7 @@ worker::PreparedCampaign prepare(const Campaign& campaign) {
                                                    const std::function<void(int)>& progress) {
                 return plan->simulate_batch(requests, set, progress);
               },
-          .num_orbits = plan->num_orbits()};
+          .num_steps = plan->num_steps()};
 }
 
 }  // namespace

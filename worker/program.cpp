@@ -32,7 +32,7 @@ using wire::Field;
 constexpr int exit_failed = 1;
 constexpr int exit_usage = 2;
 constexpr std::chrono::seconds give_up_with_parent(60);
-/// A thread that computes looks several times an orbit whether it is still wanted.
+/// A thread that computes looks whether it is still wanted each time its runs report progress.
 constexpr std::chrono::seconds thread_end_max(5);
 
 /// A worker that a campaign started must not outlive it, however that ends.

@@ -87,7 +87,7 @@ std::vector<ResultDifference> Replay::run(const RunResult& stored, SeriesOutput*
   const SampleSink pass_on = [&](const RecordedSample& sample) {
     if (output != nullptr) output->add(sample);
   };
-  const auto stop_if_asked = [&](int /*num_orbits*/) {
+  const auto stop_if_asked = [&](int /*num_steps*/) {
     if (is_stopped()) throw Interrupted();
   };
   const RunResult computed =

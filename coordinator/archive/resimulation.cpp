@@ -59,7 +59,7 @@ class Simulation {
     for (const RunResult& result : batch) {
       requests.push_back({result.run, campaign_.table_values(result.run)});
     }
-    const auto on_progress = [&](int /*num_orbits*/) {
+    const auto on_progress = [&](int /*num_steps*/) {
       if (has_failed_ || is_stopped_()) throw Interrupted();
     };
     const std::vector<RunResult> computed =

@@ -47,19 +47,19 @@ double measure_batch_s(const Campaign& campaign, const Plan& plan) {
   const auto elapsed_s = [start] {
     return static_cast<double>(std::clock() - start) / static_cast<double>(CLOCKS_PER_SEC);
   };
-  int num_orbits = plan.num_orbits();
+  int num_steps = plan.num_steps();
   try {
-    (void)plan.simulate_batch(requests, set, [&](int num_orbits_now) {
-      if (num_orbits_now == 0 || elapsed_s() < measured_s_max) return;
-      num_orbits = num_orbits_now;
+    (void)plan.simulate_batch(requests, set, [&](int num_steps_now) {
+      if (num_steps_now == 0 || elapsed_s() < measured_s_max) return;
+      num_steps = num_steps_now;
       throw Measured{};
     });
   } catch (const Measured&) {
-    // The orbits so far are enough.
+    // The steps so far are enough.
   }
-  const double all_orbits = static_cast<double>(plan.num_orbits()) / num_orbits;
+  const double all_steps = static_cast<double>(plan.num_steps()) / num_steps;
   const std::size_t num_rounds = model().batch_size() / num_at_once;
-  return elapsed_s() * all_orbits * static_cast<double>(num_rounds);
+  return elapsed_s() * all_steps * static_cast<double>(num_rounds);
 }
 
 CostEstimate& CostEstimate::operator+=(const CostEstimate& other) {

@@ -8,8 +8,8 @@
 namespace proofmass::coordinator {
 
 /// Processor time of the campaign's first batch on this machine, which is a full one unless the
-/// campaign has fewer runs; extrapolated from the orbits that its first half second takes. The
-/// orbits of all sessions cost about the same.
+/// campaign has fewer runs; extrapolated from the steps that its first half second takes.
+/// All steps of a run take about the same time.
 /// @param plan  The campaign's.
 [[nodiscard]] double measure_batch_s(const Campaign& campaign, const Plan& plan);
 

@@ -16,7 +16,7 @@
 namespace proofmass::coordinator {
 namespace {
 
-constexpr int grace_ms = 3000;  // A worker looks at signals between two orbits, some 20 ms apart.
+constexpr int grace_ms = 3000;  // A worker looks at signals between two steps, some 20 ms apart.
 
 constexpr int failures_in_a_row_max = 3;
 

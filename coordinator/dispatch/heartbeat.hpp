@@ -17,7 +17,7 @@ void reconcile(State& state, WorkerId id, const wire::Heartbeat& heartbeat, Time
 /// workers that have set their results aside, so that nobody computes them again.
 void adopt_set_aside(State& state, CampaignId campaign, TimePoint now);
 
-/// Notes how many orbits the worker's batches have done.
+/// Notes how many steps the worker's batches have done.
 void note_progress(State& state, Worker& worker, const wire::Heartbeat& heartbeat, TimePoint now);
 
 /// The first of the worker's batches that hangs; null if none does.

@@ -65,9 +65,9 @@ struct DispatchConfig {
   /// faster than they can be stored delay heartbeats, and workers send them again.
   double results_per_s_max = 30'000.0;
   double run_time_s_expected = 5.0;  ///< Until a campaign's first result, for the same.
-  /// A batch that finishes no orbit for this many times the usual time of one, and for at least
+  /// A batch that finishes no step for this many times the usual time of one, and for at least
   /// `hung_after_min`, hangs.
-  double hung_after_orbits = 50.0;
+  double hung_after_steps = 50.0;
   Duration hung_after_min = std::chrono::seconds(60);
   std::uint32_t crashes_per_run_max = 3;   ///< Then a run is given up.
   std::uint32_t crashes_per_host_max = 5;  ///< In a row, without a finished run; then quarantine.
@@ -103,7 +103,7 @@ struct Worker {
   std::uint64_t num_slots_lent_for = 0;  ///< Of its leases; more than slots if runs wait there.
   /// Whether it may be lent runs, as the last tick or the last attempt to lend it some found it.
   bool is_eligible = false;
-  std::uint64_t num_orbits_done = 0;
+  std::uint64_t num_steps_done = 0;
   std::uint64_t num_results = 0;
   std::vector<Progress> computing;  ///< As the newest heartbeat has it.
   std::set<LeaseId> leases;
@@ -214,7 +214,7 @@ struct CampaignState {
   std::map<RunIndex, std::uint32_t> audit_crashes;  ///< Of runs in the two above.
   std::uint64_t num_comparing = 0;                  ///< Results on their way to be compared.
   double run_time_s = 0.0;                 ///< Running mean over all workers; 0 if not known yet.
-  double orbit_time_s = 0.0;               ///< Running mean of what an orbit takes in its slot.
+  double step_time_s = 0.0;                ///< Running mean of what a step takes in its slot.
   std::string storage_failure;             ///< Why nothing can be stored; empty if all is well.
   std::uint64_t num_committed_here = 0;    ///< Without those that were finished before.
   std::uint64_t num_without_estimate = 0;  ///< Delivered here, with a status that has none.

@@ -108,7 +108,7 @@ void part_with(State& state, WorkerId id, LossReason reason, Outbox& outbox) {
               .fields = {{"worker", id.value},
                          {"name", worker.name},
                          {"reason", name_of(reason)},
-                         {"orbits", worker.num_orbits_done}}});
+                         {"steps", worker.num_steps_done}}});
   const detail::RunsByCampaign blamed =
       is_blamed(reason) ? detail::blame_crash(state, id, outbox) : detail::RunsByCampaign();
   detail::remove_worker(state, id, reason, blamed, outbox);
@@ -122,7 +122,7 @@ void part_with_hung(State& state, WorkerId id, const wire::ComputedBatch& batch,
                          {"name", state.workers.at(id).name},
                          {"reason", "hung"},
                          {"runs", to_text(RunSet(batch.ranges))},
-                         {"orbits", batch.num_orbits_done}}},
+                         {"steps", batch.num_steps_done}}},
              batch.campaign);
   outbox.send(id, wire::Stop{});
   const detail::RunsByCampaign blamed = detail::blame_batch(state, id, batch, outbox);

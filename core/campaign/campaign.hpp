@@ -67,7 +67,7 @@ class Plan {
   ///
   /// @param requests  At most Model::batch_size().
   /// @param set       One of available_instruction_sets().
-  /// @param progress  Called now and then with the number of orbits done; the runs advance
+  /// @param progress  Called now and then with the number of steps done; the runs advance
   ///                  together.
   /// @return Results in the order of `requests`.
   [[nodiscard]] virtual std::vector<RunResult> simulate_batch(
@@ -86,8 +86,9 @@ class Plan {
   /// What replay() passes on.
   [[nodiscard]] virtual const Recording& recording() const = 0;
 
-  /// Orbits of one run: what `progress` counts to.
-  [[nodiscard]] virtual int num_orbits() const = 0;
+  /// Steps of one run, which take about the same time each: what `progress` counts to.
+  /// Model::step_name() says what they are.
+  [[nodiscard]] virtual int num_steps() const = 0;
 };
 
 /// What a run begins with.

@@ -53,6 +53,9 @@ class Model {
   /// What is drawn for a run, in the order of RunDraw::values.
   [[nodiscard]] virtual std::span<const DrawnQuantity> drawn() const = 0;
 
+  /// What a run's progress counts, for people, in the plural: `orbits`.
+  [[nodiscard]] virtual std::string_view step_name() const = 0;
+
   /// Runs that one call of Plan::simulate_batch() takes at most; fewer cost no more.
   [[nodiscard]] virtual std::size_t batch_size() const = 0;
 

@@ -87,6 +87,8 @@ class MicroscopeModel final : public Model {
     return drawn;
   }
 
+  [[nodiscard]] std::string_view step_name() const override { return "orbits"; }
+
   [[nodiscard]] std::size_t batch_size() const override { return batch_lanes; }
 
   [[nodiscard]] std::uint64_t reference_digest(InstructionSet set) const override {

@@ -157,12 +157,12 @@ void write(const ResultAck& ack, proto::Envelope& envelope) {
 void write(const Heartbeat& heartbeat, proto::Envelope& envelope) {
   proto::Heartbeat& message = *envelope.mutable_heartbeat();
   message.set_num_runs_max(heartbeat.num_runs_max);
-  message.set_num_orbits_done(heartbeat.num_orbits_done);
+  message.set_num_steps_done(heartbeat.num_steps_done);
   for (const HeldRuns& held : heartbeat.held) write_held(held, *message.add_held());
   for (const ComputedBatch& batch : heartbeat.computing) {
     proto::ComputedBatch& content = *message.add_computing();
     content.set_campaign(batch.campaign.value);
-    content.set_num_orbits_done(batch.num_orbits_done);
+    content.set_num_steps_done(batch.num_steps_done);
     write_ranges(batch.ranges, *content.mutable_ranges());
   }
   for (const HeldRuns& held : heartbeat.set_aside) write_held(held, *message.add_set_aside());

@@ -266,7 +266,7 @@ Message read(const proto::Heartbeat& message) {
   require_count(message.set_aside_size(), 0, ranges_per_message_max, "set_aside");
   require_count(message.computing_size(), 0, slots_max, "computing");
   Heartbeat heartbeat{.num_runs_max = message.num_runs_max(),
-                      .num_orbits_done = message.num_orbits_done(),
+                      .num_steps_done = message.num_steps_done(),
                       .held = {},
                       .computing = {}};
   std::size_t num_held = 0;
@@ -278,7 +278,7 @@ Message read(const proto::Heartbeat& message) {
   for (const auto& batch : message.computing()) {
     heartbeat.computing.push_back({.campaign = checked_campaign(batch.campaign()),
                                    .ranges = read_ranges(batch.ranges()),
-                                   .num_orbits_done = batch.num_orbits_done()});
+                                   .num_steps_done = batch.num_steps_done()});
     num_computing += heartbeat.computing.back().ranges.size();
     require_in(num_computing, 0, ranges_per_message_max, "number of ranges");
   }

@@ -82,7 +82,7 @@ enum class LossReason : std::uint8_t {
   silent = 1,         ///< The worker was not heard for too long.
   crashed = 2,        ///< Its process was ended by a signal. Counts against the runs it computed.
   out_of_memory = 3,  ///< Its process was ended for its use of memory. Counts as well.
-  hung = 4,           ///< No orbit was finished for too long. Counts as well.
+  hung = 4,           ///< No step was finished for too long. Counts as well.
   drained = 5,        ///< The worker was told to leave.
   walltime = 6,       ///< The worker's time is up.
   preempted = 7,      ///< The worker was asked to end by a signal.
@@ -224,7 +224,7 @@ struct ResultAck {
 struct ComputedBatch {
   CampaignId campaign;
   std::vector<RunRange> ranges;  ///< Not empty.
-  std::uint32_t num_orbits_done = 0;
+  std::uint32_t num_steps_done = 0;
 
   auto operator<=>(const ComputedBatch&) const = default;
 };
@@ -234,7 +234,7 @@ struct ComputedBatch {
 struct Heartbeat {
   /// Most unfinished runs that it wants to hold altogether, at most runs_per_lease_max.
   std::uint32_t num_runs_max = 0;
-  std::uint64_t num_orbits_done = 0;  ///< Since the process began.
+  std::uint64_t num_steps_done = 0;  ///< Since the process began.
   /// Runs that wait, are being computed, or whose result is not acknowledged; at most
   /// ranges_per_message_max ranges.
   std::vector<HeldRuns> held;

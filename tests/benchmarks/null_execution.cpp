@@ -12,7 +12,7 @@ namespace proofmass::test {
 namespace {
 
 constexpr std::size_t batch_size = 16;
-constexpr int num_orbits = 140;  ///< Of a run of the paper's campaign.
+constexpr int num_steps = 140;  ///< Of a run of the paper's campaign.
 
 std::vector<RunRange> ranges_of_requests(const std::vector<RunRequest>& requests) {
   std::vector<RunIndex> runs;
@@ -108,16 +108,16 @@ std::vector<worker::RunningBatch> NullExecution::computing() const {
         {.number = number,
          .progress = {.campaign = batch.assignment.campaign,
                       .ranges = ranges_of_requests(batch.assignment.requests),
-                      .num_orbits_done = static_cast<std::uint32_t>(num_orbits_done(batch))},
+                      .num_steps_done = static_cast<std::uint32_t>(num_steps_done(batch))},
          .time_left = std::max(worker::Duration::zero(), batch.due_at - now_)});
   }
   return running;
 }
 
-int NullExecution::num_orbits_done(const Batch& batch) const {
+int NullExecution::num_steps_done(const Batch& batch) const {
   const double fraction = std::chrono::duration<double>(now_ - batch.started_at) /
                           std::chrono::duration<double>(batch.due_at - batch.started_at);
-  return static_cast<int>(num_orbits * std::clamp(fraction, 0.0, 1.0));
+  return static_cast<int>(num_steps * std::clamp(fraction, 0.0, 1.0));
 }
 
 void NullExecution::finish(const worker::Assignment& assignment, double elapsed_s) {
@@ -127,7 +127,7 @@ void NullExecution::finish(const worker::Assignment& assignment, double elapsed_
         {.campaign = assignment.campaign,
          .computed = {.result = null_result(seed, request.run), .elapsed_s = elapsed_s}});
   }
-  num_orbits_done_ += assignment.requests.size() * num_orbits;
+  num_steps_done_ += assignment.requests.size() * num_steps;
 }
 
 }  // namespace proofmass::test

@@ -48,7 +48,7 @@ class NullExecution final : public worker::Execution {
   [[nodiscard]] std::vector<worker::FinishedRun> take_finished() override;
   [[nodiscard]] std::vector<worker::RunningBatch> computing() const override;
   [[nodiscard]] std::optional<worker::Duration> usual_batch_time() const override { return {}; }
-  [[nodiscard]] std::uint64_t num_orbits_done() const override { return num_orbits_done_; }
+  [[nodiscard]] std::uint64_t num_steps_done() const override { return num_steps_done_; }
   [[nodiscard]] std::optional<std::string> failure() const override { return {}; }
 
  private:
@@ -60,7 +60,7 @@ class NullExecution final : public worker::Execution {
 
   void begin_batches(TimePoint now);
   [[nodiscard]] worker::Duration time_of_batch(std::uint64_t number) const;
-  [[nodiscard]] int num_orbits_done(const Batch& batch) const;
+  [[nodiscard]] int num_steps_done(const Batch& batch) const;
   void finish(const worker::Assignment& assignment, double elapsed_s);
   void note_due();
 
@@ -71,7 +71,7 @@ class NullExecution final : public worker::Execution {
   worker::RunQueue waiting_;
   std::map<std::uint64_t, Batch> batches_;  ///< By number.
   std::uint64_t num_batches_ = 0;           ///< Begun.
-  std::uint64_t num_orbits_done_ = 0;       ///< Of all runs of batches that are finished.
+  std::uint64_t num_steps_done_ = 0;        ///< Of all runs of batches that are finished.
   std::vector<worker::FinishedRun> finished_;
 };
 

@@ -20,11 +20,11 @@ namespace {
 
 using namespace proofmass;
 
-constexpr int num_orbits = 10;
+constexpr int num_steps = 10;
 
 struct NullOptions {
   std::optional<std::uint64_t> poison;  ///< This run ends the process by SIGSEGV.
-  std::optional<std::uint64_t> hang;    ///< This one never ends and finishes no orbit.
+  std::optional<std::uint64_t> hang;    ///< This one never ends and finishes no step.
   double run_time_s = 0.0;              ///< What a batch takes.
 };
 
@@ -41,11 +41,11 @@ void crash() {
 
 /// Takes the time of a batch, and looks now and then whether it is still wanted.
 void pass_time(double run_time_s, const std::function<void(int)>& progress) {
-  for (int orbit = 1; orbit <= num_orbits; ++orbit) {
+  for (int step = 1; step <= num_steps; ++step) {
     if (run_time_s > 0.0) {
-      std::this_thread::sleep_for(std::chrono::duration<double>(run_time_s / num_orbits));
+      std::this_thread::sleep_for(std::chrono::duration<double>(run_time_s / num_steps));
     }
-    progress(orbit);
+    progress(step);
   }
 }
 
@@ -64,7 +64,7 @@ worker::PreparedCampaign prepare(const Campaign& campaign, const NullOptions& op
                 }
                 return results;
               },
-          .num_orbits = num_orbits};
+          .num_steps = num_steps};
 }
 
 }  // namespace

@@ -55,14 +55,14 @@ class Speaker {
   void beat(wire::CampaignId campaign, std::uint64_t first, std::uint64_t count,
             std::uint32_t attempt = 1) {
     wire::Heartbeat heartbeat{
-        .num_runs_max = 8, .num_orbits_done = ++num_orbits_, .held = {}, .computing = {}};
+        .num_runs_max = 8, .num_steps_done = ++num_steps_, .held = {}, .computing = {}};
     if (count > 0) {
       const RunRange runs{.first = {first}, .count = count};
       heartbeat.held = {{.campaign = campaign, .attempt = {attempt}, .ranges = {runs}}};
       heartbeat.computing = {
           {.campaign = campaign,
            .ranges = {{.first = {first}, .count = std::min<std::uint64_t>(count, 4)}},
-           .num_orbits_done = num_orbits_}};
+           .num_steps_done = num_steps_}};
     }
     say(std::move(heartbeat));
   }
@@ -92,7 +92,7 @@ class Speaker {
   std::uint8_t connection_;
   wire::SessionId session_;
   std::uint64_t sequence_ = 0;
-  std::uint32_t num_orbits_ = 0;
+  std::uint32_t num_steps_ = 0;
 };
 
 Step happening(StepKind kind, std::uint8_t number = 0, std::uint16_t value = 0) {

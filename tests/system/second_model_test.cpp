@@ -111,6 +111,11 @@ TEST_F(SecondModel, ErrsAsTheClosedFormSays) {
   }
 }
 
+TEST_F(SecondModel, IsCheckedInItsOwnSteps) {
+  ASSERT_EQ(proofmass("check", {"check", "example.toml", "--runs", "7"}), 0) << errors_of("check");
+  EXPECT_THAT(output_of("check"), HasSubstr("Runs      7 of 1000 periods\n"));
+}
+
 TEST_F(SecondModel, LosesRunsThatLeaveTheRangeOfTheSensor) {
   run("a", {"--set", "sensor.range_m_s2=3.35e-7"});
   const double num_lost = number("a", "SELECT count(*) FROM run_result WHERE status = 5");

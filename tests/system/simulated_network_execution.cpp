@@ -7,7 +7,7 @@
 namespace proofmass::test {
 namespace {
 
-constexpr std::uint32_t num_orbits = 3;  // Of a run.
+constexpr std::uint32_t num_steps = 3;  // Of a run.
 
 bool is_in(std::span<const RunRange> ranges, RunIndex run) {
   return std::any_of(ranges.begin(), ranges.end(), [&](const RunRange& range) {
@@ -78,7 +78,7 @@ std::vector<worker::RunningBatch> PlayedExecution::computing() const {
     computing.push_back({.number = batch.number,
                          .progress = {.campaign = batch.runs[0].first,
                                       .ranges = ranges_of(batch.runs),
-                                      .num_orbits_done = batch.num_orbits_done},
+                                      .num_steps_done = batch.num_steps_done},
                          .time_left = std::nullopt});
   }
   return computing;
@@ -114,10 +114,10 @@ PlayedExecution::Outcome PlayedExecution::advance() {
   for (auto batch = batches_.begin(); batch != batches_.end();) {
     if (is_any_of(*batch, poison_.crashing)) return Outcome::crashed;
     if (!is_any_of(*batch, poison_.hanging)) {
-      ++batch->num_orbits_done;
-      num_orbits_done_ += batch->runs.size();
+      ++batch->num_steps_done;
+      num_steps_done_ += batch->runs.size();
     }
-    if (batch->num_orbits_done < num_orbits) {
+    if (batch->num_steps_done < num_steps) {
       ++batch;
       continue;
     }

@@ -24,7 +24,7 @@ struct Poison {
   std::set<RunKey> hanging;
 };
 
-/// Computes runs in simulated time: in batches, some at a time, orbit by orbit.
+/// Computes runs in simulated time: in batches, some at a time, step by step.
 class PlayedExecution final : public worker::Execution {
  public:
   /// @param poison  Outlives this object.
@@ -45,13 +45,13 @@ class PlayedExecution final : public worker::Execution {
   std::vector<worker::FinishedRun> take_finished() override { return std::exchange(finished_, {}); }
   std::vector<worker::RunningBatch> computing() const override;
   std::optional<worker::Duration> usual_batch_time() const override { return std::nullopt; }
-  std::uint64_t num_orbits_done() const override { return num_orbits_done_; }
+  std::uint64_t num_steps_done() const override { return num_steps_done_; }
   std::optional<std::string> failure() const override { return std::nullopt; }
 
   /// What an advance comes to.
   enum class Outcome : std::uint8_t { nothing, finished, crashed };
 
-  /// Begins batches, or lets each of those that have begun do an orbit.
+  /// Begins batches, or lets each of those that have begun do a step.
   Outcome advance();
   [[nodiscard]] bool is_computing() const { return !batches_.empty(); }
 
@@ -63,7 +63,7 @@ class PlayedExecution final : public worker::Execution {
   struct Batch {
     std::uint64_t number = 0;
     std::vector<RunKey> runs;
-    std::uint32_t num_orbits_done = 0;
+    std::uint32_t num_steps_done = 0;
   };
 
   [[nodiscard]] std::optional<Batch> next_batch();
@@ -76,7 +76,7 @@ class PlayedExecution final : public worker::Execution {
   std::vector<Batch> batches_;
   std::vector<worker::FinishedRun> finished_;
   std::uint64_t next_batch_ = 1;
-  std::uint64_t num_orbits_done_ = 0;
+  std::uint64_t num_steps_done_ = 0;
 };
 
 }  // namespace proofmass::test

@@ -31,7 +31,7 @@ struct FinishedRun {
 struct RunningBatch {
   std::uint64_t number = 0;  ///< No other batch of the execution has it.
   wire::ComputedBatch progress;
-  /// Until its results are there, if it goes on as it has; nothing before its first orbit is done.
+  /// Until its results are there, if it goes on as it has; nothing before its first step is done.
   std::optional<Duration> time_left;
 };
 
@@ -72,7 +72,7 @@ class Execution {
   /// The longest that a latest batch took, of the campaigns that are defined; nothing if none has
   /// finished one.
   [[nodiscard]] virtual std::optional<Duration> usual_batch_time() const = 0;
-  [[nodiscard]] virtual std::uint64_t num_orbits_done() const = 0;
+  [[nodiscard]] virtual std::uint64_t num_steps_done() const = 0;
   /// Why no run can be computed any more, if so.
   [[nodiscard]] virtual std::optional<std::string> failure() const = 0;
 };

@@ -11,7 +11,7 @@
 namespace proofmass::worker {
 namespace {
 
-/// Leaves a simulation from within, between two orbits.
+/// Leaves a simulation from within, where it reports progress.
 struct Abandoned {};
 
 TimePoint now() { return std::chrono::steady_clock::now(); }
@@ -23,10 +23,10 @@ std::vector<RunRange> requested_ranges(const std::vector<RunRequest>& requests) 
   return ranges_of(runs);
 }
 
-/// At the pace of the orbits that are done; nothing if there are none.
-std::optional<Duration> time_left(Duration elapsed, int num_done, int num_orbits) {
+/// At the pace of the steps that are done; nothing if there are none.
+std::optional<Duration> time_left(Duration elapsed, int num_done, int num_steps) {
   if (num_done < 1) return std::nullopt;
-  return elapsed * std::max(0, num_orbits - num_done) / num_done;
+  return elapsed * std::max(0, num_steps - num_done) / num_done;
 }
 
 }  // namespace
@@ -146,13 +146,13 @@ std::vector<RunningBatch> Executor::computing() const {
   const std::lock_guard lock(mutex_);
   std::vector<RunningBatch> running;
   for (const auto& [number, batch] : batches_) {
-    const int num_done = batch->num_orbits_done;
+    const int num_done = batch->num_steps_done;
     running.push_back(
         {.number = number,
          .progress = {.campaign = batch->assignment.campaign,
                       .ranges = requested_ranges(batch->assignment.requests),
-                      .num_orbits_done = static_cast<std::uint32_t>(num_done)},
-         .time_left = time_left(now() - batch->started_at, num_done, batch->prepared->num_orbits)});
+                      .num_steps_done = static_cast<std::uint32_t>(num_done)},
+         .time_left = time_left(now() - batch->started_at, num_done, batch->prepared->num_steps)});
   }
   return running;
 }
@@ -245,14 +245,14 @@ void Executor::compute(Batch& batch) {
 
 std::vector<RunResult> Executor::simulate(Batch& batch) {
   const std::vector<RunRequest>& requests = batch.assignment.requests;
-  int num_orbits = 0;
-  const auto on_progress = [&](int num_orbits_now) {
+  int num_steps = 0;
+  const auto on_progress = [&](int num_steps_now) {
     if (batch.is_dropped) throw Abandoned{};
-    const int num_new = std::max(0, num_orbits_now - num_orbits);
+    const int num_new = std::max(0, num_steps_now - num_steps);
     if (num_new == 0) return;
-    num_orbits += num_new;
-    batch.num_orbits_done = num_orbits;
-    num_orbits_done_ += static_cast<std::uint64_t>(num_new) * requests.size();
+    num_steps += num_new;
+    batch.num_steps_done = num_steps;
+    num_steps_done_ += static_cast<std::uint64_t>(num_new) * requests.size();
   };
   std::vector<RunResult> results = batch.prepared->simulate(requests, on_progress);
   PROOFMASS_EXPECT(results.size() == requests.size());

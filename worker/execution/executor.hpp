@@ -19,7 +19,7 @@
 namespace proofmass::worker {
 
 /// Computes some runs together; their results are in the order of the requests. Calls `progress`
-/// now and then with the number of orbits that each of the runs has done. Called by several threads
+/// now and then with the number of steps that each of the runs has done. Called by several threads
 /// at the same time.
 using Simulate = std::function<std::vector<RunResult>(std::span<const RunRequest> requests,
                                                       const std::function<void(int)>& progress)>;
@@ -27,7 +27,7 @@ using Simulate = std::function<std::vector<RunResult>(std::span<const RunRequest
 /// A campaign whose runs can be computed.
 struct PreparedCampaign {
   Simulate simulate;
-  int num_orbits = 1;  ///< Of one run, all sessions together; at least 1.
+  int num_steps = 1;  ///< Of one run, all sessions together; at least 1.
 };
 
 /// Prepares what the runs of a campaign share, which may take some time.
@@ -51,7 +51,7 @@ class Executor final : public Execution {
   /// @param prepare    Called on the threads, once for each definition.
   /// @param on_change  Called on any of the threads when there is something new to take.
   Executor(Prepare prepare, std::function<void()> on_change, const ExecutorConfig& config);
-  ~Executor() override;  ///< Abandons everything; waits for all threads to come to an orbit's end.
+  ~Executor() override;  ///< Abandons everything; waits until all threads report progress or end.
 
   [[nodiscard]] bool is_defined(wire::CampaignId campaign) const override;
   void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) override;
@@ -64,7 +64,7 @@ class Executor final : public Execution {
   [[nodiscard]] std::vector<FinishedRun> take_finished() override;
   [[nodiscard]] std::vector<RunningBatch> computing() const override;
   [[nodiscard]] std::optional<Duration> usual_batch_time() const override;
-  [[nodiscard]] std::uint64_t num_orbits_done() const override { return num_orbits_done_; }
+  [[nodiscard]] std::uint64_t num_steps_done() const override { return num_steps_done_; }
   [[nodiscard]] std::optional<std::string> failure() const override;
 
   /// Abandons everything and waits until no thread computes any more, at most for this time. False
@@ -89,7 +89,7 @@ class Executor final : public Execution {
     Assignment assignment;
     std::shared_ptr<const PreparedCampaign> prepared;
     TimePoint started_at;
-    std::atomic<int> num_orbits_done = 0;
+    std::atomic<int> num_steps_done = 0;
     std::atomic<bool> is_dropped = false;
   };
 
@@ -109,7 +109,7 @@ class Executor final : public Execution {
   Prepare prepare_;
   std::function<void()> on_change_;
   ExecutorConfig config_;
-  std::atomic<std::uint64_t> num_orbits_done_ = 0;
+  std::atomic<std::uint64_t> num_steps_done_ = 0;
 
   mutable std::mutex mutex_;  ///< Guards all that follows but the threads.
   std::condition_variable changed_;

@@ -316,7 +316,7 @@ void Conversation::send_heartbeat(TimePoint now) {
   for (const auto& [key, attempt] : unfinished_) held.push_back({key.first, attempt, key.second});
   unacknowledged_.list(held, aside);
   wire::Heartbeat heartbeat{.num_runs_max = credit(),
-                            .num_orbits_done = execution_.num_orbits_done(),
+                            .num_steps_done = execution_.num_steps_done(),
                             .held = grouped(std::move(held), wire::ranges_per_message_max),
                             .computing = {}};
   // Runs that are not listed here may be lent to others as well; runs not listed above are.

@@ -13,6 +13,7 @@
 #include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "core/campaign/campaign.hpp"
+#include "core/campaign/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -42,9 +43,10 @@ CheckJson check_json(const CheckOptions& options, const Campaign& campaign, cons
                      const CostEstimate& cost) {
   CheckJson json{{"file", options.file.string()},         {"campaign", campaign.name},
                  {"seed", std::to_string(campaign.seed)}, {"num_runs", campaign.num_runs},
-                 {"num_orbits", plan.num_orbits()},       {"one_core_s", cost.one_core_s},
-                 {"all_cores_s", cost.all_cores_s},       {"num_cores", num_cores_here()},
-                 {"disk_bytes", cost.disk_mb * 1e6},      {"differences", CheckJson::array()}};
+                 {"num_steps", plan.num_steps()},         {"step_name", model().step_name()},
+                 {"one_core_s", cost.one_core_s},         {"all_cores_s", cost.all_cores_s},
+                 {"num_cores", num_cores_here()},         {"disk_bytes", cost.disk_mb * 1e6},
+                 {"differences", CheckJson::array()}};
   for (const auto& [field, own, example] : campaign.differences_from(*example_campaign())) {
     json["differences"].push_back({{"field", field}, {"value", own}, {"example", example}});
   }
@@ -53,9 +55,10 @@ CheckJson check_json(const CheckOptions& options, const Campaign& campaign, cons
 
 std::string check_text(const CheckOptions& options, const Campaign& campaign, const Plan& plan,
                        const CostEstimate& cost) {
-  return fmt::format("{} is valid\nCampaign  {}, seed {}\nRuns      {} of {} orbits\n{}\n{}",
+  return fmt::format("{} is valid\nCampaign  {}, seed {}\nRuns      {} of {} {}\n{}\n{}",
                      options.file.string(), campaign.name, campaign.seed, campaign.num_runs,
-                     plan.num_orbits(), cost_text(cost), differences_text(campaign));
+                     plan.num_steps(), model().step_name(), cost_text(cost),
+                     differences_text(campaign));
 }
 
 int check_campaign_file(const CheckOptions& options) {

@@ -131,23 +131,23 @@ Sweep plan_sweep(const SweepOptions& options) {
   return sweep;
 }
 
-/// What the missing runs of these campaigns take. The time of an orbit is measured with the first,
+/// What the missing runs of these campaigns take. The time of a step is measured with the first,
 /// and the length of a run is looked up for a few of them, as preparing one takes a tenth of a
 /// second: the others are taken to be like the one before them.
 CostEstimate cost_of(const std::vector<const SweptCampaign*>& unfinished) {
   constexpr std::size_t num_prepared_max = 8;
   const std::size_t stride = unfinished.size() / num_prepared_max + 1;
   CostEstimate cost;
-  double orbit_s = 0.0;  // Of a batch.
-  int num_orbits = 0;
+  double step_s = 0.0;  // Of a batch.
+  int num_steps = 0;
   for (std::size_t i = 0; i < unfinished.size(); ++i) {
     if (i % stride == 0) {
       const std::unique_ptr<const Campaign> campaign = read_swept(*unfinished[i]);
       const std::unique_ptr<const Plan> plan = campaign->prepare();
-      num_orbits = plan->num_orbits();
-      if (i == 0) orbit_s = measure_batch_s(*campaign, *plan) / num_orbits;
+      num_steps = plan->num_steps();
+      if (i == 0) step_s = measure_batch_s(*campaign, *plan) / num_steps;
     }
-    cost += estimated_cost(unfinished[i]->num_missing, orbit_s * num_orbits);
+    cost += estimated_cost(unfinished[i]->num_missing, step_s * num_steps);
   }
   return cost;
 }

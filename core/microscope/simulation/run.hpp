@@ -94,7 +94,9 @@ class RunPlan final : public Plan {
   [[nodiscard]] const Recording& recording() const override;
 
   /// Of all sessions together.
-  [[nodiscard]] int num_orbits() const override;
+  [[nodiscard]] int num_orbits() const;
+  /// A step is an orbit.
+  [[nodiscard]] int num_steps() const override { return num_orbits(); }
 
  private:
   struct Impl;

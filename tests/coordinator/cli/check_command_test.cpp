@@ -84,7 +84,8 @@ TEST_F(Check, PrintsJson) {
   EXPECT_EQ(json["campaign"], "mine");
   EXPECT_EQ(json["seed"], "1");
   EXPECT_EQ(json["num_runs"], 7);
-  EXPECT_EQ(json["num_orbits"], 140);
+  EXPECT_EQ(json["num_steps"], 140);
+  EXPECT_EQ(json["step_name"], "orbits");
   EXPECT_GT(json["one_core_s"], 0.0);
   EXPECT_EQ(json["all_cores_s"], json["one_core_s"]) << "one batch";
   EXPECT_GE(json["num_cores"], 1);

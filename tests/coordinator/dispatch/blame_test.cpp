@@ -17,8 +17,8 @@ class BlameTest : public DispatchFixture {
     return runs;
   }
 
-  static wire::ComputedBatch batch(RunRange runs, std::uint32_t num_orbits_done = 0) {
-    return {.campaign = one, .ranges = {runs}, .num_orbits_done = num_orbits_done};
+  static wire::ComputedBatch batch(RunRange runs, std::uint32_t num_steps_done = 0) {
+    return {.campaign = one, .ranges = {runs}, .num_steps_done = num_steps_done};
   }
 
   /// A worker on a host that has shown that it can compute.
@@ -44,7 +44,7 @@ TEST_F(BlameTest, ACrashCountsAgainstWhatWasComputed) {
   on_gone(state, first, LossReason::out_of_memory, now, outbox);
   EXPECT_EQ(suspects(), (Runs{{1}, {2}}));
   EXPECT_EQ(outbox.take_events(),
-            (Strings{"worker_gone worker=1 name=w reason=out_of_memory orbits=0",
+            (Strings{"worker_gone worker=1 name=w reason=out_of_memory steps=0",
                      "runs_lost worker=1 runs=0..3 attempt=1 reason=out_of_memory blamed=1..2"}));
   const auto losses = outbox.take_losses();
   ASSERT_EQ(losses.size(), 3U);
@@ -229,7 +229,7 @@ TEST_F(BlameTest, FiveCrashesInARowQuarantineAHostAndItsBlameIsWithdrawn) {
   EXPECT_TRUE(campaign(one).pending_suspects.empty());
   EXPECT_TRUE(is_quarantined(state, "bad"));
   EXPECT_EQ(outbox.take_events(),
-            (Strings{"worker_gone worker=1 name=w reason=crashed orbits=0",
+            (Strings{"worker_gone worker=1 name=w reason=crashed steps=0",
                      "host_quarantined host=bad crashes=5",
                      "runs_lost worker=1 runs=8..9 attempt=1 reason=crashed"}));
   EXPECT_FALSE(outbox.take_losses().at(0).is_blamed);
@@ -283,7 +283,7 @@ TEST_F(BlameTest, ARunIsNotGivenUpOnTheWordOfOneUnprovenHost) {
 TEST_F(BlameTest, ABatchThatComesNoFurtherIsHung) {
   add_campaign(one, 10);
   add_worker(first, 4);
-  campaign(one).orbit_time_s = 0.1;
+  campaign(one).step_time_s = 0.1;
   for (std::uint32_t i = 0; i <= 12; ++i, now += 5s) {
     heartbeat(first, {held(one, {{0}, 4})}, {batch({{0}, 2}, 7), batch({{2}, 2}, 50 * i)});
     outbox.forget();
@@ -295,11 +295,11 @@ TEST_F(BlameTest, ABatchThatComesNoFurtherIsHung) {
   on_tick(state, now, outbox);
   EXPECT_TRUE(state.workers.contains(first)) << "its last heartbeats may wait to be read";
   state.is_behind = false;
-  on_tick(state, now, outbox);  // A minute without an orbit.
+  on_tick(state, now, outbox);  // A minute without a step.
   (void)outbox.take_sent<wire::Stop>(first);
   EXPECT_EQ(suspects(), (Runs{{0}, {1}}));
   EXPECT_EQ(outbox.take_events().at(0),
-            "worker_gone worker=1 name=w reason=hung runs=0..1 orbits=7");
+            "worker_gone worker=1 name=w reason=hung runs=0..1 steps=7");
   EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::hung);
   outbox.forget();
 }
@@ -307,7 +307,7 @@ TEST_F(BlameTest, ABatchThatComesNoFurtherIsHung) {
 TEST_F(BlameTest, ASlowCampaignIsNotHung) {
   add_campaign(one, 10);
   add_worker(first);
-  campaign(one).orbit_time_s = 10.0;  // Then 500 s are allowed.
+  campaign(one).step_time_s = 10.0;  // Then 500 s are allowed.
   for (int i = 0; i < 99; ++i) {
     heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1})});
     on_tick(state, now, outbox);
@@ -320,7 +320,7 @@ TEST_F(BlameTest, ASlowCampaignIsNotHung) {
 TEST_F(BlameTest, AProcessThatWasStoppedForAWhileIsNotHung) {
   add_campaign(one, 10);
   add_worker(first);
-  campaign(one).orbit_time_s = 0.1;
+  campaign(one).step_time_s = 0.1;
   heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
   now += 59s;
   heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
@@ -334,7 +334,7 @@ TEST_F(BlameTest, AProcessThatWasStoppedForAWhileIsNotHung) {
 TEST_F(BlameTest, OfAWorkerThatIsSilentNothingIsKnown) {
   add_campaign(one, 10);
   add_worker(first);
-  campaign(one).orbit_time_s = 0.1;
+  campaign(one).step_time_s = 0.1;
   for (int i = 0; i < 10; ++i, now += 5s) {
     heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
   }
@@ -347,7 +347,7 @@ TEST_F(BlameTest, OfAWorkerThatIsSilentNothingIsKnown) {
 TEST_F(BlameTest, OfAWorkerWhoseHeartbeatsDoNotArriveNothingIsKnown) {
   add_campaign(one, 10);
   add_worker(first, 2);
-  campaign(one).orbit_time_s = 0.1;
+  campaign(one).step_time_s = 0.1;
   for (int i = 0; i < 10; ++i, now += 5s) {
     heartbeat(first, {held(one, {{0}, 2})}, {batch({{0}, 1}, 5)});
   }
@@ -358,14 +358,14 @@ TEST_F(BlameTest, OfAWorkerWhoseHeartbeatsDoNotArriveNothingIsKnown) {
   outbox.forget();
 }
 
-TEST_F(BlameTest, TheTimeOfAnOrbitIsLearnedFromHeartbeats) {
+TEST_F(BlameTest, TheTimeOfAStepIsLearnedFromHeartbeats) {
   add_campaign(one, 10);
   add_worker(first);
   outbox.forget();
   heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
   now += 5s;
   heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 15)});
-  EXPECT_DOUBLE_EQ(campaign(one).orbit_time_s, 0.5);
+  EXPECT_DOUBLE_EQ(campaign(one).step_time_s, 0.5);
 }
 
 TEST_F(BlameTest, BlameOutlivesTheCoordinator) {

@@ -89,7 +89,7 @@ class DispatchFixture : public testing::Test {
                  std::uint32_t num_runs_max = 4096) {
     on_heartbeat(state, id,
                  {.num_runs_max = num_runs_max,
-                  .num_orbits_done = 0,
+                  .num_steps_done = 0,
                   .held = std::move(held),
                   .computing = std::move(computing)},
                  ++sequence, now, outbox);

@@ -18,7 +18,7 @@ class TailTest : public DispatchFixture {
     complete(first, one, {0});
     campaign(one).run_time_s = 10.0;
     heartbeat(first, {held(one, {{1}, 4})},
-              {{.campaign = one, .ranges = {{{1}, 2}}, .num_orbits_done = 0}});
+              {{.campaign = one, .ranges = {{{1}, 2}}, .num_steps_done = 0}});
     outbox.forget();
     ASSERT_EQ(runs_held_text(state, first), "1..4");
     add_worker(second, 2);

@@ -203,7 +203,7 @@ TEST_F(WorkerTest, ALossIsRecordedAndLogged) {
   outbox.forget();
   now += 60s;
   on_tick(state, now, outbox);
-  EXPECT_EQ(outbox.take_events(), (Strings{"worker_gone worker=1 name=w reason=silent orbits=0",
+  EXPECT_EQ(outbox.take_events(), (Strings{"worker_gone worker=1 name=w reason=silent steps=0",
                                            "runs_lost worker=1 runs=0 attempt=1 reason=silent"}));
   const auto losses = outbox.take_losses();
   ASSERT_EQ(losses.size(), 1U);

@@ -260,13 +260,13 @@ TEST(Codec, KeepsWhatIsRetractedAndGivenBack) {
 
 TEST(Codec, KeepsAHeartbeat) {
   const ComputedBatch batch{
-      .campaign = {3}, .ranges = {{.first = {9}, .count = 2}}, .num_orbits_done = 139};
+      .campaign = {3}, .ranges = {{.first = {9}, .count = 2}}, .num_steps_done = 139};
   const Heartbeat heartbeat = round_trip(Heartbeat{.num_runs_max = 4096,
-                                                   .num_orbits_done = 1ULL << 33,
+                                                   .num_steps_done = 1ULL << 33,
                                                    .held = {some_runs, some_runs},
                                                    .computing = {batch}});
   EXPECT_EQ(heartbeat.num_runs_max, 4096U);
-  EXPECT_EQ(heartbeat.num_orbits_done, 1ULL << 33);
+  EXPECT_EQ(heartbeat.num_steps_done, 1ULL << 33);
   EXPECT_EQ(heartbeat.held, (std::vector{some_runs, some_runs}));
   EXPECT_EQ(heartbeat.computing, std::vector{batch});
 }
@@ -342,7 +342,7 @@ TEST(Codec, SurvivesRandomBytesAndRandomDamage) {
                                         encode({.header = some_header, .message = batch}),
                                         encode({.header = some_header,
                                                 .message = Heartbeat{.num_runs_max = 1,
-                                                                     .num_orbits_done = 5,
+                                                                     .num_steps_done = 5,
                                                                      .held = {some_runs},
                                                                      .computing = {}}}),
                                         encoded_part()};

@@ -33,9 +33,9 @@ const HeldRuns good_runs{.campaign = {1}, .attempt = {1}, .ranges = {{.first = {
 const GiveBack good_give_back{.reason = LossReason::drained, .runs = {good_runs}};
 const Heartbeat good_heartbeat{
     .num_runs_max = 1,
-    .num_orbits_done = 0,
+    .num_steps_done = 0,
     .held = {good_runs},
-    .computing = {{.campaign = {1}, .ranges = good_runs.ranges, .num_orbits_done = 1}}};
+    .computing = {{.campaign = {1}, .ranges = good_runs.ranges, .num_steps_done = 1}}};
 
 std::string refusal_of_hello(const std::function<void(proto::Hello&)>& change) {
   return refusal(good_hello, [&](auto& envelope) { change(*envelope.mutable_hello()); });

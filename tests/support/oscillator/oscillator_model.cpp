@@ -170,23 +170,23 @@ class OscillatorPlan final : public Plan {
       const std::function<void(int)>& progress) const override {
     std::vector<RunResult> results;
     for (const RunRequest& request : requests) results.push_back(simulate(request.run, {}));
-    if (progress) progress(num_orbits());
+    if (progress) progress(num_steps());
     return results;
   }
   [[nodiscard]] RunResult replay(const RunRequest& request, const SampleSink& sink,
                                  const std::function<void(int)>& progress) const override {
     RunResult result = simulate(request.run, sink);
-    if (progress) progress(num_orbits());
+    if (progress) progress(num_steps());
     return result;
   }
   [[nodiscard]] const Recording& recording() const override { return recording_; }
-  [[nodiscard]] int num_orbits() const override {
+  [[nodiscard]] int num_steps() const override {
     return static_cast<int>(campaign_.oscillator.num_periods);
   }
 
  private:
   [[nodiscard]] std::uint32_t num_samples() const {
-    return static_cast<std::uint32_t>(num_orbits()) * samples_per_period;
+    return static_cast<std::uint32_t>(num_steps()) * samples_per_period;
   }
 
   /// The drive's line over white noise: 2σ²T at all frequencies.
@@ -289,6 +289,7 @@ class OscillatorModel final : public Model {
     return schema;
   }
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override { return drawn_quantities; }
+  [[nodiscard]] std::string_view step_name() const override { return "periods"; }
   [[nodiscard]] std::size_t batch_size() const override { return 4; }
 
   [[nodiscard]] std::uint64_t reference_digest(InstructionSet set) const override {

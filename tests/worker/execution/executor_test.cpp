@@ -42,16 +42,16 @@ std::vector<RunResult> results_of(std::span<const RunRequest> requests) {
   return results;
 }
 
-/// Such runs, after `num_orbits` orbits, of each of which they report twice.
-Prepare prepare_counting(int num_orbits) {
-  return [num_orbits](const Campaign&) -> PreparedCampaign {
+/// Such runs, after `num_steps` steps, of each of which they report twice.
+Prepare prepare_counting(int num_steps) {
+  return [num_steps](const Campaign&) -> PreparedCampaign {
     return {.simulate =
-                [num_orbits](std::span<const RunRequest> requests,
-                             const std::function<void(int)>& progress) {
-                  for (int half = 1; half <= 2 * num_orbits; ++half) progress(half / 2);
+                [num_steps](std::span<const RunRequest> requests,
+                            const std::function<void(int)>& progress) {
+                  for (int half = 1; half <= 2 * num_steps; ++half) progress(half / 2);
                   return results_of(requests);
                 },
-            .num_orbits = num_orbits};
+            .num_steps = num_steps};
   };
 }
 
@@ -99,7 +99,7 @@ TEST(Executor, ComputesTheRunsOfItsLeasesInOrder) {
     EXPECT_EQ(run.computed.result.num_draws, run.computed.result.run.value);
     EXPECT_GE(run.computed.elapsed_s, 0.0);
   }
-  EXPECT_EQ(bench.executor.num_orbits_done(), 8U);
+  EXPECT_EQ(bench.executor.num_steps_done(), 8U);
   EXPECT_TRUE(bench.executor.computing().empty());
 }
 
@@ -113,7 +113,7 @@ TEST(Executor, HandsEachRunItsTableValues) {
   EXPECT_EQ(runs[1].computed.result.truth[0], 2.5);
 }
 
-/// Batches of ten orbits that wait, after their first, until they are let go.
+/// Batches of ten steps that wait, after their first, until they are let go.
 struct Gate {
   std::counting_semaphore<> entered{0};
   std::counting_semaphore<> open{0};
@@ -129,7 +129,7 @@ struct Gate {
                     progress(10);
                     return results_of(requests);
                   },
-              .num_orbits = 10};
+              .num_steps = 10};
     };
   }
 };
@@ -217,8 +217,8 @@ TEST(Executor, TellsWhatIsBeingComputedAndHowFarItIs) {
   (void)bench.wait_for(3);
 }
 
-// One orbit of ten is done: what is left takes nine times as long as it has taken so far.
-TEST(Executor, ExpectsTheOrbitsToComeToTakeAsLongAsThoseThatAreDone) {
+// One step of ten is done: what is left takes nine times as long as it has taken so far.
+TEST(Executor, ExpectsTheStepsToComeToTakeAsLongAsThoseThatAreDone) {
   Gate gate;
   Bench bench(gate.prepare());
   const TimePoint before = std::chrono::steady_clock::now();
@@ -227,7 +227,7 @@ TEST(Executor, ExpectsTheOrbitsToComeToTakeAsLongAsThoseThatAreDone) {
   const Duration left = bench.executor.computing().at(0).time_left.value();
   EXPECT_LE(left, 9 * (std::chrono::steady_clock::now() - before));
   const Duration left_later = bench.executor.computing().at(0).time_left.value();
-  EXPECT_GE(left_later, left) << "no orbit was done since";
+  EXPECT_GE(left_later, left) << "no step was done since";
   gate.open.release();
   (void)bench.wait_for(1);
 }
@@ -322,7 +322,7 @@ Prepare prepare_endless(std::counting_semaphore<>& entered) {
           entered.release();
           while (true) progress(1);
         },
-        .num_orbits = 1};
+        .num_steps = 1};
   };
 }
 
@@ -361,7 +361,7 @@ Prepare prepare_by_seed(std::atomic<int>& num_prepared) {
                   }
                   return results;
                 },
-            .num_orbits = 1};
+            .num_steps = 1};
   };
 }
 

@@ -56,7 +56,7 @@ class FakeExecution final : public Execution {
   std::vector<FinishedRun> take_finished() override { return std::exchange(finished, {}); }
   std::vector<RunningBatch> computing() const override { return batches; }
   std::optional<Duration> usual_batch_time() const override { return batch_time; }
-  std::uint64_t num_orbits_done() const override { return 11; }
+  std::uint64_t num_steps_done() const override { return 11; }
   std::optional<std::string> failure() const override { return failure_text; }
 
   /// The oldest lease becomes a batch.

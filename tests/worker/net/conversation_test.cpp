@@ -150,7 +150,7 @@ TEST_F(ConversationTest, ShowsThatItLives) {
   EXPECT_TRUE(sent.empty());
   tick_after(100ms);
   const auto heartbeat = take_sent<wire::Heartbeat>();
-  EXPECT_EQ(heartbeat.num_orbits_done, 11U);
+  EXPECT_EQ(heartbeat.num_steps_done, 11U);
   EXPECT_TRUE(heartbeat.held.empty());
 }
 

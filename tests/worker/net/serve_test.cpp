@@ -85,7 +85,7 @@ PreparedCampaign prepare(const Campaign&) {
                 }
                 return results;
               },
-          .num_orbits = 1};
+          .num_steps = 1};
 }
 
 class ServeTest : public testing::Test {

@@ -263,7 +263,7 @@ TEST(Batch, ReportsItsOrbits) {
         EXPECT_GE(orbits, last);
         last = orbits;
       });
-      EXPECT_EQ(last, plan.num_orbits()) << name_of(set) << ", " << count;
+      EXPECT_EQ(last, plan.num_steps()) << name_of(set) << ", " << count;
     }
   }
 }

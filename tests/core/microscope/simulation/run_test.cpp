@@ -181,6 +181,7 @@ TEST(RunPlan, ReportsItsOrbitsInOrder) {
   const MicroscopeCampaign campaign = short_campaign(1);
   const RunPlan plan(campaign);
   EXPECT_EQ(plan.num_orbits(), 11);
+  EXPECT_EQ(plan.num_steps(), 11);
   int last = 0;
   (void)plan.simulate(RunIndex{0}, {}, [&last](int orbits) {
     EXPECT_GE(orbits, last);
