@@ -1,9 +1,13 @@
 #include "coordinator/cli/override_options.hpp"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <cmath>
 
 #include "coordinator/cli/program.hpp"
 #include "core/campaign/model_rules.hpp"
+#include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -17,16 +21,25 @@ void add_override_options(CLI::App& command, Overrides& overrides) {
       ->check(wire::in_range(std::uint64_t{0}, seed_max));
   command
       .add_option("--set", overrides.assignments,
-                  "Replace a value of the file, e.g.\nnoise.scale=0; may be repeated")
+                  "Replace a value of the file: TABLE.KEY=VALUE;\nmay be repeated")
       ->take_all()
       ->allow_extra_args(false);
+}
+
+std::string example_requirement() {
+  const Quantity& quantity = example_quantity(model().results());
+  const double limit =
+      std::isfinite(quantity.objective) ? quantity.objective : quantity.display_scale;
+  return fmt::format("{} < {} for 99% with 95%", quantity.name,
+                     proofmass::detail::number_text(limit));
 }
 
 void add_stop_options(CLI::App& command, StopOptions& options) {
   command
       .add_option("--until", options.rule,
-                  "Stop as soon as the rule holds, as in\n\"std(a_c13) within 5%\",\n"
-                  "\"all objectives within 2%\" or\n\"a_c12 < 9e-4 for 99% with 95% decided\"")
+                  fmt::format("Stop as soon as the rule holds, as in\n\"std({}) within 5%\",\n"
+                              "\"all objectives within 2%\" or\n\"{} decided\"",
+                              example_quantity(model().results()).name, example_requirement()))
       ->check([](const std::string& rule) {
         try {
           (void)parse_stop_rule(rule);

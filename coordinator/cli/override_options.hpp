@@ -22,6 +22,9 @@ struct StopOptions {
   std::optional<std::uint64_t> failures_max;  ///< Runs without an estimate.
 };
 
+/// A requirement about a quantity of the model, for help texts: `gain < 1e-3 for 99% with 95%`.
+[[nodiscard]] std::string example_requirement();
+
 /// Declares --until and --failures.
 /// @param options  Lives as long as the command.
 void add_stop_options(CLI::App& command, StopOptions& options);

@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
+#include <string>
 #include <string_view>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "core/campaign/definition.hpp"
+#include "core/campaign/model.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/manual_option.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -62,7 +64,7 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
 
 int run_proofmass(int argc, char** argv,
                   const std::function<void(CLI::App&, Command&)>& add_further_commands) {
-  CLI::App app("Validates the in-flight calibration of drag-free accelerometers.", "proofmass");
+  CLI::App app(std::string(model().purpose()), "proofmass");
   app.footer(exit_codes_text({}));  // Of the commands, unless they say otherwise.
   app.set_version_flag("--version", "proofmass " PROOFMASS_VERSION);
   app.require_subcommand(1);

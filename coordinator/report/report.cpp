@@ -152,7 +152,7 @@ std::string joint_text(const CampaignStatistics& statistics, std::uint64_t num_g
                  margin);
 }
 
-// Contributions before calibration and after it, with the worst and the mean errors.
+// Contributions before estimation and after it, with the worst and the mean errors.
 using Figures = std::array<std::optional<double>, 3>;
 
 std::string budget_row(const BudgetEntryInfo& info, const Figures& figures) {
@@ -164,7 +164,7 @@ std::string budget_row(const BudgetEntryInfo& info, const Figures& figures) {
   return row_of(budget_columns, cells);
 }
 
-// The paper adds up the worst errors of all parameters, which no single run has.
+// Published totals, too, add up the worst errors of all parameters, which no single run has.
 std::string totals_text(const RunTotals& totals) {
   return fmt::format(
       "worst adds up the worst errors of different runs, as the paper does; totals of\n"
@@ -234,17 +234,22 @@ std::string given_up_text(std::span<const RunRange> given_up) {
 
 std::string accuracy_table(const Campaign& campaign, const CampaignStatistics& statistics) {
   std::string text = fmt::format(
-      "Accuracy of calibration: |estimate − truth| of {} {}\n\n{}", statistics.num_estimated,
+      "Accuracy of the estimates: |estimate − truth| of {} {}\n\n{}", statistics.num_estimated,
       statistics.num_estimated == 1 ? "run" : "runs", table_heading(accuracy_columns));
   const std::vector<double> objectives = campaign.objectives();
-  const std::vector<Quantity>& quantities = model().results().quantities;
+  const ResultSchema& schema = model().results();
+  const std::vector<Quantity>& quantities = schema.quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {
     const bool has_runs = statistics.num_estimated > 0;
     text += accuracy_row(quantities[i], objectives[i],
                          has_runs ? statistics.accuracy[i] : AccuracyStatistic{},
                          statistics.num_estimated);
   }
-  return text + "beyond: runs whose error exceeds the objective; the paper: Hardy et al. 2013\n";
+  text += "beyond: runs whose error exceeds the objective";
+  if (!schema.published_source.empty()) {
+    text += fmt::format("; {}: {}", theirs, schema.published_source);
+  }
+  return text + "\n";
 }
 
 std::string interval_table(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
@@ -288,7 +293,7 @@ std::string budget_table(const Campaign& campaign, const CampaignStatistics& sta
   }
   text += table_rule(budget_columns) +
           budget_row(budget->total_info, figures([](const Budget& of) { return of.total; })) +
-          "before: bounds of construction; worst, mean: left by the errors of calibration\n" +
+          "before: bounds of construction; worst, mean: left by errors of the estimates\n" +
           budget->note;
   return totals ? text + totals_text(*totals) : text;
 }

@@ -33,7 +33,7 @@ namespace proofmass::coordinator {
 /// @param given_up  Ascending.
 [[nodiscard]] std::string given_up_text(std::span<const RunRange> given_up);
 
-/// Accuracy of each parameter beside [Hardy2013] tab:perfo-numerical.
+/// Accuracy of each parameter beside the published one, and whose that is.
 [[nodiscard]] std::string accuracy_table(const Campaign& campaign,
                                          const CampaignStatistics& statistics);
 
@@ -49,8 +49,7 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string error_table(const CampaignStatistics& statistics,
                                       std::uint64_t num_given_up);
 
-/// Budget before and after calibration beside [Hardy2013] tab:Budget and tab:Budget_cali, and what
-/// single runs have.
+/// Budget before and after estimation beside the published one, and what single runs have.
 [[nodiscard]] std::string budget_table(const Campaign& campaign,
                                        const CampaignStatistics& statistics,
                                        const std::optional<RunTotals>& totals);

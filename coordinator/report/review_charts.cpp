@@ -130,8 +130,8 @@ std::optional<BarChart> budget_chart(const Review& review) {
   const Budget worst = has_errors ? budget.after(statistics.worst_errors()) : Budget{};
   BarChart chart;
   chart.text = {.id = "budget",
-                .title = "Budget before and after calibration",
-                .description = fmt::format("{}. Before calibration the total is {}", budget.title,
+                .title = "Budget before and after estimation",
+                .description = fmt::format("{}. Before estimation the total is {}", budget.title,
                                            figure_text(budget.before.total))};
   chart.x = {.label = "m/s²", .scale = Scale::logarithmic};
   chart.series = {{.name = "before", .values = {}, .ink = Ink::second},

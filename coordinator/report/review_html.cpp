@@ -159,7 +159,7 @@ std::vector<Section> sections_of(const Review& review) {
 std::string heading_markup(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
   std::string html = fmt::format(
-      "<h1>Calibration campaign {}</h1>\n<p>{} of {} runs are finished, {} of them with an "
+      "<h1>Campaign {}</h1>\n<p>{} of {} runs are finished, {} of them with an "
       "estimate. Seed {}, model {}.</p>\n",
       markup_text(review.identity.name), statistics.num_runs, review.identity.num_runs,
       statistics.num_estimated, review.identity.seed, markup_text(review.identity.model_version));

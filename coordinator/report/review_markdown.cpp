@@ -67,10 +67,10 @@ std::string markdown_text(std::string_view text) {
 }
 
 std::string review_markdown(const Review& review) {
-  std::string text = fmt::format(
-      "# Calibration campaign {}\n\n{} of {} runs are finished, {} of them with an estimate.\n\n",
-      markdown_text(review.identity.name), review.results.statistics.num_runs,
-      review.identity.num_runs, review.results.statistics.num_estimated);
+  std::string text =
+      fmt::format("# Campaign {}\n\n{} of {} runs are finished, {} of them with an estimate.\n\n",
+                  markdown_text(review.identity.name), review.results.statistics.num_runs,
+                  review.identity.num_runs, review.results.statistics.num_estimated);
   text += section("Verification matrix", {matrix_table(review)}) +
           section("Accuracy", {review_accuracy_table(review), inference_table(review)}) +
           section("Budget", {review_budget_table(review)}) +

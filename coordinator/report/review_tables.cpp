@@ -204,8 +204,8 @@ ReviewTable review_budget_table(const Review& review) {
   }
   add(budget.total_info, [](const Budget& of) { return of.total; });
   table.notes.emplace_back(
-      "Before: bounds of construction. After: what the errors of calibration leave; the worst adds "
-      "up the worst errors of different runs.");
+      "Before: bounds of construction. After: what the errors of the estimates leave; the worst "
+      "adds up the worst errors of different runs.");
   if (!budget.note.empty()) table.notes.push_back(budget.note);
   if (const std::optional<RunTotals>& totals = review.results.totals) {
     table.notes.push_back(fmt::format(

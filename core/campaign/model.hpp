@@ -47,6 +47,9 @@ class Model {
   /// Coordinator and workers must agree on it; a campaign is finished by the model that began it.
   [[nodiscard]] virtual std::string_view version() const = 0;
 
+  /// What its campaigns are for: a sentence, the first of `proofmass --help`.
+  [[nodiscard]] virtual std::string_view purpose() const = 0;
+
   /// What the results of every campaign of this model are.
   [[nodiscard]] virtual const ResultSchema& results() const = 0;
 
@@ -80,6 +83,8 @@ class Model {
 
   /// A campaign file with every key at its nominal value, its meaning and its rule.
   [[nodiscard]] virtual std::string example() const = 0;
+  /// The file that the example is written to unless the user names another: `hardy2013.toml`.
+  [[nodiscard]] virtual std::string_view example_file() const = 0;
 };
 
 /// The model that this program runs campaigns of. It is chosen where the program is linked: each

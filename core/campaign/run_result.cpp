@@ -20,6 +20,10 @@ std::optional<std::size_t> find_quantity(const ResultSchema& schema, std::string
   return static_cast<std::size_t>(found - schema.quantities.begin());
 }
 
+const Quantity& example_quantity(const ResultSchema& schema) {
+  return schema.quantities.at((schema.quantities.size() - 1) / 2);
+}
+
 std::vector<std::string_view> quantity_names(const ResultSchema& schema) {
   std::vector<std::string_view> names;
   for (const Quantity& quantity : schema.quantities) names.push_back(quantity.name);

@@ -64,6 +64,9 @@ struct ResultSchema {
   std::vector<std::string_view> loss_sessions;  ///< In which part of it: `a_c12`.
   std::uint32_t num_draws_max = 1;              ///< Most draws of one run.
   std::vector<DataTableSchema> tables;
+  /// Of the published figures, for people: `Hardy et al. 2013`, 20 characters at most; empty
+  /// without any.
+  std::string_view published_source = {};
 };
 
 /// The name at a position from 1, as in Loss; `none` at 0.
@@ -73,6 +76,10 @@ struct ResultSchema {
 /// Index of the quantity of that name; nothing if there is none.
 [[nodiscard]] std::optional<std::size_t> find_quantity(const ResultSchema& schema,
                                                        std::string_view name);
+
+/// The quantity that texts take as an example: the one in the middle. It is the same as long as the
+/// list is, because comments in the schema of every database name it.
+[[nodiscard]] const Quantity& example_quantity(const ResultSchema& schema);
 
 /// The names of all quantities, in their order.
 [[nodiscard]] std::vector<std::string_view> quantity_names(const ResultSchema& schema);

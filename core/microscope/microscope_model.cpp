@@ -77,6 +77,10 @@ class MicroscopeModel final : public Model {
  public:
   [[nodiscard]] std::string_view version() const override { return model_version; }
 
+  [[nodiscard]] std::string_view purpose() const override {
+    return "Validates the in-flight calibration of drag-free accelerometers.";
+  }
+
   [[nodiscard]] const ResultSchema& results() const override {
     static const ResultSchema results = results_of(estimation_methods());
     return results;
@@ -109,6 +113,8 @@ class MicroscopeModel final : public Model {
   [[nodiscard]] std::string example() const override {
     return commented_campaign(hardy2013_campaign());
   }
+
+  [[nodiscard]] std::string_view example_file() const override { return "hardy2013.toml"; }
 };
 
 }  // namespace

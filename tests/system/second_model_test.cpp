@@ -6,6 +6,7 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -24,7 +25,9 @@ namespace proofmass::test {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::StartsWith;
 using Arguments = std::vector<std::string>;
 
 const std::string programs = PROOFMASS_OSCILLATOR_PROGRAMS;
@@ -126,6 +129,52 @@ TEST_F(SecondModel, LosesRunsThatLeaveTheRangeOfTheSensor) {
                    "loss_cause = 'out_of_range' AND loss_session = 'steady_state'"),
             num_lost);
   EXPECT_EQ(proofmass("verify", {"verify", "a.db", "--fraction", "1"}), 0) << output_of("verify");
+}
+
+/// Words of MICROSCOPE's that a text has. Only a model knows what its campaigns are about.
+std::vector<std::string> foreign_words_in(std::string text) {
+  std::ranges::transform(text, text.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::vector<std::string> words;
+  for (const std::string word :
+       {"hardy", "calibration", "microscope", "equivalence", "environment_row", "a_c1", "k2d"}) {
+    if (text.find(word) != std::string::npos) words.push_back(word);
+  }
+  return words;
+}
+
+TEST_F(SecondModel, SaysInHelpWhatItsOwnCampaignsAreFor) {
+  ASSERT_EQ(proofmass("help", {"--help"}), 0);
+  const std::string help = output_of("help");
+  EXPECT_THAT(help, StartsWith("Measures how well a driven oscillator is known"));
+  EXPECT_THAT(foreign_words_in(help), IsEmpty());
+  const std::string list = help.substr(help.find("Subcommands:\n"));
+  const std::regex command("\n  ([a-z-]+) ");
+  for (std::sregex_iterator it(list.begin(), list.end(), command), end; it != end; ++it) {
+    const std::string name = (*it)[1];
+    ASSERT_EQ(proofmass(name, {name, "--help"}), 0);
+    EXPECT_THAT(foreign_words_in(output_of(name)), IsEmpty()) << name;
+  }
+  EXPECT_THAT(output_of("init"), HasSubstr("FILE.toml=oscillator.toml"));
+  EXPECT_THAT(output_of("run"), HasSubstr("\"std(in_phase) within 5%\""));
+  EXPECT_THAT(output_of("report"), HasSubstr("\"in_phase < 1e-9 for 99% with 95%\""));
+  ASSERT_EQ(proofmass("write", {"init"}), 0);
+  EXPECT_EQ(output_of("write"), "wrote oscillator.toml\n");
+}
+
+TEST_F(SecondModel, IsReportedInNoWordsOfTheOtherModel) {
+  run("a");
+  ASSERT_EQ(proofmass("report", {"report", "a.db"}), 0) << errors_of("report");
+  EXPECT_THAT(output_of("report"), HasSubstr("; the paper: made up for tests\n"));
+  ASSERT_EQ(proofmass("html", {"report", "a.db", "--html", "-"}), 0) << errors_of("html");
+  ASSERT_EQ(proofmass("markdown", {"report", "a.db", "--markdown", "-"}), 0);
+  EXPECT_THAT(output_of("markdown"), StartsWith("# Campaign oscillator\n"));
+  for (const std::string report : {"report", "html", "markdown"}) {
+    EXPECT_THAT(foreign_words_in(output_of(report)), IsEmpty()) << report;
+  }
+  EXPECT_THAT(foreign_words_in(
+                  stored_text(path("a.db"), "SELECT group_concat(sql, ';') FROM sqlite_schema")),
+              IsEmpty());
 }
 
 TEST_F(SecondModel, HasOneDigestWhateverIsKilled) {

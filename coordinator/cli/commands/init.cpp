@@ -10,7 +10,7 @@ namespace proofmass::coordinator {
 namespace {
 
 struct InitOptions {
-  std::filesystem::path file = "hardy2013.toml";
+  std::filesystem::path file = model().example_file();
   IfThere if_there = IfThere::keep;
 };
 
@@ -25,7 +25,7 @@ int write_example(const InitOptions& options) {
 
 void add_init(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<InitOptions>(
-      app, chosen, "init", "Write the paper's campaign file, commented", write_example);
+      app, chosen, "init", "Write an example of a campaign file, commented", write_example);
   command.add_option("FILE", options.file, "File to write")
       ->type_name(campaign_file_type)
       ->capture_default_str();

@@ -19,6 +19,7 @@
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/model.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/start_program.hpp"
@@ -164,7 +165,8 @@ void add_plot(CLI::App& app, Command& chosen) {
   command.footer(exit_codes_text({exit_interrupted}));
   add_database(command, options.database);
   command.add_option("--chart", options.chart,
-                     "Which one, as in errors or histogram:a_c12; see\n--list");
+                     fmt::format("Which one, as in errors or histogram:{};\nsee --list",
+                                 example_quantity(model().results()).name));
   command
       .add_option("--output", options.output,
                   "File .svg, or .png by rsvg-convert; - for SVG on\nstandard output")

@@ -16,6 +16,7 @@
 #include "coordinator/campaign_file/requirements_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output_file.hpp"
+#include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/remote_answer.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
@@ -178,9 +179,9 @@ void add_report(CLI::App& app, Command& chosen) {
   command.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   add_database(command, options.database);
   command.add_option("--requirement", options.requirements,
-                     "Answer whether this requirement is met, as in\n"
-                     "\"a_c12 < 9e-4 for 99% with 95%\" or\n"
-                     "\"all objectives for 95% with 90%\"; may be repeated");
+                     fmt::format("Answer whether this requirement is met, as in\n\"{}\" or\n"
+                                 "\"all objectives for 95% with 90%\"; may be repeated",
+                                 example_requirement()));
   command
       .add_option("--requirements", options.requirements_file,
                   "File (TOML) of requirements, each with id, text\nand requirement")

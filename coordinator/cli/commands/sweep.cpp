@@ -230,7 +230,7 @@ void add_sweep(CLI::App& app, Command& chosen) {
   command
       .add_option(
           "--vary", options.varied,
-          "Values of a key, e.g. noise.scale=0.5,1,2; may\nbe repeated for all combinations")
+          "Values of a key: TABLE.KEY=VALUE,VALUE,...; may\nbe repeated for all combinations")
       ->required()
       ->take_all()
       ->allow_extra_args(false);

@@ -80,6 +80,14 @@ std::string data_tables() {
   return text;
 }
 
+std::string digested_tables() {
+  std::string text;
+  for (const DataTableSchema& table : model().results().tables) {
+    text += fmt::format("{}{}", text.empty() ? "" : ", ", table.table);
+  }
+  return text.empty() ? "dispersion_value" : text + " and dispersion_value";
+}
+
 std::string value_of_parameter(std::string_view prefix) {
   int position = 0;
   return "CASE p.position" +
@@ -123,6 +131,8 @@ std::map<std::string_view, std::string> texts() {
   const ResultSchema& schema = model().results();
   return {
       {"data_tables", data_tables()},
+      {"digested_tables", digested_tables()},
+      {"example_quantity", std::string(example_quantity(schema).name)},
       {"truth_columns", value_columns("truth", "status = 4")},
       {"estimate_columns", value_columns("estimate", "status > 2")},
       {"error_columns", error_columns()},

@@ -19,6 +19,8 @@ namespace proofmass::coordinator::detail {
 ///                           {error_of_parameter}
 ///     {budget_total}        budget total that the errors of a row of run_result leave, m/s²
 ///     {num_sessions}        also {session_names}, {num_causes}, {cause_names}
+///     {digested_tables}     names of the tables that campaign.table_digest is of
+///     {example_quantity}    its name, for comments; see example_quantity()
 [[nodiscard]] std::string with_quantities(std::string_view sql);
 
 }  // namespace proofmass::coordinator::detail

@@ -32,12 +32,12 @@ CREATE TABLE campaign (
   -- 1 while results may stand only in the write-ahead log beside this file: a copy of the file that
   -- says so and has no log lacks results.
   is_log_needed   INTEGER NOT NULL DEFAULT 0 CHECK (is_log_needed IN (0, 1)),
-  -- SHA-256 (hexadecimal) of environment_row and dispersion_value, as detail/table_digest.hpp lays
+  -- SHA-256 (hexadecimal) of {digested_tables}, as detail/table_digest.hpp lays
   -- them out; written with them.
   table_digest    TEXT NOT NULL DEFAULT '' CHECK (length(table_digest) IN (0, 64))
 ) STRICT;
 
--- The calibrated parameters; unit is that of every number about them in this file.
+-- The estimated parameters; unit is that of every number about them in this file.
 CREATE TABLE parameter (
   position                  INTEGER PRIMARY KEY,
   parameter                 TEXT NOT NULL UNIQUE,
@@ -81,8 +81,8 @@ CREATE TABLE note (
 
 -- One row a finished run, with what depends on campaign and run alone: two files of one campaign
 -- hold the same rows. Insert with ON CONFLICT DO NOTHING: a second delivery changes nothing.
---   truth_     of the drawn instrument, NULL if no draw was acceptable (status 4)
---   estimate_  of the calibration, NULL unless it came to an end (status 1 and 2)
+--   truth_     of what was drawn, NULL if no draw was acceptable (status 4)
+--   estimate_  of the same, NULL unless the estimation came to an end (status 1 and 2)
 --   error_     estimate - truth, computed when read
 --   health_    of the loops, NULL if no draw was acceptable
 --   loss_      why and in which session a run was lost, NULL unless it was (status 5)
@@ -267,8 +267,8 @@ CREATE TABLE summary (
   computed_utc           TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%SZ', 'now'))
 ) STRICT;
 
--- Contributions to the test of the equivalence principle, m/s²; the last row is their total. After
--- calibration with the worst and with the mean errors: NULL while no run has an estimate.
+-- Contributions to the measurement that the estimates serve, m/s²; the last row is their total.
+-- After estimation with the worst and with the mean errors: NULL while no run has an estimate.
 CREATE TABLE budget_entry (
   position          INTEGER PRIMARY KEY,
   term              TEXT NOT NULL UNIQUE,
@@ -292,7 +292,7 @@ CREATE TABLE budget_coefficient (
 
 -- The stop rule against the runs below num_runs, each time that so many were finished.
 CREATE TABLE stop_check (
-  statistic            TEXT NOT NULL,                          -- `std(a_c13)`
+  statistic            TEXT NOT NULL,                          -- `std({example_quantity})`
   num_runs             INTEGER NOT NULL CHECK (num_runs > 0),
   estimate             REAL NOT NULL,                          -- unit as in parameter
   lower                REAL,                                   -- 95 %; NULL if runs are too few
@@ -409,7 +409,7 @@ SELECT term, label,
 FROM budget_entry
 ORDER BY position;
 
--- One row a run that has an estimate: the budget's total after its calibration. The total of the
+-- One row a run that has an estimate: the budget's total after its estimation. The total of the
 -- worst errors of all parameters is larger: no run has them all.
 CREATE VIEW run_budget AS
 SELECT run_index, {budget_total} AS total_m_s2

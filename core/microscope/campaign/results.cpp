@@ -79,7 +79,8 @@ ResultSchema make_schema() {
           .loss_causes = loss_causes(),
           .loss_sessions = {targets.begin(), targets.end()},
           .num_draws_max = num_draws_max,
-          .tables = {environment_table_schema()}};
+          .tables = {environment_table_schema()},
+          .published_source = "Hardy et al. 2013"};
 }
 
 }  // namespace

@@ -16,12 +16,17 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 TEST(Init, WritesACampaignThatCanBeRead) {
   const test::TemporaryDirectory directory;
   const auto file = directory / "a.toml";
   EXPECT_EQ(test::answer_of({"init", file}).output, "wrote " + file.string() + "\n");
   EXPECT_TRUE(definition_differences(hardy2013_campaign(), *read_campaign(file)).empty());
+}
+
+TEST(Init, NamesTheFileAsTheModelDoes) {
+  EXPECT_THAT(test::answer_of({"init", "--help"}).output, HasSubstr("FILE.toml=hardy2013.toml"));
 }
 
 TEST(Init, ReplacesAFileOnlyIfItMust) {
@@ -55,6 +60,11 @@ TEST(Init, LeavesNothingOnAFullDisk) {
   EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
   EXPECT_EQ(answer.error, "output = " + file.string() + " (File too large)");
   EXPECT_TRUE(std::filesystem::is_empty(file.parent_path()));
+}
+
+TEST(Help, BeginsWithThePurposeOfTheModel) {
+  EXPECT_THAT(test::answer_of({"--help"}).output,
+              StartsWith("Validates the in-flight calibration of drag-free accelerometers.\n"));
 }
 
 // Only what a command can end with.

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,6 +7,7 @@
 #include <string>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
+#include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/digest.hpp"
 #include "coordinator/store/store.hpp"
@@ -74,6 +76,13 @@ TEST_F(ReportCommand, RefusesARequirementThatCannotBeRead) {
   EXPECT_EQ(refused.error,
             "requirement = a_c12 is small (must read \"PARAMETER < LIMIT for COVERAGE% with "
             "CONFIDENCE%\" or \"all objectives for COVERAGE% with CONFIDENCE%\")");
+}
+
+TEST_F(ReportCommand, ShowsARequirementThatCanBeRead) {
+  EXPECT_EQ(example_requirement(), "a_c13 < 0.0009 for 99% with 95%");
+  EXPECT_EQ(answer(example_requirement()), exit_not_met);  // 60 runs are too few.
+  EXPECT_THAT(test::answer_of({"report", "--help"}).output,
+              testing::HasSubstr('"' + example_requirement() + '"'));
 }
 
 TEST_F(ReportCommand, RefusesAnUnknownParameter) {

@@ -64,7 +64,7 @@ TEST_F(ReviewCommands, WriteAReport) {
   EXPECT_EQ(answer.output, "");
   EXPECT_THAT(text_of_file(output_), StartsWith("<!DOCTYPE html>"));
   const test::Answer markdown = test::answer_of({"report", database_, "--markdown", "-"});
-  EXPECT_THAT(markdown.output, StartsWith("# Calibration campaign hardy2013\n"));
+  EXPECT_THAT(markdown.output, StartsWith("# Campaign hardy2013\n"));
 }
 
 TEST_F(ReviewCommands, ReplaceAFileOnlyByForce) {

@@ -73,6 +73,8 @@ TEST(AccuracyTable, ShowsEachParameterBesideThePaper) {
                               "     5   1.6   1.2"));
   EXPECT_THAT(lines, Contains("K2d/K1c²   s²/m           250     124    25.0    23.0      0 │"
                               "   124    25    23"));
+  EXPECT_EQ(lines.back(),
+            "beyond: runs whose error exceeds the objective; the paper: Hardy et al. 2013");
 }
 
 TEST(AccuracyTable, CountsTheRunsThatItIsAbout) {
@@ -100,7 +102,7 @@ TEST(BudgetTable, ShowsEachTermBesideThePaper) {
                               "  2.0e-13  1.1e-15  3.6e-16"));
 }
 
-TEST(BudgetTable, HasDashesAfterCalibrationWhileNoRunHasAnEstimate) {
+TEST(BudgetTable, HasDashesAfterEstimationWhileNoRunHasAnEstimate) {
   const std::vector<std::string> lines =
       test::lines_of(budget_table(MicroscopeCampaign{}, CampaignStatistics{}, {}));
   EXPECT_THAT(lines, Contains("Total                    2.0e-13        -        - │"

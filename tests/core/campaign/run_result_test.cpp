@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,14 @@ TEST(RunResult, HasTheCountsThatItsStatusAllows) {
   EXPECT_EQ(broken(RunStatus::not_converged, 1, 10), "");
   EXPECT_EQ(broken(RunStatus::not_finite, 2, 0), "");
   EXPECT_EQ(broken(RunStatus::no_draw, 1000, 0), "");
+}
+
+TEST(ResultSchema, HasTheQuantityInTheMiddleAsAnExample) {
+  for (const std::size_t num_quantities : {1, 2, 3, 10}) {
+    ResultSchema schema;
+    schema.quantities.resize(num_quantities);
+    EXPECT_EQ(&example_quantity(schema), &schema.quantities[(num_quantities - 1) / 2]);
+  }
 }
 
 TEST(RunResult, OfImpossibleCountsBreaksARuleThatIsNamed) {

@@ -268,6 +268,9 @@ std::unique_ptr<OscillatorCampaign> read(Document& document) {
 class OscillatorModel final : public Model {
  public:
   [[nodiscard]] std::string_view version() const override { return "oscillator-1"; }
+  [[nodiscard]] std::string_view purpose() const override {
+    return "Measures how well a driven oscillator is known from a noisy reading.";
+  }
 
   [[nodiscard]] const ResultSchema& results() const override {
     static const ResultSchema schema{
@@ -285,7 +288,8 @@ class OscillatorModel final : public Model {
         .loss_causes = {"out_of_range"},
         .loss_sessions = {"steady_state"},
         .num_draws_max = 1,
-        .tables = {}};
+        .tables = {},
+        .published_source = "made up for tests"};
     return schema;
   }
   [[nodiscard]] std::span<const DrawnQuantity> drawn() const override { return drawn_quantities; }
@@ -310,6 +314,7 @@ class OscillatorModel final : public Model {
     return read(document);
   }
   [[nodiscard]] std::string example() const override { return OscillatorCampaign().text(); }
+  [[nodiscard]] std::string_view example_file() const override { return "oscillator.toml"; }
 };
 
 }  // namespace
