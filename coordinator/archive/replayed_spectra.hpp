@@ -32,7 +32,7 @@ inline constexpr std::size_t num_spectrum_samples_max = std::size_t{1} << 23;
 [[nodiscard]] RunSpectra worst_run_spectra(const Store& store, const Review& review,
                                            const IsStopped& is_stopped);
 
-/// `spectrum:a_c13` for each session that has a spectrum: the names of their charts.
+/// `spectrum:SESSION` for each session that has a spectrum: the names of their charts.
 [[nodiscard]] std::vector<std::string> spectrum_names(const Recording& recording);
 
 }  // namespace proofmass::coordinator

@@ -59,7 +59,7 @@ struct ResultDifference {
 struct Redraw {
   std::uint64_t num_drawn = 0;      ///< Runs that have a draw.
   std::uint64_t num_different = 0;  ///< Those of another draw.
-  /// The first ones by run: `run 3: truth_a_c12_rad = 1 (must be 2)`.
+  /// The first ones by run: `run 3: truth_offset_m = 1 (must be 2)`.
   std::vector<std::string> differences;
 };
 

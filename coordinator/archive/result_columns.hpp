@@ -30,8 +30,8 @@ enum class ValueKind : std::uint8_t { truth, estimate, error, standard_error, he
 struct ValueColumn {
   ValueKind kind = ValueKind::truth;
   std::size_t index = 0;  ///< Of the value in its list of a RunResult.
-  std::string own_name;   ///< With its unit: `a_c12_rad`, `attitude_rad`.
-  std::string name;       ///< As in the table `run_result`: `truth_a_c12_rad`.
+  std::string own_name;   ///< With its unit: `offset_m`, `acceleration_m_s2`.
+  std::string name;       ///< As in the table `run_result`: `truth_offset_m`.
   std::string_view unit;  ///< `m`, `rad`, `s²/m`, `m/s²` or `1`.
 
   /// Nothing if the run's status leaves it without a meaning.

@@ -115,7 +115,7 @@ Check check_current(const Store& store, const Campaign& campaign, const Summary&
       fmt::format("of {} runs: every number and every budget", statistics.num_runs));
 }
 
-// Without a summary nothing was ever stored but the budget before calibration.
+// Without a summary nothing was ever stored but the budget before estimation.
 Check check_first(const Store& store, const Campaign& campaign) {
   Lines lines = statistic_differences(store, campaign, {});
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));

@@ -26,7 +26,7 @@ class SignalSelection {
 
   /// @param recording         Outlives this.
   /// @param sessions, groups  Names; none for all.
-  /// @throws InvalidArgument `session = a_c99 (must be one of a_c11_delta_x ...)`.
+  /// @throws InvalidArgument `session = third (must be one of first, second)`.
   SignalSelection(const Recording& recording, std::span<const std::string> sessions,
                   std::span<const std::string> groups);
 
@@ -82,7 +82,7 @@ class SeriesOutput {
                                                        RunIndex run,
                                                        const SignalSelection& selection);
 
-/// `DIRECTORY/run42_a_c13.csv`.
+/// `DIRECTORY/run42_SESSION.csv`.
 [[nodiscard]] std::filesystem::path csv_series_file(const std::filesystem::path& directory,
                                                     RunIndex run, const RecordedSession& session);
 

@@ -20,17 +20,16 @@ struct Overrides {
   std::optional<std::uint64_t> seed = {};
 };
 
-/// Largest campaign file that is read; the paper's campaign has 12 kB.
+/// Largest campaign file that is read; those with every key have some 12 kB.
 inline constexpr std::uintmax_t campaign_file_size_max = std::uintmax_t{1} << 20;
-/// Largest environment or table file that is read.
+/// Largest file of data that a campaign file may name.
 inline constexpr std::uintmax_t data_file_size_max = std::uintmax_t{64} << 20;
 
 /// Reads, completes with the nominal values and checks a campaign file and its data files, whose
 /// paths are relative to it.
 ///
-/// A key of the file replaces the nominal value of its field; without any `[[session]]` the
-/// sessions are the paper's. `noise.preset` applies before the other keys of noise, the law of a
-/// dispersion group before those of its elements.
+/// A key of the file replaces the nominal value of its field; the model says which values are
+/// nominal, and which keys apply before others.
 ///
 /// @throws DefinitionError naming file, line, field, value and rule, or a key that is overridden
 ///         twice.

@@ -17,8 +17,8 @@ inline constexpr std::size_t num_requirements_max = 100;
 ///
 ///     [[requirements]]
 ///     id = "SYS-REQ-012"
-///     text = "The quadratic factor is known to 250 s²/m."
-///     requirement = "k2d < 250 for 99% with 95%"
+///     text = "The gain is known to 1e-3."
+///     requirement = "gain < 1e-3 for 99% with 95%"
 ///
 /// `id` has 1 to 64 bytes and is unique, `text` 1,000 at most and may be absent; see
 /// parse_requirement() for the rest.

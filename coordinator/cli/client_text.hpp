@@ -23,7 +23,7 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string workers_table(const wire::WorkersReply& workers,
                                         std::size_t line_width_max);
 
-/// `hardy2013 active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left`, and the notes.
+/// `mine active: 42 of 100 runs, 42 %, 0.500 runs/s, 1 min 56 s left`, and the notes.
 [[nodiscard]] std::string campaign_line(const wire::CampaignStatus& campaign);
 
 // What a coordinator replied, for programs; coordinator/report/status_json.hpp has the rest.

@@ -14,10 +14,10 @@ namespace proofmass::coordinator {
 /// SHA-256 over results in run order: two files of one campaign have the same digest,
 /// whichever workers computed the runs and in whatever order they arrived.
 ///
-/// A result is 184 bytes for the ten quantities of MICROSCOPE, little-endian: run index (64 bits),
-/// status, draws, rounds (32 bits each), 32 bits of zero, then the truth and the estimate of each
-/// quantity (doubles; 0 where they mean nothing, no negative zeros), and the standard errors if the
-/// model has any.
+/// A result of n quantities, m of them with a standard error, is 24 + 16 n + 8 m bytes,
+/// little-endian: run index (64 bits), status, draws, rounds (32 bits each), 32 bits of zero, then
+/// the truth and the estimate of each quantity (doubles; 0 where they mean nothing, no negative
+/// zeros), and the standard errors.
 ///
 /// The health of loops has a digest of its own, so that that of the results is the same as of
 /// before there was any. Of a result that has it, these are run index, the numbers in the order of
@@ -68,7 +68,7 @@ struct WalkedResults {
 [[nodiscard]] WalkedResults walk_checked(const Store& store,
                                          const std::function<void(const RunResult&)>& visit);
 
-/// Holds what defines a campaign, its environment and its tables of drawn values against the digest
+/// Holds what defines a campaign, its data files and its tables of drawn values against the digest
 /// that is stored with them.
 /// @throws StoreError `campaign database = x.db (is damaged: ...)`.
 void check_definition_digest(const Store& store);

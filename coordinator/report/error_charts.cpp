@@ -13,7 +13,7 @@ namespace {
 
 const Quantity& quantity_at(std::size_t index) { return model().results().quantities[index]; }
 
-/// `|error| of a_c12, 1e-4 rad`; of a pure number without a unit.
+/// `|error| of offset, nm`; of a pure number without a unit.
 std::string axis_label(std::string_view what, const Quantity& quantity) {
   const std::string_view unit = quantity.display_unit == "1" ? "" : quantity.display_unit;
   return unit.empty() ? std::string(what) : fmt::format("{}, {}", what, unit);

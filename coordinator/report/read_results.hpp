@@ -94,7 +94,7 @@ struct CheckedResults {
 void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results);
 
 /// What `statistic` and `budget_entry` have other than write_statistics() would store, a line each:
-/// `statistic.mean of k2d = 1 (must be 25.5)`.
+/// `statistic.mean of gain = 1 (must be 25.5)`.
 [[nodiscard]] std::vector<std::string> statistic_differences(const Store& store,
                                                              const Campaign& campaign,
                                                              const CampaignStatistics& statistics);

@@ -44,10 +44,10 @@ namespace proofmass::coordinator {
 /// model.
 [[nodiscard]] std::vector<Chart> spectrum_charts(const RunSpectra& spectra);
 
-/// `spectrum:a_c13`, the name of a session's chart.
+/// `spectrum:SESSION`, the name of a session's chart.
 [[nodiscard]] std::string spectrum_name(std::string_view session);
 
-/// A chart with the name by which `proofmass plot` knows it: `histogram:a_c12`.
+/// A chart with the name by which `proofmass plot` knows it: `histogram:gain`.
 struct NamedPicture {
   std::string name;
   Picture picture;

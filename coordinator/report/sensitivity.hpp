@@ -24,7 +24,7 @@ struct DrawnRuns {
   std::vector<RunIndex> runs;                  ///< Ascending; n of them.
   MissingEstimates missing;  ///< Runs among these that are left out; all that are given up.
   /// Drawn quantities as in Model::drawn(), then the true parameters that follow from them, as in
-  /// `truth_k2d_s2_m`. Units are in the names.
+  /// `truth_offset_m`. Units are in the names.
   std::vector<std::string> names;
   std::vector<std::vector<double>> columns;  ///< Their values, shape [names.size()][n].
   std::vector<std::vector<double>> errors;   ///< estimate − truth, SI; shape [quantities][n].
@@ -45,7 +45,7 @@ inline constexpr std::uint64_t sensitivity_runs_max = 100'000;
 /// Parts of a sum that explain an error that are searched for at most.
 inline constexpr std::size_t num_terms_max = 3;
 
-/// The name of a column, of its square or of the product of two: `truth_a_d11_prime × truth_a_d12`.
+/// The name of a column, of its square or of the product of two: `truth_gain × truth_offset_m`.
 [[nodiscard]] std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term);
 
 /// Which drawn quantities drive a parameter's error, and which its magnitude: the first `num_rows`

@@ -23,7 +23,7 @@ std::optional<std::uint64_t> summarise_file(
     const std::function<void(const std::function<void(Store&)>&)>& write);
 
 /// What `stop_check` has other than the results yield, a line each:
-/// `stop_check.estimate of std(a_c13) after 128 runs = 1 (must be 2.5)`.
+/// `stop_check.estimate of std(gain) after 128 runs = 1 (must be 2.5)`.
 ///
 /// Beside the rows that are there, that of the campaign's rule and of all runs must be there once
 /// the campaign has ended.

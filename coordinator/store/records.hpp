@@ -136,7 +136,7 @@ using Annotation = std::variant<AddTag, RemoveTag, AddNote>;
 
 /// When a campaign ends before all of its runs are finished.
 struct StopPlan {
-  std::string stop_rule;                      ///< `std(a_c13) within 5%`; empty: none.
+  std::string stop_rule;                      ///< `std(gain) within 5%`; empty: none.
   std::optional<std::uint64_t> num_runs_max;  ///< However far the rule is from being reached; > 0.
   std::optional<std::uint64_t> failures_max;  ///< Runs without an estimate, above which it stops.
 
@@ -154,7 +154,7 @@ struct StoredStopCheck {
 
 /// A row of `stop_check`.
 struct StopCheckRow {
-  std::string statistic;  ///< `std(a_c13)`.
+  std::string statistic;  ///< `std(gain)`.
   std::uint64_t num_runs = 0;
   StopCheck check;
 };

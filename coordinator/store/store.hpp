@@ -119,7 +119,7 @@ class Store {
   /// Name of the key that submitted the campaign; empty without keys, or if it was not submitted.
   [[nodiscard]] std::string owner() const;
   void set_owner(std::string_view owner);
-  /// SHA-256 (64 hexadecimal digits) of environment rows and table values, as it was stored with
+  /// SHA-256 (64 hexadecimal digits) of data tables and table values, as it was stored with
   /// them.
   [[nodiscard]] std::string table_digest() const;
   /// The same of what the tables hold now: another one if a number in them has changed.
@@ -131,7 +131,7 @@ class Store {
   [[nodiscard]] std::vector<std::vector<double>> table_columns() const;
 
   /// Raises the number of runs; takes the table values of the new ones.
-  /// @throws StoreError if that number is less than before, or if name, seed, environment or the
+  /// @throws StoreError if that number is less than before, or if name, seed, data tables or the
   ///         table values of the old runs are not those of the file. The caller compares the rest.
   void extend(const Campaign& campaign, std::string_view definition);
 
@@ -141,7 +141,7 @@ class Store {
   /// Under another plan with a rule, a finished campaign is active until the rule is checked.
   void set_stop_plan(const StopPlan& plan);
   /// Keeps what came of evaluating a stop rule; replaces what is there of these runs.
-  /// @param statistic  Of the rule: `std(a_c13)`.
+  /// @param statistic  Of the rule: `std(gain)`.
   void record_stop_check(std::uint64_t num_runs, std::string_view statistic,
                          const StopCheck& check);
   /// The one with the most runs.
@@ -231,13 +231,13 @@ class Store {
   [[nodiscard]] std::optional<Summary> summary() const;
 
   /// What `parameter` and `budget_coefficient` have other than a new file of a campaign of this
-  /// definition, a line each: `parameter.unit of k2d = m (must be s²/m)`. Numbers are equal if
+  /// definition, a line each: `parameter.unit of gain = m (must be 1)`. Numbers are equal if
   /// their bits are.
   [[nodiscard]] std::vector<std::string> parameter_differences(const Campaign& campaign) const;
   /// What `statistic` and `budget_entry` have other than write_statistics() would store, likewise.
   [[nodiscard]] std::vector<std::string> statistic_differences(
       const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget) const;
-  /// The same of `budget_entry` alone, but for the budgets after calibration.
+  /// The same of `budget_entry` alone, but for the budgets after estimation.
   [[nodiscard]] std::vector<std::string> budget_differences(
       const std::optional<ErrorBudget>& budget) const;
   /// What rows of `stop_check` have other than these; there may be more of them.

@@ -188,7 +188,7 @@ struct WorkersReply {
 
 /// The request was carried out.
 struct DoneReply {
-  std::string text;  ///< For people: `campaign hardy2013: 100 runs, 0 of them done`.
+  std::string text;  ///< For people: `campaign mine: 100 runs, 0 of them done`.
 };
 
 /// The request was refused.

@@ -24,7 +24,7 @@
 namespace proofmass::coordinator {
 namespace {
 
-/// A run of the paper takes seconds and, with all its signals, 2 GB of disk.
+/// A long run takes seconds and, with all its signals, gigabytes of disk.
 constexpr std::size_t num_worst_max = 1000;
 
 enum class SeriesFormat : std::uint8_t { hdf5, csv };

@@ -37,8 +37,8 @@ struct ComparedTable {
 /// Rows that are not expected.
 enum class FurtherRows : std::uint8_t { refuse, ignore };
 
-/// What tables have other than they would have in a new file, a line each: `statistic lacks k2d`,
-/// `statistic.mean of k2d = 1 (must be 25.5)`. Numbers are equal if their bits are.
+/// What tables have other than they would have in a new file, a line each: `statistic lacks gain`,
+/// `statistic.mean of gain = 1 (must be 25.5)`. Numbers are equal if their bits are.
 ///
 /// @param write  Writes to a new file in memory what is expected. The same functions as those that
 /// write to a campaign database: nothing is said twice of what a table holds.

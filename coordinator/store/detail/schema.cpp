@@ -73,7 +73,7 @@ std::int64_t version_of(const Database& database, const std::filesystem::path& p
   return version;
 }
 
-// Tables of as many rows as the campaign has runs, workers or lines of its environment: their pages
+// Tables of as many rows as the campaign has runs, workers or lines of its data files: their pages
 // are checked when they are read.
 constexpr std::array<std::string_view, 8> large_tables{"attempt",          "audit",   "delivery",
                                                        "dispersion_value", "overrun", "run_failure",

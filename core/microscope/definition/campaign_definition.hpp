@@ -15,7 +15,9 @@ class DataFiles;
 class Document;
 
 /// The campaign that a document defines, without the values of its data files. What is absent keeps
-/// its nominal value; what is wrong is remembered by the document.
+/// its nominal value, and without any `[[session]]` the sessions are the paper's; `noise.preset`
+/// applies before the other keys of noise, the law of a dispersion group before those of its
+/// elements. What is wrong is remembered by the document.
 [[nodiscard]] MicroscopeCampaign read_definition(Document& document);
 
 /// Rows of an environment file, checked for an orbit of that period.
