@@ -17,8 +17,8 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
 #include "core/campaign/model.hpp"
-#include "core/microscope/session/session_signals.hpp"
 #include "core/microscope/simulation/run.hpp"
+#include "core/microscope/simulation/session_signals.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 

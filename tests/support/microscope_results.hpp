@@ -6,7 +6,8 @@
 #include "core/campaign/model_rules.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
-#include "core/microscope/campaign/results.hpp"
+#include "core/microscope/results/health.hpp"
+#include "core/microscope/results/results.hpp"
 
 namespace proofmass::test {
 

@@ -57,7 +57,7 @@ TEST(CheckLayers, AllowsWhatTheLayersAreFor) {
 }
 
 TEST(CheckLayers, KeepTheEngineFromKnowingOneModel) {
-  const std::string model = "\"core/microscope/campaign/results.hpp\"";
+  const std::string model = "\"core/microscope/results/results.hpp\"";
   for (const std::string path :
        {"proto/wire/a.cpp", "proto/wire/a.hpp", "coordinator/report/a.hpp", "coordinator/cli/a.cpp",
         "coordinator/query/extension.cpp", "worker/program.cpp", "worker/net/main.cpp",

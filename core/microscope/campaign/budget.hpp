@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "core/campaign/campaign.hpp"
-#include "core/microscope/campaign/results.hpp"
+#include "core/microscope/results/results.hpp"
 
 namespace proofmass {
 

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <vector>
 
 #include "core/error.hpp"
+#include "core/microscope/results/results.hpp"
 
 namespace proofmass {
 namespace {
@@ -59,15 +59,6 @@ MicroscopeCampaign hardy2013_campaign() {
   campaign.num_runs = 100;
   campaign.scenario.estimation.correction = Correction::hardy2013;
   return campaign;
-}
-
-bool is_accepted(const Instrument& instrument, const AcceptanceConfig& acceptance) {
-  const auto [a_c, a_d] = sensitivity_matrices(instrument);
-  return std::abs(a_d(0, 0)) <= acceptance.a_d11_max &&
-         std::abs(a_d(0, 1)) <= acceptance.a_d1j_max_rad &&
-         std::abs(a_d(0, 2)) <= acceptance.a_d1j_max_rad &&
-         std::abs(a_c(0, 1)) <= acceptance.a_c1j_max_rad &&
-         std::abs(a_c(0, 2)) <= acceptance.a_c1j_max_rad;
 }
 
 AcceptedDraw draw_instrument(const MicroscopeCampaign& campaign, RunIndex run,

@@ -7,9 +7,9 @@
 
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/dispersion.hpp"
-#include "core/microscope/campaign/drawn_quantities.hpp"
 #include "core/microscope/campaign/scenario.hpp"
 #include "core/microscope/environment/environment.hpp"
+#include "core/microscope/instrument/drawn_quantities.hpp"
 #include "core/microscope/instrument/instrument.hpp"
 
 namespace proofmass {
@@ -47,19 +47,11 @@ class MicroscopeCampaign final : public Campaign {
 /// The campaign of [Hardy2013] section 5: 100 draws, the corrections of the paper.
 [[nodiscard]] MicroscopeCampaign hardy2013_campaign();
 
-/// Most draws of one run; with the nominal laws three of four are accepted. A run that needs more
-/// ends as RunStatus::no_draw.
-inline constexpr std::uint32_t num_draws_max = 1000;
-
 /// The instrument of a run.
 struct AcceptedDraw {
   std::optional<Instrument> instrument;  ///< Empty if all num_draws_max were rejected.
   std::uint32_t num_draws = 0;           ///< At most num_draws_max.
 };
-
-/// True if |a_d11|, |a_d12|, |a_d13|, |a_c12| and |a_c13| are at most their bounds, those behind
-/// [Hardy2013] tab:Budget.
-[[nodiscard]] bool is_accepted(const Instrument& instrument, const AcceptanceConfig& acceptance);
 
 /// Draws the run's instrument, again as a whole until it is accepted. A pure function of the
 /// campaign and the arguments.

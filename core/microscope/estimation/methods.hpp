@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "core/microscope/campaign/results.hpp"
-#include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/estimation/estimation_config.hpp"
+#include "core/microscope/results/results.hpp"
 #include "core/microscope/session/session.hpp"
 
 namespace proofmass {
@@ -49,9 +49,11 @@ struct EstimationMethodInfo {
   void (*check)(const std::vector<Session>& sessions);
 
   /// A pure function of its arguments.
-  /// @param records   Of scenario.sessions, with what `needs` asks for.
-  /// @param scenario  For which `check` passed.
-  Estimation (*estimate)(const RunPhasors& records, const Scenario& scenario);
+  /// @param records     Of the sessions, in their order, with what `needs` asks for.
+  /// @param sessions    For which `check` passed.
+  /// @param objectives  Those of the scenario, SI.
+  Estimation (*estimate)(const RunPhasors& records, const std::vector<Session>& sessions,
+                         const EstimationConfig& config, const ParameterArray& objectives);
 
   bool has_standard_errors = false;
 };

@@ -1,6 +1,7 @@
 #include "core/microscope/instrument/instrument.hpp"
 
 #include <Eigen/LU>
+#include <cmath>
 #include <cstddef>
 #include <string_view>
 
@@ -104,6 +105,15 @@ SensitivityMatrices sensitivity_matrices(const Instrument& instrument) {
   const Eigen::Matrix3d difference = 0.5 * (m1 - m2);
   const Eigen::Matrix3d ratio = difference * common.inverse();
   return {.common = common - ratio * difference, .differential = ratio};
+}
+
+bool is_accepted(const Instrument& instrument, const AcceptanceConfig& acceptance) {
+  const auto [a_c, a_d] = sensitivity_matrices(instrument);
+  return std::abs(a_d(0, 0)) <= acceptance.a_d11_max &&
+         std::abs(a_d(0, 1)) <= acceptance.a_d1j_max_rad &&
+         std::abs(a_d(0, 2)) <= acceptance.a_d1j_max_rad &&
+         std::abs(a_c(0, 1)) <= acceptance.a_c1j_max_rad &&
+         std::abs(a_c(0, 2)) <= acceptance.a_c1j_max_rad;
 }
 
 ParameterArray true_parameters(const Instrument& instrument, double bias_error_x_m_s2) {

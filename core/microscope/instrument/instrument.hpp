@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "core/microscope/campaign/drawn_quantities.hpp"
-#include "core/microscope/campaign/results.hpp"
+#include "core/microscope/instrument/drawn_quantities.hpp"
+#include "core/microscope/results/results.hpp"
 
 namespace proofmass {
 
@@ -51,6 +51,17 @@ struct SensitivityMatrices {
 };
 
 [[nodiscard]] SensitivityMatrices sensitivity_matrices(const Instrument& instrument);
+
+/// A draw outside these bounds is drawn again.
+struct AcceptanceConfig {
+  double a_d11_max = 1e-2;
+  double a_d1j_max_rad = 1.6e-3;  ///< |a_d12| and |a_d13|.
+  double a_c1j_max_rad = 2.6e-3;  ///< |a_c12| and |a_c13|.
+};
+
+/// True if |a_d11|, |a_d12|, |a_d13|, |a_c12| and |a_c13| are at most their bounds, those behind
+/// [Hardy2013] tab:Budget.
+[[nodiscard]] bool is_accepted(const Instrument& instrument, const AcceptanceConfig& acceptance);
 
 /// True values of the ten parameters, SI, from exact matrices.
 ///

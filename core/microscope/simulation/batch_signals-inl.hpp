@@ -7,8 +7,8 @@
 #include <cstddef>
 
 #include "core/math/elementary.hpp"
-#include "core/microscope/session/session_signals.hpp"
 #include "core/microscope/simulation/batch-inl.hpp"
+#include "core/microscope/simulation/session_signals.hpp"
 
 namespace proofmass {
 namespace {

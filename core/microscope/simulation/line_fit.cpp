@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <utility>
 
+#include "core/microscope/simulation/session_signals.hpp"
+
 namespace proofmass {
 
 LineFit line_fit(const Scenario& scenario, const Session& session) {

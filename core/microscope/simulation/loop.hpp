@@ -7,8 +7,8 @@
 #include "core/math/vector3.hpp"
 #include "core/microscope/control/control_loops.hpp"
 #include "core/microscope/instrument/sensor_model.hpp"
-#include "core/microscope/session/session_signals.hpp"
 #include "core/microscope/simulation/sample_noise.hpp"
+#include "core/microscope/simulation/session_signals.hpp"
 
 namespace proofmass {
 

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "core/microscope/session/session.hpp"
-#include "core/microscope/session/session_signals.hpp"
 #include "core/microscope/simulation/loop.hpp"
 #include "core/microscope/simulation/sample_noise.hpp"
+#include "core/microscope/simulation/session_signals.hpp"
 
 namespace proofmass {
 

@@ -397,7 +397,9 @@ std::vector<RunRecord> RunPlan::record_batch(std::span<const RunRequest> request
 }
 
 Estimation RunPlan::estimation(const RunRecord& record) const {
-  return impl_->method.estimate(record.phasors, impl_->campaign.scenario);
+  const Scenario& scenario = impl_->campaign.scenario;
+  return impl_->method.estimate(record.phasors, scenario.sessions, scenario.estimation,
+                                scenario.objectives);
 }
 
 RunResult RunPlan::estimate(const RunRecord& record) const {

@@ -6,7 +6,7 @@
 
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
-#include "core/microscope/session/session_signals.hpp"
+#include "core/microscope/simulation/session_signals.hpp"
 #include "core/signal/band_pass.hpp"
 #include "core/signal/noise_shape.hpp"
 

@@ -7,9 +7,9 @@
 
 #include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
-#include "core/microscope/campaign/results.hpp"
 #include "core/microscope/campaign/scenario.hpp"
 #include "core/microscope/estimation/methods.hpp"
+#include "core/microscope/results/health.hpp"
 #include "core/microscope/session/session.hpp"
 #include "core/microscope/simulation/loop.hpp"
 #include "core/signal/line_weights.hpp"

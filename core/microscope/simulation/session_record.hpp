@@ -6,10 +6,10 @@
 
 #include "core/math/inline.hpp"
 #include "core/microscope/session/session.hpp"
-#include "core/microscope/session/session_signals.hpp"
 #include "core/microscope/simulation/loop.hpp"
 #include "core/microscope/simulation/observer.hpp"
 #include "core/microscope/simulation/run_health.hpp"
+#include "core/microscope/simulation/session_signals.hpp"
 #include "core/signal/line_weights.hpp"
 
 namespace proofmass {

@@ -11,7 +11,7 @@
 #include <tuple>
 
 #include "coordinator/archive/replay.hpp"
-#include "core/microscope/campaign/drawn_quantities.hpp"
+#include "core/microscope/instrument/drawn_quantities.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/signal/noise_shape.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"

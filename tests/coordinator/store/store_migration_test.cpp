@@ -12,7 +12,7 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/microscope/campaign/budget.hpp"
-#include "core/microscope/campaign/results.hpp"
+#include "core/microscope/results/results.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"

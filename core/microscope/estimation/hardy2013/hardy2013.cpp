@@ -139,11 +139,9 @@ struct SlopeSums {
 /// Estimates everything once from what the round before knows.
 class Round {
  public:
-  Round(const RunPhasors& records, const Scenario& scenario, const Estimates& known)
-      : records_(records),
-        sessions_(scenario.sessions),
-        correction_(scenario.estimation.correction),
-        known_(known) {}
+  Round(const RunPhasors& records, const std::vector<Session>& sessions, Correction correction,
+        const Estimates& known)
+      : records_(records), sessions_(sessions), correction_(correction), known_(known) {}
 
   [[nodiscard]] Estimates estimates() const {
     Estimates next;
@@ -215,16 +213,16 @@ double largest_move(const Estimates& before, const Estimates& after,
 
 }  // namespace
 
-Estimation estimate_hardy2013(const RunPhasors& records, const Scenario& scenario) {
-  PROOFMASS_EXPECT(records.size() == scenario.sessions.size());
-  const EstimationConfig& config = scenario.estimation;
+Estimation estimate_hardy2013(const RunPhasors& records, const std::vector<Session>& sessions,
+                              const EstimationConfig& config, const ParameterArray& objectives) {
+  PROOFMASS_EXPECT(records.size() == sessions.size());
   Estimates known;
   Estimation result;
   double last_move = 0.0;
   while (!result.converged && result.num_rounds < config.num_rounds_max) {
-    const Estimates next = Round(records, scenario, known).estimates();
-    result.converged = has_settled(known, next, config.convergence, scenario.objectives);
-    last_move = largest_move(known, next, scenario.objectives);
+    const Estimates next = Round(records, sessions, config.correction, known).estimates();
+    result.converged = has_settled(known, next, config.convergence, objectives);
+    last_move = largest_move(known, next, objectives);
     known = next;
     ++result.num_rounds;
   }

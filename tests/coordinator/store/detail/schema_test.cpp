@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "core/microscope/campaign/results.hpp"
+#include "core/microscope/results/health.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.hpp"
+#include "core/microscope/campaign/scenario.hpp"
 #include "core/random/stream.hpp"
 #include "tests/message_of.hpp"
 #include "tests/support/microscope_results.hpp"
@@ -152,9 +153,8 @@ EstimationConfig precise(Correction correction) {
 
 /// The paper's sessions are in the order of their targets, as ModelRecord makes its records.
 Estimation calibrate(const RunPhasors& record, const EstimationConfig& config) {
-  Scenario scenario;
-  scenario.estimation = config;
-  return estimate_hardy2013(record, scenario);
+  const Scenario scenario;
+  return estimate_hardy2013(record, scenario.sessions, config, scenario.objectives);
 }
 
 const ParameterArray& objectives() {
@@ -356,7 +356,8 @@ TEST(EstimateHardy2013, WeightsTheSessionsOfATargetByTheirLengths) {
   Complex& regressor = record.back().amplitude[index(Signal::common_y)][0];
   regressor *= 0.5;
   record.back().amplitude[index(Signal::differential_x)][0] = (slope + 1e-5) * regressor;
-  const Estimation result = estimate_hardy2013(record, scenario);
+  const Estimation result =
+      estimate_hardy2013(record, scenario.sessions, scenario.estimation, scenario.objectives);
   EXPECT_TRUE(result.converged);
   const double share = 3.0 * 0.25 / (1.0 + 3.0 * 0.25);
   EXPECT_NEAR(at(result.values, Parameter::a_d12), slope + share * 1e-5, 1e-12);

@@ -32,7 +32,10 @@ RecordNeeds all_lines_and_signals(const Session& /*session*/) {
   return {.lines = RecordedLines::all, .signals = SignalSet::all};
 }
 void accept_sessions(const std::vector<Session>& /*sessions*/) {}
-Estimation no_estimation(const RunPhasors& /*records*/, const Scenario& /*scenario*/) { return {}; }
+Estimation no_estimation(const RunPhasors& /*records*/, const std::vector<Session>& /*sessions*/,
+                         const EstimationConfig& /*config*/, const ParameterArray& /*objectives*/) {
+  return {};
+}
 
 /// A method that wants all that can be recorded.
 constexpr EstimationMethodInfo recording_method{"recording", all_lines_and_signals, accept_sessions,

@@ -42,13 +42,6 @@ using DispersionSet = std::array<Dispersion, num_drawn>;
 /// Indices of the quantities with law `table`, ascending.
 [[nodiscard]] std::vector<std::size_t> table_elements(const DispersionSet& dispersions);
 
-/// A draw outside these bounds is drawn again.
-struct AcceptanceConfig {
-  double a_d11_max = 1e-2;
-  double a_d1j_max_rad = 1.6e-3;  ///< |a_d12| and |a_d13|.
-  double a_c1j_max_rad = 2.6e-3;  ///< |a_c12| and |a_c13|.
-};
-
 /// The values of a run's draw number `draw` (from 0), before any acceptance rule: a pure function
 /// of its arguments.
 ///

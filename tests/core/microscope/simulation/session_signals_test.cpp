@@ -1,4 +1,4 @@
-#include "core/microscope/session/session_signals.hpp"
+#include "core/microscope/simulation/session_signals.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "core/microscope/campaign/drawn_quantities.hpp"
+#include "core/microscope/instrument/drawn_quantities.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
