@@ -8,8 +8,8 @@
 #include <map>
 #include <thread>
 
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/wire/messages.hpp"

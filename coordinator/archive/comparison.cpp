@@ -12,7 +12,7 @@
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/report/digest.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/error_change.hpp"

@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "coordinator/archive/result_columns.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

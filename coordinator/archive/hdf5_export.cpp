@@ -13,7 +13,7 @@
 #include "coordinator/archive/detail/hdf5_file.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/result_columns.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

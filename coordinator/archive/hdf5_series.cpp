@@ -8,7 +8,7 @@
 #include "coordinator/archive/detail/hdf5_file.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/series_output.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

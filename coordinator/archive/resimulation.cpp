@@ -14,7 +14,7 @@
 
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/archive/verification.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {

@@ -5,8 +5,8 @@
 #include <span>
 
 #include "coordinator/archive/stored_campaign.hpp"
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -17,7 +17,7 @@
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/summarise.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {

@@ -13,7 +13,7 @@
 #include "coordinator/archive/detail/comparison_json.hpp"
 #include "coordinator/archive/several_comparison.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "core/statistics/comparison.hpp"
 
 namespace proofmass::coordinator {

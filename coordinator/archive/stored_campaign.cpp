@@ -12,7 +12,7 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/report/digest.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

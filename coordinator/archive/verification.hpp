@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "coordinator/archive/archive_error.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "coordinator/store/store.hpp"
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "proto/link/start_program.hpp"
 #include "proto/link/whole_file.hpp"
 

@@ -16,9 +16,9 @@
 #include "coordinator/bench/bench_report.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/program.hpp"
-#include "core/campaign/model.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
+#include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 

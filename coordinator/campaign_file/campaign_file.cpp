@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "coordinator/campaign_file/data_file.hpp"
-#include "core/campaign/model.hpp"
 #include "core/definition/document.hpp"
+#include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

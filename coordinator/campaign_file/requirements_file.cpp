@@ -6,8 +6,8 @@
 #include <string>
 
 #include "coordinator/campaign_file/data_file.hpp"
-#include "core/campaign/model_rules.hpp"
 #include "core/definition/document.hpp"
+#include "core/model_rules.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -17,8 +17,8 @@
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/draft_file.hpp"
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

@@ -23,7 +23,7 @@
 #include "coordinator/net/service.hpp"
 #include "coordinator/page/page.hpp"
 #include "coordinator/report/report.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/manual_option.hpp"
 #include "proto/command_line/option_checks.hpp"

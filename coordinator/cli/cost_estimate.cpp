@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "coordinator/cli/progress_display.hpp"
-#include "core/campaign/model.hpp"
 #include "core/math/instruction_set.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "coordinator/cli/program.hpp"
-#include "core/campaign/model_rules.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/error.hpp"
+#include "core/model_rules.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 

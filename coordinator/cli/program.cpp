@@ -13,7 +13,7 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "core/campaign/definition.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/manual_option.hpp"
 #include "proto/command_line/option_checks.hpp"

@@ -10,8 +10,8 @@
 
 #include "coordinator/dispatch/blame.hpp"
 #include "coordinator/dispatch/leases.hpp"
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

@@ -12,8 +12,8 @@
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
 #include "coordinator/dispatch/workers.hpp"
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

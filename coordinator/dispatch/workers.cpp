@@ -13,8 +13,8 @@
 #include "coordinator/dispatch/lending.hpp"
 #include "coordinator/dispatch/results.hpp"
 #include "coordinator/dispatch/speculation.hpp"
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {

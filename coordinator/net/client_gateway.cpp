@@ -8,8 +8,8 @@
 #include <utility>
 #include <variant>
 
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -12,8 +12,8 @@
 
 #include "coordinator/dispatch/workers.hpp"
 #include "coordinator/net/service_snapshot.hpp"
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {

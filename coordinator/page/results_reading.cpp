@@ -6,7 +6,7 @@
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "coordinator/query/functions.hpp"
 #include "coordinator/query/virtual_table-inl.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 SQLITE_EXTENSION_INIT3
 

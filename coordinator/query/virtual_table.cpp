@@ -12,8 +12,8 @@
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/query/virtual_table-inl.hpp"
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 
 SQLITE_EXTENSION_INIT3
 

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

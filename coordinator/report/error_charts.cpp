@@ -6,7 +6,7 @@
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

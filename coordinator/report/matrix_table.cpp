@@ -5,7 +5,7 @@
 
 #include "coordinator/report/review_tables.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

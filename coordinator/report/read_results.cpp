@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "coordinator/report/summarise.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {

@@ -11,7 +11,7 @@
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "core/statistics/interval.hpp"
 
 namespace proofmass::coordinator {

@@ -12,7 +12,7 @@
 #include "coordinator/report/review_tables.hpp"
 #include "coordinator/report/verification_matrix.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

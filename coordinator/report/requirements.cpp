@@ -7,8 +7,8 @@
 
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/campaign/model_rules.hpp"
 #include "core/error.hpp"
+#include "core/model_rules.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {

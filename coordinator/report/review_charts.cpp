@@ -7,7 +7,7 @@
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "core/statistics/distribution.hpp"
 
 namespace proofmass::coordinator {

@@ -8,7 +8,7 @@
 #include "coordinator/report/html_table.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/report/review_tables.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

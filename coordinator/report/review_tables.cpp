@@ -7,7 +7,7 @@
 
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

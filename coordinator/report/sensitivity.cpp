@@ -12,8 +12,8 @@
 
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/sensitivity.hpp"
 #include "core/statistics/term_search.hpp"

@@ -9,7 +9,7 @@
 
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "core/campaign/model_rules.hpp"
+#include "core/model_rules.hpp"
 #include "core/statistics/value_passes.hpp"
 
 namespace proofmass::coordinator {

@@ -7,8 +7,8 @@
 #include <functional>
 #include <set>
 
-#include "core/campaign/model.hpp"
-#include "core/campaign/model_rules.hpp"
+#include "core/model.hpp"
+#include "core/model_rules.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -22,7 +22,7 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "proto/link/kill_point.hpp"
 #include "proto/text/visible_text.hpp"
 

@@ -2,7 +2,6 @@
 #include <memory>
 #include <utility>
 
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
 #include "core/microscope/campaign/budget.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
@@ -11,6 +10,7 @@
 #include "core/microscope/instrument/instrument.hpp"
 #include "core/microscope/simulation/reference_digest.hpp"
 #include "core/microscope/simulation/run.hpp"
+#include "core/model.hpp"
 
 namespace proofmass {
 

@@ -4,8 +4,8 @@
 #include <optional>
 #include <utility>
 
-#include "core/campaign/model_rules.hpp"
 #include "core/error.hpp"
+#include "core/model_rules.hpp"
 #include "proto/client.pb.h"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/client_codec.hpp"

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "proto/proofmass.pb.h"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/message_reader.hpp"

@@ -7,8 +7,8 @@
 #include <initializer_list>
 #include <utility>
 
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "proto/proofmass.pb.h"
 #include "proto/wire/checks.hpp"
 #include "proto/wire/codec.hpp"

@@ -3,11 +3,11 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/campaign/model_rules.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/results/health.hpp"
 #include "core/microscope/results/results.hpp"
+#include "core/model_rules.hpp"
 
 namespace proofmass::test {
 

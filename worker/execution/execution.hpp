@@ -11,7 +11,7 @@
 
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/definition.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::worker {

@@ -13,7 +13,7 @@
 #include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output_file.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -19,7 +19,7 @@
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/store.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/start_program.hpp"

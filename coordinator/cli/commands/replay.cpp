@@ -17,7 +17,7 @@
 #include "coordinator/cli/output_file.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 

@@ -33,7 +33,7 @@
 #include "coordinator/report/report_json.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/store_error.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"

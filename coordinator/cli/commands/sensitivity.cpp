@@ -16,7 +16,7 @@
 #include "coordinator/report/sensitivity.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/dispersion.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 

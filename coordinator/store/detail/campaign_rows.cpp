@@ -15,8 +15,8 @@
 
 #include "coordinator/store/detail/integrity.hpp"
 #include "coordinator/store/store_error.hpp"
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator::detail {

@@ -12,9 +12,9 @@
 
 #include "coordinator/store/store.hpp"
 #include "coordinator/store/store_error.hpp"
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

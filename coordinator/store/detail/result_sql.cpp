@@ -7,8 +7,8 @@
 #include <map>
 #include <vector>
 
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "coordinator/store/detail/result_sql.hpp"
 #include "coordinator/store/store_error.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "proto/link/kill_point.hpp"
 
 namespace proofmass::coordinator::detail {

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <utility>
 
-#include "core/campaign/model.hpp"
 #include "core/error.hpp"
+#include "core/model.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

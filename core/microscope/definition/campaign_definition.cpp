@@ -9,10 +9,10 @@
 #include <span>
 #include <utility>
 
-#include "core/campaign/model.hpp"
 #include "core/definition/csv.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
+#include "core/model.hpp"
 
 namespace proofmass {
 namespace {

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "core/campaign/model.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "core/model.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::coordinator {

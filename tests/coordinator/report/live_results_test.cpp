@@ -7,7 +7,7 @@
 #include <string>
 
 #include "coordinator/report/review_tables.hpp"
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
 #include "tests/coordinator/report/review_fixture.hpp"

@@ -18,10 +18,10 @@
 #include <utility>
 
 #include "core/campaign/dispersion.hpp"
-#include "core/campaign/model.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
 #include "core/math/elementary.hpp"
+#include "core/model.hpp"
 #include "core/random/normal.hpp"
 #include "core/random/stream.hpp"
 

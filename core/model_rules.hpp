@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "core/campaign/model.hpp"
+#include "core/model.hpp"
 #include "core/statistics/requirement.hpp"
 #include "core/statistics/stop_rule.hpp"
 
