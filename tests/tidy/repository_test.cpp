@@ -22,6 +22,7 @@ void expect_none(Findings (*rule)(const SourceFile&)) {
 
 TEST(Repository, HasSources) { EXPECT_GT(sources().size(), 50u); }
 TEST(Repository, KeepsItsLayers) { expect_none(check_layers); }
+TEST(Repository, LinksProgramsAloneWithAModel) { expect_none(check_links); }
 TEST(Repository, GuardsItsHeaders) { expect_none(check_header_guard); }
 TEST(Repository, KeepsFilesAndLinesShort) { expect_none(check_size); }
 TEST(Repository, KeepsFunctionsShort) { expect_none(check_function_length); }

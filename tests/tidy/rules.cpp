@@ -9,6 +9,7 @@
 #include <map>
 #include <regex>
 #include <set>
+#include <span>
 
 namespace proofmass::test {
 namespace {
@@ -25,25 +26,66 @@ bool matches(const std::string& text, const char* pattern) {
   return std::regex_search(text, std::regex(pattern));
 }
 
+// The parts of core, and those of the model in core/microscope: each may include those before it.
+// A part is a folder, or the files of that name beside the folders.
+constexpr std::array<std::string_view, 11> core_order{
+    "error",    "runs",       "math",  "random",      "signal",    "statistics",
+    "campaign", "definition", "model", "model_rules", "microscope"};
+constexpr std::array<std::string_view, 11> microscope_order{
+    "orbit",      "environment", "session",    "results",    "instrument",      "control",
+    "estimation", "campaign",    "simulation", "definition", "microscope_model"};
+
+// `signal` for `core/signal/window.hpp` in `core`, empty for what is not in the folder.
+std::string part_of(const std::string& path, std::string_view folder) {
+  if (!path.starts_with(std::string(folder) + "/")) return "";
+  const std::size_t begin = folder.size() + 1;
+  return path.substr(begin, path.find_first_of("/.", begin) - begin);
+}
+
+// What is wrong with an include between two parts of a folder; empty if it is admissible.
+std::string broken_order(const SourceFile& file, const std::string& include,
+                         std::string_view folder, std::span<const std::string_view> order) {
+  const std::string from = part_of(file.path, folder);
+  const std::string to = part_of(include, folder);
+  if (from.empty() || to.empty() || from == to) return "";
+  for (const std::string& part : {from, to}) {
+    if (std::ranges::find(order, part) != order.end()) continue;
+    return fmt::format("{} has no place in the order of {} (tests/tidy/rules.cpp)", part, folder);
+  }
+  if (std::ranges::find(order, to) < std::ranges::find(order, from)) return "";
+  return fmt::format("{} comes before {} in the order of {}", from, to, folder);
+}
+
 // What would tie the engine to one model, or the parts of core to each other; empty if admissible.
 std::string broken_seam(const SourceFile& file, const std::string& include) {
   const bool is_of_model = file.is_in("core/microscope");
-  const bool chooses_model = matches(
-      file.path,
-      "^(coordinator/bench/|coordinator/cli/(coordinator_)?main\\.cpp$|worker/main\\.cpp$)");
-  if (matches(include, "^core/microscope/") && !is_of_model && !chooses_model) {
-    return "what runs campaigns knows core/campaign/model.hpp, not one model";
+  const bool is_of_bench = file.is_in("coordinator/bench");
+  if (matches(include, "^core/microscope/") && !is_of_model && !is_of_bench) {
+    return "what runs campaigns knows core/model.hpp, not one model";
   }
-  const bool may_read_text = matches(
-      file.path, "^core/(definition/|microscope/definition/|microscope/microscope_model\\.cpp$)");
-  if (file.is_in("core") && !may_read_text && matches(include, "^core/definition/")) {
-    return "numerics depend on no text: core/definition stands above the rest of core";
+  if (matches(include, "^coordinator/bench/") && !is_of_bench &&
+      file.path != "coordinator/cli/main.cpp") {
+    return "bench knows one model: only coordinator/cli/main.cpp adds it to a program";
   }
-  if (matches(file.path, "^core/(math|random|signal|statistics)/") &&
-      matches(include, "^core/campaign/")) {
-    return "mathematics depends on no campaign";
+  const bool may_read_text =
+      matches(file.path, "^core/microscope/(definition/|microscope_model\\.cpp$)");
+  if (is_of_model && !may_read_text && matches(include, "^core/definition/")) {
+    return "numerics depend on no text: of a model, its definition alone reads and writes it";
   }
-  return "";
+  const std::string broken = broken_order(file, include, "core", core_order);
+  if (!broken.empty()) return broken;
+  return broken_order(file, include, "core/microscope", microscope_order);
+}
+
+// Whether the other rules can see what an include means; empty if they can.
+std::string badly_written(const std::string& include, bool is_quoted) {
+  const std::filesystem::path path = include;
+  const bool is_plain = path.is_relative() && path.lexically_normal().generic_string() == include &&
+                        !include.starts_with("..");
+  if (is_plain && (!is_quoted || matches(include, "^(core|proto|coordinator|worker|tests)/"))) {
+    return "";
+  }
+  return "an include of the project is written from its root, without . and ..";
 }
 
 // What a file must not include, by layer; empty if the include is admissible.
@@ -154,14 +196,45 @@ bool is_banned(std::string word) {
 
 Findings check_layers(const SourceFile& file) {
   Findings findings;
-  if (!file.is_cpp() || file.is_in("tests")) return findings;
-  static const std::regex pattern("^\\s*#\\s*include\\s*[<\"]([^>\"]+)[>\"]");
+  if (!file.is_cpp()) return findings;
+  static const std::regex directive("^\\s*#\\s*include\\b");
+  static const std::regex pattern("^\\s*#\\s*include\\s*([<\"])([^>\"]+)[>\"]");
   const std::vector<std::string> lines = lines_of(file.text);
   for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (!std::regex_search(lines[i], directive)) continue;
     std::smatch match;
-    if (!std::regex_search(lines[i], match, pattern)) continue;
-    const std::string what = broken_layer(file, match[1]);
-    if (!what.empty()) findings.push_back(finding(file, i + 1, match[1].str() + ": " + what));
+    if (!std::regex_search(lines[i], match, pattern)) {
+      findings.push_back(finding(file, i + 1, "an include names its file"));
+      continue;
+    }
+    const std::string include = match[2];
+    std::string what = badly_written(include, match[1] == "\"");
+    if (what.empty() && !file.is_in("tests")) what = broken_layer(file, include);
+    if (!what.empty()) findings.push_back(finding(file, i + 1, include + ": " + what));
+  }
+  return findings;
+}
+
+Findings check_links(const SourceFile& file) {
+  // Programs, and the module that SQLite loads: each is linked with one model.
+  static const std::set<std::string> programs{"coordinator/cli/CMakeLists.txt proofmass",
+                                              "coordinator/cli/CMakeLists.txt ${program}",
+                                              "coordinator/query/CMakeLists.txt proofmass_sqlite",
+                                              "worker/CMakeLists.txt proofmass-worker"};
+  static const std::regex library("proofmass(::|_)(microscope\\w*|bench\\b)");
+  Findings findings;
+  const bool may_know_a_model =
+      file.is_in("core/microscope") || file.is_in("coordinator/bench") || file.is_in("tests");
+  if (!file.path.ends_with("CMakeLists.txt") || may_know_a_model) return findings;
+  const std::string code = std::regex_replace(file.text, std::regex("#[^\n]*"), "");
+  for (std::sregex_iterator it(code.begin(), code.end(), library), end; it != end; ++it) {
+    const auto position = static_cast<std::size_t>(it->position());
+    const std::size_t open = code.rfind('(', position) + 1;  // Of the command.
+    const std::string target = code.substr(open, code.find_first_of(" \n)", open) - open);
+    if (programs.contains(file.path + " " + target)) continue;
+    findings.push_back(finding(
+        file, line_at(code, position),
+        fmt::format("{}: only a program is linked with a model, not {}", it->str(), target)));
   }
   return findings;
 }

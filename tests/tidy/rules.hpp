@@ -10,10 +10,15 @@ namespace proofmass::test {
 // Each rule yields a line for every violation, `path:line: what`; none if all is well.
 using Findings = std::vector<std::string>;
 
-/// core includes only numerics; coordinator and worker never see each other; SQLite, ZeroMQ and
-/// generated Protobuf types stay in the few sources that may know them. What runs campaigns knows
-/// no model by name: programs choose theirs where they are linked.
+/// core includes only numerics, its parts and those of the model in their order; coordinator and
+/// worker never see each other; SQLite, ZeroMQ and generated Protobuf types stay in the few sources
+/// that may know them. What runs campaigns knows no model by name: programs choose theirs where
+/// they are linked. Includes are written from the root, in tests too, for which nothing else of
+/// this holds.
 [[nodiscard]] Findings check_layers(const SourceFile& file);
+
+/// Only programs are linked with the library of a model, not the libraries that run campaigns.
+[[nodiscard]] Findings check_links(const SourceFile& file);
 
 /// A header begins with `#pragma once`.
 [[nodiscard]] Findings check_header_guard(const SourceFile& file);

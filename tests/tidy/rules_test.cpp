@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace proofmass::test {
 namespace {
@@ -36,7 +38,7 @@ TEST(CheckLayers, CatchesEachForbiddenInclude) {
   EXPECT_THAT(layers("coordinator/dispatch/a.cpp", "<zmq.hpp>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/net/a.hpp", "<zmq.hpp>"), SizeIs(1));
   EXPECT_THAT(layers("coordinator/page/page.cpp", "<boost/asio/post.hpp>"), SizeIs(1));
-  EXPECT_THAT(layers("coordinator/net/a.cpp", "\"proofmass.pb.h\""), SizeIs(1));
+  EXPECT_THAT(layers("coordinator/net/a.cpp", "\"proto/proofmass.pb.h\""), SizeIs(1));
   EXPECT_THAT(layers("proto/wire/a.hpp", "<google/protobuf/message.h>"), SizeIs(1));
   EXPECT_THAT(layers("proto/wire/a.cpp", "\"worker/net/a.hpp\""), SizeIs(1));
   EXPECT_THAT(layers("coordinator/cli/a.cpp", "\"worker/net/a.hpp\""), SizeIs(1));
@@ -49,7 +51,7 @@ TEST(CheckLayers, AllowsWhatTheLayersAreFor) {
   EXPECT_THAT(layers("coordinator/query/virtual_table-inl.hpp", "<sqlite3ext.h>"), IsEmpty());
   EXPECT_THAT(layers("worker/net/a.cpp", "<zmq.hpp>"), IsEmpty());
   EXPECT_THAT(layers("coordinator/page/http_server.cpp", "<boost/beast/http.hpp>"), IsEmpty());
-  EXPECT_THAT(layers("proto/wire/a.cpp", "\"proofmass.pb.h\""), IsEmpty());
+  EXPECT_THAT(layers("proto/wire/a.cpp", "\"proto/proofmass.pb.h\""), IsEmpty());
   EXPECT_THAT(layers("core/a.cpp", "<cmath>"), IsEmpty());
   EXPECT_THAT(layers("core/definition/a.hpp", "<toml++/toml.h>"), IsEmpty());
   EXPECT_THAT(layers("core/microscope/definition/a.hpp", "<toml++/toml.h>"), IsEmpty());
@@ -60,24 +62,75 @@ TEST(CheckLayers, KeepTheEngineFromKnowingOneModel) {
   const std::string model = "\"core/microscope/results/results.hpp\"";
   for (const std::string path :
        {"proto/wire/a.cpp", "proto/wire/a.hpp", "coordinator/report/a.hpp", "coordinator/cli/a.cpp",
-        "coordinator/query/extension.cpp", "worker/program.cpp", "worker/net/main.cpp",
-        "core/campaign/a.cpp", "core/definition/a.cpp", "core/signal/a.hpp"}) {
+        "coordinator/cli/main.cpp", "coordinator/query/extension.cpp", "worker/main.cpp",
+        "core/campaign/a.cpp", "core/definition/a.cpp", "core/signal/a.hpp", "core/model.hpp"}) {
     EXPECT_THAT(layers(path, model), SizeIs(1)) << path;
   }
-  for (const std::string path : {"coordinator/bench/a.cpp", "coordinator/cli/main.cpp",
-                                 "coordinator/cli/coordinator_main.cpp", "worker/main.cpp",
-                                 "core/microscope/session/a.hpp", "tests/worker/a.cpp"}) {
+  for (const std::string path :
+       {"coordinator/bench/a.cpp", "core/microscope/instrument/a.hpp", "tests/worker/a.cpp"}) {
     EXPECT_THAT(layers(path, model), IsEmpty()) << path;
   }
 }
 
-TEST(CheckLayers, KeepMathematicsFromKnowingCampaigns) {
-  for (const std::string topic : {"math", "random", "signal", "statistics", "statistics/detail"}) {
-    const std::string path = "core/" + topic + "/a.cpp";
-    EXPECT_THAT(layers(path, "\"core/campaign/campaign.hpp\""), SizeIs(1)) << path;
-    EXPECT_THAT(layers(path, "\"core/runs.hpp\""), IsEmpty()) << path;
+TEST(CheckLayers, KeepTheEngineFromKnowingBench) {
+  const std::string bench = "\"coordinator/bench/bench_parts.hpp\"";
+  for (const std::string path : {"coordinator/cli/coordinator_main.cpp", "coordinator/cli/a.cpp",
+                                 "coordinator/dispatch/a.hpp", "coordinator/cli/detail/main.cpp"}) {
+    EXPECT_THAT(layers(path, bench), SizeIs(1)) << path;
   }
-  EXPECT_THAT(layers("core/definition/a.hpp", "\"core/campaign/definition.hpp\""), IsEmpty());
+  for (const std::string path :
+       {"coordinator/bench/a.cpp", "coordinator/cli/main.cpp", "tests/coordinator/bench/a.cpp"}) {
+    EXPECT_THAT(layers(path, bench), IsEmpty()) << path;
+  }
+}
+
+TEST(CheckLayers, WantIncludesWrittenFromTheRoot) {
+  for (const std::string include :
+       {"\"store.hpp\"", "\"../bench/bench_parts.hpp\"", "<../microscope/a.hpp>",
+        "\"core/../core/microscope/a.hpp\"", "\"core/./runs.hpp\"", "\"core//runs.hpp\"",
+        "\"/core/runs.hpp\"", "</core/runs.hpp>", "A_MACRO"}) {
+    EXPECT_THAT(layers("coordinator/store/a.cpp", include), SizeIs(1)) << include;
+    EXPECT_THAT(layers("tests/coordinator/store/a.cpp", include), SizeIs(1)) << include;
+  }
+  EXPECT_THAT(layers("coordinator/store/a.cpp", "\"core/runs.hpp\""), IsEmpty());
+  EXPECT_THAT(layers("coordinator/store/a.cpp", "<core/microscope/a.hpp>"), SizeIs(1));
+  EXPECT_THAT(layers("tests/store/a.cpp", "\"tests/message_of.hpp\""), IsEmpty());
+}
+
+// The parts in their order: whatever comes later may include what comes earlier, never the other
+// way round.
+void expect_order(const std::string& folder, const std::vector<std::string>& parts) {
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    for (std::size_t j = 0; j < parts.size(); ++j) {
+      const Findings findings =
+          layers(folder + "/" + parts[i], "\"" + folder + "/" + parts[j] + "\"");
+      EXPECT_THAT(findings, SizeIs(i < j ? 1 : 0)) << parts[i] << " includes " << parts[j];
+    }
+  }
+}
+
+TEST(CheckLayers, KeepTheOrderOfCore) {
+  expect_order("core", {"error.hpp", "runs.hpp", "math/a.hpp", "random/a.hpp", "signal/a.hpp",
+                        "statistics/detail/a.hpp", "campaign/a.hpp", "definition/a.hpp",
+                        "model.hpp", "model_rules.hpp"});
+  EXPECT_THAT(layers("core/campaign/a.cpp", "\"core/model.hpp\""),
+              ElementsAre("core/campaign/a.cpp:1: core/model.hpp: campaign comes before model in "
+                          "the order of core"));
+  EXPECT_THAT(layers("core/microscope/definition/a.cpp", "\"core/model.hpp\""), IsEmpty());
+}
+
+TEST(CheckLayers, KeepTheOrderOfTheModel) {
+  expect_order("core/microscope",
+               {"orbit/a.hpp", "environment/a.hpp", "session/a.hpp", "results/a.hpp",
+                "instrument/a.hpp", "control/a.hpp", "estimation/hardy2013/a.hpp", "campaign/a.hpp",
+                "simulation/a-inl.hpp", "definition/a.hpp", "microscope_model.cpp"});
+}
+
+TEST(CheckLayers, WantAPlaceInTheOrderForEveryFolder) {
+  EXPECT_THAT(layers("core/filters/a.hpp", "\"core/runs.hpp\""),
+              ElementsAre("core/filters/a.hpp:1: core/runs.hpp: filters has no place in the order "
+                          "of core (tests/tidy/rules.cpp)"));
+  EXPECT_THAT(layers("core/microscope/orbit/a.hpp", "\"core/microscope/drag/a.hpp\""), SizeIs(1));
 }
 
 TEST(CheckLayers, KeepTextToDefinitionsAndModels) {
@@ -86,6 +139,34 @@ TEST(CheckLayers, KeepTextToDefinitionsAndModels) {
   EXPECT_THAT(layers("core/microscope/microscope_model.cpp", document), IsEmpty());
   EXPECT_THAT(layers("core/microscope/simulation/a.cpp", document), SizeIs(1));
   EXPECT_THAT(layers("core/statistics/a.cpp", document), SizeIs(1));
+}
+
+TEST(CheckLinks, CatchesALibraryThatIsLinkedWithAModel) {
+  const std::string link = "\ntarget_link_libraries(proofmass_cli\n  PUBLIC fmt::fmt ";
+  EXPECT_THAT(check_links({"coordinator/cli/CMakeLists.txt", link + "proofmass::microscope)"}),
+              ElementsAre("coordinator/cli/CMakeLists.txt:3: proofmass::microscope: only a program "
+                          "is linked with a model, not proofmass_cli"));
+  for (const std::string library : {"proofmass::microscope_model", "proofmass_microscope",
+                                    "proofmass::bench", "proofmass_bench"}) {
+    EXPECT_THAT(check_links({"coordinator/cli/CMakeLists.txt", link + library + ")"}), SizeIs(1));
+    EXPECT_THAT(check_links({"proto/CMakeLists.txt", link + library + ")"}), SizeIs(1));
+    EXPECT_THAT(check_links({"CMakeLists.txt", "link_libraries(" + library + ")"}), SizeIs(1));
+  }
+}
+
+TEST(CheckLinks, AllowsProgramsAndTests) {
+  const std::string libraries = " PRIVATE fmt::fmt proofmass::microscope_model)";
+  for (const auto& [path, target] : std::vector<std::pair<std::string, std::string>>{
+           {"coordinator/cli/CMakeLists.txt", "${program}"},
+           {"coordinator/query/CMakeLists.txt", "proofmass_sqlite"},
+           {"worker/CMakeLists.txt", "proofmass-worker"},
+           {"tests/fuzz/CMakeLists.txt", "proofmass_fuzz"}}) {
+    EXPECT_THAT(check_links({path, "target_link_libraries(" + target + libraries}), IsEmpty())
+        << path;
+  }
+  EXPECT_THAT(check_links({"worker/CMakeLists.txt", "# Without proofmass::microscope.\n"}),
+              IsEmpty());
+  EXPECT_THAT(check_links({"core/CMakeLists.txt", "add_subdirectory(microscope)"}), IsEmpty());
 }
 
 TEST(CheckHeaderGuard, CatchesAHeaderWithoutOne) {
