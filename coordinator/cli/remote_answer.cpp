@@ -19,13 +19,13 @@ void add_optional_connection(CLI::App& command, ClientConnectionConfig& connecti
 void read_answer(const Ask& ask, const wire::AnswerReply& answer,
                  const std::function<void(std::string_view)>& take) {
   wire::AnswerPartRequest request{.answer_id = answer.answer_id, .offset = answer.offset};
-  for (;;) {
+  while (request.offset < answer.size) {
     const auto part = reply_of<wire::AnswerPartReply>(ask, request);
     if (part.content.empty()) return;
     take(part.content);
     request.offset += part.content.size();
-    if (request.offset > answer.size) throw Error("answer = longer than it was (ask again)");
   }
+  if (request.offset > answer.size) throw Error("answer = longer than it was (ask again)");
 }
 
 int print_answer(const ClientConnectionConfig& connection, const wire::AnswerRequest& question,

@@ -25,7 +25,7 @@ void add_optional_connection(CLI::App& command, ClientConnectionConfig& connecti
   return !connection.endpoint.empty();
 }
 
-/// Reads an answer from its offset on, part by part.
+/// Reads an answer from its offset on, part by part, and asks for nothing beyond its size.
 /// @param take  Called with each part.
 /// @throws Error if the coordinator does not keep it any more; what `take` throws.
 void read_answer(const Ask& ask, const wire::AnswerReply& answer,

@@ -307,12 +307,24 @@ Answers::~Answers() {
 void Answers::require_room(const std::string& owner) const {
   const auto num_own =
       static_cast<std::size_t>(std::ranges::count(computing_, owner, &Computing::owner));
+  const auto num_unread = static_cast<std::size_t>(
+      std::ranges::count_if(kept_, [](const auto& item) { return !item.second.is_read; }));
   const bool is_full = computing_.size() >= num_computing_max ||
-                       kept_.size() + computing_.size() >= num_kept_max ||
+                       num_unread + computing_.size() >= num_kept_max ||
                        (!owner.empty() && num_own >= num_computing_per_key);
   if (!is_full) return;
   throw Error(fmt::format("questions = {} (are being answered, as many as may be; try again later)",
-                          computing_.size() + kept_.size()));
+                          computing_.size() + num_unread));
+}
+
+void Answers::make_room() {
+  if (kept_.size() + computing_.size() < num_kept_max) return;
+  auto oldest = kept_.end();
+  for (auto item = kept_.begin(); item != kept_.end(); ++item) {
+    const bool is_older = oldest == kept_.end() || item->second.read_at < oldest->second.read_at;
+    if (item->second.is_read && is_older) oldest = item;
+  }
+  if (oldest != kept_.end()) kept_.erase(oldest);
 }
 
 void Answers::ask(const wire::AnswerRequest& request, const std::filesystem::path& database,
@@ -324,6 +336,7 @@ void Answers::ask(const wire::AnswerRequest& request, const std::filesystem::pat
   const std::uint64_t id = std::max<std::uint64_t>(1, context_.start.epoch.value + num_answers_++);
   const Order order = order_for(request, context_.config, database, id);
   if (order.copy) require_space(order, database);
+  make_room();
   const auto is_cancelled = std::make_shared<std::atomic<bool>>(false);
   const auto compute = [order, id, is_cancelled]() -> Computed {
     try {
@@ -363,7 +376,9 @@ wire::AnswerPartReply Answers::part(const wire::AnswerPartRequest& request, cons
   kept.read_at = context_.now();
   wire::AnswerPartReply reply{.content =
                                   kept.file->read(request.offset, wire::answer_part_size_max)};
-  if (reply.content.empty()) kept_.erase(found);
+  const bool is_end = request.offset >= kept.size ||  // So that the difference is not negative.
+                      kept.size - request.offset <= reply.content.size();
+  if (is_end) kept.is_read = true;
   return reply;
 }
 
@@ -375,15 +390,21 @@ void Answers::review() {
     item = is_there ? computing_.erase(item) : std::next(item);
   }
   const TimePoint now = context_.now();
-  std::erase_if(kept_, [&](const auto& item) { return now - item.second.read_at > kept_for; });
+  std::erase_if(kept_, [&](const auto& item) {
+    return now - item.second.read_at > (item.second.is_read ? kept_after_end : kept_for);
+  });
 }
 
 void Answers::finish(Computing& computing) {
   Computed computed = computing.result.get();
   if (!computed.failure.empty()) return computing.respond(wire::ErrorReply{computed.failure});
-  kept_.emplace(
-      computed.reply.answer_id,
-      Kept{.owner = computing.owner, .file = std::move(computed.file), .read_at = context_.now()});
+  // A client that lacks nothing, of an empty answer for example, reads no part of it.
+  kept_.emplace(computed.reply.answer_id,
+                Kept{.owner = computing.owner,
+                     .file = std::move(computed.file),
+                     .size = computed.reply.size,
+                     .read_at = context_.now(),
+                     .is_read = computed.reply.offset >= computed.reply.size});
   computing.respond(std::move(computed.reply));
 }
 

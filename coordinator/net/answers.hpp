@@ -37,14 +37,17 @@ class UnnamedFile {
 
 /// Answers clients' questions about results. Each is answered by the program `proofmass` in a
 /// process of its own, with the command that a user would type on this machine: what a question
-/// needs of time and memory never holds up the service. Its output is kept until the client has
-/// read it, in parts.
+/// needs of time and memory never holds up the service. Its output is kept until it has been read,
+/// in parts. Several clients may read the same answer: the gateway joins those who ask the same.
 class Answers {
  public:
   static constexpr std::size_t num_computing_max = 4;      ///< Processes at a time.
   static constexpr std::size_t num_computing_per_key = 2;  ///< Of those.
   static constexpr std::size_t num_kept_max = 16;          ///< Answers that are being read.
   static constexpr std::chrono::seconds kept_for{60};      ///< After it was last read.
+  /// The same for an answer that was read to its end: another client may still be reading it. It
+  /// does not count against num_kept_max, and makes room when that many are held.
+  static constexpr std::chrono::seconds kept_after_end{10};
   /// Of an answer, bytes, unless it is a copy of the database.
   static constexpr std::uint64_t size_max = std::uint64_t{64} << 20;
 
@@ -84,10 +87,14 @@ class Answers {
   struct Kept {
     std::string owner;
     std::unique_ptr<UnnamedFile> file;
+    std::uint64_t size = 0;  ///< Bytes.
     TimePoint read_at;
+    bool is_read = false;  ///< To its end, by one client at least.
   };
 
   void require_room(const std::string& owner) const;
+  /// Drops the answer that was read to its end longest ago, if as many are held as may be.
+  void make_room();
   void finish(Computing& computing);
 
   const ServiceContext& context_;

@@ -205,7 +205,7 @@ struct PartReply {
 struct WaitReply {};
 
 /// The answer to an AnswerRequest is ready to be read. It is kept for a minute after it was last
-/// read.
+/// read; for ten seconds once it was read to its end, or less if others need the room.
 struct AnswerReply {
   std::uint64_t answer_id = 0;  ///< Not 0.
   std::uint64_t size = 0;       ///< Bytes.

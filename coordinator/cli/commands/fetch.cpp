@@ -31,12 +31,17 @@ struct FetchOptions {
   std::optional<std::filesystem::path> file;  ///< By default NAME.db.
 };
 
-/// What has arrived of a database, in a file that outlives this process: a later one goes on.
+/// What has arrived of a database, in a file that outlives this process: a later one goes on. There
+/// is no file as long as nothing has arrived.
 class ArrivedPart {
  public:
-  /// @throws Error if the file cannot be opened, or read if it is there.
+  /// @throws Error if the file is there and cannot be read, or is not and cannot be made.
   explicit ArrivedPart(std::filesystem::path path) : path_(std::move(path)) {
-    descriptor_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    descriptor_ = open(path_.c_str(), O_RDWR | O_CLOEXEC);
+    if (descriptor_ < 0 && errno == ENOENT) {
+      check_directory();
+      return;
+    }
     if (descriptor_ < 0) fail();
     std::vector<char> block(std::size_t{1} << 20);
     Sha256 hash;
@@ -57,11 +62,18 @@ class ArrivedPart {
   [[nodiscard]] const std::string& sha256() const { return sha256_; }
 
   void clear() {
-    if (ftruncate(descriptor_, 0) != 0 || lseek(descriptor_, 0, SEEK_SET) != 0) fail();
+    if (descriptor_ < 0) return;
+    if (unlink(path_.c_str()) != 0 && errno != ENOENT) fail();
+    close(descriptor_);
+    descriptor_ = -1;
     size_ = 0;
   }
 
   void append(std::string_view bytes) {
+    if (descriptor_ < 0) {
+      descriptor_ = open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+      if (descriptor_ < 0) fail();
+    }
     while (!bytes.empty()) {
       const ssize_t num_written = write(descriptor_, bytes.data(), bytes.size());
       if (num_written < 0 && errno == EINTR) continue;
@@ -72,6 +84,12 @@ class ArrivedPart {
   }
 
  private:
+  /// So that the coordinator makes no copy in vain.
+  void check_directory() const {
+    const std::filesystem::path directory = path_.parent_path();
+    if (access(directory.empty() ? "." : directory.c_str(), W_OK | X_OK) != 0) fail();
+  }
+
   [[noreturn]] void fail() const {
     throw Error(fmt::format("file = {} ({})", path_.string(), std::strerror(errno)));
   }

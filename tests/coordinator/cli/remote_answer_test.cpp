@@ -10,6 +10,7 @@
 #include <fstream>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "coordinator/net/answers.hpp"
@@ -17,6 +18,7 @@
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/net/playing_client.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
+#include "tests/message_of.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -193,13 +195,50 @@ TEST_F(Answering, KeepsNoMoreAnswersThanItMay) {
   EXPECT_THAT(client->error(AnswerRequest{.campaign = "a"}), StartsWith("questions = 16 (are"));
 }
 
-TEST_F(Answering, DropsAnAnswerThatWasReadToItsEnd) {
-  start_with("echo hello");
-  const AnswerReply answer = answer_to({.campaign = "a"});
-  EXPECT_EQ(part(answer, answer.size), "");
-  const AnswerPartRequest again{.answer_id = answer.answer_id, .offset = 0};
-  EXPECT_THAT(client->error(again), HasSubstr("(is not kept any more; ask again)"));
-  EXPECT_THAT(client->error(AnswerPartRequest{.answer_id = 1}), HasSubstr("(is not kept"));
+// Their requests have the same bytes, so one process answers both. A client's requests are taken in
+// order: once it has the status, its question was taken.
+TEST_F(Answering, GivesOneAnswerToAllWhoAskTheSameAtTheSameTime) {
+  const std::filesystem::path gate = directory / "gate";
+  start_with("until [ -e '" + gate.string() + "' ]; do :; done; echo hello");
+  test::PlayingClient other(service->clients_endpoint());
+  for (test::PlayingClient* const asking : {&*client, &other}) {
+    asking->send(100, AnswerRequest{.campaign = "a"});
+    (void)asking->status();
+  }
+  std::ofstream{gate};
+  const auto answer = std::get<AnswerReply>(client->receive_final().reply);
+  EXPECT_EQ(std::get<AnswerReply>(other.receive_final().reply).answer_id, answer.answer_id);
+  for (test::PlayingClient* const reading : {&*client, &other}) {
+    for (const auto& [offset, content] : {std::pair(0U, "hello\n"), std::pair(6U, "")}) {
+      const AnswerPartRequest request{.answer_id = answer.answer_id, .offset = offset};
+      EXPECT_EQ(std::get<AnswerPartReply>(reading->ask(request)).content, content);
+    }
+  }
+}
+
+TEST_F(Answering, KnowsNoAnswerThatItDidNotGive) {
+  start_with("echo never");
+  EXPECT_EQ(client->error(AnswerPartRequest{.answer_id = 1}),
+            "answer = 0000000000000001 (is not kept any more; ask again)");
+}
+
+TEST_F(Answering, LeavesNoFileOfAFetchThatIsRefused) {
+  start_with("echo 'database = x (is damaged)' >&2; exit 1");
+  const std::filesystem::path copy = directory / "copy.db";
+  const test::Answer answer =
+      test::answer_of({"fetch", "a", copy, "--connect", service->clients_endpoint()});
+  EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
+  EXPECT_THAT(answer.error, StartsWith("database = x (is damaged)"));
+  EXPECT_FALSE(std::filesystem::exists(directory / "copy.db.part"));
+}
+
+TEST(Fetch, LeavesNoFileIfNobodyIsThere) {
+  const test::TemporaryDirectory directory;
+  const std::string endpoint = "ipc://" + (directory / "nobody").string();
+  const test::Answer answer = test::answer_of(
+      {"fetch", "a", directory / "copy.db", "--connect", endpoint, "--timeout", "0.02"});
+  EXPECT_EQ(answer.error, "connect = " + endpoint + " (nobody there; waited 0.02 s)");
+  EXPECT_FALSE(std::filesystem::exists(directory / "copy.db.part"));
 }
 
 // The script copies the file that it is to back up.
@@ -256,6 +295,7 @@ class MadeUpAnswer : public testing::Test {
     std::size_t next = 0;
     const Ask ask = [&](const wire::ClientRequest& request) -> wire::ClientReply {
       EXPECT_EQ(std::get<AnswerPartRequest>(request).offset, taken.size());
+      ++num_asked_;
       return AnswerPartReply{next < parts.size() ? parts[next++] : ""};
     };
     AnswerReply answer;
@@ -264,12 +304,23 @@ class MadeUpAnswer : public testing::Test {
     read_answer(ask, answer, [&](std::string_view text) { taken += text; });
     return taken;
   }
+
+  int num_asked_ = 0;  ///< Parts.
 };
 
 TEST_F(MadeUpAnswer, IsReadToItsEnd) { EXPECT_EQ(read({"ab", "c", "def"}, 6), "abcdef"); }
 
-TEST_F(MadeUpAnswer, HasAnEnd) {
-  EXPECT_THROW((void)read(std::vector<std::string>(100, "ab"), 6), Error);
+// The coordinator may end, or drop the answer, as soon as all of it has been sent.
+TEST_F(MadeUpAnswer, IsAskedForNothingBeyondItsSize) {
+  EXPECT_EQ(read({"ab", "c"}, 3), "abc");
+  EXPECT_EQ(num_asked_, 2);
+  EXPECT_EQ(read({}, 0), "");
+  EXPECT_EQ(num_asked_, 2);
+}
+
+TEST_F(MadeUpAnswer, IsNoLongerThanItsSize) {
+  EXPECT_EQ(test::message_of<Error>([&] { (void)read(std::vector<std::string>(100, "ab"), 5); }),
+            "answer = longer than it was (ask again)");
 }
 
 }  // namespace

@@ -58,10 +58,18 @@ class AnswersTest : public testing::Test {
     ASSERT_EQ(replies_.size(), num_replies);
   }
 
-  /// @pre The last question was answered.
+  /// Of the answer to the last question that was answered.
   std::string part(const std::string& key, std::uint64_t offset = 0) {
-    const auto& answer = std::get<wire::AnswerReply>(replies_.back());
+    return part(key, offset, replies_.size() - 1);
+  }
+  std::string part(const std::string& key, std::uint64_t offset, std::size_t question) {
+    const auto& answer = std::get<wire::AnswerReply>(replies_.at(question));
     return answers_.part({.answer_id = answer.answer_id, .offset = offset}, {.name = key}).content;
+  }
+
+  bool is_dropped(std::size_t question = 0) {
+    const std::string refusal = test::message_of<Error>([&] { (void)part("anna", 0, question); });
+    return refusal.ends_with("(is not kept any more; ask again)");
   }
 
   test::TemporaryDirectory directory_;
@@ -99,15 +107,55 @@ TEST_F(AnswersTest, AreComputedForEachKeyTwoAtATimeAndFourForAll) {
 }
 
 TEST_F(AnswersTest, AreDroppedAMinuteAfterTheyWereLastRead) {
+  answer_with("head -c 2000000 /dev/zero");  // The first part does not reach its end.
+  ask("anna");
+  wait_for(1);
+  EXPECT_EQ(part("anna").size(), std::size_t{1} << 20);
+  now_ += Answers::kept_for;
+  answers_.review();
+  EXPECT_EQ(part("anna", 3).size(), std::size_t{1} << 20);
+  now_ += Answers::kept_for + std::chrono::milliseconds(1);
+  answers_.review();
+  EXPECT_TRUE(is_dropped());
+}
+
+// Clients that asked the same read one answer, each at its own pace.
+TEST_F(AnswersTest, AreDroppedTenSecondsAfterTheyWereReadToTheirEnd) {
   ask("anna");
   wait_for(1);
   EXPECT_EQ(part("anna"), "answered\n");
-  now_ += Answers::kept_for;
+  EXPECT_EQ(part("anna", 9), "");
+  now_ += Answers::kept_after_end;
   answers_.review();
-  EXPECT_EQ(part("anna", 3), "wered\n");
-  now_ += Answers::kept_for + std::chrono::milliseconds(1);
+  EXPECT_EQ(part("anna"), "answered\n");
+  now_ += Answers::kept_after_end + std::chrono::milliseconds(1);
   answers_.review();
-  EXPECT_THAT(test::message_of<Error>([&] { (void)part("anna"); }), HasSubstr("is not kept"));
+  EXPECT_TRUE(is_dropped());
+}
+
+TEST_F(AnswersTest, MakeRoomForOthersOnceTheyWereReadToTheirEnd) {
+  for (std::size_t i = 0; i < Answers::num_kept_max; ++i) {
+    ask("anna");
+    wait_for(i + 1);
+    EXPECT_EQ(part("anna"), "answered\n");
+    now_ += std::chrono::milliseconds(1);
+  }
+  EXPECT_EQ(part("anna", 0, 0), "answered\n");  // Now the second was read longest ago.
+  now_ += std::chrono::milliseconds(1);
+  ask("anna");
+  EXPECT_FALSE(is_dropped(0));
+  EXPECT_TRUE(is_dropped(1));
+  EXPECT_FALSE(is_dropped(2));
+  wait_for(Answers::num_kept_max + 1);
+  EXPECT_EQ(part("anna"), "answered\n");
+}
+
+TEST_F(AnswersTest, ThatAreEmptyNeedNotBeReadToMakeRoom) {
+  answer_with(":");
+  for (std::size_t i = 0; i < Answers::num_kept_max + 1; ++i) {
+    ask("anna");
+    wait_for(i + 1);
+  }
 }
 
 TEST_F(AnswersTest, AreComputedWithinLimitsThatTheProcessCannotRaise) {
