@@ -37,7 +37,7 @@ class ClientConnection::Impl {
   explicit Impl(const ClientConnectionConfig& config)
       : config_(config),
         security_(security_of(config)),
-        dealer_(wire::make_dealer(context_, security_)),
+        dealer_(wire::make_dealer(context_, security_, wire::KeyRole::client)),
         monitor_(context_, dealer_, config.endpoint, security_, Clock::now()) {}
 
   wire::ClientReply ask(const wire::ClientRequest& request) {
@@ -95,12 +95,22 @@ class ClientConnection::Impl {
   [[noreturn]] void fail_late() const {
     const double waited_s = config_.reply_wait.count();
     if (monitor_.is_connected()) fail(fmt::format("no answer within {:.3g} s", waited_s));
+    if (refusal_) throw Error(*refusal_);
     fail(fmt::format("nobody there; waited {:.3g} s", waited_s));
   }
 
+  /// Before the first connection a refusal is a mistake in the options. After it, it may pass: a
+  /// tunnel breaks connections off while the coordinator behind it starts again.
   void check_admission() {
     monitor_.update(Clock::now());
-    if (const auto refusal = monitor_.take_refusal()) throw Error(*refusal);
+    if (monitor_.is_connected()) {
+      was_admitted_ = true;
+      refusal_.reset();
+    }
+    if (auto refusal = monitor_.take_refusal()) {
+      if (!was_admitted_) throw Error(*refusal);
+      refusal_ = std::move(refusal);
+    }
   }
 
   bool send(const std::string& bytes) {
@@ -147,6 +157,8 @@ class ClientConnection::Impl {
   zmq::context_t context_;
   zmq::socket_t dealer_;
   wire::ConnectionMonitor monitor_;
+  bool was_admitted_ = false;           ///< By this coordinator, at some time.
+  std::optional<std::string> refusal_;  ///< The last one since the last connection.
   std::uint64_t request_id_ = 0;
   std::string request_;       ///< The bytes of the last one.
   std::uint64_t offset_ = 0;  ///< Of the part to be sent, if it travels in parts.

@@ -34,6 +34,9 @@ class ClientConnection {
   /// says that it is at work. The request is sent again when the connection was lost meanwhile, so
   /// the coordinator may carry it out twice; each leads to the same end as once.
   ///
+  /// Refused connections end the wait at once if there was never a successful one. Otherwise the
+  /// coordinator may be starting again, and a refusal is only the reason if time runs out.
+  ///
   /// @return The reply, which may be that the request is refused.
   /// @throws Error reading `connect = endpoint (reason)` if nobody is there, the coordinator lets
   ///         this client not in, or it does not answer in time or in the same words;

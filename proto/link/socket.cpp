@@ -25,8 +25,12 @@ constexpr int tcp_idle_s = 10;
 constexpr int tcp_probe_interval_s = 3;
 constexpr int tcp_probe_count = 3;
 constexpr int tcp_unconfirmed_max = 20000;
+// Intervals double from the least to the most. A person waits for a client, and the coordinator may
+// be there for a few seconds only. Workers come by the thousand: with the longer interval their
+// handshakes are spread, and they are back within the 15 s that a new coordinator waits for them.
 constexpr int reconnect_interval_min = 100;
-constexpr int reconnect_interval_max = 5000;
+constexpr int reconnect_interval_max_of_client = 1000;
+constexpr int reconnect_interval_max_of_worker = 5000;
 constexpr int linger_of_router = 1000;
 constexpr int linger_of_dealer = 2000;
 
@@ -89,13 +93,15 @@ zmq::socket_t make_router(zmq::context_t& context, std::string_view option,
   return socket;
 }
 
-zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& security) {
+zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& security, KeyRole role) {
   zmq::socket_t socket(context, zmq::socket_type::dealer);
   limit(socket, message_size_max, linger_of_dealer);
   // Without a connection nothing is queued: a peer that needs an answer asks again.
   socket.set(zmq::sockopt::immediate, true);
   socket.set(zmq::sockopt::reconnect_ivl, reconnect_interval_min);
-  socket.set(zmq::sockopt::reconnect_ivl_max, reconnect_interval_max);
+  socket.set(zmq::sockopt::reconnect_ivl_max, role == KeyRole::client
+                                                  ? reconnect_interval_max_of_client
+                                                  : reconnect_interval_max_of_worker);
   if (security.identity) {
     socket.set(zmq::sockopt::curve_serverkey, security.identity->coordinator.text());
     socket.set(zmq::sockopt::curve_publickey, security.identity->keys.public_key.text());

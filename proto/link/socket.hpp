@@ -33,7 +33,10 @@ namespace proofmass::wire {
                                         std::optional<int> listener = std::nullopt);
 
 /// A DEALER, not connected yet: a ConnectionMonitor connects it.
-[[nodiscard]] zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& security);
+/// @param role  Worker or client, with or without keys: while nobody is there a client tries again
+///              at least once a second, a worker every 5 s.
+[[nodiscard]] zmq::socket_t make_dealer(zmq::context_t& context, const ClientSecurity& security,
+                                        KeyRole role = KeyRole::worker);
 
 /// Wakes a loop that polls file descriptors, from any thread.
 class Wake {

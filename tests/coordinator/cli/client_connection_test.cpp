@@ -3,6 +3,10 @@
 #include "coordinator/net/client_connection.hpp"
 
 #include <gmock/gmock.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cstdint>
@@ -22,6 +26,44 @@ namespace {
 
 using test::PlayedCoordinator;
 using ::testing::StartsWith;
+
+/// Takes connections to a socket file and breaks them off, as the near end of a tunnel does while
+/// there is no coordinator at its far end.
+class Tunnel {
+ public:
+  explicit Tunnel(const std::string& endpoint)
+      : path_(endpoint.substr(std::string("ipc://").size())),
+        listener_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    const timeval patience{.tv_sec = 20, .tv_usec = 0};
+    ::setsockopt(listener_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path_.copy(address.sun_path, sizeof address.sun_path - 1);
+    ::unlink(path_.c_str());
+    if (::bind(listener_, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0 ||
+        ::listen(listener_, 8) != 0) {
+      throw Error("cannot listen at " + endpoint);
+    }
+  }
+  ~Tunnel() {
+    ::close(listener_);
+    ::unlink(path_.c_str());
+  }
+  Tunnel(const Tunnel&) = delete;
+  Tunnel& operator=(const Tunnel&) = delete;
+
+  void break_off(int num_connections) {
+    for (int i = 0; i < num_connections; ++i) {
+      const int connection = ::accept(listener_, nullptr, nullptr);
+      if (connection < 0) throw Error("nobody connects");
+      ::close(connection);
+    }
+  }
+
+ private:
+  std::string path_;
+  int listener_;
+};
 
 class ClientOfAPlayedCoordinator : public testing::Test {
  protected:
@@ -43,6 +85,11 @@ class ClientOfAPlayedCoordinator : public testing::Test {
     });
   }
 
+  /// What the client says of a peer that breaks off.
+  std::string broken_off() const {
+    return "coordinator = " + endpoint_.address() +
+           " (breaks the connection off: it wants --keys, or is no coordinator)";
+  }
   std::string failed(const std::string& reason) const {
     return "connect = " + endpoint_.address() + " (" + reason + ")";
   }
@@ -121,6 +168,39 @@ TEST_F(ClientOfAPlayedCoordinator, AsksAgainWhenTheCoordinatorWasAway) {
   EXPECT_EQ(coordinator->receive().id, id);
   coordinator->answer(id, "after all");
   EXPECT_EQ(reply.get(), "after all");
+}
+
+TEST_F(ClientOfAPlayedCoordinator, AsksAgainThroughATunnelWhenTheCoordinatorWasAway) {
+  auto coordinator = std::make_unique<PlayedCoordinator>(endpoint_.address());
+  ClientConnection client(config());
+  auto reply = ask(client);
+  const std::uint64_t id = coordinator->receive().id;
+  coordinator.reset();
+  Tunnel(endpoint_.address()).break_off(5);
+  coordinator = std::make_unique<PlayedCoordinator>(endpoint_.address());
+  EXPECT_EQ(coordinator->receive().id, id);
+  coordinator->answer(id, "after all");
+  EXPECT_EQ(reply.get(), "after all");
+}
+
+// By the third connection the client's socket has seen two break, after which it is a refusal.
+TEST_F(ClientOfAPlayedCoordinator, SaysWhatItMetWhenItsTimeRunsOut) {
+  auto coordinator = std::make_unique<PlayedCoordinator>(endpoint_.address());
+  ClientConnection client(config(0.5));
+  auto reply = ask(client);
+  coordinator->answer(coordinator->receive().id, "x");
+  EXPECT_EQ(reply.get(), "x");
+  coordinator.reset();
+  Tunnel(endpoint_.address()).break_off(3);
+  EXPECT_EQ(ask(client).get(), broken_off());
+}
+
+TEST_F(ClientOfAPlayedCoordinator, DoesNotWaitForAPeerThatBreaksOffFromTheFirst) {
+  Tunnel tunnel(endpoint_.address());
+  ClientConnection client(config(3600.0));
+  auto reply = ask(client);
+  tunnel.break_off(2);
+  EXPECT_EQ(reply.get(), broken_off());
 }
 
 TEST_F(ClientOfAPlayedCoordinator, GivesUpInTime) {

@@ -47,6 +47,18 @@ TEST(Router, SaysWhyItCannotBeBound) {
             "bind_clients = " + endpoint + " (Address already in use)");
 }
 
+// A coordinator may be back for a few seconds only, and a client waits 10 s by default.
+TEST(Dealer, OfAClientTriesAgainEachSecond) {
+  zmq::context_t context;
+  const auto interval_max = [&](KeyRole role) {
+    const zmq::socket_t dealer = make_dealer(context, {}, role);
+    EXPECT_EQ(dealer.get(zmq::sockopt::reconnect_ivl), 100);
+    return dealer.get(zmq::sockopt::reconnect_ivl_max);
+  };
+  EXPECT_EQ(interval_max(KeyRole::client), 1000);
+  EXPECT_EQ(interval_max(KeyRole::worker), 5000);
+}
+
 // A limit that is set but not obeyed is none.
 TEST(Router, ClosesTheConnectionOfWhoSendsTooMuch) {
   zmq::context_t context;
