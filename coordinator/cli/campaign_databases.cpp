@@ -59,30 +59,46 @@ void extend_same(Store& store, const Campaign& wanted, const std::filesystem::pa
   if (wanted.num_runs > store.num_runs()) store.extend(wanted, text_of(wanted));
 }
 
+namespace {
+
+void check_plan(const Campaign& wanted, const StopPlan& plan) {
+  if (plan.stop_rule.empty() || wanted.table_columns.empty()) return;
+  throw UsageError(
+      fmt::format("until = {} (must not be with quantities whose law is a table)", plan.stop_rule));
+}
+
+/// The campaign as it is to be for now; shared with the dispatch and with messages under way.
+std::shared_ptr<const Campaign> with_horizon(const Campaign& wanted, const StopPlan& plan,
+                                             std::uint64_t num_runs_now) {
+  std::shared_ptr<Campaign> campaign = wanted.clone();
+  campaign->num_runs = horizon_of(plan, wanted.num_runs, num_runs_now);
+  return campaign;
+}
+
+/// The database after require_same() and extend_same().
+ServedCampaign open_same(const Campaign& wanted, const StopPlan& plan,
+                         const std::filesystem::path& database, std::string_view remedy,
+                         const Asker& asker) {
+  check_plan(wanted, plan);
+  Store store = Store::open(database);
+  require_control(asker, wanted.name, store.owner());
+  const std::shared_ptr<const Campaign> campaign = with_horizon(wanted, plan, store.num_runs());
+  require_same(store, *campaign, database, remedy);
+  extend_same(store, *campaign, database);
+  if (store.stop_plan() != plan) store.set_stop_plan(plan);
+  return {.file = database, .store = std::move(store), .definition = campaign};
+}
+
+}  // namespace
+
 ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,
                               const std::filesystem::path& database, std::string_view remedy,
                               const Asker& asker) {
-  if (!plan.stop_rule.empty() && !wanted.table_columns.empty()) {
-    throw UsageError(fmt::format("until = {} (must not be with quantities whose law is a table)",
-                                 plan.stop_rule));
-  }
-  // Shared with the dispatch and with messages under way.
-  const std::shared_ptr<Campaign> campaign = wanted.clone();
-  const auto set_horizon = [&](std::uint64_t num_runs_now) {
-    campaign->num_runs = horizon_of(plan, wanted.num_runs, num_runs_now);
-  };
-  const bool is_new = !std::filesystem::exists(database);
-  if (is_new) set_horizon(0);
-  Store store =
-      is_new ? Store::create(database, *campaign, text_of(*campaign)) : Store::open(database);
-  if (is_new) {
-    if (!asker.name.empty()) store.set_owner(asker.name);
-  } else {
-    require_control(asker, wanted.name, store.owner());
-    set_horizon(store.num_runs());
-    require_same(store, *campaign, database, remedy);
-    extend_same(store, *campaign, database);
-  }
+  if (std::filesystem::exists(database)) return open_same(wanted, plan, database, remedy, asker);
+  check_plan(wanted, plan);
+  const std::shared_ptr<const Campaign> campaign = with_horizon(wanted, plan, 0);
+  Store store = Store::create(database, *campaign, text_of(*campaign));
+  if (!asker.name.empty()) store.set_owner(asker.name);
   if (store.stop_plan() != plan) store.set_stop_plan(plan);
   return {.file = database, .store = std::move(store), .definition = campaign};
 }
@@ -170,6 +186,12 @@ std::filesystem::path CampaignFolder::archive(const std::filesystem::path& file)
 ServedCampaign CampaignFolder::open(const Campaign& wanted, const StopPlan& plan,
                                     const Asker& asker) {
   return open_or_create(wanted, plan, file_of(wanted), remedy, asker);
+}
+
+// The file may have come from elsewhere, under any name.
+ServedCampaign CampaignFolder::open_again(const std::filesystem::path& file, const Campaign& wanted,
+                                          const StopPlan& plan, const Asker& asker) {
+  return open_same(wanted, plan, file, remedy, asker);
 }
 
 void CampaignFolder::require_same(const std::filesystem::path& file, const Campaign& wanted) {

@@ -65,6 +65,8 @@ class CampaignFolder final : public CampaignFiles, public CampaignDirectory {
 
   [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan& plan,
                                     const Asker& asker) override;
+  [[nodiscard]] ServedCampaign open_again(const std::filesystem::path& file, const Campaign& wanted,
+                                          const StopPlan& plan, const Asker& asker) override;
   void require_same(const std::filesystem::path& file, const Campaign& wanted) override;
   [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,
                                                        const Campaign& wanted) override;

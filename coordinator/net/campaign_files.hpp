@@ -41,14 +41,19 @@ class CampaignFiles {
  public:
   virtual ~CampaignFiles() = default;
 
-  /// The file for a campaign that is not served: a new one, or one that was served before. With a
-  /// stop rule it has as many runs as the rule is to be checked with next. Called in a background
-  /// thread.
+  /// The file for a campaign that the service does not know: a new one, or one that has been there
+  /// since a service before. With a stop rule it has as many runs as the rule is to be checked with
+  /// next. Called in a background thread.
   ///
   /// @param asker  Its name becomes the owner of a new file.
   /// @throws Error if there is another campaign in the file, naming what differs, or one that the
   ///         asker may not control.
   virtual ServedCampaign open(const Campaign& wanted, const StopPlan& plan, const Asker& asker) = 0;
+
+  /// The same for a campaign that was served before from this file, whatever the file is called.
+  /// @throws Error likewise; StoreError if there is no such file any more.
+  virtual ServedCampaign open_again(const std::filesystem::path& file, const Campaign& wanted,
+                                    const StopPlan& plan, const Asker& asker) = 0;
 
   /// Compares a served file with the campaign that is wanted, whatever its number of runs. Called
   /// in a background thread, before extend().

@@ -213,12 +213,12 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
     deferred_.push_back({.request = request, .asker = asker, .respond = std::move(respond)});
     return;
   }
-  const std::string& owner = entry ? entry->owner : asker.name;
-  check_limits(owner, definition_size(*request->campaign), !entry || entry->is_closed);
+  check_limits(entry ? entry->owner : asker.name, definition_size(*request->campaign),
+               !entry || entry->is_closed);
   if (entry && !entry->is_closed) {
     change_served(entry->id, request, std::move(respond));
   } else {
-    open_file(request, asker, owner, std::move(respond));
+    open_file(request, asker, entry, std::move(respond));
   }
 }
 
@@ -263,11 +263,17 @@ void RequestService::check_limits(const std::string& owner, std::uint64_t size, 
 }
 
 void RequestService::open_file(const Submitted& request, const Asker& asker,
-                               const std::string& owner, Respond respond) {
+                               const std::optional<CampaignService::Entry>& closed,
+                               Respond respond) {
   CampaignFiles& files = *context_.config.files;
   serve_opened(
-      request->campaign->name, {.owner = owner, .size = definition_size(*request->campaign)},
-      [&files, request, asker] { return files.open(*request->campaign, plan_of(*request), asker); },
+      request->campaign->name,
+      {.owner = closed ? closed->owner : asker.name, .size = definition_size(*request->campaign)},
+      [&files, request, asker, closed] {
+        const StopPlan plan = plan_of(*request);
+        return closed ? files.open_again(closed->file, *request->campaign, plan, asker)
+                      : files.open(*request->campaign, plan, asker);
+      },
       [request](Store& store) {
         const CampaignControl control = store.control();
         write(store, CampaignControl{.phase = Phase::active,

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -65,8 +66,9 @@ class RequestService {
   void submit(const Submitted& request, const Asker& asker, Respond respond);
   [[nodiscard]] bool is_busy(const std::string& name) const;
   void check_limits(const std::string& owner, std::uint64_t size, bool is_new) const;
-  void open_file(const Submitted& request, const Asker& asker, const std::string& owner,
-                 Respond respond);
+  /// @param closed  The campaign if it has been served; otherwise its file may have to be made.
+  void open_file(const Submitted& request, const Asker& asker,
+                 const std::optional<CampaignService::Entry>& closed, Respond respond);
   /// Opens the file of a campaign that has ended, and resumes it or retries its runs.
   void reopen(const CampaignService::Entry& campaign, wire::ControlAction action, Respond respond);
   void change_served(CampaignId id, const Submitted& request, Respond respond);

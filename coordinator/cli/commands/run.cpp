@@ -85,6 +85,10 @@ class GrowingFile final : public CampaignFiles {
                                     const Asker&) override {
     throw UsageError(fmt::format("submit = {} (nobody is there to submit)", wanted.name));
   }
+  [[nodiscard]] ServedCampaign open_again(const std::filesystem::path&, const Campaign& wanted,
+                                          const StopPlan& plan, const Asker& asker) override {
+    return open(wanted, plan, asker);
+  }
   [[nodiscard]] std::shared_ptr<const Campaign> extend(Store& store,
                                                        const Campaign& wanted) override {
     store.extend(wanted, wanted.definition(TableColumns::left_out).text);

@@ -225,6 +225,20 @@ TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
   EXPECT_THAT(served(), ElementsAre("a"));
 }
 
+// Somebody computed the campaign elsewhere, and put its file into the directory.
+TEST_F(ServiceWithADirectory, ExtendsAClosedCampaignInItsFileWhateverThatIsCalled) {
+  make_finished_file("a");
+  fs::rename(directory / "a.db", directory / "small.db");
+  start_service();
+  EXPECT_EQ(
+      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))}),
+      "campaign a: active, 3 runs, 0 of them done");
+  EXPECT_THAT(served(), ElementsAre("a"));
+  EXPECT_FALSE(fs::exists(directory / "a.db"));
+  end(StopRequest::now);
+  EXPECT_EQ(Store::open_read_only(directory / "small.db").num_runs(), 3U);
+}
+
 // A file that is open can be restored if it is removed.
 TEST_F(ServiceWithADirectory, KeepsTheFilesOpenThatFinishedLast) {
   config.finished_open_max = 1;

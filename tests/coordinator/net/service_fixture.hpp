@@ -46,6 +46,14 @@ class PlainFiles final : public coordinator::CampaignFiles {
     store.set_stop_plan(plan);
     return {.file = file, .store = std::move(store), .definition = wanted.clone()};
   }
+  coordinator::ServedCampaign open_again(const std::filesystem::path& file, const Campaign& wanted,
+                                         const coordinator::StopPlan& plan,
+                                         const coordinator::Asker&) override {
+    coordinator::Store store = coordinator::Store::open(file);
+    (void)extend(store, wanted);
+    store.set_stop_plan(plan);
+    return {.file = file, .store = std::move(store), .definition = wanted.clone()};
+  }
   std::shared_ptr<const Campaign> extend(coordinator::Store& store,
                                          const Campaign& wanted) override {
     if (wanted.num_runs < store.num_runs()) throw Error("runs = fewer (must be more)");
