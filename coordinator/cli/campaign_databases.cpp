@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <exception>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -97,10 +99,16 @@ ServedCampaign open_or_create(const Campaign& wanted, const StopPlan& plan,
   if (std::filesystem::exists(database)) return open_same(wanted, plan, database, remedy, asker);
   check_plan(wanted, plan);
   const std::shared_ptr<const Campaign> campaign = with_horizon(wanted, plan, 0);
-  Store store = Store::create(database, *campaign, text_of(*campaign));
-  if (!asker.name.empty()) store.set_owner(asker.name);
-  if (store.stop_plan() != plan) store.set_stop_plan(plan);
-  return {.file = database, .store = std::move(store), .definition = campaign};
+  std::optional<Store> store = Store::create(database, *campaign, text_of(*campaign));
+  try {
+    if (!asker.name.empty()) store->set_owner(asker.name);
+    if (store->stop_plan() != plan) store->set_stop_plan(plan);
+  } catch (const std::exception&) {
+    store.reset();
+    remove_made(database);
+    throw;
+  }
+  return {.file = database, .store = std::move(*store), .definition = campaign, .is_new = true};
 }
 
 namespace {

@@ -9,6 +9,7 @@
 
 #include "coordinator/dispatch/campaigns.hpp"
 #include "coordinator/net/campaign_service.hpp"
+#include "coordinator/net/outcome.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
@@ -92,8 +93,13 @@ void CampaignService::begin_closing(CampaignId id, std::function<void(bool is_cl
       Served& served = served_.at(id);
       served.is_held = false;
       served.closing_at = context_.now();
-      const bool is_closing = is_folded && is_settled(id, served) && has_ended(phase_of(id));
-      if (is_closing) close_ended(id);
+      bool is_closing = is_folded && is_settled(id, served) && has_ended(phase_of(id));
+      try {
+        if (is_closing) close_ended(id);
+      } catch (const std::exception& error) {
+        say_not_closed(error.what());
+        is_closing = false;
+      }
       then(is_closing);
     };
   });
@@ -143,10 +149,10 @@ void CampaignService::archive(CampaignId id,
     throw Error(fmt::format("campaign = {} (something is still to be stored; try again)",
                             found->second.name));
   }
-  begin_closing(id, [this, id, respond](bool is_closing) {
+  begin_closing(id, [this, id, respond, name = found->second.name](bool is_closing) {
     if (is_closing) return move_to_archive(id, respond);
-    respond(wire::ErrorReply{fmt::format(
-        "campaign = {} (its database is being read or changed; try again)", served_.at(id).name)});
+    respond(wire::ErrorReply{
+        fmt::format("campaign = {} (its database is being read or changed; try again)", name)});
   });
 }
 
@@ -165,17 +171,24 @@ void CampaignService::move_to_archive(CampaignId id,
     }
     return [this, id, respond, place, failure, name] {
       if (!failure.empty()) return respond(wire::ErrorReply{failure});
-      // Looking at the directory may have found out before that the file is gone.
-      if (ended_.erase(id) > 0) {
-        std::erase(order_, id);
-        on_unlisted(state_, id);
-      }
-      outbox_.log(
-          {.kind = "campaign_archived", .fields = {{"campaign", name}, {"file", place.string()}}});
-      respond(wire::DoneReply{
-          fmt::format("campaign {}: its database is {} now", name, place.string())});
+      respond(outcome_of([&]() -> wire::ClientReply {
+        note_archived(id, name, place);
+        return wire::DoneReply{
+            fmt::format("campaign {}: its database is {} now", name, place.string())};
+      }));
     };
   });
+}
+
+void CampaignService::note_archived(CampaignId id, const std::string& name,
+                                    const std::filesystem::path& place) {
+  // Looking at the directory may have found out before that the file is gone.
+  if (ended_.erase(id) > 0) {
+    std::erase(order_, id);
+    on_unlisted(state_, id);
+  }
+  outbox_.log(
+      {.kind = "campaign_archived", .fields = {{"campaign", name}, {"file", place.string()}}});
 }
 
 void CampaignService::say_not_closed(std::string_view reason) {

@@ -1,7 +1,9 @@
 #include "coordinator/net/campaign_files.hpp"
 
 #include <algorithm>
+#include <system_error>
 
+#include "coordinator/store/draft_file.hpp"
 #include "core/statistics/stop_rule.hpp"
 
 namespace proofmass::coordinator {
@@ -11,6 +13,12 @@ std::uint64_t horizon_of(const StopPlan& plan, std::uint64_t num_runs_wanted,
   if (plan.stop_rule.empty() || num_runs_wanted < num_runs_now) return num_runs_wanted;
   const std::uint64_t num_before = num_runs_now == 0 ? 0 : num_runs_now - 1;
   return std::min(next_stop_check(num_before), num_runs_wanted);
+}
+
+void remove_made(const std::filesystem::path& file) {
+  std::error_code ignored;
+  std::filesystem::remove(file, ignored);
+  (void)synchronise_directory_of(file);
 }
 
 }  // namespace proofmass::coordinator

@@ -20,7 +20,11 @@ struct ServedCampaign {
   Store store;
   std::shared_ptr<const Campaign> definition;  ///< Shared with the dispatch and its messages.
   std::vector<RunRange> elsewhere = {};        ///< Runs that are not to be computed here.
+  bool is_new = false;                         ///< Made just now, with nothing in it yet.
 };
+
+/// Removes a database that was made for nothing, if it can be. @pre It is closed.
+void remove_made(const std::filesystem::path& file);
 
 /// The number of runs that a campaign is to have for now. With a stop rule it is the next at which
 /// the rule is checked, so that the stopping point does not depend on workers and their order.

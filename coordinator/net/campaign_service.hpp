@@ -177,6 +177,7 @@ class CampaignService {
   /// @param then  Called with true when the closing is under way, with false if it is not.
   void begin_closing(CampaignId id, std::function<void(bool is_closing)> then);
   void move_to_archive(CampaignId id, const std::function<void(wire::ClientReply)>& respond);
+  void note_archived(CampaignId id, const std::string& name, const std::filesystem::path& place);
   void close_ended(CampaignId id);
   void say_not_closed(std::string_view reason);
 

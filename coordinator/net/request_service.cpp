@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <exception>
+#include <filesystem>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -11,6 +12,7 @@
 #include <variant>
 
 #include "coordinator/dispatch/workers.hpp"
+#include "coordinator/net/outcome.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
@@ -308,26 +310,42 @@ void RequestService::serve_opened(const std::string& name, UnderWay under_way,
                      respond]() -> Background::Finish {
     // Copyable, as the function is.
     const auto prepared = std::make_shared<std::optional<PreparedCampaign>>();
+    std::filesystem::path made;
     std::string failure;
     try {
       ServedCampaign campaign = open();
+      if (campaign.is_new) made = campaign.file;
       activate(campaign.store);
       *prepared = prepare(std::move(campaign), GivenUpRuns::keep, context_.start);
     } catch (const std::exception& error) {
-      prepared->reset();
       failure = error.what();
+      if (!made.empty()) remove_made(made);
     }
     return [this, name, prepared, failure, respond] {
       under_way_.erase(name);
-      if (!*prepared) return respond(wire::ErrorReply{failure});
-      const CampaignId id = (*prepared)->campaign.store.id();
-      campaigns_.serve(std::move(**prepared));
-      campaigns_.review();
-      respond(campaigns_.done_reply(id));
+      respond(outcome_of([&]() -> wire::ClientReply {
+        if (!*prepared) return wire::ErrorReply{failure};
+        return serve(std::move(**prepared));
+      }));
     };
   };
   if (!context_.background.post(work)) refuse_as_too_many();
   under_way_.emplace(name, std::move(under_way));
+}
+
+// A campaign of that name may have come into the directory while the file was made.
+wire::DoneReply RequestService::serve(PreparedCampaign prepared) {
+  const CampaignId id = prepared.campaign.store.id();
+  const bool is_new = prepared.campaign.is_new;
+  const std::filesystem::path file = prepared.campaign.file;
+  try {
+    campaigns_.serve(std::move(prepared));
+  } catch (const std::exception&) {
+    if (is_new && !campaigns_.is_served(id)) remove_made(file);
+    throw;
+  }
+  campaigns_.review();
+  return campaigns_.done_reply(id);
 }
 
 void RequestService::change_served(CampaignId id, const Submitted& request, Respond respond) {
@@ -359,8 +377,10 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Resp
         campaigns_.let_go(id);
         return respond(wire::ErrorReply{failure});
       }
-      campaigns_.change(id, change);
-      respond(campaigns_.done_reply(id));
+      respond(outcome_of([&] {
+        campaigns_.change(id, change);
+        return campaigns_.done_reply(id);
+      }));
     };
   };
   if (context_.background.post(work)) return;

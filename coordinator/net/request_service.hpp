@@ -15,6 +15,7 @@
 #include "coordinator/net/client_gateway.hpp"
 #include "coordinator/net/directory_service.hpp"
 #include "coordinator/net/factory_reports.hpp"
+#include "coordinator/net/prepared_campaign.hpp"
 #include "coordinator/net/service_context.hpp"
 #include "proto/wire/client_messages.hpp"
 
@@ -72,11 +73,13 @@ class RequestService {
   /// Opens the file of a campaign that has ended, and resumes it or retries its runs.
   void reopen(const CampaignService::Entry& campaign, wire::ControlAction action, Respond respond);
   void change_served(CampaignId id, const Submitted& request, Respond respond);
-  /// Opens or makes a file with `open` in the background, and serves it.
+  /// Opens or makes a file with `open` in the background, and serves it. If that fails, a file that
+  /// was made for it is removed.
   /// @param activate  Stores what is to be different from now on, the phase at least.
   void serve_opened(const std::string& name, UnderWay under_way,
                     std::function<ServedCampaign()> open, std::function<void(Store&)> activate,
                     Respond respond);
+  [[nodiscard]] wire::DoneReply serve(PreparedCampaign prepared);
 
   const ServiceContext& context_;
   CampaignService& campaigns_;

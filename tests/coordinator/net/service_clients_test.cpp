@@ -354,6 +354,34 @@ TEST_F(ServiceClients, OutliveAFileSystemThatThrows) {
   EXPECT_THAT(client->done(request), StartsWith("campaign a: active"));
 }
 
+// The file is a copy of one that is served, and stays.
+TEST_F(ServiceClients, AreToldThatAFileCannotBeServed) {
+  std::atomic<int> num_calls = 0;
+  files.before_open = [&] {
+    if (num_calls++ == 1) std::filesystem::copy_file(directory / "b.db", directory / "a.db");
+  };
+  start_with({test::campaign_of("b", 2)});
+  const wire::SubmitRequest request{.definition = definition_of(test::campaign_of("a", 2))};
+  const std::string expected = "campaign = a in " + (directory / "a.db").string() +
+                               " (is served already, from another file)";
+  EXPECT_EQ(client->error(request), expected);
+  EXPECT_EQ(client->error(request), expected);
+  EXPECT_TRUE(std::filesystem::exists(directory / "a.db"));
+  end(StopRequest::now);
+}
+
+// The campaign has failed by the new limit, and nobody can be told of it.
+TEST_F(ServiceClients, AreToldWhatFailsWhenTheirChangeTakesEffect) {
+  config.on_notice = [](const CampaignNotice&) { throw Error("notice = a (must be heard)"); };
+  start_with({test::campaign_of("a", 3)});
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow(1), RunStatus::no_draw);
+  (void)worker.receive<wire::ResultAck>();
+  EXPECT_EQ(client->error(wire::SubmitRequest{
+                .definition = definition_of(test::campaign_of("a", 3)), .failures_max = 0}),
+            "notice = a (must be heard)");
+}
+
 TEST_F(ServiceClients, SeeAllCampaignsInPages) {
   std::vector<MicroscopeCampaign> campaigns;
   for (std::size_t i = 0; i < 3; ++i) {

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <iterator>
 #include <mutex>
 
@@ -237,6 +238,35 @@ TEST_F(ServiceWithADirectory, ExtendsAClosedCampaignInItsFileWhateverThatIsCalle
   EXPECT_FALSE(fs::exists(directory / "a.db"));
   end(StopRequest::now);
   EXPECT_EQ(Store::open_read_only(directory / "small.db").num_runs(), 3U);
+}
+
+// While the directory is looked at, the campaign is submitted that is found there.
+TEST_F(ServiceWithADirectory, RemovesAFileThatItMadeForASubmissionInVain) {
+  std::promise<void> begun;
+  std::promise<void> released;
+  std::atomic<int> num_looks = 0;
+  make_file("a");
+  fs::rename(directory / "a.db", directory / "small.db");
+  folder.set_before_load([](const fs::path&) { throw Error("file = small.db (is locked)"); });
+  start_service();
+  folder.set_before_load([&](const fs::path&) {
+    if (num_looks++ > 0) return;
+    begun.set_value();
+    released.get_future().get();
+  });
+  begun.get_future().get();
+  client->send(100, wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))});
+  EXPECT_THAT(served(), IsEmpty());  // An answer after the submission was begun.
+  released.set_value();
+  const wire::ReplyPacket packet = client->receive_final();
+  EXPECT_EQ(packet.id, 100U);
+  EXPECT_EQ(std::get<wire::ErrorReply>(packet.reply).text,
+            "campaign = a in " + (directory / "a.db").string() +
+                " (is served already, from another file)");
+  EXPECT_FALSE(fs::exists(directory / "a.db"));
+  EXPECT_TRUE(fs::exists(directory / "small.db"));
+  EXPECT_THAT(served(), ElementsAre("a"));
+  end(StopRequest::now);
 }
 
 // A file that is open can be restored if it is removed.

@@ -40,11 +40,15 @@ class PlainFiles final : public coordinator::CampaignFiles {
                                    const coordinator::Asker&) override {
     before_open();
     const auto file = directory_ / (wanted.name + ".db");
-    coordinator::Store store = std::filesystem::exists(file)
-                                   ? coordinator::Store::open(file)
-                                   : coordinator::Store::create(file, wanted, "definition");
+    const bool is_new = !std::filesystem::exists(file);
+    coordinator::Store store = is_new ? coordinator::Store::create(file, wanted, "definition")
+                                      : coordinator::Store::open(file);
     store.set_stop_plan(plan);
-    return {.file = file, .store = std::move(store), .definition = wanted.clone()};
+    return {.file = file,
+            .store = std::move(store),
+            .definition = wanted.clone(),
+            .elsewhere = {},
+            .is_new = is_new};
   }
   coordinator::ServedCampaign open_again(const std::filesystem::path& file, const Campaign& wanted,
                                          const coordinator::StopPlan& plan,
