@@ -119,11 +119,17 @@ bool CampaignService::unlist(const EndedFile& changed) {
 CampaignService::Holdings CampaignService::holdings_of(std::string_view owner) const {
   Holdings holdings;
   for (const auto& [id, served] : served_) {
-    if (served.owner != owner || has_ended(phase_of(id))) continue;
-    ++holdings.num_campaigns;
-    holdings.size += definition_size(*state_.campaigns.at(id).definition);
+    if (served.owner != owner) continue;
+    const Holdings one = holdings_of(id);
+    holdings.num_campaigns += one.num_campaigns;
+    holdings.size += one.size;
   }
   return holdings;
+}
+
+CampaignService::Holdings CampaignService::holdings_of(CampaignId id) const {
+  if (!served_.contains(id) || has_ended(phase_of(id))) return {};
+  return {.num_campaigns = 1, .size = definition_size(*state_.campaigns.at(id).definition)};
 }
 
 void CampaignService::take_hold(CampaignId id) {

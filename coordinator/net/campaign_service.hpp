@@ -70,6 +70,8 @@ class CampaignService {
     std::uint64_t size = 0;
   };
   [[nodiscard]] Holdings holdings_of(std::string_view owner) const;
+  /// What a campaign has of those of its owner: nothing if it is finished or cancelled.
+  [[nodiscard]] Holdings holdings_of(CampaignId id) const;
 
   /// Keeps a served campaign from being closed, or changed by a stop rule, until change() or
   /// let_go().

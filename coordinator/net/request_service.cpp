@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <filesystem>
@@ -117,6 +118,7 @@ void RequestService::take(wire::ControlRequest&& request, const Asker& asker,
     return campaigns_.archive(campaign->id, respond);
   }
   if (campaign->is_closed) return control_ended(*campaign, request.action, respond);
+  check_limits(request.campaign, *campaign, request.action);
   respond(campaigns_.control(campaign->id, request));
 }
 
@@ -215,12 +217,13 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
     deferred_.push_back({.request = request, .asker = asker, .respond = std::move(respond)});
     return;
   }
-  check_limits(entry ? entry->owner : asker.name, definition_size(*request->campaign),
-               !entry || entry->is_closed);
+  UnderWay under_way{.owner = entry ? entry->owner : asker.name,
+                     .added = added_by(*request, entry)};
+  check_limits(name, under_way.owner, under_way.added);
   if (entry && !entry->is_closed) {
-    change_served(entry->id, request, std::move(respond));
+    change_served(entry->id, request, std::move(under_way), std::move(respond));
   } else {
-    open_file(request, asker, entry, std::move(respond));
+    open_file(request, asker, entry, std::move(under_way), std::move(respond));
   }
 }
 
@@ -241,36 +244,65 @@ void RequestService::review() {
   }
 }
 
+// More runs of an unfinished campaign may make its tables larger. One that has ended begins again
+// if it was cancelled, gets more runs, or has a stop rule that was not checked yet.
+RequestService::Holdings RequestService::added_by(
+    const Submission& request, const std::optional<CampaignService::Entry>& entry) const {
+  const Holdings wanted{.num_campaigns = 1, .size = definition_size(*request.campaign)};
+  if (!entry || entry->is_closed) return wanted;
+  const CampaignId id = entry->id;
+  const Holdings held = campaigns_.holdings_of(id);
+  if (held.num_campaigns > 0) {
+    return {.num_campaigns = 0, .size = wanted.size - std::min(held.size, wanted.size)};
+  }
+  const StopPlan plan = plan_of(request);
+  const std::uint64_t num_runs_now = campaigns_.num_runs_of(id);
+  const bool has_more = horizon_of(plan, request.campaign->num_runs, num_runs_now) > num_runs_now;
+  const bool has_new_rule = !plan.stop_rule.empty() && plan != campaigns_.plan_of(id);
+  const bool is_cancelled = campaigns_.status_of(id).phase == Phase::cancelled;
+  return has_more || has_new_rule || is_cancelled ? wanted : Holdings{};
+}
+
+void RequestService::check_limits(const std::string& campaign, const CampaignService::Entry& entry,
+                                  wire::ControlAction action) const {
+  const bool begins = action == wire::ControlAction::resume || action == wire::ControlAction::retry;
+  if (!begins || campaigns_.holdings_of(entry.id).num_campaigns > 0) return;
+  const Campaign& definition = *context_.state.campaigns.at(entry.id).definition;
+  check_limits(campaign, entry.owner, {.num_campaigns = 1, .size = definition_size(definition)});
+}
+
 // Files without an owner, and all files of a coordinator without keys, are not limited: a client
 // that can reach it can fill its disk in other ways.
-void RequestService::check_limits(const std::string& owner, std::uint64_t size, bool is_new) const {
-  if (owner.empty() || !is_new) return;
-  CampaignService::Holdings holdings = campaigns_.holdings_of(owner);
+void RequestService::check_limits(const std::string& campaign, const std::string& owner,
+                                  const Holdings& added) const {
+  if (owner.empty()) return;
+  Holdings holdings = campaigns_.holdings_of(owner);
   for (const auto& [name, under_way] : under_way_) {
-    if (under_way.owner != owner) continue;
-    ++holdings.num_campaigns;
-    holdings.size += under_way.size;
+    if (under_way.owner != owner || name == campaign) continue;
+    holdings.num_campaigns += under_way.added.num_campaigns;
+    holdings.size += under_way.added.size;
   }
+  holdings.num_campaigns += added.num_campaigns;
+  holdings.size += added.size;
   const auto& [campaigns_max, size_max] = context_.config.limits;
-  if (holdings.num_campaigns >= campaigns_max) {
+  if (added.num_campaigns > 0 && holdings.num_campaigns > campaigns_max) {
     throw Error(fmt::format("campaigns = {} (must be at most {} unfinished ones of the key {})",
-                            holdings.num_campaigns + 1, campaigns_max, owner));
+                            holdings.num_campaigns, campaigns_max, owner));
   }
-  if (holdings.size + size > size_max) {
+  if (added.size > 0 && holdings.size > size_max) {
     throw Error(fmt::format(
         "definitions size = {} bytes (must be at most {} of the unfinished campaigns of the key "
         "{})",
-        holdings.size + size, size_max, owner));
+        holdings.size, size_max, owner));
   }
 }
 
 void RequestService::open_file(const Submitted& request, const Asker& asker,
                                const std::optional<CampaignService::Entry>& closed,
-                               Respond respond) {
+                               UnderWay under_way, Respond respond) {
   CampaignFiles& files = *context_.config.files;
   serve_opened(
-      request->campaign->name,
-      {.owner = closed ? closed->owner : asker.name, .size = definition_size(*request->campaign)},
+      request->campaign->name, std::move(under_way),
       [&files, request, asker, closed] {
         const StopPlan plan = plan_of(*request);
         return closed ? files.open_again(closed->file, *request->campaign, plan, asker)
@@ -290,9 +322,44 @@ void RequestService::reopen(const CampaignService::Entry& campaign, wire::Contro
                             Respond respond) {
   const wire::CampaignStatus status = campaigns_.status_of(campaign.id);
   if (under_way_.contains(status.name)) refuse_as_under_way(status.name);
+  if (campaign.owner.empty()) {
+    return reopen_measured(status.name, campaign, action, 0, std::move(respond));
+  }
+  check_limits(status.name, campaign.owner, {.num_campaigns = 1, .size = 0});
+  // What its definition takes is known when the file is read, which must not change if that is too
+  // much: so it is opened twice.
+  const auto work = [this, &directory = *context_.config.directory, name = status.name, campaign,
+                     action, respond]() -> Background::Finish {
+    std::uint64_t size = 0;
+    std::string failure;
+    try {
+      size = definition_size(*directory.load(campaign.file).definition);
+    } catch (const std::exception& error) {
+      failure = error.what();
+    }
+    return [this, name, campaign, action, size, failure, respond] {
+      under_way_.erase(name);
+      if (!failure.empty()) return respond(wire::ErrorReply{failure});
+      try {
+        reopen_measured(name, campaign, action, size, respond);
+      } catch (const std::exception& error) {
+        respond(wire::ErrorReply{error.what()});
+      }
+    };
+  };
+  if (!context_.background.post(work)) refuse_as_too_many();
+  under_way_.emplace(status.name, UnderWay{.owner = campaign.owner, .added = {.num_campaigns = 1}});
+}
+
+void RequestService::reopen_measured(const std::string& name,
+                                     const CampaignService::Entry& campaign,
+                                     wire::ControlAction action, std::uint64_t size,
+                                     Respond respond) {
+  UnderWay under_way{.owner = campaign.owner, .added = {.num_campaigns = 1, .size = size}};
+  check_limits(name, under_way.owner, under_way.added);
   const CampaignDirectory& directory = *context_.config.directory;
   serve_opened(
-      status.name, {.owner = campaign.owner},
+      name, std::move(under_way),
       [&directory, file = campaign.file] { return directory.load(file); },
       [action](Store& store) {
         if (action == wire::ControlAction::retry) write(store, RetriedRuns{});
@@ -348,7 +415,8 @@ wire::DoneReply RequestService::serve(PreparedCampaign prepared) {
   return campaigns_.done_reply(id);
 }
 
-void RequestService::change_served(CampaignId id, const Submitted& request, Respond respond) {
+void RequestService::change_served(CampaignId id, const Submitted& request, UnderWay under_way,
+                                   Respond respond) {
   const StopPlan plan = plan_of(*request);
   const std::uint64_t num_runs =
       horizon_of(plan, request->campaign->num_runs, campaigns_.num_runs_of(id));
@@ -372,7 +440,8 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Resp
     } catch (const std::exception& error) {
       failure = error.what();
     }
-    return [this, id, change, failure, respond] {
+    return [this, id, name = request->campaign->name, change, failure, respond] {
+      under_way_.erase(name);
       if (!failure.empty()) {
         campaigns_.let_go(id);
         return respond(wire::ErrorReply{failure});
@@ -383,9 +452,11 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Resp
       }));
     };
   };
-  if (context_.background.post(work)) return;
-  campaigns_.let_go(id);
-  refuse_as_too_many();
+  if (!context_.background.post(work)) {
+    campaigns_.let_go(id);
+    refuse_as_too_many();
+  }
+  under_way_.emplace(request->campaign->name, std::move(under_way));
 }
 
 }  // namespace proofmass::coordinator

@@ -45,10 +45,12 @@ class RequestService {
  private:
   using Submitted = std::shared_ptr<const Submission>;
 
-  /// What is being opened or made in the background.
+  using Holdings = CampaignService::Holdings;
+
+  /// What is being opened, made or changed in the background.
   struct UnderWay {
     std::string owner;
-    std::uint64_t size = 0;
+    Holdings added;  ///< To the unfinished campaigns of the owner.
   };
 
   /// A submission that waits.
@@ -66,13 +68,27 @@ class RequestService {
 
   void submit(const Submitted& request, const Asker& asker, Respond respond);
   [[nodiscard]] bool is_busy(const std::string& name) const;
-  void check_limits(const std::string& owner, std::uint64_t size, bool is_new) const;
+  /// What a submission adds to the unfinished campaigns of an owner.
+  /// @param entry  The campaign, if it is known.
+  [[nodiscard]] Holdings added_by(const Submission& request,
+                                  const std::optional<CampaignService::Entry>& entry) const;
+  /// To be asked wherever a request makes a campaign active or larger.
+  /// @throws Error if its owner would have more than SubmissionLimits allow.
+  void check_limits(const std::string& campaign, const std::string& owner,
+                    const Holdings& added) const;
+  /// The same for an action on a campaign whose file is open.
+  void check_limits(const std::string& campaign, const CampaignService::Entry& entry,
+                    wire::ControlAction action) const;
   /// @param closed  The campaign if it has been served; otherwise its file may have to be made.
   void open_file(const Submitted& request, const Asker& asker,
-                 const std::optional<CampaignService::Entry>& closed, Respond respond);
-  /// Opens the file of a campaign that has ended, and resumes it or retries its runs.
+                 const std::optional<CampaignService::Entry>& closed, UnderWay under_way,
+                 Respond respond);
+  /// Opens the file of a campaign that has ended, and resumes it or retries its runs, if its owner
+  /// may have it unfinished.
   void reopen(const CampaignService::Entry& campaign, wire::ControlAction action, Respond respond);
-  void change_served(CampaignId id, const Submitted& request, Respond respond);
+  void reopen_measured(const std::string& name, const CampaignService::Entry& campaign,
+                       wire::ControlAction action, std::uint64_t size, Respond respond);
+  void change_served(CampaignId id, const Submitted& request, UnderWay under_way, Respond respond);
   /// Opens or makes a file with `open` in the background, and serves it. If that fails, a file that
   /// was made for it is removed.
   /// @param activate  Stores what is to be different from now on, the phase at least.

@@ -17,8 +17,8 @@ namespace proofmass::test {
 /// A client's socket; every receive has a deadline.
 class PlayingClient {
  public:
-  explicit PlayingClient(const std::string& endpoint)
-      : socket_(wire::make_dealer(context_, wire::ClientSecurity{})) {
+  explicit PlayingClient(const std::string& endpoint, const wire::ClientSecurity& security = {})
+      : socket_(wire::make_dealer(context_, security)) {
     socket_.set(zmq::sockopt::linger, 0);
     socket_.set(zmq::sockopt::immediate, false);
     socket_.set(zmq::sockopt::rcvtimeo, 20'000);

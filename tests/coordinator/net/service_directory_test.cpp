@@ -8,10 +8,10 @@
 #include <fstream>
 #include <future>
 #include <iterator>
-#include <mutex>
 
 #include "coordinator/store/store_error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "tests/coordinator/net/plain_directory.hpp"
 #include "tests/coordinator/net/playing_client.hpp"
 #include "tests/coordinator/net/service_fixture.hpp"
 
@@ -19,6 +19,7 @@ namespace proofmass::coordinator {
 namespace {
 
 namespace fs = std::filesystem;
+using test::PlainDirectory;
 using test::PlayingWorker;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
@@ -31,54 +32,6 @@ std::string bytes_of(const fs::path& file) {
 void write_bytes(const fs::path& file, const std::string& bytes) {
   std::ofstream(file, std::ios::binary) << bytes;
 }
-
-/// The *.db of a directory, and no look at the definitions in them.
-class PlainDirectory final : public CampaignDirectory {
- public:
-  explicit PlainDirectory(const test::TemporaryDirectory& directory) : directory_(directory / "") {}
-
-  [[nodiscard]] std::vector<fs::path> list() const override {
-    std::vector<fs::path> files;
-    for (const auto& item : fs::directory_iterator(directory_)) {
-      if (item.path().extension() == ".db") files.push_back(item.path());
-    }
-    return files;
-  }
-
-  [[nodiscard]] ServedCampaign load(const fs::path& file) const override {
-    {
-      const std::lock_guard lock(mutex_);
-      ++num_loads_;
-      before_load_(file);
-    }
-    Store store = Store::open(file);
-    auto campaign =
-        std::make_shared<MicroscopeCampaign>(test::campaign_of(store.name(), store.num_runs()));
-    return {.file = file, .store = std::move(store), .definition = std::move(campaign)};
-  }
-
-  [[nodiscard]] fs::path archive(const fs::path& file) const override {
-    fs::path place = fs::path(file).replace_extension(".archived");
-    fs::rename(file, place);
-    return place;
-  }
-
-  /// May throw.
-  void set_before_load(std::function<void(const fs::path&)> before_load) {
-    const std::lock_guard lock(mutex_);
-    before_load_ = std::move(before_load);
-  }
-  [[nodiscard]] int num_loads() const {
-    const std::lock_guard lock(mutex_);
-    return num_loads_;
-  }
-
- private:
-  fs::path directory_;
-  mutable std::mutex mutex_;
-  mutable int num_loads_ = 0;
-  std::function<void(const fs::path&)> before_load_ = [](const fs::path&) {};
-};
 
 class ServiceWithADirectory : public test::ServiceTest {
  protected:

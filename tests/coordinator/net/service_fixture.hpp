@@ -37,12 +37,13 @@ class PlainFiles final : public coordinator::CampaignFiles {
   explicit PlainFiles(const TemporaryDirectory& directory) : directory_(directory) {}
 
   coordinator::ServedCampaign open(const Campaign& wanted, const coordinator::StopPlan& plan,
-                                   const coordinator::Asker&) override {
+                                   const coordinator::Asker& asker) override {
     before_open();
     const auto file = directory_ / (wanted.name + ".db");
     const bool is_new = !std::filesystem::exists(file);
     coordinator::Store store = is_new ? coordinator::Store::create(file, wanted, "definition")
                                       : coordinator::Store::open(file);
+    if (is_new && !asker.name.empty()) store.set_owner(asker.name);
     store.set_stop_plan(plan);
     return {.file = file,
             .store = std::move(store),
