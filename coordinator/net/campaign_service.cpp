@@ -329,8 +329,8 @@ void CampaignService::review_summary(CampaignId id, Served& served) {
 void CampaignService::take_summary(CampaignId id, Served& served) {
   const auto [failure, num_runs] = served.summary.get();
   const Campaign& definition = *state_.campaigns.at(id).definition;
-  // A rule that cannot be checked stops: nobody knows how much further it would go.
-  served.is_decided = true;
+  // A check that failed, or asks for runs that are not there yet, is made again.
+  served.is_decided = failure.empty() && !num_runs;
   const bool is_news = failure != std::exchange(served.summary_failure, failure);
   if (!failure.empty()) {
     served.is_summary_due = true;
@@ -344,16 +344,16 @@ void CampaignService::take_summary(CampaignId id, Served& served) {
   }
   wire::Fields fields{{"runs", definition.num_runs}};
   if (num_runs) fields.emplace_back("next", *num_runs);
-  outbox_.log({.kind = "campaign_summarised", .fields = std::move(fields)}, id);
+  if (served.extension_failure.empty()) {
+    outbox_.log({.kind = "campaign_summarised", .fields = std::move(fields)}, id);
+  }
   if (num_runs && !served.is_held && state_.campaigns.at(id).phase == Phase::finished) {
     go_on_to(id, *num_runs);
   }
 }
 
 void CampaignService::go_on_to(CampaignId id, std::uint64_t num_runs) {
-  Served& served = served_.at(id);
-  served.is_decided = false;
-  served.is_held = true;
+  served_.at(id).is_held = true;
   // Shared by the copies that std::function makes.
   const std::shared_ptr<Campaign> wanted = state_.campaigns.at(id).definition->clone();
   wanted->num_runs = num_runs;
@@ -366,9 +366,12 @@ void CampaignService::go_on_to(CampaignId id, std::uint64_t num_runs) {
       failure = error.what();
     }
     return [this, id, extended, failure, num_runs = wanted->num_runs] {
-      served_.at(id).is_held = false;
+      Served& served = served_.at(id);
+      served.is_held = false;
+      const bool is_news = failure != std::exchange(served.extension_failure, failure);
       if (extended != nullptr) return extend(id, extended);
-      served_.at(id).is_decided = true;
+      served.summary_after = context_.now() + context_.config.writer.retry_after;
+      if (!is_news) return;
       outbox_.log({.severity = Severity::error,
                    .kind = "campaign_not_extended",
                    .fields = {{"runs", num_runs}, Field::reason(failure)}},

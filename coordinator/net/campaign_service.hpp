@@ -148,9 +148,10 @@ class CampaignService {
     std::optional<TimePoint> closing_at = {};  ///< When closing was tried last, in vain.
     bool is_held = false;                      ///< See take_hold().
     bool is_summary_due = false;
-    std::uint64_t num_summarised = 0;  ///< Of the runs committed here.
-    std::string summary_failure = {};  ///< Of the last statistics; empty if there was none.
-    TimePoint summary_after = {};      ///< When statistics may be computed next.
+    std::uint64_t num_summarised = 0;    ///< Of the runs committed here.
+    std::string summary_failure = {};    ///< Of the last statistics; empty if there was none.
+    std::string extension_failure = {};  ///< The same of the last extension by the stop rule.
+    TimePoint summary_after = {};        ///< When statistics may be computed next.
     std::future<Summarised> summary;
   };
 

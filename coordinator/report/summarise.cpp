@@ -38,6 +38,7 @@ StopCheck check_with(const StopRule& rule, const Store& store, std::span<const d
   return check_stop_rule(rule, errors);
 }
 
+/// The one with the most runs; empty without a rule.
 std::optional<StoredStopCheck> last_check(const Store& store, const StopPlan& plan) {
   if (plan.stop_rule.empty()) return std::nullopt;
   return store.last_stop_check(statistic_of(plan.stop_rule));
@@ -196,7 +197,15 @@ std::string width_text(const StopRule& rule, const StoredStopCheck& check) {
 
 }  // namespace
 
+bool lacks_stop_check(const Store& store) {
+  const StopPlan plan = store.stop_plan();
+  if (plan.stop_rule.empty()) return false;
+  const auto check = last_check(store, plan);
+  return !check || check->num_runs < store.num_runs();
+}
+
 bool is_rule_missed(const Store& store) {
+  if (lacks_stop_check(store)) return true;
   const StopPlan plan = store.stop_plan();
   const auto check = last_check(store, plan);
   if (!check) return false;

@@ -43,8 +43,12 @@ void check_stop_checks(const Store& store, std::span<const double> objectives);
 /// longer; empty if there is none or it was not checked.
 [[nodiscard]] std::string stop_text(const Store& store);
 
-/// True if a campaign has a stop rule that was checked and not reached, or one that ends in
-/// `decided` whose requirement is not met.
+/// True if a campaign has a stop rule that was not checked with as many runs as the campaign is to
+/// have for now.
+[[nodiscard]] bool lacks_stop_check(const Store& store);
+
+/// True if a campaign has a stop rule that was not checked, see lacks_stop_check(), or not reached,
+/// or one that ends in `decided` whose requirement is not met.
 [[nodiscard]] bool is_rule_missed(const Store& store);
 
 }  // namespace proofmass::coordinator

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sqlite3.h>
 
 #include <string>
 
@@ -61,6 +62,18 @@ TEST_F(StopRule, IsFollowedByATighterOne) {
   EXPECT_EQ(stored_runs(path("tighter.db")).size(), 128U);
   EXPECT_EQ(start_until("tighter", "12", {}).wait(), 0) << errors_of("tighter");
   EXPECT_EQ(stored_runs(path("tighter.db")).size(), 192U);
+}
+
+// As a program that stopped before the check may have left it.
+TEST_F(StopRule, IsCheckedInAFinishedFileThatLacksTheCheck) {
+  ASSERT_EQ(start_until("unchecked", "50", {}).wait(), 0) << errors_of("unchecked");
+  sqlite3* file = nullptr;
+  ASSERT_EQ(sqlite3_open(path("unchecked.db").c_str(), &file), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(file, "DELETE FROM stop_check", nullptr, nullptr, nullptr), SQLITE_OK);
+  sqlite3_close(file);
+  EXPECT_EQ(start_until("unchecked", "50", {}).wait(), 0) << errors_of("unchecked");
+  EXPECT_EQ(num_checked("unchecked"), "128");
+  EXPECT_EQ(stored_runs(path("unchecked.db")).size(), 128U);
 }
 
 TEST_F(StopRule, IsRefusedIfItCannotBeRead) {

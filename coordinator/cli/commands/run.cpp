@@ -196,8 +196,9 @@ struct Outcome {
 /// @param start  Null if nothing has begun yet.
 Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOptions& options,
                 std::unique_ptr<RunStart> start) {
-  const bool is_decided =
-      options.stop.rule.empty() || campaign.store.control().phase == wire::CampaignPhase::finished;
+  const bool is_decided = options.stop.rule.empty() ||
+                          (campaign.store.control().phase == wire::CampaignPhase::finished &&
+                           !lacks_stop_check(campaign.store));
   if (num_missing(campaign.store, options) == 0 && is_decided) {
     return {.store = std::move(campaign.store), .is_done = true};
   }

@@ -98,7 +98,7 @@ FoundCampaign look_for(const Campaign& campaign, const RunOptions& run) {
   // A file at rest, whose statistics are those of its results.
   const bool is_complete = store.control().phase == wire::CampaignPhase::finished && summary &&
                            summary->num_finished == num_finished_runs &&
-                           store.given_up_runs().empty() &&
+                           store.given_up_runs().empty() && !lacks_stop_check(store) &&
                            store.stop_plan() == stop_plan_of(run, campaign.num_runs);
   const bool has_all = num_finished_runs == campaign.num_runs || !run.stop.rule.empty();
   if (is_complete && has_all) {

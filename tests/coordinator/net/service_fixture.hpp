@@ -61,6 +61,7 @@ class PlainFiles final : public coordinator::CampaignFiles {
   }
   std::shared_ptr<const Campaign> extend(coordinator::Store& store,
                                          const Campaign& wanted) override {
+    before_extend();
     if (wanted.num_runs < store.num_runs()) throw Error("runs = fewer (must be more)");
     if (wanted.num_runs > store.num_runs()) store.extend(wanted, "definition");
     return wanted.clone();
@@ -79,6 +80,9 @@ class PlainFiles final : public coordinator::CampaignFiles {
 
   /// May throw.
   std::function<void()> before_open = [] {};
+
+  /// May throw; called in the writer's thread.
+  std::function<void()> before_extend = [] {};
 
   /// May throw; called in another thread.
   std::function<void()> before_summary = [] {};

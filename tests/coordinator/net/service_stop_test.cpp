@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <future>
 #include <optional>
 #include <stdexcept>
@@ -86,11 +87,15 @@ TEST_F(ServiceStop, ChecksARuleThatItsPredecessorDidNot) {
   EXPECT_EQ(num_stored("a"), 2U);
 }
 
-TEST_F(ServiceStop, EndsACampaignWhoseRuleCannotBeChecked) {
+// Somebody else may have locked the file, or the disk may be full for a while.
+TEST_F(ServiceStop, ChecksARuleAgainThatCouldNotBeChecked) {
   config.end = ServiceEnd::when_done;
+  config.writer.retry_after = std::chrono::milliseconds(10);
   plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
-  files.next_runs = [](std::uint64_t) -> std::optional<std::uint64_t> {
-    throw Error("no disk is there");
+  int num_failures = 0;
+  files.next_runs = [&](std::uint64_t num_runs) {
+    if (num_runs == 1 && ++num_failures <= 3) throw Error("no disk is there");
+    return num_runs == 1 ? std::optional<std::uint64_t>(2) : std::nullopt;
   };
   start({test::campaign_of("a", 1)});
   test::PlayingWorker worker(endpoint.address());
@@ -98,7 +103,32 @@ TEST_F(ServiceStop, EndsACampaignWhoseRuleCannotBeChecked) {
   wait_for_end();
   EXPECT_EQ(wait_for_event("statistics_failed"),
             "statistics_failed reason=\"no disk is there\" campaign=a");
-  EXPECT_EQ(num_stored("a"), 1U);
+  EXPECT_EQ(num_events("statistics_failed"), 1);
+  EXPECT_EQ(num_failures, 4);
+  EXPECT_EQ(num_stored("a"), 2U);
+  EXPECT_EQ(file_of_a().control().phase, CampaignPhase::finished);
+}
+
+TEST_F(ServiceStop, AsksAgainForRunsThatTheFileDidNotTake) {
+  config.end = ServiceEnd::when_done;
+  config.writer.retry_after = std::chrono::milliseconds(10);
+  plan = {.stop_rule = "mean(k2c) within 5%", .num_runs_max = 100, .failures_max = {}};
+  int num_failures = 0;
+  files.before_extend = [&] {
+    if (++num_failures <= 3) throw Error("no disk is there");
+  };
+  files.next_runs = [](std::uint64_t num_runs) {
+    return num_runs == 1 ? std::optional<std::uint64_t>(2) : std::nullopt;
+  };
+  start({test::campaign_of("a", 1)});
+  test::PlayingWorker worker(endpoint.address());
+  worker.work();
+  wait_for_end();
+  EXPECT_EQ(wait_for_event("campaign_not_extended"),
+            "campaign_not_extended runs=2 reason=\"no disk is there\" campaign=a");
+  EXPECT_EQ(num_events("campaign_not_extended"), 1);
+  EXPECT_EQ(num_events("campaign_summarised runs=1"), 1);
+  EXPECT_EQ(num_stored("a"), 2U);
 }
 
 TEST_F(ServiceStop, CancelsACampaignWithMoreFailuresThanItMayHave) {

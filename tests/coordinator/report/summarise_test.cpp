@@ -138,10 +138,24 @@ TEST_F(Summarise, RecordsAfterHowManyRunsItChecked) {
   EXPECT_EQ(store.summary()->num_estimated, 127U);
 }
 
+// Or a program that stops before the check would say that the rule holds.
+TEST_F(Summarise, MissesARuleThatWasNotCheckedWithAllRuns) {
+  Store store = finished(128, plan_of(1000), 1.0, 1.01);
+  EXPECT_TRUE(lacks_stop_check(store));
+  EXPECT_TRUE(is_rule_missed(store));
+  (void)next_runs(store);
+  EXPECT_FALSE(lacks_stop_check(store));
+  EXPECT_FALSE(is_rule_missed(store));
+  store.extend(test::campaign_of(192), "");
+  EXPECT_TRUE(lacks_stop_check(store));
+  EXPECT_TRUE(is_rule_missed(store));
+}
+
 TEST_F(Summarise, WithoutARuleStoresStatisticsAlone) {
   Store store = finished(10, {}, 1.0, 3.0);
   EXPECT_EQ(next_runs(store), std::nullopt);
   EXPECT_EQ(store.summary()->num_estimated, 9U);
+  EXPECT_FALSE(lacks_stop_check(store));
   EXPECT_FALSE(is_rule_missed(store));
 }
 
