@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 #include <exception>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -18,6 +19,7 @@
 #include "coordinator/store/campaign_peek.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
+#include "core/runs.hpp"
 #include "proto/link/kill_point.hpp"
 #include "proto/link/machine.hpp"
 
@@ -71,14 +73,68 @@ EndedCampaign ended_campaign(const std::filesystem::path& file, const CampaignPe
 /// How many of the files that are looked at hold a campaign, by its name.
 using NumFiles = std::map<std::string, int>;
 
-NumFiles count_files(const std::vector<std::filesystem::path>& files) {
+/// Of which campaign a file is.
+struct Identity {
+  CampaignId id;
+  std::string name;
+};
+
+/// Empty if the file cannot be read; why is said when it is looked at.
+std::optional<Identity> identity_of(const std::filesystem::path& file) {
+  try {
+    const CampaignPeek peek = peek_campaign(file);
+    return Identity{.id = peek.id, .name = peek.name};
+  } catch (const std::exception&) {
+    if (!has_journal(file)) return std::nullopt;
+  }
+  try {
+    const Store store = Store::open_read_only(file);
+    return Identity{.id = store.id(), .name = store.name()};
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+}
+
+/// Results in a file and its log; −1 if it cannot be read.
+std::int64_t num_results(const std::filesystem::path& file) {
+  try {
+    const Store store = Store::open_read_only(file);
+    return static_cast<std::int64_t>(num_runs_in(store.finished_runs()));
+  } catch (const std::exception&) {
+    return -1;
+  }
+}
+
+/// The most results come first; of as many, the file that has the campaign's name.
+void order_copies(std::vector<std::filesystem::path>& copies, const std::string& name) {
+  std::map<std::filesystem::path, std::pair<std::int64_t, bool>> merits;
+  for (const std::filesystem::path& file : copies) {
+    merits[file] = {num_results(file), file.stem() == name};
+  }
+  std::ranges::stable_sort(copies, std::ranges::greater(),
+                           [&](const auto& file) { return merits.at(file); });
+}
+
+/// Lets the files of each campaign that is not known change places with each other: the one that is
+/// to be served comes first, so that no older copy stands for the campaign.
+NumFiles order_files(std::vector<std::filesystem::path>& files, const KnownCampaigns& known) {
   NumFiles num_files;
-  for (const std::filesystem::path& file : files) {
-    try {
-      ++num_files[peek_campaign(file).name];
-    } catch (const std::exception&) {
-      // Why is said when the file is looked at.
-    }
+  std::map<CampaignId, std::vector<std::size_t>> places;
+  std::map<CampaignId, std::string> names;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const std::optional<Identity> identity = identity_of(files[i]);
+    if (!identity) continue;
+    ++num_files[identity->name];
+    if (known.ids.contains(identity->id)) continue;
+    places[identity->id].push_back(i);
+    names[identity->id] = identity->name;
+  }
+  for (const auto& [id, indices] : places) {
+    if (indices.size() == 1) continue;
+    std::vector<std::filesystem::path> copies;
+    for (const std::size_t index : indices) copies.push_back(files[index]);
+    order_copies(copies, names.at(id));
+    for (std::size_t i = 0; i < indices.size(); ++i) files[indices[i]] = copies[i];
   }
   return num_files;
 }
@@ -195,7 +251,7 @@ std::vector<FileOutcome> look_at_all(const CampaignDirectory& directory, KnownCa
                                      const CoordinatorStart& start) {
   std::vector<std::filesystem::path> files = directory.list();
   std::erase_if(files, [&](const auto& file) { return known.files.contains(file); });
-  const NumFiles num_files = count_files(files);
+  const NumFiles num_files = order_files(files, known);
   std::vector<FileOutcome> outcomes;
   for (const std::filesystem::path& file : files) {
     try {

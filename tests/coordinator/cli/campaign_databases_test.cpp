@@ -167,6 +167,14 @@ class CampaignFolderTest : public testing::Test {
     return names;
   }
 
+  /// That of run 0.
+  static void store_result(Store& store) {
+    Delivery delivery{.result = test::zero_result({}), .worker = {1}, .attempt = {1}};
+    const std::vector<Entry> entries{
+        WorkerJoined{.session = {1}, .name = "w", .host = "h", .process_id = 1}, delivery};
+    (void)store.write(entries);
+  }
+
   test::TemporaryDirectory directory;
   std::vector<std::string> warnings;
 };
@@ -238,6 +246,35 @@ TEST_F(CampaignFolderTest, ServesOneOfTwoCopies) {
                                     ": campaign a is in another file as well"));
 }
 
+// Among them a backup whose name comes first, made before the results came. These are in the log
+// only, as a coordinator that was killed leaves them.
+TEST_F(CampaignFolderTest, ServesTheCopyWithTheMostResults) {
+  CampaignFolder folder(directory / "served");
+  const auto file = directory / "served/a.db";
+  {
+    ServedCampaign campaign = folder.open(campaign_of("a", 2), {}, {});
+    campaign.store.back_up(directory / "served/a-backup.db");
+    store_result(campaign.store);
+    for (const std::string ending : {"", "-wal"}) {
+      std::filesystem::copy_file(file.string() + ending, directory / ("killed" + ending));
+    }
+  }
+  for (const std::string ending : {"", "-wal"}) {
+    std::filesystem::rename(directory / ("killed" + ending), file.string() + ending);
+  }
+  EXPECT_THAT(loaded(folder), ElementsAre("a"));
+  EXPECT_THAT(warnings, ElementsAre((directory / "served/a-backup.db").string() +
+                                    ": campaign a is in another file as well"));
+}
+
+TEST_F(CampaignFolderTest, ServesOfEqualCopiesTheOneWithTheNameOfTheCampaign) {
+  CampaignFolder folder(directory / "served");
+  (void)folder.open(campaign_of("a"), {}, {});
+  std::filesystem::copy_file(directory / "served/a.db", directory / "served/a-backup.db");
+  EXPECT_THAT(loaded(folder), ElementsAre("a"));
+  EXPECT_THAT(warnings, ElementsAre(HasSubstr("a-backup.db: campaign a is in another file")));
+}
+
 TEST_F(CampaignFolderTest, OpensACampaignAgainAndExtendsIt) {
   CampaignFolder folder(directory / "served");
   (void)folder.open(campaign_of("a", 10), {}, {});
@@ -295,10 +332,7 @@ TEST_F(CampaignFolderTest, SaysHowTheCampaignInAFileDiffers) {
 TEST_F(CampaignFolderTest, BringsStatisticsUpToDateBesideTheWriter) {
   CampaignFolder folder(directory / "served");
   ServedCampaign campaign = folder.open(campaign_of("a", 1), {}, {});
-  Delivery delivery{.result = test::zero_result({}), .worker = {1}, .attempt = {1}};
-  const std::vector<Entry> entries{
-      WorkerJoined{.session = {1}, .name = "w", .host = "h", .process_id = 1}, delivery};
-  (void)campaign.store.write(entries);
+  store_result(campaign.store);
   int num_writes = 0;
   folder.summarise(campaign.file, *campaign.definition,
                    [&](const std::function<void(Store&)>& action) {
