@@ -15,6 +15,8 @@
 #include "coordinator/dispatch/workers.hpp"
 #include "coordinator/net/outcome.hpp"
 #include "coordinator/net/service_snapshot.hpp"
+#include "coordinator/store/campaign_peek.hpp"
+#include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/wire/client_codec.hpp"
@@ -55,6 +57,20 @@ StopPlan plan_of(const Submission& request) {
 }
 
 void write(Store& store, const Entry& entry) { (void)store.write({&entry, 1}); }
+
+/// What cannot be read at all is left to the command that answers, which says why.
+/// @throws Error if another campaign's file has taken the place of this one's.
+void require_own_file(const CampaignService::Entry& campaign) {
+  try {
+    if (peek_campaign(campaign.file).id == campaign.id) return;
+  } catch (const StoreError&) {
+    return;
+  }
+  throw Error(
+      fmt::format("campaign database = {} (took the place of the file that is being served, and is "
+                  "of another campaign; move it away)",
+                  campaign.file.string()));
+}
 
 [[noreturn]] void refuse_as_under_way(const std::string& campaign) {
   throw Error(
@@ -171,6 +187,7 @@ void RequestService::take(wire::AnswerRequest&& request, const Asker& asker,
   require_right(asker, Right::observe);
   const auto campaign = campaigns_.find(request.campaign);
   if (!campaign) throw Error(fmt::format("campaign = {} (is not served)", request.campaign));
+  require_own_file(*campaign);
   answers_.ask(request, campaign->file, asker, respond);
 }
 

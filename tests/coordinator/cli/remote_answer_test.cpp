@@ -123,6 +123,19 @@ TEST_F(Answering, NeedsACampaignThatIsServed) {
   EXPECT_EQ(client->error(AnswerRequest{.campaign = "b"}), "campaign = b (is not served)");
 }
 
+// The coordinator still has the campaign's own file open, which has lost its name.
+TEST_F(Answering, IsNotThatOfACampaignWhoseFileTookTheName) {
+  start_with("echo never");
+  (void)files.open(test::campaign_of("b", 5), {}, {});
+  std::filesystem::rename(directory / "b.db", directory / "a.db");
+  for (const Question question : {Question::report, Question::database}) {
+    EXPECT_EQ(client->error(AnswerRequest{.campaign = "a", .question = question}),
+              "campaign database = " + (directory / "a.db").string() +
+                  " (took the place of the file that is being served, and is of another campaign; "
+                  "move it away)");
+  }
+}
+
 TEST_F(Answering, IsRefusedWhereThereIsNoProgram) {
   config.answer_program.clear();
   start({test::campaign_of("a", 5)});
