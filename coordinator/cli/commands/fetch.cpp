@@ -1,5 +1,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -35,7 +37,10 @@ struct FetchOptions {
 /// is no file as long as nothing has arrived.
 class ArrivedPart {
  public:
-  /// @throws Error if the file is there and cannot be read, or is not and cannot be made.
+  /// Takes the file, if there is one, for this process alone until it ends: what another one wrote
+  /// to it after it got its final name would be in the finished database.
+  /// @throws Error if the file is there and cannot be read or is another process's, or is not and
+  ///         cannot be made.
   explicit ArrivedPart(std::filesystem::path path) : path_(std::move(path)) {
     descriptor_ = open(path_.c_str(), O_RDWR | O_CLOEXEC);
     if (descriptor_ < 0 && errno == ENOENT) {
@@ -43,6 +48,26 @@ class ArrivedPart {
       return;
     }
     if (descriptor_ < 0) fail();
+    try {
+      lock();
+      read_again();
+    } catch (const Error&) {
+      close(descriptor_);
+      throw;
+    }
+  }
+  ~ArrivedPart() { close(descriptor_); }
+  ArrivedPart(const ArrivedPart&) = delete;
+  ArrivedPart& operator=(const ArrivedPart&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  [[nodiscard]] const std::string& sha256() const { return sha256_; }
+
+  /// What is in the file now.
+  void read_again() {
+    if (lseek(descriptor_, 0, SEEK_SET) != 0) fail();
+    size_ = 0;
     std::vector<char> block(std::size_t{1} << 20);
     Sha256 hash;
     ssize_t num_read = 0;
@@ -53,27 +78,15 @@ class ArrivedPart {
     if (num_read < 0) fail();
     sha256_ = hash.finish();
   }
-  ~ArrivedPart() { close(descriptor_); }
-  ArrivedPart(const ArrivedPart&) = delete;
-  ArrivedPart& operator=(const ArrivedPart&) = delete;
-
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  [[nodiscard]] std::uint64_t size() const { return size_; }
-  [[nodiscard]] const std::string& sha256() const { return sha256_; }
 
   void clear() {
     if (descriptor_ < 0) return;
-    if (unlink(path_.c_str()) != 0 && errno != ENOENT) fail();
-    close(descriptor_);
-    descriptor_ = -1;
+    if (ftruncate(descriptor_, 0) != 0 || lseek(descriptor_, 0, SEEK_SET) != 0) fail();
     size_ = 0;
   }
 
   void append(std::string_view bytes) {
-    if (descriptor_ < 0) {
-      descriptor_ = open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-      if (descriptor_ < 0) fail();
-    }
+    if (descriptor_ < 0) make();
     while (!bytes.empty()) {
       const ssize_t num_written = write(descriptor_, bytes.data(), bytes.size());
       if (num_written < 0 && errno == EINTR) continue;
@@ -90,6 +103,29 @@ class ArrivedPart {
     if (access(directory.empty() ? "." : directory.c_str(), W_OK | X_OK) != 0) fail();
   }
 
+  void make() {
+    descriptor_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    if (descriptor_ < 0) fail();
+    lock();
+    if (ftruncate(descriptor_, 0) != 0) fail();
+  }
+
+  // Its last owner may have renamed or removed it between our opening and locking it.
+  void lock() const {
+    const bool is_locked = flock(descriptor_, LOCK_EX | LOCK_NB) == 0;
+    if (!is_locked && errno != EWOULDBLOCK) fail();
+    if (is_locked && has_its_name()) return;
+    throw Error(fmt::format("file = {} (is being written by another `fetch`; try again later)",
+                            path_.string()));
+  }
+
+  [[nodiscard]] bool has_its_name() const {
+    struct stat opened {};
+    struct stat present {};
+    return fstat(descriptor_, &opened) == 0 && stat(path_.c_str(), &present) == 0 &&
+           opened.st_dev == present.st_dev && opened.st_ino == present.st_ino;
+  }
+
   [[noreturn]] void fail() const {
     throw Error(fmt::format("file = {} ({})", path_.string(), std::strerror(errno)));
   }
@@ -97,14 +133,15 @@ class ArrivedPart {
   std::filesystem::path path_;
   int descriptor_ = -1;
   std::uint64_t size_ = 0;
-  std::string sha256_;  ///< As it was found.
+  std::string sha256_;  ///< As it was last read.
 };
 
 /// Completes the part. @throws Error if it is not what the coordinator announced; then it is gone.
 void complete(ArrivedPart& part, const Ask& ask, const wire::AnswerReply& answer) {
   if (answer.offset != part.size()) part.clear();
   read_answer(ask, answer, [&](std::string_view bytes) { part.append(bytes); });
-  if (ArrivedPart(part.path()).sha256() == answer.sha256) return;
+  part.read_again();
+  if (part.sha256() == answer.sha256) return;
   std::error_code ignored;
   std::filesystem::remove(part.path(), ignored);
   throw Error("database = another one than was announced (fetch it again)");

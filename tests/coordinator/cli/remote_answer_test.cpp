@@ -3,8 +3,11 @@
 
 #include "coordinator/cli/remote_answer.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sys/file.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -272,6 +275,23 @@ TEST_F(Answering, SendsOfADatabaseOnlyWhatTheClientLacks) {
     EXPECT_EQ(answer_to(other).offset, 0U) << other_size;
   }
   EXPECT_TRUE(std::filesystem::is_empty(config.answer_directory));
+}
+
+// Whatever a second process wrote would be in the database that the first one completes.
+TEST_F(Answering, IsFetchedByOneProcessAtATime) {
+  start_with("[ \"$1 $2\" = 'backup --' ] && printf 'hello\\n' >\"$4\"");
+  const std::filesystem::path copy = directory / "copy.db";
+  const std::string part = copy.string() + ".part";
+  const int first = open(part.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  ASSERT_EQ(flock(first, LOCK_EX), 0);
+  const auto answer =
+      test::answer_of({"fetch", "a", copy, "--connect", service->clients_endpoint()});
+  close(first);
+  EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
+  EXPECT_EQ(answer.error,
+            "file = " + part + " (is being written by another `fetch`; try again later)");
+  EXPECT_EQ(std::filesystem::file_size(part), 0U);
+  EXPECT_FALSE(std::filesystem::exists(copy));
 }
 
 TEST_F(Answering, SaysWhyThereIsNoCopy) {
