@@ -10,9 +10,17 @@
 #include "coordinator/dispatch/campaigns.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/outcome.hpp"
+#include "coordinator/store/campaign_peek.hpp"
 #include "core/error.hpp"
 
 namespace proofmass::coordinator {
+namespace {
+
+std::string not_at_rest(std::string_view campaign) {
+  return fmt::format("campaign = {} (its database is being read or changed; try again)", campaign);
+}
+
+}  // namespace
 
 void CampaignService::review_notices(CampaignId id, Served& served) {
   const CampaignState& campaign = state_.campaigns.at(id);
@@ -118,6 +126,7 @@ void CampaignService::close_ended(CampaignId id) {
   ended_.emplace(id, std::move(ended));
   context_.background.post_next([this, id, file,
                                  epoch = context_.start.epoch]() -> Background::Finish {
+    std::optional<std::string> reason;
     try {
       Store store = writer_.close(id);
       std::vector<coordinator::Entry> entries;
@@ -126,13 +135,17 @@ void CampaignService::close_ended(CampaignId id) {
       }
       if (!entries.empty()) (void)store.write(entries);
       store.end_coordinator(epoch);
+      reason = store.rest();
     } catch (const std::exception& error) {
-      return [this, reason = std::string(error.what())] { say_not_closed(reason); };
+      reason = error.what();
     }
-    return [this, id, stamp = stamp_of(file)] {
+    // The stamp of no file has a file looked at again, which serves one whose log is still needed.
+    const std::optional<FileStamp> stamp = reason ? FileStamp{} : stamp_of(file);
+    return [this, id, stamp, reason] {
       const auto found = ended_.find(id);
       if (found == ended_.end()) return;
       found->second.stamp = stamp;
+      if (reason) return say_not_closed(*reason);
       outbox_.log({.kind = "campaign_closed", .fields = {{"campaign", found->second.status.name}}});
     };
   });
@@ -151,8 +164,7 @@ void CampaignService::archive(CampaignId id,
   }
   begin_closing(id, [this, id, respond, name = found->second.name](bool is_closing) {
     if (is_closing) return move_to_archive(id, respond);
-    respond(wire::ErrorReply{
-        fmt::format("campaign = {} (its database is being read or changed; try again)", name)});
+    respond(wire::ErrorReply{not_at_rest(name)});
   });
 }
 
@@ -165,6 +177,8 @@ void CampaignService::move_to_archive(CampaignId id,
     std::filesystem::path place;
     std::string failure;
     try {
+      // A log that is left behind has results, and nobody could use the name again.
+      if (has_journal(file)) throw Error(not_at_rest(name));
       place = context_.config.directory->archive(file);
     } catch (const std::exception& error) {
       failure = error.what();

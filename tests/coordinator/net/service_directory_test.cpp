@@ -9,6 +9,7 @@
 #include <future>
 #include <iterator>
 
+#include "coordinator/store/campaign_peek.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "tests/coordinator/net/plain_directory.hpp"
@@ -323,6 +324,30 @@ TEST_F(ServiceWithADirectory, RetriesRunsOfACampaignThatItDidNotOpen) {
             "campaign a: active, 1 runs, 0 of them done");
   PlayingWorker worker(endpoint.address());
   EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{0});
+}
+
+// Who reads the newest state is in nobody's way until the end of the service is written down.
+TEST_F(ServiceWithADirectory, ArchivesNoFileThatSomebodyReads) {
+  make_file("a");
+  start_service();
+  PlayingWorker worker(endpoint.address());
+  worker.deliver(worker.borrow());
+  (void)worker.receive<wire::ResultAck>();
+  wait_for_event("campaign_summarised");
+  const fs::path file = directory / "a.db";
+  while (has_journal(file)) std::this_thread::yield();
+  sqlite3* reader = nullptr;
+  ASSERT_EQ(sqlite3_open_v2(file.c_str(), &reader, SQLITE_OPEN_READONLY, nullptr), SQLITE_OK);
+  const char* const read = "BEGIN; SELECT * FROM campaign";
+  ASSERT_EQ(sqlite3_exec(reader, read, nullptr, nullptr, nullptr), SQLITE_OK);
+  const wire::ControlRequest archive{wire::ControlAction::archive, "a"};
+  EXPECT_EQ(client->error(archive),
+            "campaign = a (its database is being read or changed; try again)");
+  EXPECT_TRUE(fs::exists(file));
+  sqlite3_close(reader);
+  while (client->done(archive).starts_with("error")) std::this_thread::yield();
+  EXPECT_EQ(Store::open_read_only(directory / "a.archived").finished_runs().size(), 1U);
+  EXPECT_FALSE(has_journal(file));
 }
 
 // The names say the opposite.
