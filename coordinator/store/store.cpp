@@ -361,7 +361,9 @@ std::optional<FileReturn> Store::return_to_place() {
   if (!impl_->lock || !impl_->lock->is_in_place()) {
     impl_->lock = std::make_unique<detail::StoreLock>(path);
   }
-  detail::restore_name(path, impl_->database, *impl_->place, placement);
+  // Whoever puts the file back finds all results in it, also if this process is killed.
+  const detail::OwnLog own_log = impl_->fold_own_log();
+  detail::restore_name(path, impl_->database, *impl_->place, placement, own_log);
   auto fresh = std::make_unique<Impl>(path, std::move(impl_->lock));
   impl_ = std::move(fresh);
   return placement == detail::Placement::removed ? FileReturn::restored : FileReturn::replaced;

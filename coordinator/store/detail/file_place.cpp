@@ -93,8 +93,9 @@ void check_that_results_are_here(const Database& other, const Database& open_fil
   }
 }
 
-void check_that_it_is_an_older_copy(const std::filesystem::path& path, const Database& open_file) {
-  Database other(path, Access::read_only);
+void check_that_it_is_an_older_copy(const std::filesystem::path& path, Access access,
+                                    const Database& open_file) {
+  Database other(path, access);
   check_campaign_file(other, path);
   constexpr std::int64_t first_version_with_uid = 4;
   if (other.integer("PRAGMA user_version") < first_version_with_uid) {
@@ -187,8 +188,12 @@ Placement FilePlace::look() const {
                                                                      : Placement::without_directory;
 }
 
+bool FilePlace::has_own_log() const {
+  return log_ != Identity{} && identity_at(log_path(path_)) == log_;
+}
+
 void FilePlace::remove_own_log() const {
-  if (log_ != Identity{} && identity_at(log_path(path_)) == log_) remove_file(log_path(path_));
+  if (has_own_log()) remove_file(log_path(path_));
   if (index_ != Identity{} && identity_at(index_path(path_)) == index_) {
     remove_file(index_path(path_));
   }
@@ -200,20 +205,25 @@ void remove_log_of(const std::filesystem::path& file) {
 }
 
 void restore_name(const std::filesystem::path& path, Database& open_file, const FilePlace& place,
-                  Placement placement) {
+                  Placement placement, OwnLog own_log) {
   check_directory_of(path);
-  place.remove_own_log();
+  // While results are in the log only, it stays until a complete copy is there.
+  if (own_log == OwnLog::folded_in || !place.has_own_log()) place.remove_own_log();
   const auto write = [&](const std::filesystem::path& draft) { copy_to_draft(open_file, draft); };
   if (placement == Placement::removed) {
-    remove_log_of(path);  // Of nobody: no file has the name.
-    appear_complete(path, IfThere::keep, write);
+    appear_complete(path, IfThere::keep, [&](const std::filesystem::path& draft) {
+      write(draft);
+      remove_log_of(path);  // Ours, all of which is in the copy, or of a file that is gone.
+    });
     return;
   }
   const FilePlace other(path);  // No other coordinator has it.
-  check_that_it_is_an_older_copy(path, open_file);
+  // While our log is there, the other file has none, and ours must not be applied to it.
+  const Access access = place.has_own_log() ? Access::immutable : Access::read_only;
+  check_that_it_is_an_older_copy(path, access, open_file);
   appear_complete(path, IfThere::replace, [&](const std::filesystem::path& draft) {
     write(draft);
-    remove_log_of(path);  // That of the older copy, whose results are all here.
+    remove_log_of(path);  // Ours, or that of the older copy, whose results are all here.
   });
 }
 

@@ -55,11 +55,14 @@ class FilePlace {
   [[nodiscard]] Placement look() const;
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }  ///< Canonical.
 
+  /// Whether the log that lies beside the name belongs to this file.
+  [[nodiscard]] bool has_own_log() const;
+
   /// Removes the log, and its index, that lie beside the name and belong to this file. A log that
   /// came with another file stays.
   ///
-  /// Whatever opens a file of this name must come afterwards: it would share the index, and empty
-  /// it, since SQLite takes no lock of its own process for that of another user.
+  /// Whatever opens a file of this name with its log must come afterwards: it would share the
+  /// index, and empty it, since SQLite takes no lock of its own process for that of another user.
   /// @throws StoreError if one of them cannot be removed.
   void remove_own_log() const;
 
@@ -86,15 +89,21 @@ class FilePlace {
 /// @throws StoreError if one of them cannot be removed.
 void remove_log_of(const std::filesystem::path& file);
 
+/// Whether an open file needs its write-ahead log.
+enum class OwnLog : std::uint8_t {
+  folded_in,  ///< The file itself has all that is stored.
+  needed,     ///< Results may be in the log only.
+};
+
 /// Writes the open file to the name that it has lost, complete or not at all.
 ///
-/// The write-ahead log beside the name is removed first if it is that of the open file: it would be
-/// applied to whatever has the name next.
+/// The write-ahead log of the open file would be applied to whatever has the name next. If it is
+/// folded in, it is removed first, and else when the copy that gets the name is complete.
 /// @param placement  `removed`: the name must still be free. `replaced`: what has the name now must
 ///                   be an older copy of the same campaign, none of whose results differ; the
 ///                   open file has all that is in it, and takes its place.
 /// @throws StoreError with the reason if that cannot be done; the open file is as it was.
 void restore_name(const std::filesystem::path& path, Database& open_file, const FilePlace& place,
-                  Placement placement);
+                  Placement placement, OwnLog own_log);
 
 }  // namespace proofmass::coordinator::detail

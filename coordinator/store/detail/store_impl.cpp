@@ -134,6 +134,7 @@ Store::Impl::~Impl() {
     rows.reset();
     if (place->look() != detail::Placement::in_place) {
       database.leave_files_alone();
+      (void)fold_own_log();
       return;
     }
     if (!rest()) {
@@ -202,6 +203,14 @@ std::optional<std::string> Store::Impl::rest() {
   const std::optional<std::string> reason = detail::bring_to_rest(database);
   is_perhaps_marked_ = reason.has_value();
   return reason;
+}
+
+detail::OwnLog Store::Impl::fold_own_log() {
+  try {
+    return rest() ? detail::OwnLog::needed : detail::OwnLog::folded_in;
+  } catch (const StoreError&) {
+    return detail::OwnLog::needed;  // The disk does not take it.
+  }
 }
 
 }  // namespace proofmass::coordinator

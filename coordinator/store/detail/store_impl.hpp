@@ -55,6 +55,9 @@ struct Store::Impl {
   /// Folds the log into the file, which is whole without it afterwards. Does not wait for readers:
   /// returns why it could not. @throws StoreError if the disk does not take it.
   [[nodiscard]] std::optional<std::string> rest();
+  /// The same for a file that has lost its name, and with it its log: all that is stored is to be
+  /// in the file itself, by whatever name it has now.
+  [[nodiscard]] detail::OwnLog fold_own_log();
 
   std::filesystem::path path;
   std::unique_ptr<detail::StoreLock> lock;   ///< Of a coordinator; a reader has none.

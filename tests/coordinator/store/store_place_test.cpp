@@ -34,6 +34,17 @@ class StorePlace : public test::WriterTest {
     return results_in(store).size();
   }
   [[nodiscard]] std::filesystem::path backup() const { return directory() / "backup.db"; }
+
+  /// Renames the file to backup() and puts that of another campaign in its place.
+  void replace_by_another() const {
+    const std::filesystem::path other = directory() / "other.db";
+    { (void)Store::create(other, campaign_of(7), ""); }
+    std::filesystem::rename(file(), backup());
+    std::filesystem::rename(other, file());
+  }
+  [[nodiscard]] static std::string error_of_rest(Store& store) {
+    return test::store_error_of([&] { (void)store.rest(); });
+  }
 };
 
 TEST_F(StorePlace, AFileThatWasRemovedIsWrittenAgainBeforeAResultIsNamed) {
@@ -140,6 +151,88 @@ TEST_F(StorePlace, AnotherFileInItsPlaceIsLeftAloneAndNothingIsLost) {
   writer.flush();
   EXPECT_THAT(take_completions(), Contains("recovered"));
   EXPECT_EQ(num_readable(), 30u);
+}
+
+// The log, which goes by the name, may hold the only copy of what workers were told to be safe.
+TEST_F(StorePlace, AKilledCoordinatorLeavesAllResultsInAFileWhoseNameAnotherHas) {
+  test::run_and_kill([&] {
+    auto* const killed = new Store(create());  // Never closed.
+    killed->commit(deliveries_of(0, 10));
+    replace_by_another();
+    (void)error_of_rest(*killed);
+  });
+  std::filesystem::rename(backup(), file());
+  EXPECT_EQ(num_readable(), 10u);
+  const Store store = Store::open(file());
+  EXPECT_FALSE(store.has_lost_its_log());
+  EXPECT_EQ(results_in(store).size(), 10u);
+}
+
+TEST_F(StorePlace, AFileThatIsClosedWhileAnotherHasItsNameHasAllResults) {
+  {
+    Store store = create();
+    store.commit(deliveries_of(0, 10));
+    replace_by_another();
+  }
+  EXPECT_EQ(Store::open_read_only(file()).num_runs(), 7u);
+  EXPECT_EQ(results_in(Store::open_read_only(backup())).size(), 10u);
+}
+
+TEST_F(StorePlace, AFileThatIsClosedWithoutItsDirectoryHasAllResults) {
+  const std::filesystem::path folder = directory() / "folder";
+  const std::filesystem::path moved = directory() / "moved";
+  std::filesystem::create_directory(folder);
+  {
+    Store store = Store::create(folder / "campaign.db", campaign_of(100), "");
+    store.commit(deliveries_of(0, 10));
+    std::filesystem::rename(folder, moved);
+  }
+  std::filesystem::copy_file(moved / "campaign.db", file());
+  EXPECT_EQ(num_readable(), 10u);
+}
+
+TEST_F(StorePlace, ALogThatAReaderNeedsIsKeptWhileAnotherFileHasTheName) {
+  Store store = create();
+  store.commit(deliveries_of(0, 10));
+  const Store reader = Store::open_read_only(file());
+  reader.read_one_state([&] {
+    (void)reader.num_runs();
+    store.commit(deliveries_of(10, 20));
+    replace_by_another();
+    EXPECT_THAT(error_of_rest(store), HasSubstr("is of another campaign"));
+    EXPECT_TRUE(detail::has_log(file()));
+  });
+  std::filesystem::rename(backup(), file());
+  EXPECT_EQ(store.rest(), std::nullopt);
+  EXPECT_EQ(num_readable(), 20u);
+}
+
+TEST_F(StorePlace, AnOlderCopyIsBroughtUpToDateThoughAReaderNeedsTheLog) {
+  Store store = create();
+  store.commit(deliveries_of(0, 10));
+  const Store reader = Store::open_read_only(file());
+  reader.back_up(backup());
+  reader.read_one_state([&] {
+    (void)reader.num_runs();
+    store.commit(deliveries_of(10, 20));
+    std::filesystem::rename(backup(), file());
+    EXPECT_EQ(error_of_rest(store), "");
+    EXPECT_EQ(num_readable(), 20u);
+  });
+}
+
+// Neither the fold nor the copy fits.
+TEST_F(StorePlace, TheLogOfARenamedFileIsKeptOnAFullDisk) {
+  Store store = create(2000);
+  store.commit(deliveries_of(0, 1000));
+  std::filesystem::rename(file(), backup());
+  {
+    const test::FileSizeLimit limit(150'000);  // More than a new campaign database needs.
+    EXPECT_NE(error_of_rest(store), "");
+    EXPECT_TRUE(detail::has_log(file()));
+  }
+  EXPECT_EQ(error_of_rest(store), "");
+  EXPECT_EQ(num_readable(), 1000u);
 }
 
 TEST_F(StorePlace, ACopyWithAnotherResultIsLeftAlone) {
