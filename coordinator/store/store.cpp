@@ -60,6 +60,16 @@ std::unique_ptr<detail::StoreLock> lock_if_free(const std::filesystem::path& pat
   }
 }
 
+// As a coordinator does: a log may be that of the file that had the name before, and folding it in
+// would destroy the file.
+void check_what_log_makes_of_it(Database& database, const std::filesystem::path& path) {
+  if (!detail::has_log(path)) return;
+  const detail::ReadTransaction one_state(database);
+  const detail::RowCounts counts = detail::check_all_pages(database);
+  detail::check_after_unclean_end(database);
+  detail::check_results(database, counts);
+}
+
 /// @param fill  Writes what a new campaign does not have.
 void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
                  std::string_view definition, const std::function<void(Database&)>& fill) {
@@ -149,6 +159,7 @@ void Store::annotate(const std::filesystem::path& path,
   detail::check_campaign_file(database, path);
   detail::check_up_to_date(database, path);
   detail::check_that_log_is_there(database, path);
+  check_what_log_makes_of_it(database, path);
   database.fold_log_at_close();
   {
     Transaction transaction(database);

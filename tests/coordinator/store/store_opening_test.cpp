@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/file_place.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -169,6 +170,8 @@ TEST_F(StoreOpening, TellsThatALogBesideARestoredFileIsNotItsOwn) {
       "log is that of the file before it, and removing the log suffices)";
   EXPECT_THAT(store_error_of(read), HasSubstr(remedy));
   EXPECT_THAT(store_error_of([&] { Store::open(file()); }), HasSubstr(remedy));
+  EXPECT_THAT(store_error_of([&] { Store::annotate(file(), {AddTag{"tag"}}); }), HasSubstr(remedy));
+  EXPECT_TRUE(test::content_of(file()) == test::content_of(backup));
   std::filesystem::remove(file().string() + "-wal");
   std::filesystem::remove(file().string() + "-shm");
   EXPECT_EQ(store_error_of(read), "");
@@ -183,6 +186,21 @@ TEST_F(StoreOpening, OfAFileThatIsDamagedWithoutItsLogNamesNoSuchRemedy) {
   test::change(file(), "UPDATE campaign SET priority = 1");
   const Store store = Store::open_read_only(file());
   EXPECT_EQ(store_error_of([&] { store.for_each_result([](const RunResult&) {}); }), damaged());
+}
+
+// Closing the file would fold the log in, which may not be its own.
+TEST_F(StoreOpening, ForATagFindsAnyDamagedPageOfAFileWithALog) {
+  create(2000);
+  damage("run_result", false);
+  test::change(file(), "PRAGMA journal_mode = WAL");
+  const Database keeps_the_log(file(), Access::read_only);
+  (void)keeps_the_log.count("SELECT num_runs FROM campaign");
+  test::change(file(), "UPDATE campaign SET priority = 1");
+  ASSERT_TRUE(detail::has_log(file()));
+  const std::string before = test::content_of(file());
+  EXPECT_EQ(store_error_of([&] { Store::annotate(file(), {AddTag{"tag"}}); }), damaged());
+  EXPECT_TRUE(test::content_of(file()) == before);
+  EXPECT_TRUE(detail::has_log(file()));
 }
 
 }  // namespace
