@@ -6,6 +6,7 @@
 
 #include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
+#include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/store_error.hpp"
 
@@ -28,9 +29,8 @@ bool is_complete(const Database& database, CampaignPeek& peek) {
 }  // namespace
 
 bool has_journal(const std::filesystem::path& path) {
-  for (const char* const ending : {"-wal", "-journal"}) {
+  for (const std::filesystem::path& log : {detail::log_path(path), detail::journal_path(path)}) {
     std::error_code error;
-    const std::filesystem::path log = std::filesystem::path(path).concat(ending);
     const std::uintmax_t size = std::filesystem::file_size(log, error);
     if (!error && size > 0) return true;
   }

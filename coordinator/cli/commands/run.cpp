@@ -262,10 +262,12 @@ int say_interrupted(const Store& store, const RunOptions& options) {
 void bring_to_rest(Store& store, const std::filesystem::path& database) {
   const std::optional<std::string> reason = store.rest();
   if (!reason) return;
+  std::error_code ignored;  // The log lies beside the file that a symbolic link leads to.
+  const std::filesystem::path file = std::filesystem::weakly_canonical(database, ignored);
   wire::say(
       fmt::format("proofmass: warning: campaign database = {0} ({1}; copy {2}-wal with it, or make "
                   "copies with `proofmass backup`)\n",
-                  database.string(), *reason, database.filename().string()));
+                  database.string(), *reason, file.filename().string()));
 }
 
 /// Statistics of a file that cannot be written stay as they are; what is stored is said.

@@ -351,8 +351,7 @@ bool Database::is_in_place() const {
 
 std::uint64_t Database::log_size() const {
   std::error_code error;
-  const std::uintmax_t size =
-      std::filesystem::file_size(std::filesystem::path(path_).concat("-wal"), error);
+  const std::uintmax_t size = std::filesystem::file_size(log_path(path_), error);
   return error ? 0 : size;
 }
 

@@ -41,8 +41,14 @@ std::filesystem::path canonical_path(const std::filesystem::path& path) {
   return error ? path : result;
 }
 
-std::filesystem::path index_path(const std::filesystem::path& file) {
-  return std::filesystem::path(file).concat("-shm");
+// Of a canonical name, as SQLite has opened it: whatever a symbolic link that took the name since
+// leads to has other files beside it.
+std::filesystem::path log_of(const std::filesystem::path& canonical) {
+  return std::filesystem::path(canonical).concat("-wal");
+}
+
+std::filesystem::path index_of(const std::filesystem::path& canonical) {
+  return std::filesystem::path(canonical).concat("-shm");
 }
 
 void remove_file(const std::filesystem::path& path) {
@@ -118,7 +124,11 @@ void copy_to_draft(const Database& open_file, const std::filesystem::path& draft
 }  // namespace
 
 std::filesystem::path log_path(const std::filesystem::path& file) {
-  return std::filesystem::path(file).concat("-wal");
+  return log_of(canonical_path(file));
+}
+
+std::filesystem::path journal_path(const std::filesystem::path& file) {
+  return canonical_path(file).concat("-journal");
 }
 
 bool has_log(const std::filesystem::path& file) {
@@ -173,14 +183,14 @@ FilePlace::Identity FilePlace::identity_at(const std::filesystem::path& path) {
 }
 
 void FilePlace::remember_log() {
-  log_ = identity_at(log_path(path_));
-  index_ = identity_at(index_path(path_));
+  log_ = identity_at(log_of(path_));
+  index_ = identity_at(index_of(path_));
 }
 
 Placement FilePlace::look() const {
   const Identity present = identity_at(path_);
   if (present == file_) {
-    return identity_at(log_path(path_)) == log_ ? Placement::in_place : Placement::log_removed;
+    return identity_at(log_of(path_)) == log_ ? Placement::in_place : Placement::log_removed;
   }
   if (present != Identity{}) return Placement::replaced;
   std::error_code ignored;
@@ -189,19 +199,19 @@ Placement FilePlace::look() const {
 }
 
 bool FilePlace::has_own_log() const {
-  return log_ != Identity{} && identity_at(log_path(path_)) == log_;
+  return log_ != Identity{} && identity_at(log_of(path_)) == log_;
 }
 
 void FilePlace::remove_own_log() const {
-  if (has_own_log()) remove_file(log_path(path_));
-  if (index_ != Identity{} && identity_at(index_path(path_)) == index_) {
-    remove_file(index_path(path_));
+  if (has_own_log()) remove_file(log_of(path_));
+  if (index_ != Identity{} && identity_at(index_of(path_)) == index_) {
+    remove_file(index_of(path_));
   }
 }
 
 void remove_log_of(const std::filesystem::path& file) {
-  remove_file(log_path(file));
-  remove_file(index_path(file));
+  remove_file(log_of(file));
+  remove_file(index_of(file));
 }
 
 void restore_name(const std::filesystem::path& path, Database& open_file, const FilePlace& place,

@@ -10,8 +10,12 @@
 
 namespace proofmass::coordinator::detail {
 
-/// Where SQLite keeps the write-ahead log of a database file.
+/// Where SQLite keeps the write-ahead log of a database file: beside the file itself, also if
+/// `file` is a symbolic link that leads to it.
 [[nodiscard]] std::filesystem::path log_path(const std::filesystem::path& file);
+
+/// The same of the rollback journal.
+[[nodiscard]] std::filesystem::path journal_path(const std::filesystem::path& file);
 
 /// Whether a write-ahead log with something in it lies beside the file: one that is longer than its
 /// header and begins as such a log does.
@@ -85,7 +89,8 @@ class FilePlace {
   Identity index_;
 };
 
-/// Removes the write-ahead log and its index that lie beside this name, whosever they are.
+/// Removes the write-ahead log and its index that lie beside this canonical name, whosever they
+/// are.
 /// @throws StoreError if one of them cannot be removed.
 void remove_log_of(const std::filesystem::path& file);
 

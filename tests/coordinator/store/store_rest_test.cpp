@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "coordinator/store/campaign_peek.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "tests/coordinator/store/before_writes.hpp"
 #include "tests/coordinator/store/writer_fixture.hpp"
@@ -31,6 +32,15 @@ class StoreRest : public test::WriterTest {
     std::filesystem::remove(directory() / "copy.db-wal");
     std::filesystem::copy_file(file(), path);
     return path;
+  }
+
+  /// A symbolic link to the file, in another directory.
+  [[nodiscard]] std::filesystem::path link() const {
+    const std::filesystem::path folder = directory() / "links";
+    if (std::filesystem::create_directory(folder)) {
+      std::filesystem::create_symlink(file(), folder / "link.db");
+    }
+    return folder / "link.db";
   }
 
   /// Somebody in the middle of a table, who needs the state of the file as it is now.
@@ -69,6 +79,30 @@ TEST_F(StoreRest, ACopyWithItsLogIsRead) {
   const std::filesystem::path both = copy();
   std::filesystem::copy_file(file().string() + "-wal", both.string() + "-wal");
   EXPECT_EQ(results_in(Store::open_read_only(both)).size(), 64u);
+}
+
+// SQLite keeps the log beside the file that a symbolic link leads to.
+TEST_F(StoreRest, AFileIsReadThroughALinkWithItsLog) {
+  Store store = Store::create(file(), campaign_of(64), "");
+  store.commit(deliveries_of(0, 64));
+  EXPECT_EQ(results_in(Store::open_read_only(link())).size(), 64u);
+  EXPECT_EQ(Store::open_read_only(link()).log_size(), store.log_size());
+  EXPECT_TRUE(has_journal(link()));
+  EXPECT_EQ(store.rest(), std::nullopt);
+  EXPECT_FALSE(has_journal(link()));
+}
+
+TEST_F(StoreRest, ACampaignIsResumedThroughALinkWithItsLog) {
+  { (void)Store::create(file(), campaign_of(64), ""); }
+  test::run_and_kill([&] {
+    auto* const killed = new Store(Store::open(link()));  // Never closed.
+    killed->commit(deliveries_of(0, 64));
+  });
+  const Store store = Store::open(link());
+  EXPECT_FALSE(store.has_lost_its_log());
+  EXPECT_EQ(results_in(store).size(), 64u);
+  Store::annotate(link(), {AddTag{"tag"}});
+  EXPECT_THAT(store.tags(), ElementsAre("tag"));
 }
 
 TEST_F(StoreRest, ACopyOfACampaignAtRestIsWhole) {
