@@ -172,6 +172,8 @@ void Store::annotate(const std::filesystem::path& path,
   if (lock != nullptr) (void)detail::bring_to_rest(database);
 }
 
+void Store::check_absence(const std::filesystem::path& path) { detail::check_absence(path); }
+
 wire::CampaignId Store::id() const {
   return {static_cast<std::uint64_t>(impl_->database.integer("SELECT campaign_uid FROM campaign"))};
 }

@@ -100,6 +100,11 @@ class Store {
   static void annotate(const std::filesystem::path& path,
                        const std::vector<Annotation>& annotations);
 
+  /// For a program that gives a finished campaign database a name that is new.
+  /// @throws StoreError if a file has it, or if the log or the journal of one that is gone lies
+  ///         beside it: SQLite would apply that to whatever gets the name.
+  static void check_absence(const std::filesystem::path& path);
+
   /// Closes the file. One that has lost its name gets it back if that is possible, as
   /// return_to_place() does. Of a coordinator's, no other file (log, lock) remains unless somebody
   /// reads.

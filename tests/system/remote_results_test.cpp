@@ -118,6 +118,18 @@ TEST_F(RemoteResults, GoOnWithAFetchThatWasInterrupted) {
   }
 }
 
+// SQLite would apply it to the copy.
+TEST_F(RemoteResults, AreNotFetchedBesideTheJournalOfAFileThatIsGone) {
+  std::ofstream(path("copy.db-journal")) << "pages of the file that is gone";
+  EXPECT_EQ(remote_command({"fetch", "hardy2013", "copy.db"}), 1);
+  EXPECT_EQ(errors_of("remote"),
+            "proofmass: error: campaign database = copy.db (is gone, but its journal "
+            "copy.db-journal is there: put the file back, or move copy.db-journal away and begin "
+            "anew)\n");
+  EXPECT_FALSE(std::filesystem::exists(path("copy.db")));
+  EXPECT_FALSE(std::filesystem::exists(path("copy.db.part")));
+}
+
 TEST_F(RemoteResults, SayThatACopyHasNoPlace) {
   EXPECT_EQ(remote_command({"fetch", "hardy2013", "missing/copy.db"}), 1);
   EXPECT_EQ(errors_of("remote"),

@@ -167,6 +167,7 @@ int fetch_database(const FetchOptions& options) {
   const std::string name = checked_campaign_name(options.campaign);
   const std::filesystem::path file = options.file.value_or(name + ".db");
   check_new_file("file", file);
+  Store::check_absence(file);
   return with_connection(options.client, [&](const Ask& ask) {
     ArrivedPart part(std::filesystem::path(file).concat(".part"));
     const auto answer = reply_of<wire::AnswerReply>(
@@ -175,6 +176,7 @@ int fetch_database(const FetchOptions& options) {
                                  .known_size = part.size(),
                                  .known_sha256 = part.size() > 0 ? part.sha256() : ""});
     complete(part, ask, answer);
+    Store::check_absence(file);  // Again: completing it may have taken long.
     if (const int error = publish_file(part.path(), file, IfThere::keep); error != 0) {
       throw Error(fmt::format("file = {} ({})", file.string(), std::strerror(error)));
     }

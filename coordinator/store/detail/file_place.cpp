@@ -74,6 +74,14 @@ int open_and_lock(const std::filesystem::path& path) {
       path.string()));
 }
 
+[[noreturn]] void refuse_to_make(const std::filesystem::path& file, std::string_view kind,
+                                 const std::filesystem::path& beside) {
+  throw StoreError(
+      fmt::format("campaign database = {0} (is gone, but its {1} {2} is there: put the file back, "
+                  "or move {2} away and begin anew)",
+                  file.string(), kind, beside.filename().string()));
+}
+
 [[noreturn]] void refuse(const Database& other, const std::string& what) {
   other.refuse(fmt::format(
       "took the place of the file that is being served, and {}; move it away, and the campaign is "
@@ -163,12 +171,9 @@ void check_absence(const std::filesystem::path& file) {
   if (std::filesystem::exists(file, ignored)) {
     throw StoreError(fmt::format("campaign database = {} (exists already)", file.string()));
   }
-  if (!has_log(file)) return;
-  throw StoreError(
-      fmt::format("campaign database = {0} (is gone, but its log {1} is there: put the file back, "
-                  "or move {1} away "
-                  "and begin anew)",
-                  file.string(), log_path(file).filename().string()));
+  if (has_log(file)) refuse_to_make(file, "log", log_path(file));
+  const std::uintmax_t journal_size = std::filesystem::file_size(journal_path(file), ignored);
+  if (!ignored && journal_size > 0) refuse_to_make(file, "journal", journal_path(file));
 }
 
 FilePlace::FilePlace(const std::filesystem::path& file)

@@ -70,6 +70,23 @@ TEST_F(StoreRefusal, ToCreateAFileBesideTheLogOfOneThatIsGone) {
   EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
 }
 
+// SQLite would roll old pages back into the new one.
+TEST_F(StoreRefusal, ToCreateAFileBesideTheJournalOfOneThatIsGone) {
+  const std::filesystem::path journal = file().string() + "-journal";
+  const std::string expected = message(
+      "is gone, but its journal campaign.db-journal is there: put the file back, or move "
+      "campaign.db-journal away and begin anew");
+  test::write_file(journal, "pages of the file that is gone");
+  EXPECT_EQ(store_error_of([&] { create(); }), expected);
+  EXPECT_EQ(store_error_of([&] { Store::check_absence(file()); }), expected);
+  const std::filesystem::path source = directory() / "source.db";
+  const Store store = Store::create(source, campaign_of(1), "");
+  EXPECT_EQ(store_error_of([&] { store.back_up(file()); }), expected);
+  EXPECT_FALSE(std::filesystem::exists(file()));
+  test::write_file(journal, "");  // As some modes leave it behind.
+  EXPECT_EQ(store_error_of([&] { store.back_up(file()); }), "");
+}
+
 // A file that was restored from a copy, beside the log of the file before it: SQLite would copy the
 // log into it when the connection is closed, and nothing could mend it any more.
 TEST_F(StoreRefusal, OfAFileWithTheLogOfAnotherLeavesItAsItIs) {
