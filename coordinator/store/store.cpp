@@ -425,7 +425,10 @@ void Store::back_up(const std::filesystem::path& destination) const {
     Database copy(draft, Access::create);
     impl_->database.copy_to(copy);
     copy.execute("PRAGMA cell_size_check = ON");
-    (void)detail::check_all_pages(copy);  // Nobody shall rely on the copy of a damaged file.
+    // Nobody shall rely on the copy of a damaged file, which is the one to be named.
+    copy.name_in_messages(impl_->path);
+    (void)detail::check_all_pages(copy);
+    copy.name_in_messages(draft);
     // What is copied may say that there is a log.
     copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
   });

@@ -1,7 +1,9 @@
 #include "coordinator/store/detail/database.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
@@ -9,6 +11,7 @@
 #include <system_error>
 
 #include "coordinator/store/detail/file_place.hpp"
+#include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -58,6 +61,16 @@ std::string damage(const std::filesystem::path& file, std::string_view what) {
   return fmt::format("is damaged: {}; restore it from a copy", what);
 }
 
+constexpr std::string_view log_out_of_reach =
+    "has a log that only a user who may write to its directory can read";
+
+// SQLite keeps an index beside a log; where it cannot make one, it says that it cannot open a file.
+bool is_log_out_of_reach(const std::filesystem::path& file) {
+  const std::string directory = directory_of(log_path(file)).string();
+  return has_log(file) && ::faccessat(AT_FDCWD, file.c_str(), R_OK, AT_EACCESS) == 0 &&
+         ::faccessat(AT_FDCWD, directory.c_str(), W_OK, AT_EACCESS) != 0;
+}
+
 // What a reader meets that must be written before anything can be read.
 std::string explanation_of_readonly(int code, sqlite3* connection) {
   switch (code) {
@@ -66,7 +79,10 @@ std::string explanation_of_readonly(int code, sqlite3* connection) {
              "back: resume the campaign, or add a tag";
     case SQLITE_READONLY_RECOVERY:
     case SQLITE_READONLY_CANTINIT:
-      return "has a log that only a user who may write to its directory can read";
+      return std::string(log_out_of_reach);
+    case SQLITE_READONLY_DIRECTORY:
+      return "needs a log or a journal beside it, and its directory is not writable; use a copy in "
+             "a directory that is";
     default:
       return sqlite3_errmsg(connection);
   }
@@ -89,6 +105,7 @@ std::string explanation(int code, sqlite3* connection, const std::filesystem::pa
     case SQLITE_IOERR:
       return fmt::format("{}; what was committed before is safe", sqlite3_errmsg(connection));
     case SQLITE_CANTOPEN:
+      if (is_log_out_of_reach(file)) return std::string(log_out_of_reach);
       return fmt::format("{}: {}", sqlite3_errmsg(connection),
                          std::strerror(sqlite3_system_errno(connection)));
     default:
@@ -302,7 +319,11 @@ bool Database::in_transaction() const { return sqlite3_get_autocommit(connection
 
 void Database::copy_to(Database& copy) const {
   const int code = copy_all(connection_.get(), copy.connection_.get());
-  if (code != SQLITE_OK) copy.fail(code);
+  if (code == SQLITE_OK) return;
+  if ((code & 0xff) == SQLITE_CORRUPT) {  // Found where it was read.
+    refuse_as_damaged(sqlite3_errmsg(copy.connection_.get()));
+  }
+  copy.fail(code);
 }
 
 void Database::go_on_with_private_copy() {

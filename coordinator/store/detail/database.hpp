@@ -122,6 +122,7 @@ class Database {
   [[nodiscard]] bool in_transaction() const;
 
   /// Replaces the content of another database by that of this one, as it is now.
+  /// @throws StoreError naming this file if it is damaged, and else the copy.
   void copy_to(Database& copy) const;
 
   /// Goes on with a copy of its own that may be changed: SQLite keeps it in memory while it is
@@ -159,6 +160,9 @@ class Database {
   void leave_files_alone();
   /// Takes that back: as usual, the last connection copies the log into the file and removes it.
   void fold_log_at_close();
+
+  /// From now on messages name another file: that of which this one is a copy.
+  void name_in_messages(const std::filesystem::path& file) { path_ = file; }
 
   /// @throws StoreError `campaign database = path (what)`.
   [[noreturn]] void refuse(std::string_view what) const;

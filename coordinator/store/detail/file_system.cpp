@@ -107,11 +107,16 @@ void check_directory_of(const std::filesystem::path& path) {
 }
 
 void check_presence(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (std::filesystem::is_regular_file(path, ignored)) return;
-  throw StoreError(
-      fmt::format("campaign database = {} ({})", path.string(),
-                  std::filesystem::exists(path, ignored) ? "is no file" : "does not exist"));
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (std::filesystem::is_regular_file(status)) return;
+  const auto refuse = [&](std::string_view why) {
+    throw StoreError(fmt::format("campaign database = {} ({})", path.string(), why));
+  };
+  if (!std::filesystem::status_known(status)) {
+    refuse(fmt::format("cannot be reached: {}", std::strerror(error.value())));
+  }
+  refuse(std::filesystem::exists(status) ? "is no file" : "does not exist");
 }
 
 void appear_complete(const std::filesystem::path& path, IfThere if_there,

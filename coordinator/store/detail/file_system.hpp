@@ -24,7 +24,7 @@ namespace proofmass::coordinator::detail {
 ///         system below it.
 void check_directory_of(const std::filesystem::path& path);
 
-/// @throws StoreError unless there is a file of this name.
+/// @throws StoreError with the reason unless there is a file of this name.
 void check_presence(const std::filesystem::path& path);
 
 /// Lets `write` make a file beside `path`, which then takes that name: complete or not at all, and

@@ -32,6 +32,18 @@ class StoreRefusal : public test::StoreTest {
   [[nodiscard]] std::string error_of_open_read_only() const {
     return store_error_of([&] { Store::open_read_only(file()); });
   }
+  /// What an action without the rights of root throws while the directory has these permissions.
+  [[nodiscard]] std::string error_with(std::filesystem::perms permissions,
+                                       const std::function<void()>& action) const {
+    std::filesystem::permissions(directory(), permissions);
+    std::string error;
+    {
+      const test::OrdinaryUser user;
+      error = store_error_of(action);
+    }
+    std::filesystem::permissions(directory(), std::filesystem::perms(0755));
+    return error;
+  }
   void create(std::uint64_t num_runs = 1) const {
     Store::create(file(), campaign_of(num_runs), "");
   }
@@ -361,17 +373,41 @@ TEST_F(StoreRefusal, OfADirectoryThatDoesNotExist) {
 
 TEST_F(StoreRefusal, OfADirectoryThatIsNotWritable) {
   create();
-  std::filesystem::permissions(directory(), std::filesystem::perms(0555));
-  std::string error;
-  {
-    const test::OrdinaryUser user;
-    error = error_of_open();
-  }
-  std::filesystem::permissions(directory(), std::filesystem::perms(0755));
-  EXPECT_EQ(error,
+  EXPECT_EQ(error_with(std::filesystem::perms(0555), [&] { Store::open(file()); }),
             "lock = " + file().string() +
                 ".lock (cannot be created: Permission denied; the directory of a campaign database "
                 "must be writable)");
+}
+
+TEST_F(StoreRefusal, OfAFileWithALogInADirectoryThatIsNotWritable) {
+  create();
+  test::run_and_kill([&] {
+    auto* const killed = new Store(Store::open(file()));  // Never closed.
+    killed->commit(deliveries_of(0, 1));
+  });
+  std::filesystem::remove(file().string() + "-shm");
+  EXPECT_EQ(error_with(std::filesystem::perms(0555), [&] { Store::open_read_only(file()); }),
+            message("has a log that only a user who may write to its directory can read"));
+}
+
+TEST_F(StoreRefusal, ToMakeALogOrAJournalInADirectoryThatIsNotWritable) {
+  const std::string expected = message(
+      "needs a log or a journal beside it, and its directory is not writable; use a copy in a "
+      "directory that is");
+  create();
+  std::filesystem::permissions(file(), std::filesystem::perms(0666));
+  EXPECT_EQ(
+      error_with(std::filesystem::perms(0555), [&] { Store::annotate(file(), {AddTag{"tag"}}); }),
+      expected);
+  test::change(file(), "PRAGMA journal_mode = WAL");
+  EXPECT_EQ(error_with(std::filesystem::perms(0555), [&] { Store::open_read_only(file()); }),
+            expected);
+}
+
+TEST_F(StoreRefusal, OfAFileInADirectoryThatMayNotBeEntered) {
+  create();
+  EXPECT_EQ(error_with(std::filesystem::perms(0000), [&] { Store::open_read_only(file()); }),
+            message("cannot be reached: Permission denied"));
 }
 
 TEST_F(StoreRefusal, OfAFileThatIsNotWritable) {
