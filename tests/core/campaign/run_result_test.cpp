@@ -30,7 +30,7 @@ TEST(RunResult, HasTheCountsThatItsStatusAllows) {
 }
 
 TEST(ResultSchema, HasTheQuantityInTheMiddleAsAnExample) {
-  for (const std::size_t num_quantities : {1, 2, 3, 10}) {
+  for (const std::size_t num_quantities : {1U, 2U, 3U, 10U}) {
     ResultSchema schema;
     schema.quantities.resize(num_quantities);
     EXPECT_EQ(&example_quantity(schema), &schema.quantities[(num_quantities - 1) / 2]);
