@@ -149,7 +149,9 @@ class Conversation {
   void send_all_results(TimePoint now);
   void watch_time(TimePoint now);
   void watch_idleness(TimePoint now);
-  [[nodiscard]] Duration time_to_leave() const;  ///< Before the walltime is over.
+  [[nodiscard]] Duration time_to_leave() const;       ///< Before the walltime is over.
+  [[nodiscard]] TimePoint walltime_deadline() const;  ///< @pre There is a walltime.
+  void leave_by(TimePoint deadline, wire::LossReason reason, TimePoint now);
   void begin_to_leave(const Leaving& leaving, TimePoint now);
   void give_back_waiting();
   void give_back_late_batches(TimePoint now);

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -11,9 +12,10 @@
 
 namespace proofmass::worker {
 void Conversation::on_drain_request(TimePoint now) {
-  if (ending_ || (leaving_ && leaving_->deadline)) return;
-  begin_to_leave({.reason = wire::LossReason::preempted, .deadline = now + config_.drain_time},
-                 now);
+  if (ending_) return;
+  TimePoint deadline = now + config_.drain_time;
+  if (config_.walltime_end) deadline = std::min(deadline, walltime_deadline());
+  leave_by(deadline, wire::LossReason::preempted, now);
 }
 
 void Conversation::on_abandon_request() {
@@ -24,13 +26,8 @@ void Conversation::on_abandon_request() {
 }
 
 void Conversation::watch_time(TimePoint now) {
-  const bool has_deadline = leaving_ && leaving_->deadline;
-  if (!has_deadline && config_.walltime_end) {
-    if (now + time_to_leave() >= *config_.walltime_end) {
-      begin_to_leave({.reason = wire::LossReason::walltime,
-                      .deadline = *config_.walltime_end - config_.delivery_time},
-                     now);
-    }
+  if (config_.walltime_end && now + time_to_leave() >= *config_.walltime_end) {
+    leave_by(walltime_deadline(), wire::LossReason::walltime, now);
   }
   if (ending_ || !leaving_ || !leaving_->deadline) return;
   give_back_late_batches(now);
@@ -58,6 +55,17 @@ Duration Conversation::time_to_leave() const {
   const double share = fraction_of(mixed(session_.value));
   return usual + usual / 2 + std::chrono::duration_cast<Duration>(share * usual) +
          2 * config_.delivery_time;
+}
+
+TimePoint Conversation::walltime_deadline() const {
+  return *config_.walltime_end - config_.delivery_time;
+}
+
+/// Whoever asks first, the earliest deadline holds: a drain gives no time beyond the walltime, nor
+/// the walltime beyond a drain.
+void Conversation::leave_by(TimePoint deadline, wire::LossReason reason, TimePoint now) {
+  if (leaving_ && leaving_->deadline && *leaving_->deadline <= deadline) return;
+  begin_to_leave({.reason = reason, .deadline = deadline}, now);
 }
 
 void Conversation::begin_to_leave(const Leaving& leaving, TimePoint now) {

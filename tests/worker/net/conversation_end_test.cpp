@@ -278,6 +278,56 @@ TEST_F(ConversationTest, HeedsItsWalltimeAlsoWhenDrainedByTheCoordinator) {
   expect_ending(Ending::Kind::done, "nothing left to do");
 }
 
+// The batch system kills it at 30 s, whatever it was asked before: its results must be kept by
+// then.
+TEST_F(ConversationTest, HeedsItsWalltimeAlsoWhenAskedToEnd) {
+  register_with_campaign({.drain_time = 100s, .walltime_end = now + 30s});
+  (void)compute(lease(0, 2));
+  receive(lease(2, 1));
+  execution.begin_batch();
+  execution.batches[0].time_left = 50s;
+  conversation->on_drain_request(now);
+  (void)take_sent<wire::Heartbeat>();
+  tick_after(0s);
+  EXPECT_EQ(take_sent<wire::GiveBack>().runs, held(2, 1)) << "it would end after the walltime";
+  tick_after(24s);
+  EXPECT_FALSE(conversation->ending().has_value());
+  sent.clear();
+  tick_after(1s);
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  expect_ending(Ending::Kind::done, "out of time with 2 results not acknowledged");
+}
+
+// It leaves 100 to 160 s before the end of its walltime, and is then to leave within 3 s.
+TEST_F(ConversationTest, HeedsTheDrainTimeAlsoWhenItsWalltimeIsNearlyOver) {
+  register_with_campaign({.drain_time = 3s, .walltime_end = now + 100s});
+  (void)compute(lease(0, 2));
+  execution.batch_time = 60s;
+  tick_after(0s);
+  EXPECT_TRUE(conversation->is_leaving());
+  conversation->on_drain_request(now);
+  sent.clear();
+  tick_after(2s);
+  EXPECT_FALSE(conversation->ending().has_value());
+  sent.clear();
+  tick_after(1s);
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::preempted);
+  expect_ending(Ending::Kind::done, "out of time with 2 results not acknowledged");
+}
+
+TEST_F(ConversationTest, GetsNoTimeBeyondItsWalltimeByBeingAskedToEnd) {
+  register_with_campaign({.drain_time = 100s, .walltime_end = now + 100s});
+  (void)compute(lease(0, 1));
+  tick_after(90s);
+  EXPECT_TRUE(conversation->is_leaving());
+  sent.clear();
+  conversation->on_drain_request(now);
+  EXPECT_TRUE(sent.empty());
+  tick_after(5s);
+  EXPECT_EQ(take_sent<wire::Bye>().reason, wire::LossReason::walltime);
+  expect_ending(Ending::Kind::done, "out of time with 1 results not acknowledged");
+}
+
 TEST_F(ConversationTest, LeavesAfterTheIdleTimeout) {
   register_with_campaign({.idle_timeout = 300s});
   now += 299s;
