@@ -18,6 +18,7 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/link/signals.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
 #include "worker/net/serve.hpp"
@@ -170,6 +171,7 @@ void leave_out_service_options(Options& options) {
 
 int run(Options options, const Program& program) {
   const TimePoint program_start = std::chrono::steady_clock::now();
+  wire::ignore_broken_pipes();  // What reads the log must not take results with it.
   const wire::Log log =
       wire::make_log(program.name, options.log_format,
                      options.parent ? wire::LogLevel::warning : wire::LogLevel::info);

@@ -29,6 +29,7 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/init_system.hpp"
 #include "proto/link/log.hpp"
+#include "proto/link/signals.hpp"
 #include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
@@ -164,6 +165,7 @@ bool has_given_up_runs(const Service& service) {
 /// Serves all campaigns of a directory to the workers that connect.
 /// @return An ExitCode.
 int serve_campaigns(const ServeOptions& options) {
+  wire::ignore_broken_pipes();  // The service outlives what reads its log.
   const std::optional<PageConfig> page_config = page_config_of(options.page);
   const Log log = wire::make_log("proofmass-coordinator", options.log_format, wire::LogLevel::info);
   const SignalThread signals;

@@ -36,7 +36,10 @@ pid_t start_program(const ProgramStart& start) {
   sigset_t none;
   sigemptyset(&none);
   posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+  sigset_t defaulted = none;
+  sigaddset(&defaulted, SIGPIPE);
+  posix_spawnattr_setsigdefault(&attributes, &defaulted);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
   const std::vector<char*> arguments = pointers_to(start.arguments);
   std::vector<char*> environment;
   if (start.environment) environment = pointers_to(*start.environment);

@@ -21,7 +21,7 @@ struct ProgramStart {
   std::optional<std::vector<std::string>> environment = {};
 };
 
-/// Starts the program with no signal blocked, whatever is blocked here.
+/// Starts the program with no signal blocked and SIGPIPE not ignored, whatever holds here.
 /// @returns Its process id; the caller waits for its end.
 /// @throws Error reading `PROGRAM: cannot be started: reason`.
 [[nodiscard]] pid_t start_program(const ProgramStart& start);

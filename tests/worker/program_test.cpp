@@ -5,7 +5,9 @@
 #include <unistd.h>
 
 #include <array>
+#include <csignal>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace proofmass::worker {
@@ -16,20 +18,29 @@ struct Outcome {
   std::string text;  ///< On standard error.
 };
 
+/// Ends this process as a worker does that writes to such a standard error.
+[[noreturn]] void be_worker(std::vector<std::string> arguments, int standard_error) {
+  dup2(standard_error, STDERR_FILENO);
+  arguments.insert(arguments.begin(), "test-worker");
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  const Program program{.name = "test-worker",
+                        .prepare = [](const Campaign&) { return PreparedCampaign{}; }};
+  _exit(run_worker(static_cast<int>(argv.size()), argv.data(), program));
+}
+
+int exit_code_of(pid_t process) {
+  int status = 0;
+  waitpid(process, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
 /// Runs a worker in a process of its own.
 Outcome run(std::vector<std::string> arguments) {
   int ends[2];
   if (pipe(ends) != 0) return {};
   const pid_t process = fork();
-  if (process == 0) {
-    dup2(ends[1], STDERR_FILENO);
-    arguments.insert(arguments.begin(), "test-worker");
-    std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
-    const Program program{.name = "test-worker",
-                          .prepare = [](const Campaign&) { return PreparedCampaign{}; }};
-    _exit(run_worker(static_cast<int>(argv.size()), argv.data(), program));
-  }
+  if (process == 0) be_worker(std::move(arguments), ends[1]);
   close(ends[1]);
   Outcome outcome;
   std::array<char, 4096> part{};
@@ -38,9 +49,7 @@ Outcome run(std::vector<std::string> arguments) {
     outcome.text.append(part.data(), static_cast<std::size_t>(size));
   }
   close(ends[0]);
-  int status = 0;
-  waitpid(process, &status, 0);
-  if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
+  outcome.exit_code = exit_code_of(process);
   return outcome;
 }
 
@@ -67,6 +76,20 @@ TEST(WorkerProgram, NeedsAName) {
     EXPECT_EQ(outcome.text,
               "test-worker: error: name = a b (must be 1 to 128 of [A-Za-z0-9._-])\n");
   }
+}
+
+// As at the end of a pipe to `head`.
+TEST(WorkerProgram, GoesOnIfNobodyReadsItsLog) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  close(ends[0]);
+  const pid_t process = fork();
+  if (process == 0) {
+    (void)std::signal(SIGPIPE, SIG_DFL);
+    be_worker({"--connect", "ipc:///tmp/none", "--name", "a b"}, ends[1]);
+  }
+  close(ends[1]);
+  EXPECT_EQ(exit_code_of(process), 2) << "it could say why, but for the reader";
 }
 
 TEST(WorkerProgram, DoesNotOutliveItsCampaign) {

@@ -1,6 +1,5 @@
 #include "coordinator/archive/export.hpp"
 
-#include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -13,6 +12,7 @@
 #include "coordinator/store/store.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/link/signals.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -64,7 +64,7 @@ void write(const ExportOptions& options, const IsStopped& is_stopped) {
 
 int export_results(const ExportOptions& options) {
   check(options);
-  std::signal(SIGPIPE, SIG_IGN);  // A reader that goes away is an error like any other.
+  wire::ignore_broken_pipes();  // A reader that goes away is an error like any other.
   return run_until_stopped([&](const IsStopped& is_stopped) {
     write(options, is_stopped);
     return exit_done;

@@ -37,6 +37,7 @@
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
+#include "proto/link/signals.hpp"
 #include "proto/link/start_program.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -353,6 +354,7 @@ StopPlan stop_plan_of(const RunOptions& options, std::uint64_t num_runs) {
 }
 
 int run_campaign(const RunOptions& options) {
+  wire::ignore_broken_pipes();  // A campaign goes on when nobody reads its progress.
   const std::unique_ptr<Campaign> campaign =
       read_campaign(options.campaign_file, options.overrides);
   check_part(options, *campaign);

@@ -26,6 +26,7 @@
 #include "core/runs.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/standard_error.hpp"
+#include "proto/link/signals.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -205,6 +206,7 @@ std::string sweep_text(const Sweep& sweep, OutputFormat format, const IsStopped&
 }
 
 int sweep_campaigns(const SweepOptions& options) {
+  wire::ignore_broken_pipes();  // It goes on when nobody reads its progress.
   const Sweep sweep = plan_sweep(options);
   say_plan(sweep, options);
   make_sweep_directory(directory_of_sweep(options));
