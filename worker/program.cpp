@@ -197,6 +197,7 @@ int run(Options options, const Program& program) {
 }  // namespace
 
 int run_worker(int argc, char** argv, const Program& program) {
+  wire::keep_ends_of_children();
   Options options;
   CLI::App app(
       "Simulates runs for a proofmass coordinator.\n"

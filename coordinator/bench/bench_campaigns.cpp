@@ -17,6 +17,7 @@
 #include "coordinator/store/store.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
 #include "proto/link/whole_file.hpp"
 
@@ -78,9 +79,7 @@ bool run_to_end(const std::vector<std::string>& arguments) {
   const pid_t child =
       wire::start_program({.arguments = arguments, .descriptors = {nowhere, nowhere, 2}});
   close(nowhere);
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
+  const int status = wire::wait_for_end(child);
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 

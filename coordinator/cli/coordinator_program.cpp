@@ -268,6 +268,7 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
 }  // namespace
 
 int run_proofmass_coordinator(int argc, char** argv) {
+  wire::keep_ends_of_children();
   CLI::App app(
       "Lends the runs of campaigns to workers and stores their results.\n"
       "On SIGTERM it first lets workers deliver their results; on SIGINT or a second\n"

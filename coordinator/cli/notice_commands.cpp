@@ -1,7 +1,6 @@
 #include "coordinator/cli/notice_commands.hpp"
 
-#include <sys/wait.h>
-
+#include <optional>
 #include <string_view>
 #include <thread>
 
@@ -45,9 +44,9 @@ void NoticeCommands::take(const CampaignNotice& notice) {
 
 void NoticeCommands::review() {
   std::erase_if(running_, [&](const Running& running) {
-    int status = 0;
-    if (waitpid(running.process_id, &status, WNOHANG) != running.process_id) return false;
-    if (status != 0) log_failure(running.notice, wire::end_text(status));
+    const std::optional<int> status = wire::status_if_ended(running.process_id);
+    if (!status) return false;
+    if (*status != 0) log_failure(running.notice, wire::end_text(*status));
     return true;
   });
   while (!waiting_.empty() && running_.size() < num_running_max) {

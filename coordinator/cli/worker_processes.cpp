@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 #include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -39,7 +39,7 @@ WorkerProcesses::~WorkerProcesses() {
   wait_until_ended(grace_ms);
   for (const Process& process : processes_) {
     kill(process.process_id, SIGKILL);
-    waitpid(process.process_id, nullptr, 0);
+    (void)wire::wait_for_end(process.process_id);
   }
 }
 
@@ -57,12 +57,12 @@ void WorkerProcesses::start_local(std::uint64_t count) {
 std::vector<WorkerProcesses::Exit> WorkerProcesses::take_exits() {
   std::vector<Exit> exits;
   std::erase_if(processes_, [&](const Process& process) {
-    int status = 0;
-    if (waitpid(process.process_id, &status, WNOHANG) != process.process_id) return false;
+    const std::optional<int> status = wire::status_if_ended(process.process_id);
+    if (!status) return false;
     exits.push_back({.name = process.name,
                      .process_id = process.process_id,
-                     .text = wire::end_text(status),
-                     .reason = reason_of(status)});
+                     .text = wire::end_text(*status),
+                     .reason = reason_of(*status)});
     return true;
   });
   return exits;

@@ -4,12 +4,12 @@
 #include <fmt/format.h>
 #include <signal.h>
 #include <sys/mman.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <optional>
 #include <sstream>
 #include <thread>
 
@@ -260,11 +260,11 @@ class MemoryFile {
 /// @return What waitpid() says of the end; nothing if it does not end in time and is killed.
 std::optional<int> status_at_end(pid_t process_id) {
   const auto deadline = std::chrono::steady_clock::now() + command_wait;
-  int status = 0;
-  while (waitpid(process_id, &status, WNOHANG) != process_id) {
+  std::optional<int> status;
+  while (!(status = wire::status_if_ended(process_id))) {
     if (std::chrono::steady_clock::now() > deadline) {
       kill(process_id, SIGKILL);
-      waitpid(process_id, &status, 0);
+      (void)wire::wait_for_end(process_id);
       return std::nullopt;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));

@@ -212,13 +212,7 @@ class AnswerProcess {
     error_text_.resize(std::min(error_text_.size(), wire::reply_text_size_max));
   }
 
-  int wait() {
-    int status = 0;
-    while (waitpid(process_id_, &status, 0) < 0 && errno == EINTR) {
-    }
-    process_id_ = 0;
-    return status;
-  }
+  int wait() { return wire::wait_for_end(std::exchange(process_id_, 0)); }
 
   pid_t process_id_ = 0;
   int errors_ = -1;         ///< What it writes to standard error.

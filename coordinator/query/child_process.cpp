@@ -5,7 +5,6 @@
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,6 +13,7 @@
 #include <chrono>
 #include <cstring>
 #include <exception>
+#include <utility>
 
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
@@ -92,13 +92,7 @@ void ChildProcess::signal(int number) const {
   if (id_ != 0) kill(id_, number);
 }
 
-int ChildProcess::wait() {
-  int status = 0;
-  while (waitpid(id_, &status, 0) < 0 && errno == EINTR) {
-  }
-  id_ = 0;
-  return status;
-}
+int ChildProcess::wait() { return wire::wait_for_end(std::exchange(id_, 0)); }
 
 PartWriter::PartWriter(int pipe) : pipe_(pipe), thread_([this] { write_late(); }) {}
 

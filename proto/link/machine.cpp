@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <csignal>
 #include <cstring>
@@ -15,6 +16,11 @@
 #include "proto/wire/names.hpp"
 
 namespace proofmass::wire {
+namespace {
+
+constexpr int status_if_unknown = W_EXITCODE(1, 0);
+
+}  // namespace
 
 std::string host_name() {
   std::array<char, 256> name{};
@@ -35,6 +41,21 @@ std::uint64_t oom_kills_in(std::string_view vmstat) {
   std::uint64_t count = 0;
   std::from_chars(digits, vmstat.data() + vmstat.size(), count);
   return count;
+}
+
+int wait_for_end(pid_t child) {
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0) {
+    if (errno != EINTR) return status_if_unknown;
+  }
+  return status;
+}
+
+std::optional<int> status_if_ended(pid_t child) {
+  int status = 0;
+  const pid_t ended = waitpid(child, &status, WNOHANG);
+  if (ended == 0) return std::nullopt;
+  return ended == child ? status : status_if_unknown;
 }
 
 std::string end_text(int status) {

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -26,6 +29,14 @@ inline constexpr bool has_address_space_limit = true;
 
 /// The same number, from the text of /proc/vmstat; 0 if the text does not have it.
 [[nodiscard]] std::uint64_t oom_kills_in(std::string_view vmstat);
+
+/// Waits until a child process ends.
+/// @return What waitpid() says of it. A child whose status the kernel does not keep counts as one
+///         that exited with 1, so that it is not taken for a success.
+[[nodiscard]] int wait_for_end(pid_t child);
+
+/// The same of a child process that has ended; nothing if it has not. Does not wait.
+[[nodiscard]] std::optional<int> status_if_ended(pid_t child);
 
 /// How a process ended, for people: `exit code 1`, `killed by signal 9 (Killed)`.
 /// @param status  From waitpid().

@@ -78,6 +78,17 @@ TEST(WorkerProgram, NeedsAName) {
   }
 }
 
+// Its first process has to learn that the second one has ended.
+TEST(WorkerProgram, EndsIfItWasStartedWithItsChildrenIgnored) {
+  const pid_t process = fork();
+  if (process == 0) {
+    (void)std::signal(SIGCHLD, SIG_IGN);
+    alarm(60);  // Without it, a worker that never ends would hold the test up.
+    be_worker({"--connect", "ipc:///tmp/none", "--name", "a b"}, STDERR_FILENO);
+  }
+  EXPECT_EQ(exit_code_of(process), 2);
+}
+
 // As at the end of a pipe to `head`.
 TEST(WorkerProgram, GoesOnIfNobodyReadsItsLog) {
   int ends[2];

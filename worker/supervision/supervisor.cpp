@@ -91,8 +91,8 @@ class Supervisor {
   /// continued (SIGCONT) or asked to end, the child is continued, too: a child that is forked while
   /// its process group is stopped and continued may stay stopped, and then it could not even end.
   int wait_for(pid_t child) {
-    int status = 0;
-    while (waitpid(child, &status, WNOHANG) != child) {
+    std::optional<int> status;
+    while (!(status = wire::status_if_ended(child))) {
       const int signal = sigwaitinfo(&signals_, nullptr);
       if (signal == SIGTERM || signal == SIGINT) {
         ++num_requests_;
@@ -101,7 +101,7 @@ class Supervisor {
       }
       if (signal == SIGCONT) kill(child, SIGCONT);
     }
-    return status;
+    return *status;
   }
 
   static int exit_code_of(int status) {

@@ -2,7 +2,6 @@
 #include <sys/wait.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -22,6 +21,7 @@
 #include "core/model.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/text/visible_text.hpp"
@@ -80,10 +80,7 @@ void write_png(const Picture& picture, const PlotOptions& options) {
   DraftFile png(options.output, ".png-draft");
   wire::write_whole_file("output", svg.draft(), svg_of(picture, SvgUse::plain), picture_mode,
                          wire::IfExists::replace);
-  const pid_t converter = start_converter(svg.draft(), png.draft(), options.output);
-  int status = 0;
-  while (waitpid(converter, &status, 0) < 0 && errno == EINTR) {
-  }
+  const int status = wire::wait_for_end(start_converter(svg.draft(), png.draft(), options.output));
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
     throw Error(fmt::format("output = {} (rsvg-convert failed)", options.output.string()));
   }

@@ -36,6 +36,21 @@ int run_with(ProgramMain program, std::vector<std::string> arguments) {
   _exit(run_with(program, arguments));
 }
 
+/// Ends this process with 0 if a program that is started with SIGCHLD ignored does not ignore it.
+[[noreturn]] void exit_with_children_ignored(ProgramMain program, const std::string& name) {
+  (void)std::signal(SIGCHLD, SIG_IGN);
+  (void)run_with(program, {name, "--version"});
+  _exit(std::signal(SIGCHLD, SIG_DFL) == SIG_DFL ? 0 : 1);
+}
+
+// Otherwise it would never learn how the programs ended that it starts.
+TEST(ProgramSignalsDeathTest, AProgramDoesNotIgnoreItsChildrenWhoeverStartsIt) {
+  EXPECT_EXIT(exit_with_children_ignored(run_proofmass_alone, "proofmass"),
+              testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(exit_with_children_ignored(run_proofmass_coordinator, "proofmass-coordinator"),
+              testing::ExitedWithCode(0), "");
+}
+
 // Each of them says what is wrong, and would go on likewise if it were only progress.
 TEST(ProgramSignalsDeathTest, ABrokenPipeDoesNotEndWhatComputesACampaign) {
   EXPECT_EXIT(exit_without_reader(run_proofmass_coordinator,

@@ -26,6 +26,32 @@ TEST(OomKills, AreReadFromTheKernelsCounters) {
   EXPECT_EQ(oom_kills_in("nr_free_pages 1\n"), 0U);
 }
 
+pid_t child_that_exits(int exit_code) {
+  const pid_t child = fork();
+  if (child == 0) _exit(exit_code);
+  return child;
+}
+
+TEST(EndOfAChild, IsWhatTheKernelSaysOfIt) {
+  EXPECT_EQ(end_text(wait_for_end(child_that_exits(0))), "exit code 0");
+  EXPECT_EQ(end_text(wait_for_end(child_that_exits(7))), "exit code 7");
+  const pid_t child = fork();
+  while (child == 0) pause();
+  EXPECT_FALSE(status_if_ended(child));
+  kill(child, SIGKILL);
+  EXPECT_EQ(end_text(wait_for_end(child)), "killed by signal 9 (Killed)");
+}
+
+TEST(EndOfAChild, IsAFailureIfTheKernelDoesNotKeepIt) {
+  (void)std::signal(SIGCHLD, SIG_IGN);
+  const pid_t child = child_that_exits(0);
+  EXPECT_EQ(end_text(wait_for_end(child)), "exit code 1");
+  const auto status = status_if_ended(child);
+  (void)std::signal(SIGCHLD, SIG_DFL);
+  ASSERT_TRUE(status);
+  EXPECT_EQ(end_text(*status), "exit code 1");
+}
+
 TEST(ReasonOfEnd, BlamesRunsForACrashAndForWantOfMemory) {
   EXPECT_EQ(reason_of_end(status_after(SIGILL), false), LossReason::crashed);
   EXPECT_EQ(reason_of_end(status_after(SIGILL), true), LossReason::crashed);
