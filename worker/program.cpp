@@ -161,15 +161,7 @@ int reporting_errors(const Program& program, const std::function<int()>& what) {
   }
 }
 
-/// What is meant for the workers of a service is not for those of a campaign.
-void leave_out_service_options(Options& options) {
-  options.keys.reset();
-  options.spool.reset();
-  options.walltime_max.reset();
-  options.end_time_unix_s.reset();
-}
-
-int run(Options options, const Program& program) {
+int run(const Options& options, const Program& program) {
   const TimePoint program_start = std::chrono::steady_clock::now();
   wire::ignore_broken_pipes();  // What reads the log must not take results with it.
   const wire::Log log =
@@ -177,7 +169,6 @@ int run(Options options, const Program& program) {
                      options.parent ? wire::LogLevel::warning : wire::LogLevel::info);
   if (options.parent) {
     die_with(*options.parent);
-    leave_out_service_options(options);
     std::signal(SIGINT, SIG_IGN);  // Ctrl-C reaches the campaign, which tells its workers.
   }
   const ServeConfig config = serve_config(options, program_start, log);

@@ -46,7 +46,8 @@ WorkerProcesses::~WorkerProcesses() {
 void WorkerProcesses::start(const std::string& name) {
   const pid_t process_id = wire::start_program(
       {.arguments = {executable_.string(), "--connect", endpoint_, "--name", name, "--threads", "1",
-                     "--parent", std::to_string(getpid())}});
+                     "--parent", std::to_string(getpid())},
+       .environment = wire::environment_without_settings()});
   processes_.push_back({.name = name, .process_id = process_id});
 }
 

@@ -28,8 +28,6 @@
 #include "proto/link/start_program.hpp"
 #include "proto/wire/client_codec.hpp"
 
-extern char** environ;
-
 namespace proofmass::coordinator {
 namespace {
 
@@ -132,18 +130,6 @@ std::unique_ptr<UnnamedFile> make_unnamed_file(const std::filesystem::path& dire
   return std::make_unique<UnnamedFile>(descriptor);
 }
 
-/// Settings of this process are none of the commands'.
-std::vector<std::string> environment_of_command() {
-  std::vector<std::string> variables;
-  for (char** variable = environ; *variable != nullptr; ++variable) {
-    const std::string_view text = *variable;
-    if (!text.starts_with("PROOFMASS_") && !text.starts_with("NOTIFY_SOCKET=")) {
-      variables.emplace_back(text);
-    }
-  }
-  return variables;
-}
-
 void limit(pid_t process_id, __rlimit_resource resource, std::uint64_t maximum) {
   const rlimit wanted{.rlim_cur = maximum, .rlim_max = maximum};
   if (prlimit(process_id, resource, &wanted, nullptr) != 0 && errno != ESRCH) fail("limits");
@@ -160,7 +146,7 @@ class AnswerProcess {
     try {
       process_id_ = wire::start_program({.arguments = order.arguments,
                                          .descriptors = {nothing, output, ends[1]},
-                                         .environment = environment_of_command()});
+                                         .environment = wire::environment_without_settings()});
     } catch (const Error&) {
       close(nothing);
       close(ends[1]);

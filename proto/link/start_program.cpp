@@ -54,6 +54,17 @@ pid_t start_program(const ProgramStart& start) {
                           std::generic_category().message(error)));
 }
 
+std::vector<std::string> environment_without_settings() {
+  std::vector<std::string> variables;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    const std::string_view text = *variable;
+    const bool is_setting = text.starts_with("PROOFMASS_") || text.starts_with("NOTIFY_SOCKET=") ||
+                            text.starts_with("SLURM_JOB_END_TIME=");
+    if (!is_setting) variables.emplace_back(text);
+  }
+  return variables;
+}
+
 std::filesystem::path program_beside_this(std::string_view name) {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);

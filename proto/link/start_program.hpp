@@ -26,6 +26,11 @@ struct ProgramStart {
 /// @throws Error reading `PROGRAM: cannot be started: reason`.
 [[nodiscard]] pid_t start_program(const ProgramStart& start);
 
+/// The environment of this process without the variables that set options of Proofmass's programs
+/// (`PROOFMASS_*`, `SLURM_JOB_END_TIME`) or name an init system: they are meant for this process,
+/// or for workers elsewhere.
+[[nodiscard]] std::vector<std::string> environment_without_settings();
+
 /// Another program of Proofmass: the file of that name beside the program that runs.
 /// @throws Error reading `program = PATH (rule)` if it is not there or cannot be executed.
 [[nodiscard]] std::filesystem::path program_beside_this(std::string_view name);

@@ -1,10 +1,13 @@
 #include "coordinator/cli/worker_processes.hpp"
 
 #include <gtest/gtest.h>
+#include <stdlib.h>
 
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <string>
 
 #include "coordinator/cli/stop_signals.hpp"
 #include "core/error.hpp"
@@ -47,6 +50,17 @@ TEST(WorkerProcesses, GiveAWorkerItsNameItsCoordinatorAndItsParent) {
       "[ \"$1 $2 $3 $4 $5 $6 $7\" = \"--connect ipc:///nowhere --name local-1 --threads 1 "
       "--parent\" ]");
   EXPECT_EQ(exit.text, "exit code 0");
+}
+
+// A user may have set it for workers of a cluster, with whose coordinator this has nothing to do.
+TEST(WorkerProcesses, KeepSettingsOfOtherWorkersFromAWorker) {
+  const std::map<std::string, std::string> settings{{"PROOFMASS_GIVE_UP_AFTER", "1s"},
+                                                    {"PROOFMASS_DRAIN_TIME", "xx"},
+                                                    {"SLURM_JOB_END_TIME", "1"}};
+  for (const auto& [name, value] : settings) setenv(name.c_str(), value.c_str(), 1);
+  EXPECT_EQ(exit_of("! env | grep -E '^(PROOFMASS_|SLURM_JOB_END_TIME=)'").text, "exit code 0");
+  EXPECT_EQ(exit_of("env | grep -q ^PATH=").text, "exit code 0");
+  for (const auto& [name, value] : settings) unsetenv(name.c_str());
 }
 
 TEST(WorkerProcesses, AWorkerIsEndedBySignalsThatAreBlockedHere) {
