@@ -120,7 +120,34 @@ ServeConfig serve_config(const Options& options, TimePoint program_start, const 
   return config;
 }
 
-/// The worker itself; 0, or it throws, or it ends the process because threads hang.
+/// Turns what goes wrong into a message and an exit code.
+int reporting_errors(const Program& program, const std::function<int()>& what) {
+  const auto fail = [&](const std::exception& error, int exit_code) {
+    wire::say(fmt::format("{}: error: {}\n", program.name, error.what()));
+    return exit_code;
+  };
+  try {
+    return what();
+  } catch (const InvalidArgument& error) {
+    return fail(error, exit_usage);
+  } catch (const std::exception& error) {
+    return fail(error, exit_failed);
+  }
+}
+
+/// @return 0, or it throws.
+int say_ended(const Ending& ending, const wire::Log& log) {
+  if (ending.kind == Ending::Kind::failed) throw Error(ending.reason);
+  log({.kind = "worker_ended", .fields = {Field::reason(ending.reason)}});
+  return 0;
+}
+
+[[noreturn]] void exit_without_threads(int exit_code) {
+  std::fflush(nullptr);
+  _exit(exit_code);
+}
+
+/// The worker itself; 0, or it throws, or it ends the process because threads do not end.
 int work(const Options& options, const Program& program, ServeConfig config,
          const ChildStart& start) {
   if (options.faults && options.faults->kill) {
@@ -138,27 +165,12 @@ int work(const Options& options, const Program& program, ServeConfig config,
         {.severity = wire::Severity::error,
          .kind = "computation_hangs",
          .fields = {Field::reason(ending.reason), Field::remark("(the process ends without it)")}});
-    std::fflush(nullptr);
-    _exit(exit_hung);
+    exit_without_threads(exit_hung);
   }
-  if (ending.kind == Ending::Kind::failed) throw Error(ending.reason);
-  config.log({.kind = "worker_ended", .fields = {Field::reason(ending.reason)}});
-  return 0;
-}
-
-/// Turns what goes wrong into a message and an exit code.
-int reporting_errors(const Program& program, const std::function<int()>& what) {
-  const auto fail = [&](const std::exception& error, int exit_code) {
-    wire::say(fmt::format("{}: error: {}\n", program.name, error.what()));
-    return exit_code;
-  };
-  try {
-    return what();
-  } catch (const InvalidArgument& error) {
-    return fail(error, exit_usage);
-  } catch (const std::exception& error) {
-    return fail(error, exit_failed);
-  }
+  const auto conclude = [&] { return say_ended(ending, config.log); };
+  // Nothing is lost with a preparation, which cannot be interrupted and may take minutes.
+  if (executor.is_preparing()) exit_without_threads(reporting_errors(program, conclude));
+  return conclude();
 }
 
 int run(const Options& options, const Program& program) {

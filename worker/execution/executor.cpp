@@ -29,6 +29,18 @@ std::optional<Duration> time_left(Duration elapsed, int num_done, int num_steps)
   return elapsed * std::max(0, num_steps - num_done) / num_done;
 }
 
+/// One more as long as it lives.
+class Counted {
+ public:
+  explicit Counted(std::atomic<std::size_t>& count) : count_(count) { ++count_; }
+  ~Counted() { --count_; }
+  Counted(const Counted&) = delete;
+  Counted& operator=(const Counted&) = delete;
+
+ private:
+  std::atomic<std::size_t>& count_;
+};
+
 }  // namespace
 
 Executor::Executor(Prepare prepare, std::function<void()> on_change, const ExecutorConfig& config)
@@ -54,7 +66,7 @@ bool Executor::end_within(Duration time_max) {
   queue_.clear();
   drop_batches([](const Batch&) { return true; });
   changed_.notify_all();
-  return changed_.wait_for(lock, time_max, [&] { return num_serving_ == 0; });
+  return changed_.wait_for(lock, time_max, [&] { return num_serving_ == num_preparing_; });
 }
 
 bool Executor::is_defined(wire::CampaignId campaign) const {
@@ -223,6 +235,7 @@ wire::CampaignId Executor::campaign_to_prepare() const {
 void Executor::prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock) {
   const std::shared_ptr<const Campaign> definition = campaigns_.at(id).definition;
   campaigns_.at(id).is_preparing = true;
+  const Counted counted(num_preparing_);  // Before anybody else has the lock.
   lock.unlock();
   auto prepared = std::make_shared<const PreparedCampaign>(prepare_(*definition));
   lock.lock();

@@ -51,7 +51,8 @@ class Executor final : public Execution {
   /// @param prepare    Called on the threads, once for each definition.
   /// @param on_change  Called on any of the threads when there is something new to take.
   Executor(Prepare prepare, std::function<void()> on_change, const ExecutorConfig& config);
-  ~Executor() override;  ///< Abandons everything; waits until all threads report progress or end.
+  /// Abandons everything; waits until all threads have prepared, report progress or end.
+  ~Executor() override;
 
   [[nodiscard]] bool is_defined(wire::CampaignId campaign) const override;
   void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) override;
@@ -67,9 +68,12 @@ class Executor final : public Execution {
   [[nodiscard]] std::uint64_t num_steps_done() const override { return num_steps_done_; }
   [[nodiscard]] std::optional<std::string> failure() const override;
 
-  /// Abandons everything and waits until no thread computes any more, at most for this time. False
-  /// if one still does: it hangs, and the destructor would as well.
+  /// Abandons everything and waits until no thread computes runs any more, at most for this time.
+  /// False if one still does: it hangs, and the destructor would as well. It does not wait for
+  /// threads that prepare a campaign, which cannot be interrupted and may take long.
   [[nodiscard]] bool end_within(Duration time_max);
+  /// True if the destructor waits for the preparation of a campaign.
+  [[nodiscard]] bool is_preparing() const { return num_preparing_ > 0; }
 
  private:
   struct KnownCampaign {
@@ -110,6 +114,7 @@ class Executor final : public Execution {
   std::function<void()> on_change_;
   ExecutorConfig config_;
   std::atomic<std::uint64_t> num_steps_done_ = 0;
+  std::atomic<std::size_t> num_preparing_ = 0;  ///< Threads that do; grows under the mutex only.
 
   mutable std::mutex mutex_;  ///< Guards all that follows but the threads.
   std::condition_variable changed_;

@@ -337,15 +337,29 @@ TEST(Executor, EndsInTheMiddleOfRuns) {
   SUCCEED();
 }
 
+// The first campaign computes, and the second one is being prepared, which nobody waits for.
 TEST(Executor, EndsInTimeUnlessAThreadHangs) {
   Gate gate;
-  Bench bench(gate.prepare());
+  std::counting_semaphore<> preparing{0};
+  std::counting_semaphore<> may_prepare{1};
+  const Prepare prepare = [&](const Campaign& campaign) {
+    preparing.release();
+    may_prepare.acquire();
+    return gate.prepare()(campaign);
+  };
+  Bench bench(prepare, {.num_threads = 2});
   bench.executor.submit(lease(0, 1));
   gate.entered.acquire();
+  preparing.acquire();
+  bench.executor.define(second_campaign, definition());
+  bench.executor.submit(lease(0, 1, second_campaign));
+  preparing.acquire();
   EXPECT_FALSE(bench.executor.end_within(std::chrono::milliseconds(1)));
   gate.open.release();
-  EXPECT_TRUE(bench.executor.end_within(std::chrono::hours(1)));
+  EXPECT_TRUE(bench.executor.end_within(std::chrono::minutes(1)));
+  EXPECT_TRUE(bench.executor.is_preparing());
   EXPECT_TRUE(bench.executor.take_finished().empty());
+  may_prepare.release();
 }
 
 /// Yields the campaign's seed as number of draws.
