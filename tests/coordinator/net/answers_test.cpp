@@ -82,8 +82,13 @@ class AnswersTest : public testing::Test {
   StoreWriter writer_{[] {}, {}};
   Background background_{[] {}};
   test::RecordingOutbox outbox_;
-  const ServiceContext context_{
-      config_, {}, state_, writer_, background_, outbox_, [this] { return now_; }};
+  const ServiceContext context_{config_,
+                                {.epoch = {1}, .host = {}, .version = {}},
+                                state_,
+                                writer_,
+                                background_,
+                                outbox_,
+                                [this] { return now_; }};
 
  protected:
   Answers answers_{context_};
