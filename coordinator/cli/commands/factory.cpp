@@ -24,6 +24,7 @@
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/log.hpp"
+#include "proto/link/signals.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/names.hpp"
 
@@ -228,6 +229,7 @@ class FactoryLoop {
 };
 
 int keep_workers(const FactoryOptions& options) {
+  wire::ignore_broken_pipes();  // Workers are wanted also when nobody reads its log.
   (void)checked(options);
   if (options.is_dry_run) return show_submission(options.system, allocation_config(options));
   const bool is_json = options.client.format == OutputFormat::json;

@@ -62,6 +62,11 @@ TEST(ProgramSignalsDeathTest, ABrokenPipeDoesNotEndWhatComputesACampaign) {
   EXPECT_EXIT(exit_without_reader(run_proofmass_alone, {"proofmass", "sweep", "/dev/null/a.toml",
                                                         "--vary", "simulation.orbits=1,2"}),
               testing::ExitedWithCode(exit_wrong_usage), "");
+  EXPECT_EXIT(exit_without_reader(
+                  run_proofmass_alone,
+                  {"proofmass", "factory", "--batch-system", "slurm", "--connect",
+                   "tcp://127.0.0.1:1", "--worker-connect", "tcp://head:2", "--name", "no name"}),
+              testing::ExitedWithCode(exit_wrong_usage), "");
 }
 
 }  // namespace
