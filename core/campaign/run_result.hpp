@@ -96,7 +96,7 @@ enum class RunStatus : std::uint8_t {
   completed = 1,      ///< All estimates converged.
   not_converged = 2,  ///< Estimates are those of the last allowed round.
   not_finite =
-      3,        ///< An estimate is out of range, see is_in_range(); truth holds, estimates do not.
+      3,        ///< An estimate or its standard error is not in range, see is_in_range(); truth is.
   no_draw = 4,  ///< No draw inside the acceptance bounds was found; neither truth nor estimate.
   lost = 5,     ///< The run left the limits of its model, see Loss; truth holds, estimates do not.
 };

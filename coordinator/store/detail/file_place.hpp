@@ -26,9 +26,9 @@ namespace proofmass::coordinator::detail {
 [[nodiscard]] bool is_sound_without_log(const std::filesystem::path& file);
 
 /// For a file that is about to be made.
-/// @throws StoreError if it is there, or the log or the rollback journal of one that is gone:
-/// SQLite
-///         would apply that to the new file.
+/// @throws StoreError
+///         if it is there, or the log or the rollback journal of one that is gone: SQLite would
+///         apply that to the new file.
 void check_absence(const std::filesystem::path& file);
 
 /// Where the open file of a coordinator is now.
