@@ -69,7 +69,7 @@ void WorkerGateway::receive(const Incoming& message, TimePoint now, Outbox& outb
   if (!callbacks_.is_allowed(message.from.key, now)) {
     return close_out(message.from, RejectReason::revoked, revoked_text(message.from), now, outbox);
   }
-  const std::optional<wire::Packet> packet = decode(message, now, outbox);
+  std::optional<wire::Packet> packet = decode(message, now, outbox);
   if (!packet) return;
   const wire::Header& header = packet->header;
   const auto worker = peers_.meet(header.session, header.sequence, message.from);

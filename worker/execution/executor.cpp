@@ -272,7 +272,7 @@ std::vector<RunResult> Executor::simulate(Batch& batch) {
   return results;
 }
 
-void Executor::finish(const Batch& batch, const std::vector<RunResult>& results) {
+void Executor::finish(const Batch& batch, std::vector<RunResult> results) {
   const Duration elapsed = now() - batch.started_at;
   const double elapsed_s = std::chrono::duration<double>(elapsed).count();
   const double compute_s = elapsed_s / static_cast<double>(results.size());
@@ -286,10 +286,11 @@ void Executor::finish(const Batch& batch, const std::vector<RunResult>& results)
       known.largest_batch = results.size();
       known.batch_time = elapsed;
     }
-    for (const RunResult& result : results) {
+    for (RunResult& result : results) {
       finished_.push_back(
           {.campaign = campaign,
-           .computed = {.result = result, .compute_s = compute_s, .elapsed_s = elapsed_s}});
+           .computed = {
+               .result = std::move(result), .compute_s = compute_s, .elapsed_s = elapsed_s}});
     }
   }
   on_change_();

@@ -105,7 +105,7 @@ class Executor final : public Execution {
   void prepare(wire::CampaignId id, std::unique_lock<std::mutex>& lock);
   void compute(Batch& batch);
   [[nodiscard]] std::vector<RunResult> simulate(Batch& batch);
-  void finish(const Batch& batch, const std::vector<RunResult>& results);
+  void finish(const Batch& batch, std::vector<RunResult> results);
   void drop_batches(const std::function<bool(const Batch&)>& is_unwanted);
   void make_room();
   [[nodiscard]] bool is_in_use(wire::CampaignId campaign) const;

@@ -302,7 +302,7 @@ std::optional<RunResult> ResultReader::next() {
   if (!impl_->num_runs) {
     impl_->num_runs = impl_->database.count("SELECT num_runs FROM campaign");
   }
-  const RunResult result = detail::read_result(impl_->row);
+  RunResult result = detail::read_result(impl_->row);
   if (impl_->last && !(*impl_->last < result.run)) {
     impl_->database.refuse_as_damaged(fmt::format("result of run {} comes after that of run {}",
                                                   result.run.value, impl_->last->value));
