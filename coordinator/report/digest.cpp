@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <bit>
 #include <concepts>
 #include <cstddef>
@@ -21,9 +22,11 @@ class Layout {
 
   template <std::unsigned_integral Integer>
   void put(Integer value) {
+    std::array<unsigned char, sizeof(value)> bytes{};
     for (std::size_t i = 0; i < sizeof(value); ++i) {
-      bytes_.push_back(static_cast<unsigned char>(value >> (8 * i)));
+      bytes[i] = static_cast<unsigned char>(value >> (8 * i));
     }
+    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
   }
 
   // Adding zero takes the sign from a negative zero, which SQLite does not keep.
