@@ -1,6 +1,10 @@
 #include "proto/wire/codec.hpp"
 
 #include <fmt/format.h>
+#include <google/protobuf/arena.h>
+
+#include <array>
+#include <cstddef>
 
 #include "core/error.hpp"
 #include "core/model.hpp"
@@ -13,6 +17,25 @@ namespace {
 
 /// The largest batch of results has 40,000.
 constexpr std::size_t fields_max = 65536;
+
+/// An envelope and its parts, which are freed at once: a batch of results has hundreds. Those of a
+/// short message lie within the object.
+class EnvelopeArena {
+ public:
+  [[nodiscard]] proto::Envelope& envelope() { return envelope_; }
+
+ private:
+  alignas(std::max_align_t) std::array<char, 2048> first_block_;
+  google::protobuf::Arena arena_{first_block_.data(), first_block_.size()};
+  proto::Envelope& envelope_ = *google::protobuf::Arena::CreateMessage<proto::Envelope>(&arena_);
+};
+
+bool has_few_fields(std::string_view bytes) {
+  // A field takes two bytes or more. To count those of most messages would take as long as to parse
+  // them.
+  return bytes.size() / 2 <= fields_max ||
+         detail::has_fields_at_most(bytes, *proto::Envelope::descriptor(), fields_max);
+}
 
 DecodeError too_large(std::size_t size, std::size_t size_max) {
   return {DecodeFault::too_large,
@@ -181,10 +204,10 @@ void write(const Stop&, proto::Envelope& envelope) { envelope.mutable_stop(); }
 std::variant<Packet, DecodeError> decode(std::string_view bytes) {
   detail::silence_protobuf();
   if (bytes.size() > message_size_max) return too_large(bytes.size(), message_size_max);
-  proto::Envelope envelope;
-  const bool is_parsed =
-      detail::has_fields_at_most(bytes, *proto::Envelope::descriptor(), fields_max) &&
-      envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+  EnvelopeArena arena;
+  proto::Envelope& envelope = arena.envelope();
+  const bool is_parsed = has_few_fields(bytes) &&
+                         envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
   if (!is_parsed) {
     return DecodeError{DecodeFault::unparsable,
                        fmt::format("message = {} bytes (must be an envelope of at most {} fields)",
@@ -204,7 +227,8 @@ std::variant<Packet, DecodeError> decode(std::string_view bytes) {
 }
 
 std::string encode(const Packet& packet) {
-  proto::Envelope envelope;
+  EnvelopeArena arena;
+  proto::Envelope& envelope = arena.envelope();
   envelope.set_protocol_version(protocol_version);
   envelope.set_session(packet.header.session.value);
   envelope.set_epoch(packet.header.epoch.value);
