@@ -231,10 +231,7 @@ Duration patience(const State& state, CampaignId id) {
     if (campaign->second.run_time_s > 0.0) step_time_s = campaign->second.run_time_s;
     if (campaign->second.step_time_s > 0.0) step_time_s = campaign->second.step_time_s;
   }
-  constexpr double patience_s_max = 1e6;  // A worker may claim any time.
-  const double patience_s = std::min(patience_s_max, config.hung_after_steps * step_time_s);
-  return std::max(config.hung_after_min,
-                  std::chrono::duration_cast<Duration>(std::chrono::duration<double>(patience_s)));
+  return std::max(config.hung_after_min, bounded_duration(config.hung_after_steps * step_time_s));
 }
 
 }  // namespace

@@ -122,10 +122,7 @@ struct Share {
 /// Slots that will soon want what waits: those that are idle, and those that have been computing
 /// for half of the usual time of a run; before that time is known, no slot that was lent a run.
 std::uint64_t num_slots_sharing(State& state, double time_s, TimePoint now) {
-  if (time_s > 0.0) {
-    state.lately_lent.forget_before(
-        now - std::chrono::duration_cast<Duration>(std::chrono::duration<double>(time_s / 2.0)));
-  }
+  if (time_s > 0.0) state.lately_lent.forget_before(now - bounded_duration(time_s / 2.0));
   const std::uint64_t num_in_all = num_slots_in_all(state);
   const std::uint64_t num_lately = std::min(num_in_all, state.lately_lent.num_slots());
   return std::max(num_in_all - num_lately, state.num_idle_slots + state.num_slots_expected);

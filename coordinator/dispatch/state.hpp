@@ -33,6 +33,14 @@ using Duration = std::chrono::steady_clock::duration;
   return std::chrono::duration<double>(duration).count();
 }
 
+/// A duration that follows from what workers say. They may claim any time: 1e6 s stand for all that
+/// is longer.
+[[nodiscard]] inline Duration bounded_duration(double duration_s) {
+  constexpr double duration_s_max = 1e6;
+  return std::chrono::duration_cast<Duration>(
+      std::chrono::duration<double>(std::min(duration_s, duration_s_max)));
+}
+
 /// A computer, as the workers with one key name it. What these workers say about it, and their
 /// crashes there, count for this key alone, so that one key cannot put the hosts of another one
 /// under quarantine.
