@@ -33,9 +33,8 @@ std::pair<std::string, pid_t> state_and_parent(pid_t id) {
   return {state, parent};
 }
 
-void redirect(const std::filesystem::path& file, int to) {
-  const int fd = open(file.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600);
-  dup2(fd, to);
+int open_empty(const std::filesystem::path& file) {
+  return open(file.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0600);
 }
 
 }  // namespace
@@ -65,14 +64,19 @@ Process::Process(const std::filesystem::path& directory, const std::string& name
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
+  // Empty before anybody reads: a former process of the same name may have said what is waited for.
+  const int output = open_empty(directory / (name + ".out"));
+  const int errors = open_empty(directory / (name + ".err"));
   id_ = fork();
   if (id_ != 0) {
+    close(output);
+    close(errors);
     setpgid(id_, id_);  // In both, so that the group is there whoever comes first.
     return;
   }
   setpgid(0, 0);
-  redirect(directory / (name + ".out"), STDOUT_FILENO);
-  redirect(directory / (name + ".err"), STDERR_FILENO);
+  dup2(output, STDOUT_FILENO);
+  dup2(errors, STDERR_FILENO);
   setenv("TMPDIR", directory.c_str(), 1);  // What a killed program leaves goes with the test.
   if (chdir(directory.c_str()) == 0) execv(program.c_str(), argv.data());
   _exit(127);
