@@ -33,8 +33,7 @@ using Duration = std::chrono::steady_clock::duration;
   return std::chrono::duration<double>(duration).count();
 }
 
-/// A duration that follows from what workers say. They may claim any time: 1e6 s stand for all that
-/// is longer.
+/// A duration computed from times that workers report, which may be any: 1e6 s at most.
 [[nodiscard]] inline Duration bounded_duration(double duration_s) {
   constexpr double duration_s_max = 1e6;
   return std::chrono::duration_cast<Duration>(

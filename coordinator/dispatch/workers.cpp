@@ -212,7 +212,7 @@ void reject_unregistered(WorkerId id, Outbox& outbox) {
                                .text = "this worker is not registered"});
 }
 
-void on_packet(State& state, WorkerId id, const std::string& key, wire::Packet packet,
+void on_packet(State& state, WorkerId id, const std::string& key, wire::Packet&& packet,
                TimePoint now, Outbox& outbox) {
   const Handler handle{state, id, key, packet.header, now, outbox};
   const bool is_of_worker = wire::visit_if<wire::WorkerMessage>(std::move(packet.message), handle);

@@ -24,8 +24,9 @@ namespace proofmass::coordinator {
 void reject_unregistered(WorkerId id, Outbox& outbox);
 /// Calls the event of the message: one of those below, or on_results().
 /// @param key  Public key of the connection; empty without keys.
+/// @param packet  Moved from: a constant one, whose results would be copied, does not compile.
 /// @pre The message is one of a worker.
-void on_packet(State& state, WorkerId id, const std::string& key, wire::Packet packet,
+void on_packet(State& state, WorkerId id, const std::string& key, wire::Packet&& packet,
                TimePoint now, Outbox& outbox);
 /// Registers a worker, or answers again if it is registered already.
 /// @param key  Public key of the connection; empty without keys. What is said about a host counts

@@ -18,8 +18,8 @@ namespace {
 /// The largest batch of results has 40,000.
 constexpr std::size_t fields_max = 65536;
 
-/// An envelope and its parts, which are freed at once: a batch of results has hundreds. Those of a
-/// short message lie within the object.
+/// An envelope in an arena. The parts of a message, of which a batch of results has hundreds, are
+/// freed at once; those of a short message need no memory but this object.
 class EnvelopeArena {
  public:
   [[nodiscard]] proto::Envelope& envelope() { return envelope_; }
@@ -31,8 +31,8 @@ class EnvelopeArena {
 };
 
 bool has_few_fields(std::string_view bytes) {
-  // A field takes two bytes or more. To count those of most messages would take as long as to parse
-  // them.
+  // A field takes two bytes or more, so that a short message cannot have too many. Counting takes
+  // as long as parsing.
   return bytes.size() / 2 <= fields_max ||
          detail::has_fields_at_most(bytes, *proto::Envelope::descriptor(), fields_max);
 }

@@ -22,6 +22,13 @@ class HostileTest : public DispatchFixture {
   }
 };
 
+TEST(BoundedDuration, IsOfTheSecondsUpToAMillion) {
+  EXPECT_EQ(coordinator::bounded_duration(0.25), 250ms);
+  EXPECT_EQ(coordinator::bounded_duration(999'999.0), 999'999s);
+  EXPECT_EQ(coordinator::bounded_duration(1e300), 1'000'000s);
+  EXPECT_EQ(coordinator::bounded_duration(std::numeric_limits<double>::infinity()), 1'000'000s);
+}
+
 // A copy of a run goes out under the attempt after: it must not become 0, which no worker takes.
 TEST_F(HostileTest, TheLargestAttemptFollowsItself) {
   add_campaign(one, 2);
