@@ -126,8 +126,10 @@ class BoundedMemory : public FaultTest {
     wait_until("resets",
                [&] { return num_log_lines("coordinator", "] sockets_reset ") >= num_resets_min; });
     RecordProperty("peak_mib", static_cast<int>(peak_mib()));
+#if !defined(__SANITIZE_ADDRESS__)  // It keeps what is freed.
     EXPECT_LT(peak_mib(), memory_mib_max) << errors_of("coordinator");
     EXPECT_EQ(num_log_lines("coordinator", "memory_high"), 0U) << errors_of("coordinator");
+#endif
     process_->signal(SIGTERM);
     EXPECT_EQ(process_->wait(), 0) << errors_of("coordinator");
     EXPECT_EQ(digest("null"), undisturbed_digest("null"));
@@ -252,6 +254,9 @@ TEST_F(BoundedMemory, LetsPeersWithoutAKeyFillNoMoreThanAMebibyteEach) {
 // The service's thread cannot go on while nobody reads its log: what arrives meanwhile is held by
 // the library. Afterwards all goes on.
 TEST_F(BoundedMemory, HoldsWhileTheServiceIsBusy) {
+#if defined(__SANITIZE_ADDRESS__)
+  GTEST_SKIP() << "AddressSanitizer keeps what is freed";
+#endif
   const std::string log = path("log").string();
   ASSERT_EQ(mkfifo(log.c_str(), 0600), 0);
   const int reader = open(log.c_str(), O_RDWR | O_CLOEXEC);
