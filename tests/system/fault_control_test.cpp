@@ -41,8 +41,8 @@ class WorkerEnd : public ControlledCampaign {
 TEST_F(WorkerEnd, ComesBeforeTheWalltime) {
   Process coordinator = this->coordinator("coordinator", {"null.toml", "--exit-when-done"});
   wait_for_log("coordinator", "coordinator_started");
-  const auto walltime_end = std::chrono::steady_clock::now() + std::chrono::seconds(12);
-  const std::int64_t end_time = std::time(nullptr) + 12;  // Not later, as it cuts off a fraction.
+  const auto walltime_end = std::chrono::steady_clock::now() + std::chrono::seconds(16);
+  const std::int64_t end_time = std::time(nullptr) + 16;  // Not later, as it cuts off a fraction.
   Process limited = null_worker("limited", {"--max-walltime", "1h", "--end-time",
                                             std::to_string(end_time), "--run-time", "0.1"});
   EXPECT_EQ(limited.wait(), 0) << errors_of("limited");

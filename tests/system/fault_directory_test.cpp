@@ -223,7 +223,9 @@ TEST_F(FinishedCampaigns, CostNothing) {
   const IoCounts io = io_counts_of(process);
   // Two looks at each, which take the header, the schema and the first rows: a dozen pages.
   EXPECT_LT(io.num_bytes_read, num_files * 32 * 4096U);
-  EXPECT_LT(io.num_bytes_written, 4096U);  // The log.
+#ifndef __SANITIZE_THREAD__
+  EXPECT_LT(io.num_bytes_written, 4096U);  // The log; ThreadSanitizer adds 512 KiB.
+#endif
   const Process worker = null_worker("worker");
   wait_for_log("coordinator", "worker_registered");
   const nlohmann::json status = nlohmann::json::parse(told({"status", "--json"}));
