@@ -126,7 +126,7 @@ class BoundedMemory : public FaultTest {
     wait_until("resets",
                [&] { return num_log_lines("coordinator", "] sockets_reset ") >= num_resets_min; });
     RecordProperty("peak_mib", static_cast<int>(peak_mib()));
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // They keep what is freed.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // They take far more.
     EXPECT_LT(peak_mib(), memory_mib_max) << errors_of("coordinator");
     EXPECT_EQ(num_log_lines("coordinator", "memory_high"), 0U) << errors_of("coordinator");
 #endif
@@ -255,7 +255,7 @@ TEST_F(BoundedMemory, LetsPeersWithoutAKeyFillNoMoreThanAMebibyteEach) {
 // the library. Afterwards all goes on.
 TEST_F(BoundedMemory, HoldsWhileTheServiceIsBusy) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "sanitizers keep what is freed";
+  GTEST_SKIP() << "with sanitizers, memory that is freed stays resident";
 #endif
   const std::string log = path("log").string();
   ASSERT_EQ(mkfifo(log.c_str(), 0600), 0);
