@@ -25,7 +25,7 @@ done
 
 if [[ ! -d $build ]]; then
   [[ $build == "$root/build/release" ]] || fail "--build = $build (must be a build tree)" 2
-  (cd "$root" && cmake --preset release && cmake --build --preset programs)
+  (cd "$root" && cmake --preset programs && cmake --build --preset programs)
 fi
 for program in proofmass proofmass-coordinator proofmass-worker; do
   [[ -x $build/bin/$program ]] || fail "--build = $build (lacks bin/$program)"

@@ -6,10 +6,11 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
-"$root/deploy/install-deps.sh"
+"$root/deploy/install-deps.sh" --build
 (
   cd "$root"
-  cmake --preset release
+  # A build tree that is there may have the tests, which would be removed.
+  [[ -f build/release/build.ninja ]] || cmake --preset programs
   cmake --build --preset programs
 )
 exec "$root/build/release/bin/proofmass" run "$root/deploy/campaigns/hardy2013.toml" \
