@@ -4,16 +4,12 @@
 
 #include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <span>
 
 #include "coordinator/charts/svg.hpp"
-#include "coordinator/report/status_json.hpp"
 
 namespace proofmass::coordinator {
 namespace {
-
-using TraceJson = nlohmann::ordered_json;
 
 constexpr double chart_span_s = 1800.0;
 constexpr std::size_t chart_lanes_max = 24;
@@ -99,54 +95,6 @@ std::vector<AttemptLane> shown_lanes(const RecentAttempts& attempts, const Shown
   return lanes;
 }
 
-TraceJson metadata(std::string_view kind, std::uint64_t process, std::size_t thread,
-                   const std::string& name) {
-  return {
-      {"name", kind}, {"ph", "M"}, {"pid", process}, {"tid", thread}, {"args", {{"name", name}}}};
-}
-
-TraceJson run_numbers(const std::vector<RunIndex>& runs) {
-  TraceJson numbers = TraceJson::array();
-  for (const RunIndex run : runs) numbers.push_back(run.value);
-  return numbers;
-}
-
-void add_lane(const AttemptLane& lane, TraceJson& events) {
-  constexpr double us_per_s = 1e6;
-  events.push_back(metadata("thread_name", lane.worker_key, lane.number,
-                            fmt::format("lane {}", lane.number + 1)));
-  for (const PlacedAttempt& attempt : lane.attempts) {
-    const ComputedRuns* const computed = attempt.computed;
-    events.push_back({{"name", runs_text(computed->runs)},
-                      {"cat", "computed"},
-                      {"ph", "X"},
-                      {"ts", attempt.begin_s() * us_per_s},
-                      {"dur", computed->compute_s * us_per_s},
-                      {"pid", lane.worker_key},
-                      {"tid", lane.number},
-                      {"args",
-                       {{"runs", run_numbers(computed->runs)},
-                        {"attempt", computed->attempt.value},
-                        {"compute_s", computed->compute_s}}}});
-  }
-}
-
-void add_loss(const LostAttempt& lost, TraceJson& events) {
-  constexpr std::uint64_t us_per_s = 1'000'000;
-  events.push_back({{"name", fmt::format("{} lost: {}", runs_text(lost.runs), lost.reason)},
-                    {"cat", "lost"},
-                    {"ph", "i"},
-                    {"s", "p"},
-                    {"ts", lost.lost_unix_s * us_per_s},
-                    {"pid", lost.worker_key},
-                    {"tid", 0},
-                    {"args",
-                     {{"first_run", lost.runs.first.value},
-                      {"num_runs", lost.runs.count},
-                      {"attempt", lost.attempt.value},
-                      {"reason", lost.reason}}}});
-}
-
 }  // namespace
 
 std::vector<AttemptLane> lanes_of(const RecentAttempts& attempts) {
@@ -209,28 +157,9 @@ std::string attempts_chart(const RecentAttempts& attempts) {
       "aria-label=\"Timeline of attempts\">{}</div>\n",
       svg_of(timeline, SvgUse::embedded));
   if (num_shown < lanes.size()) {
-    html += fmt::format("<p class=\"note\">showing {} of {} lanes; the trace has all</p>\n",
-                        num_shown, lanes.size());
+    html += fmt::format("<p class=\"note\">showing {} of {} lanes</p>\n", num_shown, lanes.size());
   }
   return html;
-}
-
-std::string attempts_trace(const RecentAttempts& attempts, std::string_view campaign) {
-  TraceJson events = TraceJson::array();
-  for (const WorkerRecord& worker : attempts.workers) {
-    events.push_back(
-        metadata("process_name", worker.key, 0, fmt::format("{} on {}", worker.name, worker.host)));
-  }
-  for (const AttemptLane& lane : lanes_of(attempts)) add_lane(lane, events);
-  for (const LostAttempt& lost : attempts.lost) add_loss(lost, events);
-  const TraceJson trace{{"traceEvents", std::move(events)},
-                        {"displayTimeUnit", "ms"},
-                        {"otherData",
-                         {{"api_version", 1},
-                          {"campaign", campaign},
-                          {"num_runs_left_out", attempts.num_runs_left_out},
-                          {"num_losses_left_out", attempts.num_losses_left_out}}}};
-  return dumped(trace, JsonLayout::one_line);
 }
 
 }  // namespace proofmass::coordinator

@@ -31,10 +31,4 @@ struct AttemptLane {
 /// many lanes are left out is said.
 [[nodiscard]] std::string attempts_chart(const RecentAttempts& attempts);
 
-/// All of the attempts as Chrome trace events, a JSON object that Perfetto and chrome://tracing
-/// open: a process a worker, a thread a lane. Times are seconds since 1970, to the second: that is
-/// how the database keeps them.
-/// @param campaign  Name.
-[[nodiscard]] std::string attempts_trace(const RecentAttempts& attempts, std::string_view campaign);
-
 }  // namespace proofmass::coordinator

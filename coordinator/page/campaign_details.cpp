@@ -83,7 +83,6 @@ std::shared_ptr<const CampaignResults> read_results_of(const DetailSubject& camp
     ResultsReading reading = is_further ? *now->reading : ResultsReading(store);
     reading.read_further(store, page_results_a_reading);
     now->html = reading.results().html();
-    now->json = reading.results().json();
     now->num_runs = reading.num_read();
     now->reading = std::make_shared<const ResultsReading>(std::move(reading));
   } catch (const std::exception& error) {

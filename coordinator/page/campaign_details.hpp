@@ -42,7 +42,6 @@ struct CampaignEvents {
 /// What those results of a campaign yield that were read so far.
 struct CampaignResults {
   std::string html = {};       ///< Of LiveResults; empty before the first reading.
-  std::string json = {};       ///< Likewise.
   std::uint64_t num_runs = 0;  ///< Finished runs that were read.
   std::string failure = {};    ///< Why the last reading failed; the rest is of the one before.
   std::shared_ptr<const ResultsReading> reading = {};  ///< What the next reading goes on from.

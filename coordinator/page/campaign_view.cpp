@@ -106,16 +106,13 @@ std::string failures_of(const CampaignEvents& events, std::uint64_t num_given_up
          (tables.empty() ? "<p class=\"note\">none</p>\n" : tables) + "</section>\n";
 }
 
-std::string attempts_of(const CampaignEvents& events, const std::string& name) {
+std::string attempts_of(const CampaignEvents& events) {
   const RecentAttempts& attempts = events.attempts;
-  std::string html = "<section><h2>Attempts</h2>\n" + attempts_chart(attempts);
-  html += fmt::format(
-      "<p class=\"note\">A bar is the time that runs of one batch took; a line is a loss. "
-      "<a href=\"../api/campaigns/{}/trace\" download=\"{}-trace.json\">Trace for "
-      "Perfetto or chrome://tracing</a>",
-      percent_encoded(name), markup_text(name));
+  std::string html = "<section><h2>Attempts</h2>\n" + attempts_chart(attempts) +
+                     "<p class=\"note\">A bar is the time that runs of one batch took; a line is a "
+                     "loss.";
   if (attempts.num_runs_left_out > 0) {
-    html += fmt::format("; without {} older runs", grouped(attempts.num_runs_left_out));
+    html += fmt::format(" {} older runs are left out.", grouped(attempts.num_runs_left_out));
   }
   return html + "</p></section>\n";
 }
@@ -138,9 +135,9 @@ std::string events_of(const CampaignEvents& events, const std::string& name, std
   html += list_navigation(list, "events, the newest first", percent_encoded(name) + "?events=");
   if (events.events.size() > count) {
     html += fmt::format(
-        "<p class=\"note\">{} older events: <a href=\"../api/campaigns/{}/events\">as JSON</a>, or "
-        "the table <code>event</code> of the database</p>\n",
-        grouped(events.events.size() - count), percent_encoded(name));
+        "<p class=\"note\">{} older events are in the table <code>event</code> of the "
+        "database</p>\n",
+        grouped(events.events.size() - count));
   }
   return html + "</section>\n";
 }
@@ -154,7 +151,7 @@ std::string history_of(const CampaignDetails& details, const CampaignSnapshot& c
     html += notes_list({"the database cannot be read now: " + events.failure});
   }
   const std::string& name = campaign.status.name;
-  return html + failures_of(events, campaign.status.num_given_up) + attempts_of(events, name) +
+  return html + failures_of(events, campaign.status.num_given_up) + attempts_of(events) +
          events_of(events, name, request.number("events").value_or(1));
 }
 

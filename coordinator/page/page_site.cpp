@@ -3,10 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <span>
 
-#include "coordinator/page/attempts_chart.hpp"
-#include "coordinator/page/page_json.hpp"
 #include "coordinator/page/page_views.hpp"
 
 namespace proofmass::coordinator {
@@ -21,10 +18,6 @@ HttpAnswer text_answer(unsigned status, std::string text) {
 }
 
 HttpAnswer not_found() { return text_answer(404, "there is nothing at this address"); }
-
-HttpAnswer json_answer(std::string body) {
-  return {.content_type = "application/json", .body = std::move(body)};
-}
 
 /// The page, or only what the script exchanges.
 HttpAnswer html_answer(const PageRequest& request, const PageContent& content) {
@@ -42,22 +35,12 @@ std::optional<HttpAnswer> file_answer(const std::string& name) {
   return std::nullopt;
 }
 
-/// The path behind `first`, joined again; nothing if it does not begin so.
-bool begins_with(const PageRequest& request, std::span<const std::string_view> first) {
-  return request.path.size() >= first.size() &&
-         std::equal(first.begin(), first.end(), request.path.begin());
-}
-
 bool is_about_workers(const PageRequest& request) { return request.path.back() == "workers"; }
-
-HttpAnswer campaign_html(const CampaignSnapshot& campaign, const CampaignDetails& details,
-                         const PageRequest& request, TimePoint now) {
-  return html_answer(request, campaign_page(campaign, details, request, now));
-}
 
 }  // namespace
 
-std::optional<HttpAnswer> PageSite::answer(const HttpRequest& http, Patience patience) const {
+std::optional<HttpAnswer> PageSite::answer(const HttpRequest& http,
+                                           HttpServer::Patience patience) const {
   const std::optional<PageRequest> request = parse_target(http.target);
   if (!request) return not_found();
   const std::vector<std::string>& path = request->path;
@@ -73,11 +56,11 @@ std::optional<HttpAnswer> PageSite::answer(const HttpRequest& http, Patience pat
                                   ? SnapshotDepth::with_workers
                                   : SnapshotDepth::without_workers;
   std::shared_ptr<const PageSnapshot> snapshot = sources_.board->want(depth, sources_.now());
-  if (snapshot == nullptr && patience == Patience::left) return std::nullopt;
+  if (snapshot == nullptr && patience == HttpServer::Patience::left) return std::nullopt;
   if (snapshot == nullptr) snapshot = sources_.board->newest();
   if (snapshot == nullptr) return text_answer(503, "the coordinator has not said anything yet");
   if (auto found = about_service(*request, *snapshot)) return found;
-  return about_campaign(*request, *snapshot, patience);
+  return about_campaign(*request, *snapshot);
 }
 
 HttpAnswer PageSite::health() const {
@@ -99,41 +82,23 @@ std::optional<HttpAnswer> PageSite::about_service(const PageRequest& request,
     return HttpAnswer{.content_type = "text/plain; version=0.0.4; charset=utf-8",
                       .body = metrics_text(snapshot, now, process_figures(), sources_.counts())};
   }
-  if (path.size() != 2 || path[0] != "api") return std::nullopt;
-  if (path[1] == "status") return json_answer(status_answer(snapshot, now));
-  if (path[1] == "workers") return json_answer(workers_answer(snapshot, request, now));
   return std::nullopt;
 }
 
-std::optional<HttpAnswer> PageSite::about_campaign(const PageRequest& request,
-                                                   const PageSnapshot& snapshot,
-                                                   Patience patience) const {
-  constexpr std::array<std::string_view, 2> api{"api", "campaigns"};
-  const bool is_api = begins_with(request, api);
-  const std::size_t name_at = is_api ? 2 : 1;
-  if (request.path.size() <= name_at || (!is_api && request.path[0] != "campaigns")) {
-    return not_found();
-  }
-  const std::string& name = request.path[name_at];
+HttpAnswer PageSite::about_campaign(const PageRequest& request,
+                                    const PageSnapshot& snapshot) const {
+  if (request.path.size() != 2 || request.path[0] != "campaigns") return not_found();
+  const std::string& name = request.path[1];
   const auto& campaigns = snapshot.service.campaigns;
   const auto found = std::ranges::find(
       campaigns, name,
       [](const CampaignSnapshot& one) -> const std::string& { return one.status.name; });
-  const std::size_t num_parts = request.path.size() - name_at;
-  if (found == campaigns.end() || num_parts > (is_api ? 2U : 1U)) return not_found();
+  if (found == campaigns.end()) return not_found();
   const TimePoint now = sources_.now();
+  // The page shows what has been read, and the rest two seconds later.
   const CampaignDetails details = sources_.details(
       name, {.id = found->id, .file = found->file, .num_finished = found->status.num_done}, now);
-  // A page shows what there is, and the rest two seconds later; a program wants all at once.
-  if (!is_api) return campaign_html(*found, details, request, now);
-  if (details.events == nullptr && patience == Patience::left) return std::nullopt;
-  if (num_parts == 1) return json_answer(campaign_answer(*found, details, now));
-  if (details.events == nullptr) return text_answer(503, "the database is being read; try again");
-  if (request.path[name_at + 1] == "events") {
-    return json_answer(events_answer(details, request, name));
-  }
-  if (request.path[name_at + 1] != "trace") return not_found();
-  return json_answer(attempts_trace(details.events->attempts, name));
+  return html_answer(request, campaign_page(*found, details, request, now));
 }
 
 }  // namespace proofmass::coordinator

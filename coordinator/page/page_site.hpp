@@ -33,14 +33,11 @@ class PageSite {
                                                  HttpServer::Patience patience) const;
 
  private:
-  using Patience = HttpServer::Patience;
-
   [[nodiscard]] HttpAnswer health() const;
   [[nodiscard]] std::optional<HttpAnswer> about_service(const PageRequest& request,
                                                         const PageSnapshot& snapshot) const;
-  [[nodiscard]] std::optional<HttpAnswer> about_campaign(const PageRequest& request,
-                                                         const PageSnapshot& snapshot,
-                                                         Patience patience) const;
+  [[nodiscard]] HttpAnswer about_campaign(const PageRequest& request,
+                                          const PageSnapshot& snapshot) const;
 
   SiteSources sources_;
 };

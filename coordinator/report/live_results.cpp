@@ -6,7 +6,6 @@
 
 #include "coordinator/charts/svg.hpp"
 #include "coordinator/report/html_table.hpp"
-#include "coordinator/report/report_json.hpp"
 #include "coordinator/report/review.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/report/review_tables.hpp"
@@ -43,7 +42,5 @@ std::string LiveResults::html() const {
          "<h3>Errors so far</h3>\n<div class=\"overview\">\n" + "<figure>\n" +
          svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n</div>\n";
 }
-
-std::string LiveResults::json() const { return accuracy_json(objectives_, statistics()); }
 
 }  // namespace proofmass::coordinator

@@ -24,9 +24,6 @@ class LiveResults {
   /// A fragment of HTML for a page with review_style(): the accuracy table and the histograms of
   /// |error| of a review report. Headings are of level 3.
   [[nodiscard]] std::string html() const;
-  /// The statistics of each quantity, a JSON array: the key `parameters` of report_json(), where
-  /// what RunningStatistics lack is null or an empty list.
-  [[nodiscard]] std::string json() const;
 
  private:
   std::vector<double> objectives_;

@@ -192,9 +192,4 @@ std::string report_json(const Store& store, const Campaign& campaign,
   return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-std::string accuracy_json(const std::vector<double>& objectives,
-                          const CampaignStatistics& statistics) {
-  return parameters_of(objectives, statistics).dump();
-}
-
 }  // namespace proofmass::coordinator

@@ -8,7 +8,6 @@
 #include "coordinator/report/stated_requirement.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"
-#include "core/campaign/statistics.hpp"
 
 namespace proofmass::coordinator {
 
@@ -20,10 +19,5 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string report_json(const Store& store, const Campaign& campaign,
                                       std::span<const RequirementAnswer> answers,
                                       std::span<const StatedRequirement> stated);
-
-/// The statistics of each quantity, a JSON array: the key `parameters` of report_json().
-/// @param objectives  Of each quantity, SI.
-[[nodiscard]] std::string accuracy_json(const std::vector<double>& objectives,
-                                        const CampaignStatistics& statistics);
 
 }  // namespace proofmass::coordinator

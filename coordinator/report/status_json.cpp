@@ -28,14 +28,7 @@ StatusJson factory_object(const wire::FactoryStatus& factory) {
   return json;
 }
 
-}  // namespace
-
-std::string dumped(const nlohmann::ordered_json& json, JsonLayout layout) {
-  constexpr auto replace = nlohmann::ordered_json::error_handler_t::replace;
-  return json.dump(layout == JsonLayout::indented ? 2 : -1, ' ', false, replace) + "\n";
-}
-
-nlohmann::ordered_json campaign_object(const wire::CampaignStatus& campaign) {
+StatusJson campaign_object(const wire::CampaignStatus& campaign) {
   StatusJson json{{"name", campaign.name},
                   {"phase", wire::name_of(campaign.phase)},
                   {"priority", campaign.priority},
@@ -57,7 +50,7 @@ nlohmann::ordered_json campaign_object(const wire::CampaignStatus& campaign) {
   return json;
 }
 
-nlohmann::ordered_json worker_object(const wire::WorkerStatus& worker) {
+StatusJson worker_object(const wire::WorkerStatus& worker) {
   return {{"worker_id", worker.id.value},
           {"name", worker.name},
           {"host", worker.host},
@@ -69,7 +62,7 @@ nlohmann::ordered_json worker_object(const wire::WorkerStatus& worker) {
           {"is_quarantined", worker.is_quarantined}};
 }
 
-nlohmann::ordered_json status_object(const wire::StatusReply& status) {
+StatusJson status_object(const wire::StatusReply& status) {
   StatusJson json{{"version", status.version},     {"model_version", status.model_version},
                   {"uptime_s", status.uptime_s},   {"num_workers", status.num_workers},
                   {"num_slots", status.num_slots}, {"campaigns", StatusJson::array()}};
@@ -85,6 +78,13 @@ nlohmann::ordered_json status_object(const wire::StatusReply& status) {
   json["factories"] = StatusJson::array();
   for (const auto& factory : status.factories) json["factories"].push_back(factory_object(factory));
   return json;
+}
+
+}  // namespace
+
+std::string dumped(const nlohmann::ordered_json& json, JsonLayout layout) {
+  constexpr auto replace = nlohmann::ordered_json::error_handler_t::replace;
+  return json.dump(layout == JsonLayout::indented ? 2 : -1, ' ', false, replace) + "\n";
 }
 
 std::string status_json(const wire::StatusReply& status, JsonLayout layout) {

@@ -17,10 +17,6 @@ enum class JsonLayout : std::uint8_t { one_line, indented };
 /// The text of an object. Bytes of it that are not UTF-8 are replaced by U+FFFD.
 [[nodiscard]] std::string dumped(const nlohmann::ordered_json& json, JsonLayout layout);
 
-[[nodiscard]] nlohmann::ordered_json status_object(const wire::StatusReply& status);
-[[nodiscard]] nlohmann::ordered_json campaign_object(const wire::CampaignStatus& campaign);
-[[nodiscard]] nlohmann::ordered_json worker_object(const wire::WorkerStatus& worker);
-
 [[nodiscard]] std::string status_json(const wire::StatusReply& status, JsonLayout layout);
 [[nodiscard]] std::string workers_json(const wire::WorkersReply& workers);
 

@@ -162,7 +162,7 @@ def check_token(programs, directory, screenshots, chromium):
     file.chmod(0o600)
     coordinator = Coordinator(programs, directory / "guarded", "--page-token-file", file)
     try:
-        for path in ("", "metrics", "api/status", "workers"):
+        for path in ("", "metrics", "workers"):
             check(get(coordinator.url + path)[0] == 401, f"{path}: is answered without the token")
             check(get(coordinator.url + path, Authorization="Bearer " + TOKEN)[0] == 200,
                   f"{path}: is not answered with the token")
@@ -214,10 +214,9 @@ def compute_campaign(programs, coordinator):
             [programs / "proofmass-worker", "--connect", f"ipc://{coordinator.directory}/workers",
              "--threads", "1"], stderr=log)
 
-    def state():
-        return json.loads(get(coordinator.url + "api/status")[1])["campaigns"][0]
-
-    wait_until("the end of the campaign", lambda: state()["phase"] == "finished", 300)
+    finished = 'proofmass_campaigns{phase="finished"} 1\n'
+    wait_until("the end of the campaign", lambda: finished in get(coordinator.url + "metrics")[1],
+               300)
     return worker
 
 

@@ -2,13 +2,11 @@
 
 #include <gmock/gmock.h>
 
-#include <nlohmann/json.hpp>
 #include <random>
 
 namespace proofmass::coordinator {
 namespace {
 
-using nlohmann::json;
 using ::testing::HasSubstr;
 
 ComputedRuns computed(std::uint64_t run, std::uint64_t worker, double compute_s,
@@ -62,32 +60,6 @@ TEST(AttemptLanes, AreOneForOneThread) {
                                          static_cast<std::uint64_t>(1000.0 + 1.5 * i)));
   }
   EXPECT_EQ(lanes_of(attempts).size(), 1U);
-}
-
-TEST(AttemptsTrace, IsWhatTheFormatWants) {
-  RecentAttempts attempts = random_attempts(2, 3.0);
-  attempts.lost = {{.runs = {{7}, 3},
-                    .attempt = {2},
-                    .worker_key = 2,
-                    .reason = "silent",
-                    .lost_unix_s = 2'000'000'000}};
-  attempts.num_runs_left_out = 11;
-  const json trace = json::parse(attempts_trace(attempts, "hardy2013"));
-  EXPECT_EQ(trace["otherData"]["num_runs_left_out"], 11);
-  EXPECT_EQ(trace["otherData"]["campaign"], "hardy2013");
-  std::map<std::string, int> counts;
-  for (const json& event : trace["traceEvents"]) {
-    const std::string phase = event["ph"];
-    ++counts[phase];
-    EXPECT_TRUE(event["pid"].is_number() && event["tid"].is_number());
-    if (phase == "X") {
-      EXPECT_GT(event["ts"].get<double>(), 1e15);
-      EXPECT_NEAR(event["dur"].get<double>(), event["args"]["compute_s"].get<double>() * 1e6, 1.0);
-    }
-  }
-  EXPECT_EQ(counts["X"], 200);
-  EXPECT_EQ(counts["i"], 1);
-  EXPECT_GE(counts["M"], 4);
 }
 
 TEST(AttemptsChart, SaysHowManyLanesItLeavesOut) {

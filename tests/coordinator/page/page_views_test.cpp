@@ -5,7 +5,6 @@
 #include <random>
 #include <string>
 
-#include "coordinator/page/page_json.hpp"
 #include "tests/coordinator/page/page_fixture.hpp"
 
 namespace proofmass::coordinator {

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "coordinator/report/review_tables.hpp"
@@ -44,22 +43,10 @@ TEST_F(LiveResultsTest, ShowTheTableOfAReview) {
   EXPECT_THAT(html, HasSubstr("50 runs exceed the objective"));  // 101 to 150 % of it.
 }
 
-TEST_F(LiveResultsTest, TellProgramsWhatOnePassCannotKnow) {
-  const auto parameters = nlohmann::json::parse(results_in(store_with(40)).json());
-  ASSERT_EQ(parameters.size(), model().results().quantities.size());
-  const auto& first = parameters[0];
-  EXPECT_EQ(first["worst_run"], 39);
-  EXPECT_DOUBLE_EQ(first["mean"], 0.205 * first["objective"].get<double>());  // 1 to 40 %.
-  EXPECT_TRUE(first["mean_interval"].is_array());
-  EXPECT_TRUE(first["percentiles"].empty());
-  EXPECT_TRUE(first["standard_deviation_interval"].is_null());
-}
-
 TEST(LiveResults, AreEmptyAtFirst) {
   const LiveResults results(test::campaign_of(1).objectives());
   EXPECT_EQ(test::malformed_part(results.html()), "");
   EXPECT_THAT(results.html(), HasSubstr("no data"));
-  EXPECT_TRUE(nlohmann::json::parse(results.json())[0]["worst"].is_null());
 }
 
 }  // namespace
