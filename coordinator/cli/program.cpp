@@ -63,8 +63,7 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
   }
 }
 
-int run_proofmass(int argc, char** argv,
-                  const std::function<void(CLI::App&, Command&)>& add_further_commands) {
+int run_proofmass(int argc, char** argv) {
   wire::keep_ends_of_children();
   CLI::App app(std::string(model().purpose()), "proofmass");
   app.footer(exit_codes_text({}));  // Of the commands, unless they say otherwise.
@@ -73,7 +72,6 @@ int run_proofmass(int argc, char** argv,
   wire::add_option_file(app, "TOML file with options, a section a command", "PROOFMASS_CONFIG");
   Command chosen;
   for (const auto add : {add_run, add_sweep, add_init, add_check, add_keygen}) add(app, chosen);
-  add_further_commands(app, chosen);
   for (const auto add :
        {add_report,  add_sensitivity, add_plot,   add_query,   add_verify,  add_export,
         add_replay,  add_backup,      add_merge,  add_compare, add_list,    add_tag,

@@ -38,9 +38,7 @@ using Command = std::function<int()>;
 [[nodiscard]] int run_program(CLI::App& app, int argc, char** argv, const Command& work);
 
 /// All of `proofmass`, from its arguments to its exit code.
-/// @param add_further_commands  Declares commands that are about the model, see add_command().
-[[nodiscard]] int run_proofmass(
-    int argc, char** argv, const std::function<void(CLI::App&, Command&)>& add_further_commands);
+[[nodiscard]] int run_proofmass(int argc, char** argv);
 
 /// All of `proofmass-coordinator`.
 [[nodiscard]] int run_proofmass_coordinator(int argc, char** argv);

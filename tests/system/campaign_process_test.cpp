@@ -207,9 +207,6 @@ TEST_F(CampaignProcess, ShowsNothingIfQuiet) {
 TEST_F(CampaignProcess, RefusesWrongUsageBeforeAnythingStarts) {
   EXPECT_EQ(start("usage", {"--worker", "1"}).wait(), 2);
   EXPECT_EQ(start("usage", {"--workers", "0"}).wait(), 2);
-  EXPECT_EQ(
-      Process(directory / "", "bench", programs + "/proofmass", {"bench", "--runs", "0"}).wait(),
-      2);
   EXPECT_EQ(start("usage", {"--set", "noise.scal=0"}).wait(), 2);
   EXPECT_EQ(errors_of("usage"),
             "proofmass: error: --set noise.scal=0: unknown key; nearest is noise.scale\n");

@@ -59,13 +59,8 @@ std::string broken_order(const SourceFile& file, const std::string& include,
 // What would tie the engine to one model, or the parts of core to each other; empty if admissible.
 std::string broken_seam(const SourceFile& file, const std::string& include) {
   const bool is_of_model = file.is_in("core/microscope");
-  const bool is_of_bench = file.is_in("coordinator/bench");
-  if (matches(include, "^core/microscope/") && !is_of_model && !is_of_bench) {
+  if (matches(include, "^core/microscope/") && !is_of_model) {
     return "what runs campaigns knows core/model.hpp, not one model";
-  }
-  if (matches(include, "^coordinator/bench/") && !is_of_bench &&
-      file.path != "coordinator/cli/main.cpp") {
-    return "bench knows one model: only coordinator/cli/main.cpp adds it to a program";
   }
   const bool may_read_text =
       matches(file.path, "^core/microscope/(definition/|microscope_model\\.cpp$)");
@@ -221,10 +216,9 @@ Findings check_links(const SourceFile& file) {
                                               "coordinator/cli/CMakeLists.txt ${program}",
                                               "coordinator/query/CMakeLists.txt proofmass_sqlite",
                                               "worker/CMakeLists.txt proofmass-worker"};
-  static const std::regex library("proofmass(::|_)(microscope\\w*|bench\\b)");
+  static const std::regex library("proofmass(::|_)(microscope\\w*)");
   Findings findings;
-  const bool may_know_a_model =
-      file.is_in("core/microscope") || file.is_in("coordinator/bench") || file.is_in("tests");
+  const bool may_know_a_model = file.is_in("core/microscope") || file.is_in("tests");
   if (!file.path.ends_with("CMakeLists.txt") || may_know_a_model) return findings;
   const std::string code = std::regex_replace(file.text, std::regex("#[^\n]*"), "");
   for (std::sregex_iterator it(code.begin(), code.end(), library), end; it != end; ++it) {

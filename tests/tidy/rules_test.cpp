@@ -66,27 +66,14 @@ TEST(CheckLayers, KeepTheEngineFromKnowingOneModel) {
         "core/campaign/a.cpp", "core/definition/a.cpp", "core/signal/a.hpp", "core/model.hpp"}) {
     EXPECT_THAT(layers(path, model), SizeIs(1)) << path;
   }
-  for (const std::string path :
-       {"coordinator/bench/a.cpp", "core/microscope/instrument/a.hpp", "tests/worker/a.cpp"}) {
+  for (const std::string path : {"core/microscope/instrument/a.hpp", "tests/worker/a.cpp"}) {
     EXPECT_THAT(layers(path, model), IsEmpty()) << path;
-  }
-}
-
-TEST(CheckLayers, KeepTheEngineFromKnowingBench) {
-  const std::string bench = "\"coordinator/bench/bench_parts.hpp\"";
-  for (const std::string path : {"coordinator/cli/coordinator_main.cpp", "coordinator/cli/a.cpp",
-                                 "coordinator/dispatch/a.hpp", "coordinator/cli/detail/main.cpp"}) {
-    EXPECT_THAT(layers(path, bench), SizeIs(1)) << path;
-  }
-  for (const std::string path :
-       {"coordinator/bench/a.cpp", "coordinator/cli/main.cpp", "tests/coordinator/bench/a.cpp"}) {
-    EXPECT_THAT(layers(path, bench), IsEmpty()) << path;
   }
 }
 
 TEST(CheckLayers, WantIncludesWrittenFromTheRoot) {
   for (const std::string include :
-       {"\"store.hpp\"", "\"../bench/bench_parts.hpp\"", "<../microscope/a.hpp>",
+       {"\"store.hpp\"", "\"../report/report.hpp\"", "<../microscope/a.hpp>",
         "\"core/../core/microscope/a.hpp\"", "\"core/./runs.hpp\"", "\"core//runs.hpp\"",
         "\"/core/runs.hpp\"", "</core/runs.hpp>", "A_MACRO"}) {
     EXPECT_THAT(layers("coordinator/store/a.cpp", include), SizeIs(1)) << include;
@@ -146,8 +133,7 @@ TEST(CheckLinks, CatchesALibraryThatIsLinkedWithAModel) {
   EXPECT_THAT(check_links({"coordinator/cli/CMakeLists.txt", link + "proofmass::microscope)"}),
               ElementsAre("coordinator/cli/CMakeLists.txt:3: proofmass::microscope: only a program "
                           "is linked with a model, not proofmass_cli"));
-  for (const std::string library : {"proofmass::microscope_model", "proofmass_microscope",
-                                    "proofmass::bench", "proofmass_bench"}) {
+  for (const std::string library : {"proofmass::microscope_model", "proofmass_microscope"}) {
     EXPECT_THAT(check_links({"coordinator/cli/CMakeLists.txt", link + library + ")"}), SizeIs(1));
     EXPECT_THAT(check_links({"proto/CMakeLists.txt", link + library + ")"}), SizeIs(1));
     EXPECT_THAT(check_links({"CMakeLists.txt", "link_libraries(" + library + ")"}), SizeIs(1));

@@ -165,8 +165,7 @@ class Terminal : public testing::Test {
     std::vector<char*> argv;
     for (std::string& argument : arguments) argv.push_back(argument.data());
     test::PseudoTerminal terminal;
-    EXPECT_EQ(run_proofmass(static_cast<int>(argv.size()), argv.data(), [](CLI::App&, Command&) {}),
-              exit_done);
+    EXPECT_EQ(run_proofmass(static_cast<int>(argv.size()), argv.data()), exit_done);
     return terminal.shown();
   }
   [[nodiscard]] std::string piped() const { return test::answer_of({"report", database_}).output; }

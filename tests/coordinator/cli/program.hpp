@@ -24,8 +24,7 @@ inline Answer answer_of(std::vector<std::string> arguments) {
   for (std::string& argument : arguments) argv.push_back(argument.data());
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();
-  Answer answer{.exit_code = coordinator::run_proofmass(static_cast<int>(argv.size()), argv.data(),
-                                                        [](CLI::App&, coordinator::Command&) {}),
+  Answer answer{.exit_code = coordinator::run_proofmass(static_cast<int>(argv.size()), argv.data()),
                 .output = {},
                 .error = {}};
   answer.output = testing::internal::GetCapturedStdout();

@@ -15,10 +15,6 @@ namespace {
 
 using ProgramMain = int (*)(int argc, char** argv);
 
-int run_proofmass_alone(int argc, char** argv) {
-  return run_proofmass(argc, argv, [](CLI::App&, Command&) {});
-}
-
 int run_with(ProgramMain program, std::vector<std::string> arguments) {
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
@@ -45,8 +41,8 @@ int run_with(ProgramMain program, std::vector<std::string> arguments) {
 
 // Otherwise it would never learn how the programs ended that it starts.
 TEST(ProgramSignalsDeathTest, AProgramDoesNotIgnoreItsChildrenWhoeverStartsIt) {
-  EXPECT_EXIT(exit_with_children_ignored(run_proofmass_alone, "proofmass"),
-              testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(exit_with_children_ignored(run_proofmass, "proofmass"), testing::ExitedWithCode(0),
+              "");
   EXPECT_EXIT(exit_with_children_ignored(run_proofmass_coordinator, "proofmass-coordinator"),
               testing::ExitedWithCode(0), "");
 }
@@ -57,16 +53,16 @@ TEST(ProgramSignalsDeathTest, ABrokenPipeDoesNotEndWhatComputesACampaign) {
                                   {"proofmass-coordinator", "--bind", "ipc:///tmp/none",
                                    "--directory", "/dev/null/served"}),
               testing::ExitedWithCode(exit_cannot_be_done), "");
-  EXPECT_EXIT(exit_without_reader(run_proofmass_alone, {"proofmass", "run", "/dev/null/a.toml"}),
+  EXPECT_EXIT(exit_without_reader(run_proofmass, {"proofmass", "run", "/dev/null/a.toml"}),
               testing::ExitedWithCode(exit_wrong_usage), "");
-  EXPECT_EXIT(exit_without_reader(run_proofmass_alone, {"proofmass", "sweep", "/dev/null/a.toml",
-                                                        "--vary", "simulation.orbits=1,2"}),
+  EXPECT_EXIT(exit_without_reader(run_proofmass, {"proofmass", "sweep", "/dev/null/a.toml",
+                                                  "--vary", "simulation.orbits=1,2"}),
               testing::ExitedWithCode(exit_wrong_usage), "");
-  EXPECT_EXIT(exit_without_reader(
-                  run_proofmass_alone,
-                  {"proofmass", "factory", "--batch-system", "slurm", "--connect",
-                   "tcp://127.0.0.1:1", "--worker-connect", "tcp://head:2", "--name", "no name"}),
-              testing::ExitedWithCode(exit_wrong_usage), "");
+  EXPECT_EXIT(
+      exit_without_reader(run_proofmass, {"proofmass", "factory", "--batch-system", "slurm",
+                                          "--connect", "tcp://127.0.0.1:1", "--worker-connect",
+                                          "tcp://head:2", "--name", "no name"}),
+      testing::ExitedWithCode(exit_wrong_usage), "");
 }
 
 }  // namespace

@@ -1,6 +1,3 @@
 #include "coordinator/cli/program.hpp"
 
-int main(int argc, char** argv) {
-  using namespace proofmass::coordinator;
-  return run_proofmass(argc, argv, [](CLI::App&, Command&) {});
-}
+int main(int argc, char** argv) { return proofmass::coordinator::run_proofmass(argc, argv); }

@@ -9,7 +9,7 @@
 #include "core/math/instruction_set.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass::test {
 
 /// What noise alone costs, on one core.
 struct NoiseCost {
@@ -64,7 +64,7 @@ struct Machine {
   std::string build_type;
 };
 
-/// What `proofmass bench` shows.
+/// What `proofmass_bench` shows.
 struct BenchFigures {
   Machine machine;
   std::uint64_t num_runs = 0;   ///< Runs of each set but `scalar`, which computes one.
@@ -92,4 +92,4 @@ struct BenchFigures {
 [[nodiscard]] bool agree_with_known(std::span<const RunResult> results,
                                     std::vector<RunResult>& known);
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::test

@@ -1,4 +1,4 @@
-#include "coordinator/bench/bench_parts.hpp"
+#include "tests/benchmarks/bench/bench_parts.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -14,7 +14,7 @@
 #include "core/microscope/simulation/session_record.hpp"
 #include "core/random/normal.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass::test {
 namespace {
 
 /// Makes the compiler believe that somebody reads the value.
@@ -176,4 +176,4 @@ bool agree_with_known(std::span<const RunResult> results, std::vector<RunResult>
   return is_same;
 }
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::test

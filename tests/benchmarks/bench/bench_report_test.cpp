@@ -1,4 +1,4 @@
-#include "coordinator/bench/bench_report.hpp"
+#include "tests/benchmarks/bench/bench_report.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "core/microscope/simulation/run.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass::test {
 namespace {
 
 BenchFigures figures() {
@@ -175,4 +175,4 @@ TEST(ProcessorName, IsFoundAmongTheFactsOfTheFirstProcessor) {
 }
 
 }  // namespace
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::test

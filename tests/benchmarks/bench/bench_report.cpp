@@ -1,4 +1,4 @@
-#include "coordinator/bench/bench_report.hpp"
+#include "tests/benchmarks/bench/bench_report.hpp"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,10 @@
 #include "coordinator/report/text_cells.hpp"
 #include "core/microscope/simulation/run.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass::test {
 namespace {
+
+using namespace coordinator;  // The cells of tables.
 
 double steps_per_s(const BenchFigures& figures, const SetCost& cost) {
   return static_cast<double>(figures.num_steps) / cost.run_s;
@@ -208,4 +210,4 @@ std::string processor_name(const std::string& cpuinfo) {
   return std::regex_search(cpuinfo, match, pattern) ? match[1].str() : "unknown";
 }
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::test

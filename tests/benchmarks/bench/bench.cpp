@@ -1,8 +1,10 @@
-#include "coordinator/bench/bench_command.hpp"
+// The speed of a run of the paper's campaign on one core of this machine, with every instruction
+// set that it has, and whether these give the same bits. README.md of the folder above has figures.
 
 #include <fmt/format.h>
 #include <time.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <fstream>
@@ -11,24 +13,18 @@
 #include <thread>
 #include <vector>
 
-#include "coordinator/bench/bench_campaigns.hpp"
-#include "coordinator/bench/bench_parts.hpp"
-#include "coordinator/bench/bench_report.hpp"
-#include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/program.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
 #include "core/model.hpp"
-#include "proto/command_line/option_checks.hpp"
-#include "proto/command_line/standard_error.hpp"
+#include "tests/benchmarks/bench/bench_campaigns.hpp"
+#include "tests/benchmarks/bench/bench_parts.hpp"
+#include "tests/benchmarks/bench/bench_report.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass::test {
 namespace {
 
-constexpr std::uint64_t bench_runs_max = 1'000'000;
-
 struct BenchOptions {
-  OutputFormat format = OutputFormat::text;
+  bool is_json = false;
   std::uint64_t num_runs = batch_lanes;  ///< Of each instruction set but `scalar`, which takes one.
   bool has_campaigns = false;
 };
@@ -137,29 +133,26 @@ BenchFigures measure(const MicroscopeCampaign& campaign, const BenchOptions& opt
   return figures;
 }
 
-/// Measures the speed of a run of the paper's campaign on one core of this machine, with every
-/// instruction set that it has, compares their results and prints both.
-/// @return An ExitCode: exit_cannot_be_done if results differ.
-int run_bench(const BenchOptions& options) {
-  const BenchFigures figures = measure(MicroscopeCampaign{}, options);
-  const bool is_json = options.format == OutputFormat::json;
-  fmt::print("{}", is_json ? bench_json(figures) : bench_table(figures));
-  if (all_bits_agree(figures)) return exit_done;
-  wire::say("proofmass: error: instruction sets give different results\n");
-  return exit_cannot_be_done;
-}
-
 }  // namespace
+}  // namespace proofmass::test
 
-void add_bench_command(CLI::App& app, Command& chosen) {
-  auto [command, options] = add_command<BenchOptions>(
-      app, chosen, "bench", "Measure the speed of this machine", run_bench);
-  command.add_option("--runs", options.num_runs, "Runs of each instruction set")
-      ->check(wire::in_range(std::uint64_t{1}, bench_runs_max))
+int main(int argc, char** argv) try {
+  using namespace proofmass::test;
+  CLI::App app{"Measure the speed of this machine"};
+  BenchOptions options;
+  app.add_option("--runs", options.num_runs, "Runs of each instruction set")
+      ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
-  command.add_flag("--campaigns", options.has_campaigns,
-                   "Also run campaigns of 100 and 1,000 runs on all\nprocessors");
-  add_json_flag(command, options.format);
+  app.add_flag("--campaigns", options.has_campaigns,
+               "Also run campaigns of 100 and 1,000 runs on all\nprocessors");
+  app.add_flag("--json", options.is_json, "Print JSON");
+  CLI11_PARSE(app, argc, argv);
+  const BenchFigures figures = measure(proofmass::MicroscopeCampaign{}, options);
+  fmt::print("{}", options.is_json ? bench_json(figures) : bench_table(figures));
+  if (all_bits_agree(figures)) return 0;
+  fmt::print(stderr, "proofmass_bench: error: instruction sets give different results\n");
+  return 1;
+} catch (const std::exception& error) {
+  fmt::print(stderr, "proofmass_bench: error: {}\n", error.what());
+  return 1;
 }
-
-}  // namespace proofmass::coordinator

@@ -1,4 +1,4 @@
-#include "coordinator/bench/bench_campaigns.hpp"
+#include "tests/benchmarks/bench/bench_campaigns.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -19,9 +20,8 @@
 #include "core/model.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
-#include "proto/link/whole_file.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass::test {
 namespace {
 
 /// A directory that is removed with all that is in it.
@@ -90,8 +90,7 @@ CampaignCost measure_campaign(std::uint64_t num_runs) {
   const ScratchDirectory directory;
   const std::filesystem::path file = directory.path() / "bench.toml";
   const std::filesystem::path database = directory.path() / "bench.db";
-  constexpr mode_t mode = 0600;
-  wire::write_whole_file("campaign file", file, model().example(), mode, wire::IfExists::refuse);
+  std::ofstream(file) << model().example();
   const auto start = std::chrono::steady_clock::now();
   const bool is_done =
       run_to_end({wire::program_beside_this("proofmass").string(), "run", file.string(), "--db",
@@ -100,7 +99,7 @@ CampaignCost measure_campaign(std::uint64_t num_runs) {
   if (!is_done) throw Error(fmt::format("runs = {} (the campaign failed)", num_runs));
   return {.num_runs = num_runs,
           .wall_s = elapsed.count(),
-          .compute_s = Store::open_read_only(database).execution().compute_s};
+          .compute_s = coordinator::Store::open_read_only(database).execution().compute_s};
 }
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::test

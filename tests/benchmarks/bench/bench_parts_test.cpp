@@ -1,4 +1,4 @@
-#include "coordinator/bench/bench_parts.hpp"
+#include "tests/benchmarks/bench/bench_parts.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "tests/support/microscope_results.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass::test {
 namespace {
 
 RunResult result(std::uint64_t run) {
@@ -64,4 +64,4 @@ TEST(KnownResults, AreNotReplacedByOthers) {
 }
 
 }  // namespace
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::test

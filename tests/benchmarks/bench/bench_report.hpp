@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include "coordinator/bench/bench_parts.hpp"
+#include "tests/benchmarks/bench/bench_parts.hpp"
 
-namespace proofmass::coordinator {
+namespace proofmass::test {
 
 /// Tables of at most 80 columns.
 [[nodiscard]] std::string bench_table(const BenchFigures& figures);
@@ -18,4 +18,4 @@ namespace proofmass::coordinator {
 /// The processor's name in the text of /proc/cpuinfo; `unknown` if there is none.
 [[nodiscard]] std::string processor_name(const std::string& cpuinfo);
 
-}  // namespace proofmass::coordinator
+}  // namespace proofmass::test
