@@ -86,8 +86,8 @@ class Survey {
 /// of either campaign.
 template <typename Visit>
 void visit_compared(const RunResult* a, const RunResult* b, bool is_paired, const Visit& visit) {
-  const RunResult* const of_first = a != nullptr && a->has_estimate() ? a : nullptr;
-  const RunResult* const of_second = b != nullptr && b->has_estimate() ? b : nullptr;
+  const RunResult* const of_first = a != nullptr && a->is_completed() ? a : nullptr;
+  const RunResult* const of_second = b != nullptr && b->is_completed() ? b : nullptr;
   if (is_paired && (of_first == nullptr || of_second == nullptr)) return;
   visit(of_first, of_second);
 }

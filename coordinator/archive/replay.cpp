@@ -68,7 +68,7 @@ std::vector<RunResult> Replay::worst_results(std::size_t count, const IsStopped&
   }
   std::vector<std::pair<double, RunResult>> worst;  // Largest ratio first, then by run.
   (void)walk_results(store_, is_stopped, [&](const RunResult& result) {
-    if (!result.has_estimate()) return;
+    if (!result.is_completed()) return;
     const double ratio = largest_ratio(result, objectives);
     if (worst.size() == count && ratio <= worst.back().first) return;
     const auto place = std::ranges::upper_bound(worst, ratio, std::greater<>(),

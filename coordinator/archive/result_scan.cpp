@@ -152,8 +152,9 @@ Check check_stored_statistics(const Store& store, const Campaign& campaign,
     return check_current(store, campaign, *summary, read_results(store, campaign).statistics);
   }
   Lines lines = store.budget_differences(campaign.error_budget());
-  const std::uint64_t num_counted =
-      summary->num_estimated + summary->num_not_finite + summary->num_no_draw + summary->num_lost;
+  const std::uint64_t num_counted = summary->num_estimated + summary->num_not_converged +
+                                    summary->num_not_finite + summary->num_no_draw +
+                                    summary->num_lost;
   if (num_counted != summary->num_finished) {
     lines.push_back(fmt::format("summary.num_finished = {} (must be {}, the sum of its kinds)",
                                 summary->num_finished, num_counted));

@@ -17,7 +17,8 @@ ComparedMember member_of(const Store& store, const std::filesystem::path& file) 
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
   CheckedResults checked = read_checked_results(store, *campaign);
   const CampaignStatistics& statistics = checked.results.statistics;
-  const MissingEstimates missing{.num_not_finite = statistics.num_not_finite,
+  const MissingEstimates missing{.num_not_converged = statistics.num_not_converged,
+                                 .num_not_finite = statistics.num_not_finite,
                                  .num_no_draw = statistics.num_no_draw,
                                  .num_lost = statistics.num_lost,
                                  .num_given_up = num_runs_in(checked.given_up)};

@@ -49,7 +49,7 @@ struct Intake {
     const RunIndex run = computed.result.run;
     if (detail::close_run(state, campaign_id, run, id, holders)) {
       campaign.delivered[run] = {.attempt = attempt, .waiting = {id}};
-      if (!computed.result.has_estimate()) ++campaign.num_without_estimate;
+      if (!computed.result.is_completed()) ++campaign.num_without_estimate;
       outbox.store(id, leased(std::move(computed)));
       return;
     }

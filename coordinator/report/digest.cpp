@@ -87,8 +87,9 @@ DigestCheck check_digest(const Store& store, std::uint64_t num_results,
     if (store.has_statistics()) store.refuse_as_damaged("its statistics are there without summary");
     return DigestCheck::not_checked;
   }
-  const std::uint64_t num_counted =
-      summary->num_estimated + summary->num_not_finite + summary->num_no_draw + summary->num_lost;
+  const std::uint64_t num_counted = summary->num_estimated + summary->num_not_converged +
+                                    summary->num_not_finite + summary->num_no_draw +
+                                    summary->num_lost;
   if (summary->num_finished != num_counted) {
     store.refuse_as_damaged(fmt::format("summary.num_finished is {} and its kinds are {}",
                                         summary->num_finished, num_counted));

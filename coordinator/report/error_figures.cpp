@@ -60,7 +60,7 @@ void FigurePasses::add_convergence() {
 }
 
 void FigurePasses::add(const RunResult& result) {
-  if (!result.has_estimate()) return;
+  if (!result.is_completed()) return;
   for (std::size_t i = 0; i < quantities_.size(); ++i) {
     add_error(result.run, result.error(i), quantities_[i]);
   }

@@ -19,7 +19,7 @@ LiveResults::LiveResults(std::vector<double> objectives)
 
 void LiveResults::add(const RunResult& result) {
   statistics_.add(result);
-  if (!result.has_estimate()) return;
+  if (!result.is_completed()) return;
   for (std::size_t i = 0; i < magnitudes_.size(); ++i) {
     magnitudes_[i].add(std::abs(result.error(i)));
   }

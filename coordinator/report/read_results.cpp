@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string_view>
@@ -49,18 +50,20 @@ class PassesOf final : public ResultPasses {
 }  // namespace
 
 void MissingEstimates::add(const RunResult& result) {
+  if (result.status == RunStatus::not_converged) ++num_not_converged;
   if (result.status == RunStatus::not_finite) ++num_not_finite;
   if (result.status == RunStatus::no_draw) ++num_no_draw;
   if (result.status == RunStatus::lost) ++num_lost;
 }
 
 std::uint64_t MissingEstimates::total() const {
-  return num_not_finite + num_no_draw + num_lost + num_given_up;
+  return num_not_converged + num_not_finite + num_no_draw + num_lost + num_given_up;
 }
 
 std::string reasons_text(const MissingEstimates& missing) {
-  const std::array<std::pair<std::uint64_t, std::string_view>, 4> reasons{
-      {{missing.num_not_finite, "not finite"},
+  const std::array<std::pair<std::uint64_t, std::string_view>, 5> reasons{
+      {{missing.num_not_converged, "not converged"},
+       {missing.num_not_finite, "not finite"},
        {missing.num_no_draw, "without draw"},
        {missing.num_lost, "lost"},
        {missing.num_given_up, "given up"}}};
@@ -75,7 +78,7 @@ RunTotalPasses::RunTotalPasses(ErrorBudget budget)
     : budget_(std::move(budget)), passes_({.levels = {0.5, 0.95}}) {}
 
 void RunTotalPasses::add(const RunResult& result) {
-  if (!result.has_estimate()) return;
+  if (!result.is_completed()) return;
   errors_.resize(result.estimate.size());
   for (std::size_t i = 0; i < errors_.size(); ++i) errors_[i] = std::abs(result.error(i));
   const double total = budget_.after(errors_).total;
@@ -96,6 +99,43 @@ std::optional<RunTotals> RunTotalPasses::totals() const {
   return totals;
 }
 
+namespace {
+
+void add_warnings(const Warner& warner, const RunResult& result, CampaignWarnings& all) {
+  if (!warner || !result.is_completed()) return;
+  const std::vector<Warning> warnings = warner(result);
+  if (!warnings.empty()) ++all.num_runs;
+  for (const Warning& warning : warnings) {
+    const auto is_same = [&](const WarnedQuantity& other) {
+      return other.effect == warning.effect && other.quantity == warning.quantity;
+    };
+    auto found = std::ranges::find_if(all.quantities, is_same);
+    if (found == all.quantities.end()) {
+      found = all.quantities.insert(found, {warning.effect, warning.quantity});
+    }
+    ++found->num_runs;
+    if (warning.part > found->largest_part) {
+      found->largest_part = warning.part;
+      found->run = result.run;
+    }
+    if (all.first.size() < num_warnings_kept) all.first.push_back({result.run, warning});
+  }
+}
+
+}  // namespace
+
+std::string warnings_text(const CampaignWarnings& warnings) {
+  if (warnings.num_runs == 0) return "";
+  std::string text =
+      fmt::format("          {} completed with a warning, of shifts up to\n", warnings.num_runs);
+  for (const WarnedQuantity& of : warnings.quantities) {
+    text += fmt::format("          {:.2g} of the objective of {}, by {} ({} {}, most in run {})\n",
+                        of.largest_part, model().results().quantities[of.quantity].symbol,
+                        of.effect, of.num_runs, of.num_runs == 1 ? "run" : "runs", of.run.value);
+  }
+  return text;
+}
+
 ReadResults read_results(const Store& store, const Campaign& campaign,
                          std::span<ResultPasses* const> further) {
   PassesOf<StatisticsPasses> statistics(campaign.objectives());
@@ -105,13 +145,15 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
     open.push_back(&totals.emplace(*std::move(budget)));
   }
   open.insert(open.end(), further.begin(), further.end());
-  ReadResults results{.statistics = {}, .digests = {}, .totals = {}};
+  ReadResults results{.statistics = {}, .digests = {}, .totals = {}, .warnings = {}};
+  const Warner warner = campaign.warner();
   store.read_one_state([&] {
     Digest digest;
     store.for_each_result([&](const RunResult& result) {
       require_in_range(result, model().results());
       for (ResultPasses* const passes : open) passes->add(result);
       digest.add(result);
+      add_warnings(warner, result, results.warnings);
     });
     // They may need different numbers of passes.
     const auto is_done = [](ResultPasses* passes) { return !passes->end_pass(); };
@@ -147,7 +189,8 @@ void update_statistics(Store& store, const Campaign& campaign) {
 }
 
 void write_statistics(Store& store, const Campaign& campaign, const ReadResults& results) {
-  store.write_statistics(results.statistics, campaign.error_budget(), results.digests);
+  store.write_statistics(results.statistics, campaign.error_budget(), results.digests,
+                         results.warnings.first);
 }
 
 std::vector<std::string> statistic_differences(const Store& store, const Campaign& campaign,

@@ -17,14 +17,15 @@
 
 namespace proofmass::coordinator {
 
-/// Runs that have no estimate, by reason: statistics leave them out, and say so.
+/// Runs that have no estimate that converged, by reason: statistics leave them out, and say so.
 struct MissingEstimates {
+  std::uint64_t num_not_converged = 0;
   std::uint64_t num_not_finite = 0;
   std::uint64_t num_no_draw = 0;
   std::uint64_t num_lost = 0;
   std::uint64_t num_given_up = 0;  ///< Having crashed workers: without a result.
 
-  /// Counts a result if it has no estimate.
+  /// Counts a result unless it is completed.
   void add(const RunResult& result);
   [[nodiscard]] std::uint64_t total() const;
 
@@ -63,11 +64,31 @@ class RunTotalPasses {
   bool is_first_ = true;  ///< No total was added in any pass.
 };
 
+/// How often an effect may have moved an estimate.
+struct WarnedQuantity {
+  std::string_view effect;
+  std::size_t quantity = 0;    ///< Index into the quantities of the ResultSchema.
+  std::uint64_t num_runs = 0;  ///< That have this warning.
+  double largest_part = 0.0;   ///< Of the objective.
+  RunIndex run = {};           ///< The first with the largest part.
+};
+
+/// The warnings of a campaign's completed runs.
+struct CampaignWarnings {
+  std::uint64_t num_runs = 0;              ///< With a warning of any kind.
+  std::vector<WarnedQuantity> quantities;  ///< In the order in which they first occur.
+  std::vector<RunWarning> first;           ///< num_warnings_kept at most, in run order.
+};
+
+/// `12 with a warning` and a line for each effect and quantity; empty without warnings.
+[[nodiscard]] std::string warnings_text(const CampaignWarnings& warnings);
+
 /// What the results of a campaign database yield.
 struct ReadResults {
   CampaignStatistics statistics;
   ResultDigests digests;
   std::optional<RunTotals> totals;  ///< Empty if no run has an estimate.
+  CampaignWarnings warnings;
 };
 
 /// Reads all results, of one state of the file, as often as StatisticsPasses needs them: twice if

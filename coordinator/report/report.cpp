@@ -178,7 +178,7 @@ std::string report_of_one_state(const Store& store, const Campaign& campaign) {
   const std::uint64_t num_given_up = num_runs_in(given_up);
   std::string text = summary_text(store.name(), store.seed(), store.num_runs(), statistics,
                                   results.digests.results, check) +
-                     given_up_text(given_up) + stop_text(store);
+                     given_up_text(given_up) + warnings_text(results.warnings) + stop_text(store);
   for (const std::string& table :
        {accuracy_table(campaign, statistics), interval_table(statistics, num_given_up),
         error_table(statistics, num_given_up),

@@ -116,6 +116,18 @@ Json budget_of(const Campaign& campaign, const ReadResults& results) {
   return json;
 }
 
+Json warnings_of(const CampaignWarnings& warnings) {
+  Json json = Json::array();
+  for (const WarnedQuantity& of : warnings.quantities) {
+    json.push_back({{"effect", of.effect},
+                    {"parameter", model().results().quantities[of.quantity].name},
+                    {"num_runs", of.num_runs},
+                    {"largest_part", of.largest_part},
+                    {"largest_run", of.run.value}});
+  }
+  return json;
+}
+
 Json json_of(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
   const Requirement& requirement = answer.requirement;
@@ -177,6 +189,8 @@ std::string report_json(const Store& store, const Campaign& campaign,
             {"num_no_draw", statistics.num_no_draw},
             {"num_lost", statistics.num_lost},
             {"num_given_up", num_given_up},
+            {"num_warned", checked.results.warnings.num_runs},
+            {"warnings", warnings_of(checked.results.warnings)},
             {"confidence", default_confidence},
             {"parameters", parameters_of(campaign.objectives(), statistics)},
             {"all_objectives",

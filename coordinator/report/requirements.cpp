@@ -54,7 +54,7 @@ void check(const Store& store, std::span<const double> objectives, RequirementAn
     ++num_runs;
     answer.missing.add(result);
     exceedances.add(result);
-    if (is_of_errors && result.has_estimate()) {
+    if (is_of_errors && result.is_completed()) {
       errors.push_back(std::abs(result.error(requirement.parameter)));
     }
   });
@@ -137,7 +137,7 @@ std::string needed_line(const RequirementAnswer& answer) {
 }  // namespace
 
 void Exceedances::add(const RunResult& result) {
-  if (!result.has_estimate()) return;
+  if (!result.is_completed()) return;
   std::vector<double> errors(objectives_.size());
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = result.error(i);
   ++num_estimated_;

@@ -23,7 +23,8 @@ CampaignIdentity identity_of(const Store& store) {
 }
 
 MissingEstimates missing_of(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
-  return {.num_not_finite = statistics.num_not_finite,
+  return {.num_not_converged = statistics.num_not_converged,
+          .num_not_finite = statistics.num_not_finite,
           .num_no_draw = statistics.num_no_draw,
           .num_lost = statistics.num_lost,
           .num_given_up = num_given_up};

@@ -255,6 +255,7 @@ ReviewTable identity_table(const Review& review) {
                        fmt::format("{} finished of {}, {} with an estimate", statistics.num_runs,
                                    identity.num_runs, statistics.num_estimated)),
                pair_of("not converged", std::to_string(statistics.num_not_converged)),
+               pair_of("with a warning", std::to_string(review.results.warnings.num_runs)),
                pair_of("without an estimate",
                        review.missing.total() == 0 ? "none" : reasons_text(review.missing)),
                pair_of("model", identity.model_version), pair_of("build", identity.build),

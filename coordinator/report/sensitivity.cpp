@@ -241,7 +241,7 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
   drawn.missing.num_given_up = num_runs_in(store.given_up_runs());
   (void)walk_checked(store, [&](const RunResult& result) {
     const bool is_first = drawn.num_first < num_runs_max;
-    if (!result.has_estimate()) {
+    if (!result.is_completed()) {
       if (is_first) drawn.missing.add(result);
       return;
     }

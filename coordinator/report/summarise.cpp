@@ -9,6 +9,7 @@
 
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/requirements.hpp"
+#include "core/model.hpp"
 #include "core/model_rules.hpp"
 #include "core/statistics/value_passes.hpp"
 
@@ -32,7 +33,7 @@ StopCheck check_with(const StopRule& rule, const Store& store, std::span<const d
   do {
     ResultReader reader = store.results({RunIndex{0}, num_runs});
     while (const std::optional<RunResult> result = reader.next()) {
-      if (result->has_estimate()) errors.add(std::abs(result->error(rule.parameter)));
+      if (result->is_completed()) errors.add(std::abs(result->error(rule.parameter)));
     }
   } while (errors.end_pass());
   return check_stop_rule(rule, errors);
@@ -129,6 +130,8 @@ std::uint64_t num_held(const Store& store) {
 std::vector<std::string> stop_check_differences(const Store& store,
                                                 std::span<const double> objectives) {
   std::vector<std::string> differences;
+  // Older models counted the errors of runs that did not converge.
+  if (store.model_version() != model().version()) return differences;
   std::vector<StopCheckRow> expected;
   const std::uint64_t num_runs = store.num_runs();
   const std::uint64_t num_runs_held = num_held(store);

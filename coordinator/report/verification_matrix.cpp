@@ -112,7 +112,7 @@ void MatrixPasses::add(const RunResult& result) {
     missing_.add(result);
     for (Exceedances& exceedances : exceedances_) exceedances.add(result);
   }
-  if (!result.has_estimate()) return;
+  if (!result.is_completed()) return;
   if (is_first_pass_) ++num_estimated_;
   for (auto& [key, values] : values_) {
     if (values.is_done) continue;

@@ -119,18 +119,19 @@ std::vector<LossCount> CampaignHistory::losses() const {
   return losses;
 }
 
-// The condition of the inner query is that of an index: results with an estimate are not looked at.
+// The condition of the inner query is that of an index: completed runs are not looked at.
 std::vector<EndCount> CampaignHistory::ends_without_estimate() const {
   Statement row = database_->prepare(
       "SELECT status, cause, session, count(*) FROM "
       "(SELECT r.status, ifnull(h.loss_cause, '') AS cause, ifnull(h.loss_session, '') AS session "
       " FROM run_result AS r LEFT JOIN loop_health AS h USING (run_index) "
-      " WHERE r.status <> 1 AND r.status >= 3) "
+      " WHERE r.status <> 1) "
       "GROUP BY 1, 2, 3 ORDER BY 4 DESC, 1, 2, 3");
   std::vector<EndCount> ends;
   while (row.step()) {
     const std::uint64_t status = row.count(0);
-    ends.push_back({.status = status == 3   ? "not finite"
+    ends.push_back({.status = status == 2   ? "not converged"
+                              : status == 3 ? "not finite"
                               : status == 4 ? "no draw"
                                             : "lost",
                     .cause = row.text(1),

@@ -100,7 +100,8 @@ class CampaignHistory {
                                                       std::size_t count_max) const;
   /// By reason, the one with the most runs first.
   [[nodiscard]] std::vector<LossCount> losses() const;
-  /// The ways in which finished runs ended without an estimate, the most frequent first.
+  /// The ways in which finished runs ended without an estimate that converged, the most frequent
+  /// first.
   [[nodiscard]] std::vector<EndCount> ends_without_estimate() const;
   /// The first `count_max` runs that were given up.
   [[nodiscard]] std::vector<GivenUpRecord> given_up(std::size_t count_max) const;

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/stop_rule.hpp"
@@ -167,6 +168,13 @@ struct Contradiction {
   std::string second_digest;
 };
 
+/// A warning of a run, and how many of them a file keeps.
+struct RunWarning {
+  RunIndex run;
+  Warning warning;
+};
+inline constexpr std::size_t num_warnings_kept = 1'000'000;
+
 /// What tells whether results are those that were stored, each 64 hexadecimal digits.
 struct ResultDigests {
   std::string results;  ///< Of what was found of each run.
@@ -178,7 +186,7 @@ struct ResultDigests {
 /// What the stored statistics were computed from.
 struct Summary {
   std::uint64_t num_finished = 0;
-  std::uint64_t num_estimated = 0;  ///< Completed or not converged.
+  std::uint64_t num_estimated = 0;  ///< Completed.
   std::uint64_t num_not_converged = 0;
   std::uint64_t num_not_finite = 0;
   std::uint64_t num_no_draw = 0;

@@ -271,8 +271,7 @@ std::vector<StopCheckRow> Store::stop_checks() const {
 }
 
 std::uint64_t Store::num_without_estimate() const {
-  // The index has all that are not completed.
-  return impl_->database.count("SELECT count(*) FROM run_result WHERE status <> 1 AND status > 2");
+  return impl_->database.count("SELECT count(*) FROM run_result WHERE status <> 1");
 }
 
 std::vector<std::string> Store::tags() const { return detail::read_tags(impl_->database); }

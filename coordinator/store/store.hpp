@@ -152,7 +152,7 @@ class Store {
   /// The one with the most runs.
   [[nodiscard]] std::optional<StoredStopCheck> last_stop_check(std::string_view statistic) const;
   [[nodiscard]] std::vector<StopCheckRow> stop_checks() const;
-  /// Finished runs without an estimate.
+  /// Finished runs that are not completed.
   [[nodiscard]] std::uint64_t num_without_estimate() const;
 
   /// How the runs were computed. Takes 0.1 s for a million runs.
@@ -228,9 +228,11 @@ class Store {
 
   /// Replaces the stored statistics and budgets, and the summary of what they were computed from.
   /// @param budget   Of the campaign.
-  /// @param digests  Of the same results.
+  /// @param digests   Of the same results.
+  /// @param warnings  The same; rows of `run_warning`.
   void write_statistics(const CampaignStatistics& statistics,
-                        const std::optional<ErrorBudget>& budget, const ResultDigests& digests);
+                        const std::optional<ErrorBudget>& budget, const ResultDigests& digests,
+                        std::span<const RunWarning> warnings = {});
 
   /// That of the last write_statistics(); empty before the first.
   [[nodiscard]] std::optional<Summary> summary() const;

@@ -26,11 +26,12 @@ void replace_all(Database& database, const CampaignStatistics& statistics,
 }  // namespace
 
 void Store::write_statistics(const CampaignStatistics& statistics,
-                             const std::optional<ErrorBudget>& budget,
-                             const ResultDigests& digests) {
+                             const std::optional<ErrorBudget>& budget, const ResultDigests& digests,
+                             std::span<const RunWarning> warnings) {
   impl_->change([&](Database& database) {
     replace_all(database, statistics, budget);
     detail::replace_summary(database, statistics, digests);
+    detail::replace_warnings(database, warnings);
   });
 }
 

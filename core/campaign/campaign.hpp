@@ -50,6 +50,16 @@ struct ErrorBudget {
   [[nodiscard]] std::vector<std::vector<double>> coefficients(std::size_t num_quantities) const;
 };
 
+/// Something that may have moved an estimate of a completed run by this part of its objective.
+struct Warning {
+  std::string_view effect;   ///< Of a constant string: `spin`; [a-z_]+.
+  std::size_t quantity = 0;  ///< Index into the quantities of the ResultSchema.
+  double part = 0.0;         ///< At most so much; a bound.
+};
+
+/// The warnings of a completed run: a pure function of its result.
+using Warner = std::function<std::vector<Warning>(const RunResult&)>;
+
 /// A run to be simulated, with campaign.table_values(run).
 struct RunRequest {
   RunIndex run;
@@ -138,6 +148,8 @@ class Campaign {
   [[nodiscard]] virtual RunDraw draw(RunIndex run) const = 0;
   /// Nothing if the model has none.
   [[nodiscard]] virtual std::optional<ErrorBudget> error_budget() const { return std::nullopt; }
+  /// Null if the model gives no warnings.
+  [[nodiscard]] virtual Warner warner() const { return nullptr; }
 
   /// Values of the `table` quantities for one run, in the order of table_quantities().
   [[nodiscard]] std::vector<double> table_values(RunIndex run) const;

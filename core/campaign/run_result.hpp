@@ -132,6 +132,9 @@ struct RunResult {
   [[nodiscard]] bool has_estimate() const {
     return status == RunStatus::completed || status == RunStatus::not_converged;
   }
+  /// True if the errors of `estimate` enter statistics. Those of the last allowed round do not: how
+  /// far they still had to go is not known, and such a run counts as a miss.
+  [[nodiscard]] bool is_completed() const { return status == RunStatus::completed; }
   /// estimate − truth of a quantity, SI; meaningful if has_estimate().
   [[nodiscard]] double error(std::size_t quantity) const {
     return estimate[quantity] - truth[quantity];

@@ -61,7 +61,7 @@ void CampaignStatistics::count(const RunResult& result) {
   if (result.status == RunStatus::not_finite) ++num_not_finite;
   if (result.status == RunStatus::no_draw) ++num_no_draw;
   if (result.status == RunStatus::lost) ++num_lost;
-  if (result.has_estimate()) ++num_estimated;
+  if (result.is_completed()) ++num_estimated;
 }
 
 bool ErrorExtremes::add(RunIndex run, double magnitude, double objective) {
@@ -79,7 +79,7 @@ RunningStatistics::RunningStatistics(std::vector<double> objectives)
 
 void RunningStatistics::add(const RunResult& result) {
   counts_.count(result);
-  if (!result.has_estimate()) return;
+  if (!result.is_completed()) return;
   bool is_within = true;
   for (std::size_t i = 0; i < objectives_.size(); ++i) {
     const double error = result.error(i);
@@ -122,7 +122,7 @@ void StatisticsPasses::add(const RunResult& result) {
   PROOFMASS_EXPECT(!last_run_ || *last_run_ < result.run);
   last_run_ = result.run;
   if (is_first_pass_) counts_.count(result);
-  if (!result.has_estimate()) return;
+  if (!result.is_completed()) return;
   bool is_within = true;
   for (std::size_t i = 0; i < quantities_.size(); ++i) {
     QuantityPasses& quantity = quantities_[i];

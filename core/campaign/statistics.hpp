@@ -25,7 +25,7 @@ struct PercentileStatistic {
   std::optional<Interval> interval;  ///< Empty if runs are too few, 368 for the 99th.
 };
 
-/// estimate − truth of one quantity, signed, over the runs that have an estimate. SI.
+/// estimate − truth of one quantity, signed, over the completed runs. SI.
 struct ErrorStatistic {
   double bias = 0.0;                      ///< Mean.
   std::optional<Interval> bias_interval;  ///< Empty for a single run; so is the other.
@@ -38,7 +38,7 @@ struct ErrorStatistic {
 /// Of the moments of these errors.
 [[nodiscard]] ErrorStatistic error_statistic(const Moments& about);
 
-/// |estimate − truth| of one quantity over the runs that have an estimate. Intervals are of 95 %.
+/// |estimate − truth| of one quantity over the completed runs. Intervals are of 95 %.
 struct AccuracyStatistic {
   double worst = 0.0;                          ///< SI.
   RunIndex worst_run;                          ///< The first run that reaches `worst`.
@@ -55,12 +55,12 @@ struct AccuracyStatistic {
 /// Statistics of a campaign's finished runs.
 struct CampaignStatistics {
   std::uint64_t num_runs = 0;       ///< Finished runs, whatever their status.
-  std::uint64_t num_estimated = 0;  ///< Those that have an estimate: the basis of `accuracy`.
+  std::uint64_t num_estimated = 0;  ///< Completed runs: the basis of `accuracy`.
   std::uint64_t num_not_converged = 0;
   std::uint64_t num_not_finite = 0;
   std::uint64_t num_no_draw = 0;
   std::uint64_t num_lost = 0;
-  /// Runs in which no |error| is above its objective; one without an estimate is none of them.
+  /// Runs in which no |error| is above its objective; one that is not completed is none of them.
   std::uint64_t num_within_objectives = 0;
   /// Of each quantity; all zero if num_estimated = 0.
   std::vector<AccuracyStatistic> accuracy;

@@ -5,6 +5,7 @@
 #include "core/error.hpp"
 #include "core/microscope/campaign/budget.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/microscope/campaign/shift_bounds.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/instrument/instrument.hpp"
@@ -63,6 +64,18 @@ RunDraw MicroscopeCampaign::draw(RunIndex run) const {
 
 std::optional<ErrorBudget> MicroscopeCampaign::error_budget() const {
   return microscope_budget(scenario);
+}
+
+Warner MicroscopeCampaign::warner() const {
+  return [bounds = ShiftBounds(scenario)](const RunResult& result) {
+    std::vector<Warning> warnings;
+    if (result.health.empty()) return warnings;
+    for (const Shift& shift : bounds.of(health_of(result.health), result.truth)) {
+      if (shift.part < warned_part) continue;
+      warnings.push_back({name_of(shift.effect), index(shift.parameter), shift.part});
+    }
+    return warnings;
+  };
 }
 
 namespace {

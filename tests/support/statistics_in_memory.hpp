@@ -29,7 +29,7 @@ class StatisticsInMemory {
     if (result.status == RunStatus::not_finite) ++counts_.num_not_finite;
     if (result.status == RunStatus::no_draw) ++counts_.num_no_draw;
     if (result.status == RunStatus::lost) ++counts_.num_lost;
-    if (!result.has_estimate()) return;
+    if (!result.is_completed()) return;
 
     ++counts_.num_estimated;
     estimated_runs_.push_back(result.run);

@@ -49,7 +49,7 @@ class Programs:
 
 
 def microscope(programs, directory):
-    """A campaign of which some runs are lost: those whose attitude error is in the upper half."""
+    """A campaign of which some runs are lost: those whose largest acceleration is in the upper half."""
     machine = Programs(programs, directory)
     machine.run("init", "paper.toml")
     text = machine.path("paper.toml").read_text()
@@ -58,9 +58,9 @@ def microscope(programs, directory):
     machine.path("short.toml").write_text(text)
     machine.run("run", "short.toml", "--db", "whole.db")
     with sqlite3.connect(machine.path("whole.db")) as database:
-        limit, = database.execute("SELECT health_attitude_rad FROM run_result "
+        limit, = database.execute("SELECT health_acceleration_m_s2 FROM run_result "
                                   "ORDER BY 1 LIMIT 1 OFFSET ?", (NUM_RUNS // 2,)).fetchone()
-    machine.run("run", "short.toml", "--db", "a.db", "--set", f"health.attitude_max_rad={limit}")
+    machine.run("run", "short.toml", "--db", "a.db", "--set", f"sensor.range_m_s2={limit!r}")
     return machine
 
 

@@ -16,6 +16,7 @@
 #include "core/microscope/simulation/run.hpp"
 #include "core/random/stream.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/spin_sessions.hpp"
 
 namespace proofmass {
 namespace {
@@ -186,46 +187,6 @@ INSTANTIATE_TEST_SUITE_P(Each, RecoveryOfOneParameter,
                                          Parameter::a_d13, Parameter::k2d, Parameter::k2c),
                          parameter_name);
 
-/// The paper's sessions in a frame that spins at 4.5 f_orb. A gradient's line at 2 f_orb is one at
-/// 2 f_EP = 11 f_orb there, with eccentric companions f_orb away; the Earth's direction turns at
-/// f_EP = 5.5 f_orb, that of the Sun at f_spin; the moving mass meets the Coriolis acceleration.
-void spin_sessions(MicroscopeCampaign& campaign) {
-  const double period_s = campaign.scenario.orbit.period_s;
-  const std::vector<LineMultiple> turning{{5.5, 0}, {0, 0, 1}, {2, 0, 2}};
-  const std::vector<LineMultiple> environment{{5.5, 0}, {0, 0, 1}, {3.5, 0}, {6.5, 0},
-                                              {1, 0},   {1, 0, 2}, {3, 0, 2}};
-  for (Session& session : campaign.scenario.sessions) {
-    session.spin_rate_rad_s = 2.0 * std::numbers::pi * 4.5 / period_s;
-    for (LineMultiple& line : session.fit_lines) {
-      if (std::abs(line.orbital) == 2.0) line.spin = line.orbital;
-    }
-    if (session.excitations.empty()) {
-      session.known_lines = environment;
-      continue;
-    }
-    std::vector<LineMultiple> known = turning;
-    for (const LineMultiple& line : {LineMultiple{0, 1},
-                                     {0, 2},
-                                     {2, 1, 2},
-                                     {-2, 1, -2},
-                                     {1, 1},
-                                     {-1, 1},
-                                     {3, 1, 2},
-                                     {-3, 1, -2},
-                                     {1, 1, 2},
-                                     {-1, 1, -2}}) {
-      const auto is_near = [&](const LineMultiple& other) {
-        return std::abs(line_frequency_hz(session, line, period_s) -
-                        line_frequency_hz(session, other, period_s)) < 0.11 / period_s;
-      };
-      const bool is_negative = line_frequency_hz(session, line, period_s) <= 0.0;
-      if (is_negative || std::ranges::any_of(session.fit_lines, is_near)) continue;
-      if (std::ranges::none_of(known, is_near)) known.push_back(line);
-    }
-    session.known_lines = known;
-  }
-}
-
 enum class Biases { absent, at_their_bounds };
 
 /// A corner of the box of all construction bounds: every drawn quantity at plus or minus its bound,
@@ -296,7 +257,7 @@ TEST_P(RecoveryOfADraw, IsWithinOneFiftieth) {
 // does of b_1d. The paper neglects Γ_app,d at DC.
 TEST_P(RecoveryOfADraw, IsWithinOneFiftiethInAFrameThatSpins) {
   auto [campaign, allowance] = silent_draw(GetParam());
-  spin_sessions(campaign);
+  test::spin_sessions(campaign, 4.5);
   const double rate = campaign.scenario.sessions.front().spin_rate_rad_s;
   const double k2c = 0.5 * (fixed_value(campaign, "quadratic_factor_s2_m.sensor_1_x") +
                             fixed_value(campaign, "quadratic_factor_s2_m.sensor_2_x"));
@@ -315,7 +276,7 @@ TEST(RecoveryInAFrameThatSpins, FindsTheCentrifugalAccelerationInADPrime) {
     MicroscopeCampaign campaign = silent_campaign();
     excite(campaign, Parameter::k2c);
     set(campaign, "offcentring_m.x", offcentring_S_m);
-    spin_sessions(campaign);
+    test::spin_sessions(campaign, 4.5);
     return RunPlan(campaign).simulate(RunIndex{0}, {}).error(index(Parameter::a_d11_prime));
   };
   const MicroscopeCampaign campaign;

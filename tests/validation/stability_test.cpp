@@ -10,6 +10,7 @@
 
 #include "core/microscope/simulation/run.hpp"
 #include "tests/support/microscope_results.hpp"
+#include "tests/support/spin_sessions.hpp"
 
 namespace proofmass {
 namespace {
@@ -68,84 +69,84 @@ class Stability : public testing::Test {
     return deviations;
   }
 
-  /// Six standard deviations of the noise, which 16 runs tell to a fifth, and half as much again as
-  /// the same instrument leaves without noise.
-  ///
-  /// The noise of a squared measurement scales its sensors' quadratic factors by 1 + x, where x has
-  /// the variance of half of square_noise; that is doubled, as two orbits tell it to a third only.
-  /// Six deviations of x are a tenth at the limit, by which 1/(1 − x) may exceed 1 + x.
-  static double allowance(const MicroscopeCampaign& campaign, const RunResult& result,
-                          std::size_t parameter) {
+  /// Six standard deviations of the noise, which 16 runs tell to a fifth, half as much again as the
+  /// same instrument leaves without noise, and what every effect may have moved the estimate by.
+  static double allowance(const MicroscopeCampaign& campaign, const ShiftBounds& bounds,
+                          const RunResult& result, std::size_t parameter) {
     const RunResult& without_noise = silent()[result.run.value];
     const double systematic =
         std::abs(without_noise.estimate[parameter] - without_noise.truth[parameter]);
-    const double k2d = without_noise.truth[index(Parameter::k2d)];
-    const double k2c = without_noise.truth[index(Parameter::k2c)];
-    const bool is_quadratic =
-        parameter == index(Parameter::k2d) || parameter == index(Parameter::k2c);
-    const double of_square = is_quadratic ? (std::abs(k2d) + std::abs(k2c)) *
-                                                std::sqrt(test::health_of(result).square_noise)
-                                          : 0.0;
-    const double of_noise = campaign.scenario.noise.scale * deviation()[parameter];
-    return 1.1 * 6.0 * std::hypot(of_noise, of_square) + 1.5 * systematic +
-           campaign.scenario.objectives[parameter] / 50.0;
+    const double objective = campaign.scenario.objectives[parameter];
+    double part = 1.0 / 50.0;
+    for (const Shift& shift : bounds.of(test::health_of(result), result.truth)) {
+      if (index(shift.parameter) == parameter) part += shift.part;
+    }
+    return 1.1 * 6.0 * campaign.scenario.noise.scale * deviation()[parameter] + 1.5 * systematic +
+           part * objective;
   }
 
   /// @returns How many of the runs are completed.
   static std::size_t expect_explained(const MicroscopeCampaign& campaign, const std::string& what) {
     std::size_t num_completed = 0;
     const std::vector<RunResult> results = simulate(campaign);
+    const ShiftBounds bounds(campaign.scenario);
     for (std::size_t i = 0; i < num_runs; ++i) {
       const RunResult& result = results[i];
       if (result.status == RunStatus::lost) {
         EXPECT_NE(result.loss.cause, static_cast<std::uint32_t>(LossCause::none));
         continue;
       }
+      // Where the axes of a weak loop push each other, corrections of one estimate by the others
+      // grow.
+      if (result.status == RunStatus::not_converged) continue;
       EXPECT_EQ(result.status, RunStatus::completed) << what << ", run " << i;
       ++num_completed;
       for (const test::ParameterInfo& info : test::parameter_infos()) {
         const std::size_t p = index(info.parameter);
-        EXPECT_LE(std::abs(result.error(index(info.parameter))), allowance(campaign, result, p))
+        EXPECT_LE(std::abs(result.error(index(info.parameter))),
+                  allowance(campaign, bounds, result, p))
             << what << ", run " << i << ", " << info.name;
       }
     }
     return num_completed;
   }
 
-  /// Checks every value of a sweep whose first one is harmless and whose last one is not.
-  static void expect_explained_sweep(const std::string& name, const std::vector<double>& values,
-                                     const std::function<void(MicroscopeCampaign&, double)>& set) {
-    for (const double value : values) {
+  using Setting = std::function<void(MicroscopeCampaign&, double)>;
+
+  /// Checks values of which no run is lost, values between, and such of which every run is.
+  static void expect_explained_sweep(const std::string& name, const std::vector<double>& harmless,
+                                     const std::vector<double>& between,
+                                     const std::vector<double>& absurd, const Setting& set) {
+    const auto num_completed_at = [&](double value) {
       MicroscopeCampaign campaign = short_campaign();
       set(campaign, value);
-      const std::size_t num_completed =
-          expect_explained(campaign, name + " = " + std::to_string(value));
-      if (value == values.front()) {
-        EXPECT_EQ(num_completed, num_runs) << name << " = " << value;
-      }
-      if (value == values.back()) {
-        EXPECT_EQ(num_completed, 0U) << name << " = " << value;
-      }
+      return expect_explained(campaign, name + " = " + std::to_string(value));
+    };
+    for (const double value : harmless) {
+      EXPECT_EQ(num_completed_at(value), num_runs) << name << " = " << value;
     }
+    for (const double value : between) num_completed_at(value);
+    for (const double value : absurd)
+      EXPECT_EQ(num_completed_at(value), 0U) << name << " = " << value;
   }
 };
 
 // The loop of one integrator and one sample of delay is stable below 2/(ω_c T) = 25.5 times its
 // gain; close to that it rings at half the sample rate, and K2 turns that into noise at the lines.
 TEST_F(Stability, OfHighThrustGainIsKeptOrReported) {
-  expect_explained_sweep("thrust gain", {1.0, 10.0, 18.0, 20.0, 22.0, 23.0, 24.0, 25.0, 26.0, 40.0},
+  expect_explained_sweep("thrust gain", {10.0, 18.0}, {20.0, 22.0, 23.0, 24.0, 25.0}, {26.0, 40.0},
                          set_thrust_gain);
 }
 
-// A weak loop leaves the environment's accelerations in the measurement, and below the gain where
-// its phase lag at the crossover reaches 90° more than the integrator's it swings up.
+// Below 0.03 times its gain a loop of thrusters that are misaligned by 0.017 rad pushes across as
+// much as along, and swings up.
 TEST_F(Stability, OfLowThrustGainIsKeptOrReported) {
-  expect_explained_sweep("thrust gain", {1.0, 0.1, 0.03, 0.02, 0.01, 0.003, 0.001},
+  expect_explained_sweep("thrust gain", {0.1}, {0.03, 0.02, 0.015}, {0.003, 0.001},
                          set_thrust_gain);
 }
 
 TEST_F(Stability, OfThrustAlongOneAxisIsKeptOrReported) {
-  expect_explained_sweep("thrust gain along Y", {1.0, 22.0, 24.0, 25.0, 26.0, 40.0},
+  expect_explained_sweep("thrust gain along Y", {22.0}, {24.0, 25.0}, {26.0, 40.0},
                          [](MicroscopeCampaign& campaign, double gain) {
                            for (std::size_t i = 0; i < num_drawn; ++i) {
                              if (drawn_names()[i] != "thruster_scale_error.y") continue;
@@ -157,7 +158,7 @@ TEST_F(Stability, OfThrustAlongOneAxisIsKeptOrReported) {
 
 // The slow integral makes the loop unstable where ω_I is above 2ζω.
 TEST_F(Stability, OfTheAttitudeIntegralIsKeptOrReported) {
-  expect_explained_sweep("attitude integral", {0.001, 0.002, 0.0025, 0.003, 0.0035, 0.004, 0.0049},
+  expect_explained_sweep("attitude integral", {0.001, 0.002}, {0.0025, 0.003, 0.0035}, {0.0049},
                          [](MicroscopeCampaign& campaign, double integral_hz) {
                            campaign.scenario.attitude.bandwidth_hz = 0.005;
                            campaign.scenario.attitude.damping = 0.3;
@@ -167,8 +168,7 @@ TEST_F(Stability, OfTheAttitudeIntegralIsKeptOrReported) {
 
 // With its integral kept, the loop is unstable below the gain at which 2ζω is ω_I: at 0.0033 Hz.
 TEST_F(Stability, OfLowAttitudeGainIsKeptOrReported) {
-  expect_explained_sweep("attitude bandwidth",
-                         {0.02, 0.01, 0.007, 0.005, 0.004, 0.0036, 0.0034, 0.0032, 0.003, 0.0025},
+  expect_explained_sweep("attitude bandwidth", {0.01, 0.005}, {0.0036, 0.0034, 0.0032}, {0.0025},
                          [](MicroscopeCampaign& campaign, double bandwidth_hz) {
                            campaign.scenario.attitude.bandwidth_hz = bandwidth_hz;
                            campaign.scenario.attitude.damping = 0.3;
@@ -176,31 +176,46 @@ TEST_F(Stability, OfLowAttitudeGainIsKeptOrReported) {
                          });
 }
 
+// A loop that does not follow the motion which the session of Δy commands has an angle of that
+// size, and estimates that are right.
+TEST_F(Stability, OfTheAttitudeGainIsKept) {
+  const auto set = [](MicroscopeCampaign& campaign, double bandwidth_hz) {
+    campaign.scenario.attitude.bandwidth_hz = bandwidth_hz;
+    campaign.scenario.attitude.integral_hz = 0.0;
+  };
+  expect_explained_sweep("attitude bandwidth", {0.1, 0.005, 0.002}, {}, {}, set);
+}
+
 // The loop takes the thrusters' noise out of the lines, but K2 turns its square into noise there.
-// At 28 times the nominal noise the limit of quadratic noise alone keeps a run from being completed
-// whose error its noise does not explain: a_c13 of run 1.
 TEST_F(Stability, UnderNoiseOfTheThrustersIsKeptOrReported) {
-  expect_explained_sweep("thrust noise", {1.0, 10.0, 20.0, 25.0, 28.0, 100.0},
+  expect_explained_sweep("thrust noise", {10.0}, {20.0, 28.0, 40.0}, {100.0},
                          [](MicroscopeCampaign& campaign, double factor) {
                            campaign.scenario.noise.thrust_asd_m_s2 *= factor;
                          });
 }
 
-// The highest gain that a campaign file may hold is the harmless end. The lowest one here does not
-// follow the motion that the session of Δy commands: its angle is beyond the limit, though the loop
-// is stable and the estimates would still be right.
-TEST_F(Stability, OfTheAttitudeGainIsKeptOrReported) {
-  expect_explained_sweep("attitude bandwidth", {0.1, 0.02, 0.01, 0.007, 0.005, 0.004, 0.003},
-                         [](MicroscopeCampaign& campaign, double bandwidth_hz) {
-                           campaign.scenario.attitude.bandwidth_hz = bandwidth_hz;
-                           campaign.scenario.attitude.damping = 2.0;
+TEST_F(Stability, UnderNoiseIsKeptOrReported) {
+  expect_explained_sweep(
+      "noise", {3.0, 6.0}, {10.0, 15.0, 20.0, 30.0}, {100.0, 1000.0},
+      [](MicroscopeCampaign& campaign, double scale) { campaign.scenario.noise.scale = scale; });
+}
+
+TEST_F(Stability, InAStrongEnvironmentIsKeptOrReported) {
+  expect_explained_sweep("environment", {100.0, 1000.0}, {3000.0}, {30000.0},
+                         [](MicroscopeCampaign& campaign, double scale) {
+                           campaign.scenario.environment.scale = scale;
                          });
 }
 
-TEST_F(Stability, UnderNoiseIsKeptOrReported) {
-  expect_explained_sweep(
-      "noise", {1.0, 3.0, 5.0, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 30.0, 60.0, 100.0, 300.0, 1000.0},
-      [](MicroscopeCampaign& campaign, double scale) { campaign.scenario.noise.scale = scale; });
+// At the rate of the flight the centrifugal acceleration is a part of a_d11' and that of Coriolis
+// one of a_c13. Without noise, in sessions of the paper's length, nothing else hides them.
+TEST_F(Stability, OfAFrameThatSpinsIsKept) {
+  expect_explained_sweep("spin", {4.5, 17.5, -17.5}, {}, {},
+                         [](MicroscopeCampaign& campaign, double spin_in_orbits) {
+                           campaign.scenario = Scenario();
+                           campaign.scenario.noise.scale = 0.0;
+                           test::spin_sessions(campaign, spin_in_orbits);
+                         });
 }
 
 }  // namespace

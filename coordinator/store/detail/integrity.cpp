@@ -95,7 +95,7 @@ void check_largest_errors(const Database& database) {
       database.refuse(fmt::format("is damaged: overrun does not follow from the result of run {}",
                                   result.run.value));
     }
-    if (!result.has_estimate()) continue;
+    if (!result.is_completed()) continue;
     for (std::size_t i = 0; i < worst.size(); ++i) {
       worst[i].offer({.magnitude = std::abs(result.error(i)), .run = result.run});
     }

@@ -75,9 +75,9 @@ std::int64_t version_of(const Database& database, const std::filesystem::path& p
 
 // Tables of as many rows as the campaign has runs, workers or lines of its data files: their pages
 // are checked when they are read.
-constexpr std::array<std::string_view, 8> large_tables{"attempt",          "audit",   "delivery",
-                                                       "dispersion_value", "overrun", "run_failure",
-                                                       "run_result",       "worker"};
+constexpr std::array<std::string_view, 9> large_tables{
+    "attempt",    "audit",       "delivery", "dispersion_value", "overrun", "run_failure",
+    "run_result", "run_warning", "worker"};
 
 bool is_large(const std::string& table) {
   return std::ranges::find(large_tables, table) != large_tables.end() ||

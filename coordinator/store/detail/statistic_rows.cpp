@@ -146,6 +146,15 @@ std::optional<Summary> read_summary(const Database& database) {
                  .computed_utc = select.text(7)};
 }
 
+void replace_warnings(Database& database, std::span<const RunWarning> warnings) {
+  database.execute("DELETE FROM run_warning");
+  Statement insert = database.prepare("INSERT INTO run_warning VALUES (?, ?, ?, ?)");
+  for (const auto& [run, warning] : warnings) {
+    insert.run(run.value, warning.effect, model().results().quantities[warning.quantity].name,
+               warning.part);
+  }
+}
+
 void replace_budgets(Database& database, const std::optional<ErrorBudget>& budget,
                      const CampaignStatistics& statistics) {
   database.execute("DELETE FROM budget_entry");
@@ -205,7 +214,7 @@ std::vector<double> read_objectives(const Database& database) {
 
 std::uint64_t exceeded_objectives(const RunResult& result, std::span<const double> objectives) {
   std::uint64_t exceeded = 0;
-  if (!result.has_estimate()) return exceeded;
+  if (!result.is_completed()) return exceeded;
   for (std::size_t i = 0; i < objectives.size(); ++i) {
     const bool is_beyond = std::abs(result.error(i)) > objectives[i];
     exceeded |= std::uint64_t{is_beyond} << i;
@@ -222,7 +231,7 @@ LargestErrorRows::LargestErrorRows(const Database& database)
           database.prepare("DELETE FROM worst_run WHERE parameter = ? AND run_index = ?")) {}
 
 void LargestErrorRows::add(const RunResult& result) {
-  if (!result.has_estimate()) return;
+  if (!result.is_completed()) return;
   const std::uint64_t exceeded = exceeded_objectives(result, objectives_);
   if (exceeded != 0) insert_overrun_.run(result.run.value, exceeded);
   for (std::size_t i = 0; i < worst_.size(); ++i) {

@@ -22,6 +22,9 @@ void replace_summary(const Database& database, const CampaignStatistics& statist
                      const ResultDigests& digests);
 [[nodiscard]] std::optional<Summary> read_summary(const Database& database);
 
+/// Replaces the rows of `run_warning`.
+void replace_warnings(Database& database, std::span<const RunWarning> warnings);
+
 /// Replaces the rows of `budget_entry`; those after estimation are absent while no run has an
 /// estimate. Leaves none without a budget.
 void replace_budgets(Database& database, const std::optional<ErrorBudget>& budget,

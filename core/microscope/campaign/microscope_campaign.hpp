@@ -42,6 +42,7 @@ class MicroscopeCampaign final : public Campaign {
   [[nodiscard]] std::vector<std::size_t> table_quantities() const override;
   [[nodiscard]] RunDraw draw(RunIndex run) const override;
   [[nodiscard]] std::optional<ErrorBudget> error_budget() const override;
+  [[nodiscard]] Warner warner() const override;
 };
 
 /// The campaign of [Hardy2013] section 5: 100 draws, the corrections of the paper.

@@ -13,7 +13,6 @@
 #include "core/microscope/instrument/noise_config.hpp"
 #include "core/microscope/instrument/sensor_model.hpp"
 #include "core/microscope/orbit/kepler_orbit.hpp"
-#include "core/microscope/results/health.hpp"
 #include "core/microscope/results/results.hpp"
 #include "core/microscope/session/session.hpp"
 
@@ -30,7 +29,6 @@ struct Scenario {
   DragFreeConfig drag_free;
   AttitudeConfig attitude;
   SensorConfig sensor;
-  HealthConfig health;
   EstimationConfig estimation;
   AcceptanceConfig acceptance;    ///< Bounds outside which an instrument is drawn again.
   BudgetConfig budget;            ///< Levels behind the error budget; the simulation uses none.

@@ -119,19 +119,6 @@ void visit_limits(Config& scenario, Visitor& visit) {
   visit(FieldInfo{"sensor.range_m_s2", "Largest acceleration that a sensor reports.",
                   range::positive},
         scenario.sensor.range_m_s2);
-  auto& health = scenario.health;
-  visit(FieldInfo{"health.attitude_max_rad", "Angle that the attitude loop has to remove.",
-                  range::positive},
-        health.attitude_max_rad);
-  visit(FieldInfo{"health.residual_max_m_s2", "Measured acceleration at the test frequency.",
-                  range::positive},
-        health.residual_max_m_s2);
-  visit(FieldInfo{"health.quadratic_noise_max",
-                  "Noise of quadratic terms over the sensors', power.", range::positive},
-        health.quadratic_noise_max);
-  visit(FieldInfo{"health.square_noise_max", "Noise of a squared measurement over its line, power.",
-                  range::positive},
-        health.square_noise_max);
 }
 
 template <typename Config, typename Visitor>

@@ -12,6 +12,7 @@
 #include "core/definition/csv.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
+#include "core/microscope/campaign/regressor_lines.hpp"
 #include "core/model.hpp"
 
 namespace proofmass {
@@ -139,6 +140,7 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
   try {
     campaign.validate();
     check_magnitudes(campaign);
+    check_regressors(campaign.scenario);
   } catch (const ConfigError& error) {
     throw document.located(error);
   }
@@ -167,6 +169,22 @@ MicroscopeCampaign parsed_campaign(const std::string& name, std::string_view tex
   campaign.table_columns = std::move(table_columns);
   validate(campaign, columns, document);
   return campaign;
+}
+
+/// Without the limits of health that definitions had up to the model hardy2013-3. Results under
+/// them are stored and can be read; no run is computed under them any more.
+std::string without_former_limits(std::string text) {
+  constexpr std::string_view table = "\n[health]\n";
+  const std::size_t begin = text.find(table);
+  if (begin == std::string::npos) return text;
+  std::size_t end = begin + table.size();
+  for (const std::string_view key : {"attitude_max_rad = ", "residual_max_m_s2 = ",
+                                     "quadratic_noise_max = ", "square_noise_max = "}) {
+    const std::size_t line_end = text.find('\n', end);
+    if (text.compare(end, key.size(), key) != 0 || line_end == std::string::npos) return text;
+    end = line_end + 1;
+  }
+  return text.erase(begin + 1, end - begin - 1);
 }
 
 /// The first line where the texts differ, of each.
@@ -209,10 +227,11 @@ MicroscopeCampaign campaign_of(Definition definition, TableColumns columns,
         "definition.table_columns = {} of them (must be none, as they come with the runs)",
         definition.table_columns.size()));
   }
+  const std::string text = without_former_limits(std::move(definition.text));
   MicroscopeCampaign campaign =
-      parsed_campaign(std::string(source), definition.text, environment_of(definition.tables),
+      parsed_campaign(std::string(source), text, environment_of(definition.tables),
                       std::move(definition.table_columns), columns);
-  require_same_text(source, definition.text, canonical_definition(campaign));
+  require_same_text(source, text, canonical_definition(campaign));
   return campaign;
 }
 

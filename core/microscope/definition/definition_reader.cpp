@@ -44,6 +44,8 @@ void read_scenario(Document& document, Scenario& scenario) {
   document.read("noise.preset", preset);
   scenario.noise = noise_preset(preset);
   for_each_field(scenario, FieldReader{document});
+  if (document.find("health") == nullptr) return;
+  document.refuse("health", "delete this table: what loses a run follows from its objectives");
 }
 
 // Far more than the sessions of a valid campaign have: they bound what hostile texts cost.

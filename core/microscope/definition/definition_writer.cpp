@@ -173,15 +173,12 @@ class CommentedWriter {
     }
   }
 
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 6> table_notes{{
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 5> table_notes{{
       {"environment",
        "# External accelerations of the satellite, each axis mean + a1 cos(n t + phase) +\n"
        "# a2 cos(2 n t + phase), n being the mean motion; or rows of a file (kind = \"file\",\n"
        "# file = \"environment.csv\") with the columns time_s,linear_x_m_s2,linear_y_m_s2,\n"
        "# linear_z_m_s2,angular_x_rad_s2,angular_y_rad_s2,angular_z_rad_s2.\n"},
-      {"health",
-       "# Beyond one of these, or at the end of a sensor's range, a run is lost: it has no "
-       "estimates.\n"},
       {"noise",
        "# Sensor noise has the one-sided density white²(1 + f_p/f) + rise²(f/f_r)⁴/(1 + "
        "(f/f_l)⁴).\n"

@@ -15,6 +15,12 @@ const std::array<HealthValue, num_health_values>& health_values() {
   return values;
 }
 
+LoopHealth health_of(std::span<const double> values) {
+  LoopHealth health;
+  for (std::size_t i = 0; i < num_health_values; ++i) health.*health_values()[i].member = values[i];
+  return health;
+}
+
 std::string_view name_of(LossCause cause) {
   switch (cause) {
     case LossCause::none:

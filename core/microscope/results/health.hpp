@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 #include "core/campaign/run_result.hpp"
@@ -39,27 +40,23 @@ struct HealthValue {
 
 inline constexpr std::size_t num_health_values = 5;
 
+/// The health that a RunResult holds.
+/// @param values  num_health_values of them.
+[[nodiscard]] LoopHealth health_of(std::span<const double> values);
+
 /// All of them, in the order of LoopHealth.
 [[nodiscard]] const std::array<HealthValue, num_health_values>& health_values();
 
-/// Limits beyond which a run is `lost`: its estimates are not what the method claims of them. A
-/// sensor at the end of its range is lost, too. `[health]` of a campaign file.
-struct HealthConfig {
-  double attitude_max_rad = 1.4e-3;  ///< The tilt behind the budget's T_xy.
-  double residual_max_m_s2 = 1e-10;  ///< K2 of its square: 1e-3 of Δx's objective at the bound.
-  double quadratic_noise_max = 1.0;  ///< Then noise is √2 of what the sensors have.
-  double square_noise_max = 5e-4;    ///< K2 is then known to 1.6 %, and its estimate still linear.
-};
-
-/// Why a run is lost: the first of these that is beyond its limit. The values are stored and sent:
-/// never renumber.
+/// Why a run is lost: a sensor reached the end of its range, or something may have moved an
+/// estimate by more than its objective (ShiftBounds). The values are stored and sent: never
+/// renumber.
 enum class LossCause : std::uint8_t {
   none = 0,
   saturation = 1,       ///< A sensor's range.
-  attitude = 2,         ///< HealthConfig::attitude_max_rad.
-  residual = 3,         ///< HealthConfig::residual_max_m_s2.
-  quadratic_noise = 4,  ///< HealthConfig::quadratic_noise_max.
-  square_noise = 5,     ///< HealthConfig::square_noise_max.
+  attitude = 2,         ///< A large angle, or the rate at which the satellite spins.
+  residual = 3,         ///< What the drag-free loop leaves.
+  quadratic_noise = 4,  ///< Noise that the quadratic factors make.
+  square_noise = 5,     ///< Noise of the squared measurement.
 };
 
 inline constexpr std::size_t num_loss_causes = 5;
@@ -67,7 +64,8 @@ inline constexpr std::size_t num_loss_causes = 5;
 /// `saturation`, for people and files.
 [[nodiscard]] std::string_view name_of(LossCause cause);
 
-/// In which session a run was first lost, and why.
+/// Why a run is lost, and in which session: the first that saturated a sensor, or the one that
+/// finds the parameter whose estimate was moved.
 struct LoopLoss {
   LossCause cause = LossCause::none;
   SessionTarget session = SessionTarget::a_c11_delta_x;  ///< Meaningful unless cause is none.

@@ -99,6 +99,7 @@ struct RunPlan::Impl {
         noise(make_noise_model(c.scenario.noise, c.scenario.simulation.sample_period_s)),
         drag_free(drag_free_gains(c.scenario.drag_free, c.scenario.simulation.sample_period_s)),
         attitude(attitude_gains(c.scenario.attitude, c.scenario.simulation.sample_period_s)),
+        bounds(c.scenario),
         recording(recording_of(c.scenario, noise)) {
     weights.reserve(campaign.scenario.sessions.size());
     known_weights.resize(campaign.scenario.sessions.size());
@@ -291,6 +292,7 @@ struct RunPlan::Impl {
   NoiseModel noise;
   DragFreeGains drag_free;
   AttitudeGains attitude;
+  ShiftBounds bounds;
   Recording recording;
   std::vector<LineWeights> weights;                     ///< Of each session.
   std::vector<std::vector<LineWeights>> known_weights;  ///< Empty unless the method wants them.
@@ -412,7 +414,8 @@ RunResult RunPlan::estimate(const RunRecord& record) const {
   result.truth.assign(record.truth.begin(), record.truth.end());
   const Estimation found = estimation(record);
   result.num_rounds = found.num_rounds;
-  const HealthFinding finding = judge_health(scenario, record.health, record.phasors);
+  const HealthFinding finding =
+      judge_health(scenario, impl_->bounds, record.health, record.phasors, record.truth);
   for (const HealthValue& value : health_values()) {
     result.health.push_back(finding.health.*value.member);
   }

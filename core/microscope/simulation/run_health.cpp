@@ -2,23 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/campaign/run_result.hpp"
 #include "core/error.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
 #include "core/signal/band_pass.hpp"
-#include "core/signal/noise_shape.hpp"
 
 namespace proofmass {
 namespace {
-
-/// Without noise the quadratic terms still change a little from block to block: as noise of less
-/// than this, m/s²/√Hz. The largest of them is 2 K2d b_1d Γ_app,d with 2 K2d b_1d ≤ 4e-4 and lines
-/// of Γ_app,d of ½·1.7e-6 s⁻² × 20 µm along two axes: A = 9e-15 m/s². The steps of a line between
-/// blocks of n samples are at most those of white noise of density A √(nT), 2.1e-13. Noise of the
-/// density below moves a_c11Δx by 1.5 nm in ten orbits (one standard deviation).
-constexpr double quiet_asd_m_s2 = 3e-13;
 
 constexpr std::size_t block = LineWeights::block_size;
 
@@ -38,20 +29,6 @@ double num_steps(const Scenario& scenario, const Session& session) {
 /// samples has the variance n S/(2T), a step twice as much.
 double density(double squares, double steps, double period_s) {
   return squares / (2.0 * steps) * 2.0 * period_s / static_cast<double>(block);
-}
-
-/// Density of the noise of ½(Γ_mes,1x − Γ_mes,2x) where it is least among the lines of all
-/// sessions.
-double least_density(const Scenario& scenario) {
-  double least = std::numeric_limits<double>::max();
-  for (const Session& session : scenario.sessions) {
-    for (const LineMultiple& line : session.fit_lines) {
-      const double frequency_hz = line_frequency_hz(session, line, scenario.orbit.period_s);
-      least = std::min(least, 0.5 * nominal_psd(scenario.noise.linear_x, frequency_hz));
-    }
-  }
-  const double scale = scenario.noise.scale;
-  return std::max(scale * scale * least, quiet_asd_m_s2 * quiet_asd_m_s2);
 }
 
 /// Γ_mes,c at f_EP; the band-pass takes r⁴/(1 + r⁴) of a line at its centre.
@@ -113,18 +90,33 @@ LoopHealth session_health(const Scenario& scenario, const Session& session,
   health.residual_m_s2 = bounded(residual_amplitude(scenario, record));
   health.quadratic_noise = bounded(density(record.quadratic_squares, num_steps(scenario, session),
                                            scenario.simulation.sample_period_s) /
-                                   least_density(scenario));
+                                   least_noise_density(scenario));
   return health;
 }
 
-LossCause cause_of(const Scenario& scenario, const LoopHealth& health) {
-  const HealthConfig& limit = scenario.health;
-  if (health.acceleration_m_s2 > scenario.sensor.range_m_s2) return LossCause::saturation;
-  if (health.attitude_rad > limit.attitude_max_rad) return LossCause::attitude;
-  if (health.residual_m_s2 > limit.residual_max_m_s2) return LossCause::residual;
-  if (health.quadratic_noise > limit.quadratic_noise_max) return LossCause::quadratic_noise;
-  if (health.square_noise > limit.square_noise_max) return LossCause::square_noise;
-  return LossCause::none;
+LossCause cause_of(Effect effect) {
+  switch (effect) {
+    case Effect::residual:
+      return LossCause::residual;
+    case Effect::quadratic_noise:
+      return LossCause::quadratic_noise;
+    case Effect::square_noise:
+      return LossCause::square_noise;
+    case Effect::attitude:
+    case Effect::spin:
+      break;
+  }
+  return LossCause::attitude;
+}
+
+/// Why the estimates of loops that held are lost all the same.
+LoopLoss loss_by_shift(const ShiftBounds& bounds, const LoopHealth& health,
+                       const ParameterArray& truth) {
+  for (const Shift& shift : bounds.of(health, truth)) {
+    if (shift.part <= shift.part_of_loss) continue;
+    return {.cause = cause_of(shift.effect), .session = finding_session(shift.parameter)};
+  }
+  return {};
 }
 
 void take_larger(LoopHealth& largest, const LoopHealth& health) {
@@ -160,8 +152,9 @@ LineFit residual_fit(const Scenario& scenario, const Session& session) {
   return fit;
 }
 
-HealthFinding judge_health(const Scenario& scenario, const HealthRecord& record,
-                           const RunPhasors& phasors) {
+HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
+                           const HealthRecord& record, const RunPhasors& phasors,
+                           const ParameterArray& truth) {
   PROOFMASS_EXPECT(record.size() == scenario.sessions.size() && phasors.size() == record.size());
   QuietSums quiet;
   for (std::size_t i = 0; i < record.size(); ++i) {
@@ -177,8 +170,12 @@ HealthFinding judge_health(const Scenario& scenario, const HealthRecord& record,
     const Session& session = scenario.sessions[i];
     const LoopHealth health = session_health(scenario, session, record[i], phasors[i], quiet);
     take_larger(finding.health, health);
-    if (finding.loss.cause != LossCause::none) continue;
-    finding.loss = {.cause = cause_of(scenario, health), .session = session.target};
+    const bool is_saturated = health.acceleration_m_s2 > scenario.sensor.range_m_s2;
+    if (finding.loss.cause != LossCause::none || !is_saturated) continue;
+    finding.loss = {.cause = LossCause::saturation, .session = session.target};
+  }
+  if (finding.loss.cause == LossCause::none) {
+    finding.loss = loss_by_shift(bounds, finding.health, truth);
   }
   return finding;
 }

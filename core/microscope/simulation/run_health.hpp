@@ -8,6 +8,7 @@
 #include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
 #include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/campaign/shift_bounds.hpp"
 #include "core/microscope/estimation/methods.hpp"
 #include "core/microscope/results/health.hpp"
 #include "core/microscope/session/session.hpp"
@@ -17,8 +18,7 @@
 namespace proofmass {
 
 // How well the loops held a run. LoopMonitor is filled in the sample loop, SessionHealth is what a
-// session keeps of it, and judge_health() compares that with the limits. README.md gives the
-// reasons for each number and its limit.
+// session keeps of it, and judge_health() makes a verdict of that. README.md has the reasons.
 
 /// Sums of block after block of a signal, of which only the squared steps from one block to the
 /// next are kept: they are twice the variance of a block's sum, and slow changes do not count.
@@ -107,15 +107,19 @@ using HealthRecord = std::vector<SessionHealth>;
 /// The health of a run and, if it is lost, why.
 struct HealthFinding {
   LoopHealth health;
-  LoopLoss loss;  ///< In the first session, in the scenario's order, that left a limit.
+  LoopLoss loss;  ///< Of a saturated sensor the first session, in the scenario's order.
 };
 
-/// Compares what the sessions left with the limits of scenario.sensor and scenario.health. The
-/// noise of quadratic terms is compared with that of the sensors, which noise.scale multiplies.
+/// A run is lost if a sensor was at the end of its range, or if an effect may have moved an
+/// estimate by more than ShiftBounds allows. The noise of quadratic terms is compared with that of
+/// the sensors, which noise.scale multiplies.
 ///
+/// @param bounds   Of the scenario.
 /// @param record   Of scenario.sessions, in their order; as many.
 /// @param phasors  Of the same run: the squared signals that the quadratic factors are found from.
-[[nodiscard]] HealthFinding judge_health(const Scenario& scenario, const HealthRecord& record,
-                                         const RunPhasors& phasors);
+/// @param truth    Of the run, SI.
+[[nodiscard]] HealthFinding judge_health(const Scenario& scenario, const ShiftBounds& bounds,
+                                         const HealthRecord& record, const RunPhasors& phasors,
+                                         const ParameterArray& truth);
 
 }  // namespace proofmass

@@ -92,7 +92,7 @@ TEST_F(ReplayTest, IsRefusedToAnotherModel) {
   test::change(file(), "UPDATE campaign SET model_version = 'hardy2013-2'");
   const Store store = Store::open_read_only(file());
   EXPECT_EQ(test::error_of([&] { const Replay again(store); }),
-            "model_version = hardy2013-2 (must be hardy2013-3, the model of this program: others "
+            "model_version = hardy2013-2 (must be hardy2013-4, the model of this program: others "
             "compute other bits)");
 }
 

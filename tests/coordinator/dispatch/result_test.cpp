@@ -153,7 +153,7 @@ TEST_F(ResultTest, WithoutAnEstimateIsCounted) {
               .results = {computed(0, RunStatus::no_draw), computed(1, RunStatus::not_converged),
                           computed(2, RunStatus::not_finite)}},
              now, outbox);
-  EXPECT_EQ(campaign(one).num_without_estimate, 2U);
+  EXPECT_EQ(campaign(one).num_without_estimate, 3U);
   EXPECT_EQ(outbox.take_stored().size(), 3U);
   outbox.forget();
 }

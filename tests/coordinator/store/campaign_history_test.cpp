@@ -63,12 +63,13 @@ TEST_F(CampaignHistoryTest, CountsHowRunsEndedWithoutAnEstimate) {
   write({delivery_of(0), failed(1, RunStatus::not_converged), failed(2, RunStatus::not_finite),
          failed(3, RunStatus::no_draw), failed(4, RunStatus::no_draw)});
   const std::vector<EndCount> ends = CampaignHistory(file()).ends_without_estimate();
-  ASSERT_EQ(ends.size(), 2U);
+  ASSERT_EQ(ends.size(), 3U);
   EXPECT_EQ(ends[0].status, "no draw");
   EXPECT_EQ(ends[0].num_runs, 2U);
-  EXPECT_EQ(ends[1].status, "not finite");
-  EXPECT_EQ(ends[1].num_runs, 1U);
-  EXPECT_EQ(ends[1].cause, "");
+  EXPECT_EQ(ends[1].status, "not converged");
+  EXPECT_EQ(ends[2].status, "not finite");
+  EXPECT_EQ(ends[2].num_runs, 1U);
+  EXPECT_EQ(ends[2].cause, "");
 }
 
 TEST_F(CampaignHistoryTest, NamesRunsThatWereGivenUp) {

@@ -105,7 +105,7 @@ TEST(Statistics, NameTheFirstOfSeveralWorstRuns) {
   EXPECT_EQ(statistics_of_errors({1.0, -7.0, 7.0}).accuracy[index(a_c12)].worst_run, RunIndex{1});
 }
 
-TEST(Statistics, CountEveryStatusAndLeaveOutRunsWithoutEstimate) {
+TEST(Statistics, CountEveryStatusAndLeaveOutRunsThatAreNotCompleted) {
   std::vector<RunResult> results;
   constexpr std::array statuses{RunStatus::completed, RunStatus::not_converged,
                                 RunStatus::not_converged, RunStatus::not_finite,
@@ -117,12 +117,12 @@ TEST(Statistics, CountEveryStatusAndLeaveOutRunsWithoutEstimate) {
   }
   const CampaignStatistics statistics = statistics_of(results);
   EXPECT_EQ(statistics.num_runs, 5u);
-  EXPECT_EQ(statistics.num_estimated, 3u);
+  EXPECT_EQ(statistics.num_estimated, 1u);
   EXPECT_EQ(statistics.num_not_converged, 2u);
   EXPECT_EQ(statistics.num_not_finite, 1u);
   EXPECT_EQ(statistics.num_no_draw, 1u);
-  EXPECT_EQ(statistics.accuracy[index(a_c12)].worst, 3.0);
-  EXPECT_EQ(statistics.accuracy[index(a_c12)].worst_run, RunIndex{20});
+  EXPECT_EQ(statistics.accuracy[index(a_c12)].worst, 1.0);
+  EXPECT_EQ(statistics.accuracy[index(a_c12)].worst_run, RunIndex{0});
 }
 
 // 10⁵ errors 1e8 ± 1e-4 in equal numbers. Their mean is 1e8, their deviation 1e-4·√(n/(n − 1)); the

@@ -180,6 +180,23 @@ TEST(CampaignOf, IsTheCampaignToTheLastBit) {
   EXPECT_GT(campaigns.num_changed, 100U * 80U) << "or there was little to be tested";
 }
 
+// Definitions of the model hardy2013-3 and before had limits that no run is held to any more.
+TEST(CampaignOf, ReadsDefinitionsWithTheFormerLimitsOfHealth) {
+  const MicroscopeCampaign campaign = hardy2013_campaign();
+  Definition definition = campaign.definition(TableColumns::included);
+  const std::string limits =
+      "[health]\nattitude_max_rad = 0.0014\nresidual_max_m_s2 = 1e-10\nquadratic_noise_max = 1\n"
+      "square_noise_max = 0.0005\n";
+  const std::size_t place = definition.text.find("[estimation]\n");
+  ASSERT_NE(place, std::string::npos);
+  definition.text.insert(place, limits);
+  EXPECT_EQ(bits_of(campaign_of(definition)), bits_of(campaign));
+  definition.text.insert(place + limits.size(), "more = 1\n");
+  EXPECT_THROW((void)campaign_of(definition), DefinitionError);
+  EXPECT_THROW((void)parse_campaign("a.toml", "[campaign]\nname = \"a\"\n" + limits, {}, {}),
+               DefinitionError);
+}
+
 TEST(CampaignOf, MayLackTheColumns) {
   RandomCampaigns campaigns(/*seed=*/13);
   for (int i = 0; i < 10; ++i) {

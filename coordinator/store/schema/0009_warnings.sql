@@ -1,0 +1,44 @@
+-- Completed runs of which an effect may have moved an estimate by a tenth of its objective or more,
+-- computed with `statistic`: the first 1,000,000 rows. Empty if the campaign's model is older than
+-- this version of the schema.
+CREATE TABLE run_warning (
+  run_index  INTEGER NOT NULL REFERENCES run_result (run_index),
+  effect     TEXT NOT NULL,
+  parameter  TEXT NOT NULL REFERENCES parameter (parameter),
+  part       REAL NOT NULL CHECK (part > 0),  -- bound of the shift, in objectives
+  PRIMARY KEY (run_index, effect, parameter)
+) STRICT, WITHOUT ROWID;
+
+-- One row an effect and parameter.
+CREATE VIEW warnings AS
+SELECT effect, parameter, count(*) AS num_runs, max(part) AS largest_part, run_index AS largest_run
+FROM run_warning
+GROUP BY effect, parameter
+ORDER BY largest_part DESC;
+
+-- Statistics are of completed runs from here on. Those of a file with runs that did not converge
+-- are computed anew from its results; the largest errors are kept with the results, and made here.
+DELETE FROM statistic WHERE EXISTS (SELECT 1 FROM run_result WHERE status <> 1 AND status = 2);
+DELETE FROM budget_entry WHERE EXISTS (SELECT 1 FROM run_result WHERE status <> 1 AND status = 2);
+DELETE FROM summary WHERE EXISTS (SELECT 1 FROM run_result WHERE status <> 1 AND status = 2);
+DELETE FROM overrun
+WHERE run_index IN (SELECT run_index FROM run_result WHERE status <> 1 AND status = 2);
+DELETE FROM worst_run WHERE EXISTS (SELECT 1 FROM run_result WHERE status <> 1 AND status = 2);
+INSERT INTO worst_run
+SELECT parameter, run_index, magnitude
+FROM (SELECT e.parameter, e.run_index, abs(e.error) AS magnitude,
+             row_number() OVER (PARTITION BY e.parameter ORDER BY abs(e.error) DESC, e.run_index)
+               AS place
+      FROM error_long AS e JOIN run_result AS r USING (run_index)
+      WHERE r.status = 1 AND EXISTS (SELECT 1 FROM run_result WHERE status <> 1 AND status = 2))
+WHERE place <= 10;
+
+-- One row a completed run: the budget's total after its estimation. The total of the worst errors
+-- of all parameters is larger: no run has them all.
+DROP VIEW run_budget;
+CREATE VIEW run_budget AS
+SELECT run_index, {budget_total} AS total_m_s2
+FROM run_result
+WHERE status = 1;
+
+PRAGMA user_version = 9;
