@@ -62,7 +62,7 @@ RunDraw MicroscopeCampaign::draw(RunIndex run) const {
 }
 
 std::optional<ErrorBudget> MicroscopeCampaign::error_budget() const {
-  return microscope_budget(scenario);
+  return microscope_budget(scenario, dispersions, table_columns);
 }
 
 namespace {
@@ -71,6 +71,12 @@ std::array<DrawnQuantity, num_drawn> make_drawn() {
   std::array<DrawnQuantity, num_drawn> drawn;
   for (std::size_t i = 0; i < num_drawn; ++i) drawn[i] = {drawn_names()[i], drawn_unit(i)};
   return drawn;
+}
+
+ResultSchema with_budget(ResultSchema schema) {
+  for (const BudgetEntryInfo& info : budget_entry_infos()) schema.budget_terms.push_back(info.name);
+  schema.budget_level = budget_level();
+  return schema;
 }
 
 class MicroscopeModel final : public Model {
@@ -82,7 +88,7 @@ class MicroscopeModel final : public Model {
   }
 
   [[nodiscard]] const ResultSchema& results() const override {
-    static const ResultSchema results = results_of(estimation_methods());
+    static const ResultSchema results = with_budget(results_of(estimation_methods()));
     return results;
   }
 
