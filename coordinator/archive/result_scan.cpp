@@ -151,7 +151,7 @@ Check check_stored_statistics(const Store& store, const Campaign& campaign,
       scan.num_violations == 0) {
     return check_current(store, campaign, *summary, read_results(store, campaign).statistics);
   }
-  Lines lines = store.budget_differences(campaign.error_budget());
+  Lines lines;
   const std::uint64_t num_counted = summary->num_estimated + summary->num_not_converged +
                                     summary->num_not_finite + summary->num_no_draw +
                                     summary->num_lost;

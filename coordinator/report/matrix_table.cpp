@@ -5,7 +5,7 @@
 
 #include "coordinator/report/review_tables.hpp"
 #include "coordinator/report/text_cells.hpp"
-#include "core/model.hpp"
+#include "core/model_rules.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -33,7 +33,7 @@ ReviewCell value_cell(const MatrixRow& row, const std::optional<double>& value,
                       std::string (*figure)(double)) {
   if (!value) return words_cell("none");
   if (is_joint_row(row)) return {.text = figure(*value) + " × objective", .value = *value};
-  const Quantity& quantity = model().results().quantities[row.answer.requirement.parameter];
+  const Quantity quantity = requirement_subject(row.answer.requirement.parameter);
   const std::string text = figure(*value / quantity.display_scale);
   if (quantity.display_unit == "1") return {.text = text, .value = *value};
   // A unit such as 1e-4 rad begins with a number.
@@ -62,7 +62,7 @@ std::vector<ReviewCell> matrix_cells(const Review& review, const MatrixRow& row)
       words_cell(row.stated.id),
       words_cell(statement_of(row)),
       value_cell(row, row.limit, given_figure),
-      words_cell(interpretation),
+      words_cell(name_of(review.interpretation)),
       percent_cell(tolerance.coverage),
       percent_cell(tolerance.confidence),
       count_cell(check.num_runs),
@@ -84,10 +84,20 @@ std::vector<ReviewCell> matrix_cells(const Review& review, const MatrixRow& row)
   return cells;
 }
 
+std::string_view draw_sentence(Interpretation interpretation) {
+  if (interpretation == Interpretation::ensemble) {
+    return "Draws are without noise, and probabilities are over instruments.";
+  }
+  return interpretation == Interpretation::temporal
+             ? "All draws are of one instrument; probabilities are over realisations of the noise."
+             : "Each draw is one instrument with one realisation of the noise, and probabilities "
+               "are over both together.";
+}
+
 std::vector<std::string> matrix_notes(const Review& review) {
   std::vector<std::string> notes{
-      "Statistical interpretation in the terms of ECSS-E-ST-60-10C: mixed. Each draw is one "
-      "instrument with one realisation of the noise, and probabilities are over both together.",
+      fmt::format("Statistical interpretation in the terms of ECSS-E-ST-60-10C: {}. {}",
+                  name_of(review.interpretation), draw_sentence(review.interpretation)),
       "A draw without an estimate counts as an exceedance. Allowed are the exceedances with which "
       "so many draws meet the requirement.",
       "Bound: with the confidence of the row, the stated part of all draws stays below it (order "
@@ -125,25 +135,27 @@ std::string shell_word(std::string_view text) {
 }
 
 ReviewTable matrix_table(const Review& review) {
-  const auto mixed = [](std::string_view title) {
+  const std::string_view interpretation = name_of(review.interpretation);
+  const auto interpreted = [&](std::string_view title) {
     return fmt::format("{} ({})", title, interpretation);
   };
   ReviewTable table{.id = "matrix",
-                    .caption = "Verification matrix (statistical interpretation: mixed)",
+                    .caption = fmt::format("Verification matrix (statistical interpretation: {})",
+                                           interpretation),
                     .columns = {{.title = "id", .is_text = true},
                                 {.title = "requirement", .is_text = true},
                                 {.title = "limit"},
                                 {.title = "interpretation", .is_text = true},
-                                {.title = mixed("probability")},
-                                {.title = mixed("confidence")},
+                                {.title = interpreted("probability")},
+                                {.title = interpreted("confidence")},
                                 {.title = "draws"},
                                 {.title = "without estimate"},
                                 {.title = "exceedances"},
                                 {.title = "allowed"},
-                                {.title = mixed("bound")},
+                                {.title = interpreted("bound")},
                                 {.title = "margin"},
                                 {.title = "verdict", .is_text = true},
-                                {.title = "worst |error|"},
+                                {.title = "worst value"},
                                 {.title = "its run", .is_text = true}},
                     .rows = {},
                     .notes = matrix_notes(review)};

@@ -79,9 +79,7 @@ RunTotalPasses::RunTotalPasses(ErrorBudget budget)
 
 void RunTotalPasses::add(const RunResult& result) {
   if (!result.is_completed()) return;
-  errors_.resize(result.estimate.size());
-  for (std::size_t i = 0; i < errors_.size(); ++i) errors_[i] = std::abs(result.error(i));
-  const double total = budget_.after(errors_).total;
+  const double total = budget_.of_run(result).total;
   passes_.add(total);
   if (!is_first_ && total <= totals_.worst) return;
   is_first_ = false;

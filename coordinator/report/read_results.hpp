@@ -59,7 +59,6 @@ class RunTotalPasses {
  private:
   ErrorBudget budget_;
   ValuePasses passes_;
-  std::vector<double> errors_;  // Of the last result.
   RunTotals totals_;
   bool is_first_ = true;  ///< No total was added in any pass.
 };

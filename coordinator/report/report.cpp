@@ -55,13 +55,13 @@ constexpr std::array<TextColumn, 9> error_columns{{{"parameter", 10, true},
                                                    {"from", 7, false, "beyond, %", true},
                                                    {"to", 8, false, "beyond, %"}}};
 
-constexpr std::array<TextColumn, 7> budget_columns{{{"term", 23, true},
-                                                    {"before", 9, false, ours},
-                                                    {"worst", 9, false, ours},
-                                                    {"mean", 10, false, ours},
-                                                    {"before", 9, false, theirs, true},
-                                                    {"worst", 9, false, theirs},
-                                                    {"mean", 9, false, theirs}}};
+constexpr std::array<TextColumn, 7> budget_text_columns{{{"term", 23, true},
+                                                         {"before", 9, false, ours},
+                                                         {"worst", 9, false, ours},
+                                                         {"mean", 10, false, ours},
+                                                         {"before", 9, false, theirs, true},
+                                                         {"worst", 9, false, theirs},
+                                                         {"mean", 9, false, theirs}}};
 
 using Cells = std::vector<std::string>;
 
@@ -161,7 +161,7 @@ std::string budget_row(const BudgetEntryInfo& info, const Figures& figures) {
   for (const Figures& side : {figures, paper}) {
     for (const auto& figure : side) cells.push_back(figure ? fmt::format("{:.1e}", *figure) : "-");
   }
-  return row_of(budget_columns, cells);
+  return row_of(budget_text_columns, cells);
 }
 
 // Published totals, too, add up the worst errors of all parameters, which no single run has.
@@ -276,25 +276,35 @@ std::string error_table(const CampaignStatistics& statistics, std::uint64_t num_
   return text + joint_text(statistics, num_given_up);
 }
 
+std::string level_text(const ErrorBudget& budget, const CampaignStatistics& statistics) {
+  const std::string_view unit = model().results().health.at(budget.level).unit;
+  if (statistics.health.empty() || statistics.health.at(budget.level).worst == 0.0) {
+    return fmt::format("{} is assumed: {:.3g} {}", budget.level_label, budget.assumed_level, unit);
+  }
+  const HealthStatistic& level = statistics.health.at(budget.level);
+  return fmt::format("{} is that of the runs: worst {:.2e}, mean {:.2e} {}; assumed was {:.3g}",
+                     budget.level_label, level.worst, level.mean, unit, budget.assumed_level);
+}
+
 std::string budget_table(const Campaign& campaign, const CampaignStatistics& statistics,
                          const std::optional<RunTotals>& totals) {
   const std::optional<ErrorBudget> budget = campaign.error_budget();
   if (!budget) return "";
-  const bool has_errors = statistics.num_estimated > 0;
-  const Budget after_worst = has_errors ? budget->after(statistics.worst_errors()) : Budget{};
-  const Budget after_mean = has_errors ? budget->after(statistics.mean_errors()) : Budget{};
+  const BudgetColumns columns = budget_columns(*budget, statistics);
   const auto figures = [&](const auto& value_of) -> Figures {
-    if (!has_errors) return {value_of(budget->before), std::nullopt, std::nullopt};
-    return {value_of(budget->before), value_of(after_worst), value_of(after_mean)};
+    if (!columns.after_worst) return {value_of(columns.before), std::nullopt, std::nullopt};
+    return {value_of(columns.before), value_of(*columns.after_worst),
+            value_of(*columns.after_mean)};
   };
-  std::string text = fmt::format("{}\n\n{}", budget->title, table_heading(budget_columns));
-  for (std::size_t i = 0; i < budget->infos.size(); ++i) {
-    text += budget_row(budget->infos[i], figures([&](const Budget& of) { return of.entries[i]; }));
+  std::string text = fmt::format("{}\n\n{}", budget->title, table_heading(budget_text_columns));
+  for (std::size_t i = 0; i < budget->terms.size(); ++i) {
+    text +=
+        budget_row(budget->terms[i].info, figures([&](const Budget& of) { return of.entries[i]; }));
   }
-  text += table_rule(budget_columns) +
+  text += table_rule(budget_text_columns) +
           budget_row(budget->total_info, figures([](const Budget& of) { return of.total; })) +
           "before: bounds of construction; worst, mean: left by errors of the estimates\n" +
-          budget->note;
+          level_text(*budget, statistics) + "\n" + budget->note;
   return totals ? text + totals_text(*totals) : text;
 }
 

@@ -49,6 +49,10 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string error_table(const CampaignStatistics& statistics,
                                       std::uint64_t num_given_up);
 
+/// What the level of a budget is, and that it is the one of the runs or an assumed one.
+[[nodiscard]] std::string level_text(const ErrorBudget& budget,
+                                     const CampaignStatistics& statistics);
+
 /// Budget before and after estimation beside the published one, and what single runs have.
 [[nodiscard]] std::string budget_table(const Campaign& campaign,
                                        const CampaignStatistics& statistics,

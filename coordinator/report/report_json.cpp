@@ -13,6 +13,7 @@
 #include "coordinator/report/verification_matrix.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/model.hpp"
+#include "core/model_rules.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -88,24 +89,28 @@ Json parameters_of(const std::vector<double>& objectives, const CampaignStatisti
 Json budget_of(const Campaign& campaign, const ReadResults& results) {
   const std::optional<ErrorBudget> budget = campaign.error_budget();
   if (!budget) return nullptr;
-  const CampaignStatistics& statistics = results.statistics;
-  std::optional<Budget> worst, mean;
-  if (statistics.num_estimated > 0) {
-    worst = budget->after(statistics.worst_errors());
-    mean = budget->after(statistics.mean_errors());
-  }
+  const auto& [before, worst, mean] = budget_columns(*budget, results.statistics);
   const auto row = [&](std::string_view name, const auto& value_of) -> Json {
     return {{"term", name},
-            {"before_m_s2", value_of(budget->before)},
+            {"before_m_s2", value_of(before)},
             {"after_worst_m_s2", worst ? Json(value_of(*worst)) : Json(nullptr)},
             {"after_mean_m_s2", mean ? Json(value_of(*mean)) : Json(nullptr)}};
   };
   Json json{{"terms", Json::array()},
             {"total", row(budget->total_info.name, [](const Budget& of) { return of.total; })},
-            {"single_runs", nullptr}};
-  for (std::size_t i = 0; i < budget->infos.size(); ++i) {
+            {"single_runs", nullptr},
+            {"level",
+             {{"quantity", model().results().health.at(budget->level).column()},
+              {"worst", nullptr},
+              {"mean", nullptr},
+              {"assumed", budget->assumed_level}}}};
+  for (std::size_t i = 0; i < budget->terms.size(); ++i) {
     json["terms"].push_back(
-        row(budget->infos[i].name, [&](const Budget& of) { return of.entries[i]; }));
+        row(budget->terms[i].info.name, [&](const Budget& of) { return of.entries[i]; }));
+  }
+  if (const auto& health = results.statistics.health; !health.empty()) {
+    json["level"]["worst"] = health.at(budget->level).worst;
+    json["level"]["mean"] = health.at(budget->level).mean;
   }
   if (const std::optional<RunTotals>& totals = results.totals) {
     json["single_runs"] = {{"median_m_s2", totals->median},
@@ -146,16 +151,16 @@ Json json_of(const RequirementAnswer& answer) {
             {"num_runs_at_best", or_null(check.num_runs_at_best)},
             {"num_runs_at_this_rate", or_null(check.num_runs_at_this_rate)}};
   if (requirement.subject == Requirement::Subject::parameter) {
-    json["parameter"] = model().results().quantities[requirement.parameter].name;
+    json["parameter"] = requirement_subject(requirement.parameter).name;
     json["limit"] = requirement.limit;
   }
   return json;
 }
 
-Json json_of(const MatrixRow& row) {
+Json json_of(const MatrixRow& row, Interpretation interpretation) {
   Json json{{"id", row.stated.id},
             {"text", row.stated.text},
-            {"interpretation", interpretation},
+            {"interpretation", name_of(interpretation)},
             {"bound", or_null(row.bound)},
             {"relative_margin", or_null(row.relative_margin())},
             {"worst_run", row.worst ? Json(row.worst->run.value) : Json(nullptr)},
@@ -171,7 +176,8 @@ std::string report_json(const Store& store, const Campaign& campaign,
                         std::span<const RequirementAnswer> answers,
                         std::span<const StatedRequirement> stated) {
   MatrixPasses matrix(matrix_requirements({stated.begin(), stated.end()}, campaign.objectives()),
-                      campaign.objectives(), num_runs_in(store.given_up_runs()));
+                      campaign.objectives(), num_runs_in(store.given_up_runs()),
+                      campaign.error_budget());
   const std::array<ResultPasses*, 1> further{&matrix};
   CheckedResults checked;
   store.read_one_state([&] { checked = read_checked_results(store, campaign, further); });
@@ -201,7 +207,9 @@ std::string report_json(const Store& store, const Campaign& campaign,
             {"requirements", Json::array()},
             {"matrix", Json::array()}};
   for (const RequirementAnswer& answer : answers) json["requirements"].push_back(json_of(answer));
-  for (const MatrixRow& row : matrix.rows()) json["matrix"].push_back(json_of(row));
+  for (const MatrixRow& row : matrix.rows()) {
+    json["matrix"].push_back(json_of(row, campaign.interpretation()));
+  }
   constexpr int indent = 2;
   return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }

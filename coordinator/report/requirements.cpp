@@ -42,12 +42,13 @@ std::string short_percent(double fraction) {
 }
 
 /// Keeps the errors of one parameter, 8 bytes a run, at a time; none for all objectives.
-void check(const Store& store, std::span<const double> objectives, RequirementAnswer& answer) {
+void check(const Store& store, std::span<const double> objectives,
+           const std::optional<ErrorBudget>& budget, RequirementAnswer& answer) {
   const Requirement& requirement = answer.requirement;
   const bool is_of_errors = requirement.subject == Requirement::Subject::parameter;
   answer.missing = {.num_given_up = num_runs_in(store.given_up_runs())};
   std::vector<double> errors;
-  Exceedances exceedances(requirement, objectives);
+  Exceedances exceedances(requirement, objectives, budget);
   std::uint64_t num_runs = answer.missing.num_given_up;
   (void)walk_checked(store, [&](const RunResult& result) {
     require_in_range(result, model().results());
@@ -55,7 +56,7 @@ void check(const Store& store, std::span<const double> objectives, RequirementAn
     answer.missing.add(result);
     exceedances.add(result);
     if (is_of_errors && result.is_completed()) {
-      errors.push_back(std::abs(result.error(requirement.parameter)));
+      errors.push_back(required_value(result, requirement.parameter, budget));
     }
   });
   answer.check = is_of_errors ? check_requirement(requirement, errors, answer.missing.total())
@@ -113,7 +114,7 @@ std::string bound_line(const RequirementAnswer& answer) {
                        least ? fmt::format("{} draws at least,", *least) : "no number of draws",
                        given_percent(tolerance.coverage), given_percent(tolerance.confidence));
   }
-  const Quantity& quantity = model().results().quantities[answer.requirement.parameter];
+  const Quantity quantity = requirement_subject(answer.requirement.parameter);
   return fmt::format("Bound        {} of all draws below {:.6g}{}{}, with {}\n",
                      given_percent(tolerance.coverage), check.bound->value,
                      quantity.unit == "1" ? "" : " ", quantity.unit == "1" ? "" : quantity.unit,
@@ -136,8 +137,24 @@ std::string needed_line(const RequirementAnswer& answer) {
 
 }  // namespace
 
+double required_value(const RunResult& result, std::size_t position,
+                      const std::optional<ErrorBudget>& budget) {
+  const std::size_t num_quantities = result.estimate.size();
+  if (position < num_quantities) return std::abs(result.error(position));
+  PROOFMASS_EXPECT(budget.has_value());
+  const Budget of_run = budget->of_run(result);
+  return position == num_quantities ? of_run.total
+                                    : of_run.entries.at(position - num_quantities - 1);
+}
+
 void Exceedances::add(const RunResult& result) {
   if (!result.is_completed()) return;
+  if (requirement_.subject == Requirement::Subject::parameter) {
+    ++num_estimated_;
+    const double value = required_value(result, requirement_.parameter, budget_);
+    if (value >= requirement_.limit) ++num_exceeding_;
+    return;
+  }
   std::vector<double> errors(objectives_.size());
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = result.error(i);
   ++num_estimated_;
@@ -196,14 +213,15 @@ std::string success_text(const Interval& bounds, double required, Verdict verdic
 
 std::vector<RequirementAnswer> check_requirements(const Store& store,
                                                   std::span<const double> objectives,
-                                                  std::span<const std::string> texts) {
+                                                  std::span<const std::string> texts,
+                                                  const std::optional<ErrorBudget>& budget) {
   std::vector<RequirementAnswer> answers;
   for (const std::string& text : texts) {
     answers.push_back(
         {.text = text, .requirement = parse_requirement(text), .check = {}, .missing = {}});
   }
   for (RequirementAnswer& answer : answers) {
-    store.read_one_state([&] { check(store, objectives, answer); });
+    store.read_one_state([&] { check(store, objectives, budget, answer); });
   }
   return answers;
 }

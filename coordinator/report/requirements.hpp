@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -8,6 +10,7 @@
 
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/requirement.hpp"
@@ -34,12 +37,22 @@ namespace proofmass::coordinator {
 /// The same of the probability that a requirement holds, and of what is required.
 [[nodiscard]] std::string success_text(const Interval& bounds, double required, Verdict verdict);
 
+/// What a requirement of the subject at a position compares with its limit, see
+/// requirement_subjects(): an |error|, the total of the budget or a term of it.
+/// @pre The result has an estimate, and there is a budget if the subject is of one.
+[[nodiscard]] double required_value(const RunResult& result, std::size_t position,
+                                    const std::optional<ErrorBudget>& budget);
+
 /// Counts the runs that exceed what is required.
 class Exceedances {
  public:
   /// @param objectives  Largest acceptable |error| of each quantity, SI.
-  Exceedances(const Requirement& requirement, std::span<const double> objectives)
-      : requirement_(requirement), objectives_(objectives.begin(), objectives.end()) {}
+  /// @param budget      For requirements about it.
+  Exceedances(const Requirement& requirement, std::span<const double> objectives,
+              const std::optional<ErrorBudget>& budget = std::nullopt)
+      : requirement_(requirement),
+        objectives_(objectives.begin(), objectives.end()),
+        budget_(budget) {}
 
   /// Counts a result that has an estimate; others are none.
   void add(const RunResult& result);
@@ -51,6 +64,7 @@ class Exceedances {
  private:
   Requirement requirement_;
   std::vector<double> objectives_;
+  std::optional<ErrorBudget> budget_;
   std::uint64_t num_estimated_ = 0;
   std::uint64_t num_exceeding_ = 0;
 };
@@ -68,10 +82,11 @@ struct RequirementAnswer {
 ///
 /// @param objectives  Those of the campaign's scenario.
 /// @param texts       See parse_requirement().
+/// @param budget      The same of the campaign's budget, for requirements about it.
 /// @throws ConfigError if one cannot be read.
-[[nodiscard]] std::vector<RequirementAnswer> check_requirements(const Store& store,
-                                                                std::span<const double> objectives,
-                                                                std::span<const std::string> texts);
+[[nodiscard]] std::vector<RequirementAnswer> check_requirements(
+    const Store& store, std::span<const double> objectives, std::span<const std::string> texts,
+    const std::optional<ErrorBudget>& budget = std::nullopt);
 
 /// Answer, the bound by which it was decided, the tolerance bound, and the draws it takes; lines of
 /// at most 80 characters unless the requirement is longer.

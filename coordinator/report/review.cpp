@@ -37,6 +37,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
                 .results = {},
                 .missing = {},
                 .objectives = campaign.objectives(),
+                .interpretation = campaign.interpretation(),
                 .budget = campaign.error_budget(),
                 .figures = {},
                 .matrix = {},
@@ -46,7 +47,7 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
                 .stop = {}};
   review.num_given_up = num_runs_in(store.given_up_runs());
   FigurePasses figures(review.objectives.size(), num_runs_in(store.finished_runs()));
-  MatrixPasses matrix(std::move(stated), review.objectives, review.num_given_up);
+  MatrixPasses matrix(std::move(stated), review.objectives, review.num_given_up, review.budget);
   const std::array<ResultPasses*, 2> further{&figures, &matrix};
   CheckedResults checked = read_checked_results(store, campaign, further);
   review.results = std::move(checked.results);

@@ -40,6 +40,7 @@ struct Review {
   std::uint64_t num_given_up = 0;
   MissingEstimates missing;
   std::vector<double> objectives;  ///< Of each quantity, SI.
+  Interpretation interpretation = Interpretation::mixed;
   std::optional<ErrorBudget> budget;
   std::vector<QuantityFigures> figures;  ///< Of each quantity.
   std::vector<MatrixRow> matrix;         ///< That of all objectives together is the last one.

@@ -125,28 +125,25 @@ std::vector<Chart> characteristic_charts(const Review& review) {
 std::optional<BarChart> budget_chart(const Review& review) {
   if (!review.budget) return std::nullopt;
   const ErrorBudget& budget = *review.budget;
-  const CampaignStatistics& statistics = review.results.statistics;
-  const bool has_errors = statistics.num_estimated > 0;
-  const Budget worst = has_errors ? budget.after(statistics.worst_errors()) : Budget{};
+  const auto& [before, worst, mean] = budget_columns(budget, review.results.statistics);
   BarChart chart;
   chart.text = {.id = "budget",
                 .title = "Budget before and after estimation",
                 .description = fmt::format("{}. Before estimation the total is {}", budget.title,
-                                           figure_text(budget.before.total))};
+                                           figure_text(before.total))};
   chart.x = {.label = "m/s²", .scale = Scale::logarithmic};
   chart.series = {{.name = "before", .values = {}, .ink = Ink::second},
                   {.name = "after, worst errors", .values = {}, .ink = Ink::first}};
-  const auto add = [&](std::string_view label, double before, double after) {
-    chart.categories.emplace_back(label);
-    chart.series[0].values.emplace_back(before);
-    chart.series[1].values.push_back(has_errors ? std::optional(after) : std::nullopt);
-  };
-  for (std::size_t i = 0; i < budget.infos.size(); ++i) {
-    add(budget.infos[i].label, budget.before.entries[i], has_errors ? worst.entries[i] : 0.0);
+  for (std::size_t i = 0; i <= budget.terms.size(); ++i) {
+    const bool is_total = i == budget.terms.size();
+    const auto value_of = [&](const Budget& of) { return is_total ? of.total : of.entries[i]; };
+    const BudgetEntryInfo& info = is_total ? budget.total_info : budget.terms[i].info;
+    chart.categories.emplace_back(info.label);
+    chart.series[0].values.emplace_back(value_of(before));
+    chart.series[1].values.push_back(worst ? std::optional(value_of(*worst)) : std::nullopt);
   }
-  add(budget.total_info.label, budget.before.total, worst.total);
   chart.text.description +=
-      has_errors ? fmt::format(", after it at most {} m/s².", figure_text(worst.total)) : " m/s².";
+      worst ? fmt::format(", after it at most {} m/s².", figure_text(worst->total)) : " m/s².";
   return chart;
 }
 

@@ -92,10 +92,11 @@ std::string characteristics_markup(const Review& review) {
   std::string html;
   for (const Chart& chart : characteristic_charts(review)) html += figure_of(chart);
   if (html.empty()) return "";
-  return "<p>How probable it is that a campaign of as many draws meets a requirement (mixed), if "
-         "that part of all draws exceeds its limit. A steep curve tells good instruments from bad "
-         "ones; more draws make it steeper.</p>\n<div class=\"charts\">\n" +
-         html + "</div>\n";
+  return fmt::format(
+      "<p>How probable it is that a campaign of as many draws meets a requirement ({}), if that "
+      "part of all draws exceeds its limit. A steep curve tells good instruments from bad ones; "
+      "more draws make it steeper.</p>\n<div class=\"charts\">\n{}</div>\n",
+      name_of(review.interpretation), html);
 }
 
 std::string budget_markup(const Review& review) {

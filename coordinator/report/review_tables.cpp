@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "coordinator/report/report.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "core/model.hpp"
@@ -92,10 +93,9 @@ std::string joint_sentence(const Review& review) {
   const CampaignStatistics& statistics = review.results.statistics;
   const auto interval = statistics.within_objectives(review.num_given_up);
   if (!interval) return "";
-  return fmt::format(
-      "All objectives hold together in {} of {} draws: {} of all draws (mixed, 95 %).",
-      statistics.num_within_objectives, statistics.num_runs + review.num_given_up,
-      interval_percent(*interval));
+  return fmt::format("All objectives hold together in {} of {} draws: {} of all draws ({}, 95 %).",
+                     statistics.num_within_objectives, statistics.num_runs + review.num_given_up,
+                     interval_percent(*interval), name_of(review.interpretation));
 }
 
 std::vector<ReviewCell> pair_of(std::string_view name, std::string text) {
@@ -142,8 +142,9 @@ ReviewTable inference_table(const Review& review) {
   const std::string mean = "mean |error|, 95 %";
   const std::string deviation = "std of |error|, 95 %";
   const std::string bias = "bias, 95 %";
-  const std::string levels = "percentiles of |error| (mixed)";
-  const std::string beyond = "beyond, % of all draws (mixed, 95 %)";
+  const std::string_view interpretation = name_of(review.interpretation);
+  const std::string levels = fmt::format("percentiles of |error| ({})", interpretation);
+  const std::string beyond = fmt::format("beyond, % of all draws ({}, 95 %)", interpretation);
   ReviewTable table{.id = "inference",
                     .caption = "What these draws say about all draws",
                     .columns = {{.title = "parameter", .is_text = true},
@@ -186,26 +187,25 @@ ReviewTable review_budget_table(const Review& review) {
   if (!review.budget) return table;
   const ErrorBudget& budget = *review.budget;
   table.caption = std::string(budget.title);
-  const CampaignStatistics& statistics = review.results.statistics;
-  const bool has_errors = statistics.num_estimated > 0;
-  const Budget worst = has_errors ? budget.after(statistics.worst_errors()) : Budget{};
-  const Budget mean = has_errors ? budget.after(statistics.mean_errors()) : Budget{};
+  const BudgetColumns columns = budget_columns(budget, review.results.statistics);
   const auto add = [&](const BudgetEntryInfo& info, const auto& value_of) {
-    std::vector<ReviewCell> cells{heading_cell(info.label), budget_cell(value_of(budget.before))};
-    cells.push_back(has_errors ? budget_cell(value_of(worst)) : no_figure());
-    cells.push_back(has_errors ? budget_cell(value_of(mean)) : no_figure());
+    std::vector<ReviewCell> cells{heading_cell(info.label), budget_cell(value_of(columns.before))};
+    for (const auto& after : {columns.after_worst, columns.after_mean}) {
+      cells.push_back(after ? budget_cell(value_of(*after)) : no_figure());
+    }
     for (const double figure : {info.paper_before, info.paper_after_worst, info.paper_after_mean}) {
       cells.push_back({.text = fmt::format("{:.1e}", figure)});
     }
     table.rows.push_back(std::move(cells));
   };
-  for (std::size_t i = 0; i < budget.infos.size(); ++i) {
-    add(budget.infos[i], [&](const Budget& of) { return of.entries[i]; });
+  for (std::size_t i = 0; i < budget.terms.size(); ++i) {
+    add(budget.terms[i].info, [&](const Budget& of) { return of.entries[i]; });
   }
   add(budget.total_info, [](const Budget& of) { return of.total; });
   table.notes.emplace_back(
       "Before: bounds of construction. After: what the errors of the estimates leave; the worst "
       "adds up the worst errors of different runs.");
+  table.notes.push_back(level_text(budget, review.results.statistics) + ".");
   if (!budget.note.empty()) table.notes.push_back(budget.note);
   if (const std::optional<RunTotals>& totals = review.results.totals) {
     table.notes.push_back(fmt::format(

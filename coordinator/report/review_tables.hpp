@@ -33,10 +33,6 @@ struct ReviewTable {
   std::vector<std::string> notes;  ///< Sentences below it.
 };
 
-/// How probabilities are to be understood in the terms of ECSS-E-ST-60-10C: each draw has an
-/// instrument of its own and one realisation of the noise.
-inline constexpr std::string_view interpretation = "mixed";
-
 [[nodiscard]] ReviewTable matrix_table(const Review& review);
 
 /// Worst, mean and standard deviation beside published figures.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <set>
 
 #include "core/model.hpp"
@@ -12,6 +13,9 @@
 
 namespace proofmass::coordinator {
 namespace {
+
+/// Of the values of all objectives together; others have the position of their subject.
+constexpr std::size_t key_of_joint = std::numeric_limits<std::size_t>::max();
 
 std::string default_tolerance_text() {
   return fmt::format("for {:.12g}% with {:.12g}%", 100.0 * default_tolerance.coverage,
@@ -74,8 +78,10 @@ std::optional<double> MatrixRow::relative_margin() const {
 }
 
 MatrixPasses::MatrixPasses(std::vector<StatedRequirement> stated,
-                           std::span<const double> objectives, std::uint64_t num_given_up)
+                           std::span<const double> objectives, std::uint64_t num_given_up,
+                           const std::optional<ErrorBudget>& budget)
     : objectives_(objectives.begin(), objectives.end()),
+      budget_(budget),
       missing_{.num_given_up = num_given_up},
       num_runs_(num_given_up) {
   for (StatedRequirement& each : stated) {
@@ -86,7 +92,7 @@ MatrixPasses::MatrixPasses(std::vector<StatedRequirement> stated,
     const bool is_joint = requirement.subject == Requirement::Subject::all_objectives;
     if (!is_joint) row.limit = requirement.limit;
     if (is_joint && has_finite(objectives)) row.limit = 1.0;
-    exceedances_.emplace_back(requirement, objectives);
+    exceedances_.emplace_back(requirement, objectives, budget);
     values_.try_emplace(key_of(requirement));
     rows_.push_back(std::move(row));
   }
@@ -94,11 +100,11 @@ MatrixPasses::MatrixPasses(std::vector<StatedRequirement> stated,
 
 std::size_t MatrixPasses::key_of(const Requirement& requirement) const {
   const bool is_joint = requirement.subject == Requirement::Subject::all_objectives;
-  return is_joint ? objectives_.size() : requirement.parameter;
+  return is_joint ? key_of_joint : requirement.parameter;
 }
 
 double MatrixPasses::value_of(std::size_t key, const RunResult& result) const {
-  if (key < objectives_.size()) return std::abs(result.error(key));
+  if (key != key_of_joint) return required_value(result, key, budget_);
   double largest = 0.0;
   for (std::size_t i = 0; i < objectives_.size(); ++i) {
     largest = std::max(largest, std::abs(result.error(i)) / objectives_[i]);

@@ -64,9 +64,10 @@ class MatrixPasses final : public ResultPasses {
   /// @param stated      Their order is that of the rows.
   /// @param objectives  Of the campaign, SI.
   /// @param given_up    Runs that have no result, and count as exceedances.
+  /// @param budget      Of the campaign, for requirements about it.
   /// @throws ConfigError as parse_requirement().
   MatrixPasses(std::vector<StatedRequirement> stated, std::span<const double> objectives,
-               std::uint64_t num_given_up);
+               std::uint64_t num_given_up, const std::optional<ErrorBudget>& budget = std::nullopt);
 
   void add(const RunResult& result) override;
   [[nodiscard]] bool end_pass() override;
@@ -89,9 +90,10 @@ class MatrixPasses final : public ResultPasses {
   void fill_bounds();
 
   std::vector<double> objectives_;
+  std::optional<ErrorBudget> budget_;
   std::vector<MatrixRow> rows_;
   std::vector<Exceedances> exceedances_;  ///< Of each row.
-  std::map<std::size_t, Values> values_;  ///< By quantity; those of the largest ratio are last.
+  std::map<std::size_t, Values> values_;  ///< By subject; those of the largest ratio are last.
   MissingEstimates missing_;
   std::uint64_t num_runs_ = 0;
   std::uint64_t num_estimated_ = 0;

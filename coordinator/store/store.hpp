@@ -244,9 +244,6 @@ class Store {
   /// What `statistic` and `budget_entry` have other than write_statistics() would store, likewise.
   [[nodiscard]] std::vector<std::string> statistic_differences(
       const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget) const;
-  /// The same of `budget_entry` alone, but for the budgets after estimation.
-  [[nodiscard]] std::vector<std::string> budget_differences(
-      const std::optional<ErrorBudget>& budget) const;
   /// What rows of `stop_check` have other than these; there may be more of them.
   [[nodiscard]] std::vector<std::string> stop_check_differences(
       std::span<const StopCheckRow> expected) const;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/error.hpp"
 
@@ -38,6 +39,11 @@ void check_table_column(const std::vector<double>& column, const TableSource& so
 
 }  // namespace
 
+std::string_view name_of(Interpretation interpretation) {
+  if (interpretation == Interpretation::ensemble) return "ensemble";
+  return interpretation == Interpretation::temporal ? "temporal" : "mixed";
+}
+
 void check_identity(const Campaign& campaign) {
   check_name(campaign.name);
   if (campaign.seed > seed_max) {
@@ -70,15 +76,36 @@ std::vector<double> Campaign::table_values(RunIndex run) const {
   return values;
 }
 
-std::vector<std::vector<double>> ErrorBudget::coefficients(std::size_t num_quantities) const {
-  std::vector<std::vector<double>> coefficients(infos.size(), std::vector<double>(num_quantities));
-  for (std::size_t quantity = 0; quantity < num_quantities; ++quantity) {
-    std::vector<double> errors(num_quantities);
-    errors[quantity] = 1.0;
-    const Budget budget = after(errors);
-    for (std::size_t i = 0; i < infos.size(); ++i) coefficients[i][quantity] = budget.entries[i];
+namespace {
+
+/// @param value_of  Of a term, at the assumed level.
+template <typename ValueOf>
+Budget budget_of(const ErrorBudget& budget, double level, const ValueOf& value_of) {
+  const double ratio = level > 0.0 ? level / budget.assumed_level : 1.0;
+  Budget sums;
+  for (const BudgetTerm& term : budget.terms) {
+    sums.entries.push_back(term.follows_level ? value_of(term) * ratio : value_of(term));
+    sums.total += sums.entries.back();
   }
-  return coefficients;
+  return sums;
+}
+
+}  // namespace
+
+Budget ErrorBudget::before(double level_of_runs) const {
+  return budget_of(*this, level_of_runs, [](const BudgetTerm& term) { return term.before; });
+}
+
+Budget ErrorBudget::after(std::span<const double> errors, double level_of_runs) const {
+  return budget_of(*this, level_of_runs, [errors](const BudgetTerm& term) {
+    return std::inner_product(errors.begin(), errors.end(), term.coefficients.begin(), 0.0);
+  });
+}
+
+Budget ErrorBudget::of_run(const RunResult& result) const {
+  std::vector<double> errors(result.estimate.size());
+  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = std::abs(result.error(i));
+  return after(errors, result.health.empty() ? 0.0 : result.health.at(level));
 }
 
 }  // namespace proofmass

@@ -33,21 +33,33 @@ struct Budget {
   double total = 0.0;           ///< Plain sum of the entries.
 };
 
+/// A term of an error budget: what the estimates' absence leaves in it, and what their errors do.
+struct BudgetTerm {
+  BudgetEntryInfo info;
+  double before = 0.0;  ///< From the construction bounds, before any estimation.
+  /// What an |error| of 1 (SI) of each quantity leaves.
+  std::vector<double> coefficients;
+  /// True if all of it is in proportion to ErrorBudget::level, and given for its assumed value.
+  bool follows_level = false;
+};
+
 /// What estimation errors leave in the measurement that the estimates serve, m/s². Every term is
 /// linear in the errors |estimate − truth|.
 struct ErrorBudget {
-  std::string_view title;              ///< `Budget of the test of ..., m/s²`.
-  std::vector<BudgetEntryInfo> infos;  ///< Of the terms.
+  std::string_view title;  ///< `Budget of the test of ..., m/s²`.
+  std::vector<BudgetTerm> terms;
   BudgetEntryInfo total_info;
-  Budget before;  ///< From the construction bounds, before any estimation.
-  /// Left by errors |estimate − truth| of each quantity, SI.
-  std::function<Budget(std::span<const double>)> after;
-  std::string note;  ///< What a reader of the table should know; may be empty.
+  std::size_t level = 0;              ///< A health quantity of each run: its index.
+  std::string_view level_label = {};  ///< For people: `Γ_res`.
+  double assumed_level = 1.0;         ///< Where no run tells it, SI.
+  std::string note;                   ///< What a reader of the table should know; may be empty.
 
-  /// What an |error| of 1 (SI) of each of so many quantities leaves in each term: the sum of
-  /// coefficient times |error| over the quantities is that entry of after(), but for rounding.
-  /// @return shape [terms][num_quantities].
-  [[nodiscard]] std::vector<std::vector<double>> coefficients(std::size_t num_quantities) const;
+  /// @param level_of_runs  0: unknown, so that the assumed one holds.
+  [[nodiscard]] Budget before(double level_of_runs) const;
+  /// @param errors  |estimate − truth| of each quantity, SI.
+  [[nodiscard]] Budget after(std::span<const double> errors, double level_of_runs) const;
+  /// What is left by the errors of one run, which has an estimate, at its own level.
+  [[nodiscard]] Budget of_run(const RunResult& result) const;
 };
 
 /// Something that may have moved an estimate of a completed run by this part of its objective.
@@ -109,6 +121,16 @@ struct RunDraw {
   std::vector<double> truth{};  ///< Of each quantity of the results, SI; likewise.
 };
 
+/// What probabilities are over, in the terms of ECSS-E-ST-60-10C.
+enum class Interpretation : std::uint8_t {
+  ensemble,  ///< Instruments, as there is no noise.
+  temporal,  ///< Realisations of the noise, as all runs have one instrument.
+  mixed,     ///< Both together.
+};
+
+/// `ensemble`.
+[[nodiscard]] std::string_view name_of(Interpretation interpretation);
+
 /// A campaign of some model: everything its results depend on, and how many runs there are.
 class Campaign {
  public:
@@ -146,6 +168,8 @@ class Campaign {
   [[nodiscard]] virtual std::vector<std::size_t> table_quantities() const = 0;
   /// The draw that a run begins with. A pure function, some 11 µs. @pre The run is one of these.
   [[nodiscard]] virtual RunDraw draw(RunIndex run) const = 0;
+  /// What differs from run to run.
+  [[nodiscard]] virtual Interpretation interpretation() const { return Interpretation::mixed; }
   /// Nothing if the model has none.
   [[nodiscard]] virtual std::optional<ErrorBudget> error_budget() const { return std::nullopt; }
   /// Null if the model gives no warnings.

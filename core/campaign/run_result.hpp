@@ -67,6 +67,10 @@ struct ResultSchema {
   /// Of the published figures, for people: `Hardy et al. 2013`, 20 characters at most; empty
   /// without any.
   std::string_view published_source = {};
+  /// Of campaigns that have an ErrorBudget: names of its terms, and the health quantity that is its
+  /// level.
+  std::vector<std::string_view> budget_terms = {};
+  std::size_t budget_level = 0;
 };
 
 /// The name at a position from 1, as in Loss; `none` at 0.

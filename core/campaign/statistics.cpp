@@ -1,5 +1,6 @@
 #include "core/campaign/statistics.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -64,6 +65,17 @@ void CampaignStatistics::count(const RunResult& result) {
   if (result.is_completed()) ++num_estimated;
 }
 
+BudgetColumns budget_columns(const ErrorBudget& budget, const CampaignStatistics& statistics) {
+  HealthStatistic level;
+  if (!statistics.health.empty()) level = statistics.health.at(budget.level);
+  BudgetColumns columns{.before = budget.before(level.mean), .after_worst = {}, .after_mean = {}};
+  if (statistics.num_estimated > 0) {
+    columns.after_worst = budget.after(statistics.worst_errors(), level.worst);
+    columns.after_mean = budget.after(statistics.mean_errors(), level.mean);
+  }
+  return columns;
+}
+
 bool ErrorExtremes::add(RunIndex run, double magnitude, double objective) {
   if (!worst || magnitude > *worst || (magnitude == *worst && run < worst_run)) {
     worst = magnitude;
@@ -123,6 +135,14 @@ void StatisticsPasses::add(const RunResult& result) {
   last_run_ = result.run;
   if (is_first_pass_) counts_.count(result);
   if (!result.is_completed()) return;
+  if (is_first_pass_ && !result.health.empty()) {
+    ++num_with_health_;
+    health_.resize(result.health.size());
+    for (std::size_t i = 0; i < health_.size(); ++i) {
+      health_[i].first = std::max(health_[i].first, result.health[i]);
+      health_[i].second.add(result.health[i]);
+    }
+  }
   bool is_within = true;
   for (std::size_t i = 0; i < quantities_.size(); ++i) {
     QuantityPasses& quantity = quantities_[i];
@@ -149,6 +169,9 @@ bool StatisticsPasses::end_pass() {
 
 CampaignStatistics StatisticsPasses::statistics() const {
   CampaignStatistics statistics = counts_;
+  for (const auto& [worst, sum] : health_) {
+    statistics.health.push_back({worst, sum.value() / static_cast<double>(num_with_health_)});
+  }
   statistics.accuracy.resize(quantities_.size());
   if (counts_.num_estimated == 0) return statistics;
   for (std::size_t i = 0; i < quantities_.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/interval.hpp"
@@ -52,6 +53,12 @@ struct AccuracyStatistic {
   ErrorStatistic error;  ///< With its sign.
 };
 
+/// A health quantity, SI.
+struct HealthStatistic {
+  double worst = 0.0;
+  double mean = 0.0;
+};
+
 /// Statistics of a campaign's finished runs.
 struct CampaignStatistics {
   std::uint64_t num_runs = 0;       ///< Finished runs, whatever their status.
@@ -64,6 +71,8 @@ struct CampaignStatistics {
   std::uint64_t num_within_objectives = 0;
   /// Of each quantity; all zero if num_estimated = 0.
   std::vector<AccuracyStatistic> accuracy;
+  /// Of each health quantity, over the runs that have an estimate; empty if they have none.
+  std::vector<HealthStatistic> health = {};
 
   /// Of the share of runs within all objectives among all draws, 95 %.
   /// @param num_given_up  Runs that have no result, beside num_runs; they count as beyond.
@@ -77,6 +86,16 @@ struct CampaignStatistics {
   /// Counts a finished run by its status.
   void count(const RunResult& result);
 };
+
+/// The columns of a budget's table. With the worst errors the level is the worst of the runs, and
+/// else their mean.
+struct BudgetColumns {
+  Budget before;
+  std::optional<Budget> after_worst;  ///< Empty while no run has an estimate; so is the other.
+  std::optional<Budget> after_mean;
+};
+[[nodiscard]] BudgetColumns budget_columns(const ErrorBudget& budget,
+                                           const CampaignStatistics& statistics);
 
 /// The largest |error| of a quantity, and the runs beyond its objective.
 struct ErrorExtremes {
@@ -150,6 +169,8 @@ class StatisticsPasses {
   bool is_first_pass_ = true;
   std::optional<RunIndex> last_run_;  ///< Of this pass.
   std::vector<QuantityPasses> quantities_;
+  std::vector<std::pair<double, CompensatedSum>> health_;  ///< Worst and sum of each.
+  std::uint64_t num_with_health_ = 0;
 };
 
 }  // namespace proofmass

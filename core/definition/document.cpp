@@ -115,6 +115,10 @@ const toml::node* Document::find(const std::string& path) {
   return value_at(path);
 }
 
+bool Document::is_assigned(const std::string& path) const {
+  return std::ranges::find(assignments_, path, &Assignment::path) != assignments_.end();
+}
+
 std::optional<std::size_t> Document::num_tables(const std::string& path, std::size_t count_max) {
   const toml::node* const found = value_at(path);
   const toml::array* const list = found == nullptr ? nullptr : found->as_array();

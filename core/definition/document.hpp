@@ -40,6 +40,8 @@ class Document {
   /// The value at a path, null if absent; the path is a key from now on.
   [[nodiscard]] const toml::node* find(const std::string& path);
 
+  [[nodiscard]] bool is_assigned(const std::string& path) const;
+
   /// Entries of a list of tables such as `session`; nothing if absent, or if there are more than
   /// `count_max`, which is refused.
   [[nodiscard]] std::optional<std::size_t> num_tables(const std::string& path,

@@ -63,7 +63,7 @@ RunDraw MicroscopeCampaign::draw(RunIndex run) const {
 }
 
 std::optional<ErrorBudget> MicroscopeCampaign::error_budget() const {
-  return microscope_budget(scenario);
+  return microscope_budget(scenario, dispersions, table_columns);
 }
 
 Warner MicroscopeCampaign::warner() const {
@@ -86,6 +86,12 @@ std::array<DrawnQuantity, num_drawn> make_drawn() {
   return drawn;
 }
 
+ResultSchema with_budget(ResultSchema schema) {
+  for (const BudgetEntryInfo& info : budget_entry_infos()) schema.budget_terms.push_back(info.name);
+  schema.budget_level = budget_level();
+  return schema;
+}
+
 class MicroscopeModel final : public Model {
  public:
   [[nodiscard]] std::string_view version() const override { return model_version; }
@@ -95,7 +101,7 @@ class MicroscopeModel final : public Model {
   }
 
   [[nodiscard]] const ResultSchema& results() const override {
-    static const ResultSchema results = results_of(estimation_methods());
+    static const ResultSchema results = with_budget(results_of(estimation_methods()));
     return results;
   }
 

@@ -58,7 +58,7 @@ std::vector<RequirementAnswer> answers_of(const Store& store, const Campaign& ca
   std::vector<std::string> texts;
   for (const StatedRequirement& each : stated) texts.push_back(each.requirement);
   try {
-    return check_requirements(store, campaign.objectives(), texts);
+    return check_requirements(store, campaign.objectives(), texts, campaign.error_budget());
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }

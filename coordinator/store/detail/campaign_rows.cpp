@@ -113,13 +113,13 @@ void check_same_values(std::string_view drawn_name, const std::vector<double>& g
 void insert_budget_coefficients(Database& database, const Campaign& campaign) {
   const std::optional<ErrorBudget> budget = campaign.error_budget();
   if (!budget) return;
-  Statement insert = database.prepare("INSERT INTO budget_coefficient VALUES (?, ?, ?)");
+  Statement insert = database.prepare("INSERT INTO budget_coefficient VALUES (?, ?, ?, ?)");
   const std::vector<Quantity>& quantities = model().results().quantities;
-  const auto coefficients = budget->coefficients(quantities.size());
-  for (std::size_t i = 0; i < coefficients.size(); ++i) {
+  for (const BudgetTerm& term : budget->terms) {
+    const auto level = term.follows_level ? std::optional(budget->assumed_level) : std::nullopt;
     for (std::size_t j = 0; j < quantities.size(); ++j) {
-      const double value = coefficients[i][j];
-      if (value != 0.0) insert.run(budget->infos[i].name, quantities[j].name, value);
+      const double value = term.coefficients[j];
+      if (value != 0.0) insert.run(term.info.name, quantities[j].name, value, level);
     }
   }
 }
@@ -217,7 +217,8 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
   database
       .prepare(
           "INSERT INTO campaign (campaign_id, name, seed, num_runs, definition, model_version,"
-          " build, campaign_uid) VALUES (1, ?, ?, ?, ?, ?, ?, 1 + (random() & ?))")
+          " build, campaign_uid, first_version)"
+          " VALUES (1, ?, ?, ?, ?, ?, ?, 1 + (random() & ?), 9)")
       .run(campaign.name, std::to_string(campaign.seed), campaign.num_runs, definition,
            model().version(), std::string_view(PROOFMASS_BUILD), campaign_uid_max - 1);
   insert_parameters(database, campaign);

@@ -108,6 +108,22 @@ std::string budget_total() {
   });
 }
 
+/// Of the row r of run_result; what the schema has from version 9.
+std::string budget_total_at_level() {
+  if (model().results().budget_terms.empty()) return "NULL";
+  const std::string level = model().results().health.at(model().results().budget_level).column();
+  return for_each_parameter("\n       + ", [&](const Quantity& quantity) {
+    return fmt::format(
+        "abs(r.error_{0}) * (SELECT ifnull(sum(value), 0.0) FROM budget_coefficient"
+        " WHERE parameter = '{1}' AND assumed_level IS NULL)\n"
+        "       + abs(r.error_{0}) * coalesce(nullif(r.health_{2}, 0.0), (SELECT "
+        "max(assumed_level) FROM"
+        " budget_coefficient))\n         * (SELECT ifnull(sum(value / assumed_level), 0.0) FROM"
+        " budget_coefficient WHERE parameter = '{1}')",
+        quantity.column(), quantity.name, level);
+  });
+}
+
 /// The names of choices that are stored as 1, 2, ...
 std::string name_of_choice(std::string_view column, const std::vector<std::string_view>& names) {
   if (names.empty()) return "NULL";
@@ -146,6 +162,7 @@ std::map<std::string_view, std::string> texts() {
       {"estimate_of_parameter", value_of_parameter("estimate")},
       {"error_of_parameter", value_of_parameter("error")},
       {"budget_total", budget_total()},
+      {"budget_total_at_level", budget_total_at_level()},
       {"num_causes", std::to_string(schema.loss_causes.size())},
       {"cause_names", fmt::format("{}", fmt::join(schema.loss_causes, ", "))},
       {"num_sessions", std::to_string(schema.loss_sessions.size())},

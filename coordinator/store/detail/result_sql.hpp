@@ -17,7 +17,8 @@ namespace proofmass::coordinator::detail {
 ///     {health_values}       columns of r that begin with health_, without that, likewise
 ///     {truth_of_parameter}  truth in r of the parameter p; also {estimate_of_parameter},
 ///                           {error_of_parameter}
-///     {budget_total}        budget total that the errors of a row of run_result leave, m/s²
+///     {budget_total}        budget total that the errors of a row of run_result leave, m/s²;
+///                           {budget_total_at_level} that of a row r at its own level
 ///     {num_sessions}        also {session_names}, {num_causes}, {cause_names}
 ///     {digested_tables}     names of the tables that campaign.table_digest is of
 ///     {example_quantity}    its name, for comments; see example_quantity()

@@ -159,18 +159,15 @@ void replace_budgets(Database& database, const std::optional<ErrorBudget>& budge
                      const CampaignStatistics& statistics) {
   database.execute("DELETE FROM budget_entry");
   if (!budget) return;
-  const auto after = [&](const std::vector<double>& errors) {
-    return statistics.num_estimated > 0 ? std::optional(budget->after(errors)) : std::nullopt;
-  };
-  const std::optional<Budget> after_worst = after(statistics.worst_errors());
-  const std::optional<Budget> after_mean = after(statistics.mean_errors());
+  const BudgetColumns columns = budget_columns(*budget, statistics);
   Statement insert =
       database.prepare("INSERT INTO budget_entry VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
-  for (std::size_t i = 0; i <= budget->infos.size(); ++i) {
-    const BudgetEntryInfo& info = i < budget->infos.size() ? budget->infos[i] : budget->total_info;
-    insert.run(i + 1, info.name, info.label, entry_of(budget->before, i), entry_of(after_worst, i),
-               entry_of(after_mean, i), info.paper_before, info.paper_after_worst,
-               info.paper_after_mean);
+  for (std::size_t i = 0; i <= budget->terms.size(); ++i) {
+    const BudgetEntryInfo& info =
+        i < budget->terms.size() ? budget->terms[i].info : budget->total_info;
+    insert.run(i + 1, info.name, info.label, entry_of(columns.before, i),
+               entry_of(columns.after_worst, i), entry_of(columns.after_mean, i), info.paper_before,
+               info.paper_after_worst, info.paper_after_mean);
   }
 }
 

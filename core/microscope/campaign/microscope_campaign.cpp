@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "core/error.hpp"
@@ -50,6 +51,13 @@ void MicroscopeCampaign::validate_without_columns() const {
   scenario.validate();
   check_environment(*this);
   for (std::size_t i = 0; i < num_drawn; ++i) dispersions[i].validate(path_of(i));
+}
+
+Interpretation MicroscopeCampaign::interpretation() const {
+  if (scenario.noise.scale == 0.0) return Interpretation::ensemble;
+  const auto is_fixed = [](const Dispersion& dispersion) { return dispersion.law == Law::fixed; };
+  const bool are_fixed = std::ranges::all_of(dispersions, is_fixed);
+  return are_fixed ? Interpretation::temporal : Interpretation::mixed;
 }
 
 MicroscopeCampaign hardy2013_campaign() {

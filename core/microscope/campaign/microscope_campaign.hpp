@@ -41,6 +41,7 @@ class MicroscopeCampaign final : public Campaign {
   [[nodiscard]] std::int64_t num_rounds_max() const override;
   [[nodiscard]] std::vector<std::size_t> table_quantities() const override;
   [[nodiscard]] RunDraw draw(RunIndex run) const override;
+  [[nodiscard]] Interpretation interpretation() const override;
   [[nodiscard]] std::optional<ErrorBudget> error_budget() const override;
   [[nodiscard]] Warner warner() const override;
 };

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <type_traits>
 
 #include "core/error.hpp"
@@ -104,6 +106,15 @@ void check_band(const Scenario& scenario) {
   }
 }
 
+// A test that turns with the Earth's direction sees a constant, which a bias is, too.
+void check_test(const Scenario& scenario) {
+  const double rate_rad_s = scenario.budget.test_spin_rate_rad_s;
+  const double turns = rate_rad_s * scenario.orbit.period_s / (2.0 * std::numbers::pi);
+  if (std::abs(1.0 + turns) >= 0.1) return;
+  throw ConfigError("budget.test_spin_rate_rad_s", fmt::format("{}", rate_rad_s),
+                    "must leave f_EP = |f_orb + f_spin| a tenth of f_orb or more");
+}
+
 }  // namespace
 
 void Scenario::validate() const {
@@ -117,6 +128,7 @@ void Scenario::validate() const {
   check_loop("attitude", attitude.bandwidth_hz, attitude.integral_hz, simulation.sample_period_s);
   validate_sessions(sessions, orbit.period_s, simulation.sample_period_s);
   estimation_method(estimation.method).check(sessions);
+  check_test(*this);
   check_transient(*this);
   check_band(*this);
 }

@@ -155,10 +155,12 @@ void visit_tables(Config& scenario, Visitor& visit) {
           scenario.objectives[i]);
   }
   auto& budget = scenario.budget;
+  visit(FieldInfo{"budget.test_spin_rate_rad_s", "2π f_spin of the test, about Y; 0 is inertial.",
+                  range::between(-0.05, 0.05)},
+        budget.test_spin_rate_rad_s);
   visit(FieldInfo{"budget.t_xy_s2", "T_xy at the test frequency.", range::positive},
         budget.t_xy_s2);
-  visit(FieldInfo{"budget.residual_m_s2", "Drag-free residue at the test frequency.",
-                  range::positive},
+  visit(FieldInfo{"budget.residual_m_s2", "Drag-free residue that no run tells.", range::positive},
         budget.residual_m_s2);
   visit(
       FieldInfo{"budget.differential_m_s2", "Constant differential acceleration.", range::positive},

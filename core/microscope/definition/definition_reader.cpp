@@ -182,20 +182,36 @@ bool read_key(Document& document, const std::string& path, std::string_view key,
   return document.read(path, *text_at(dispersion, key));
 }
 
+/// Centre of the law that an assignment replaces: by its keys in the file, or else that of `law`.
+double replaced_centre(Document& document, const std::string& path, Dispersion law) {
+  const auto has = [&](std::string_view key) {
+    return read_key(document, fmt::format("{}.{}", path, key), key, law);
+  };
+  if (has("value")) return law.value;
+  if (has("mean")) return law.mean;
+  const bool has_minimum = has("minimum");
+  const bool has_bounds = has("maximum") && has_minimum;
+  if (has_bounds || law.law == Law::uniform) return 0.5 * law.minimum + 0.5 * law.maximum;
+  return law.law == Law::fixed ? law.value : law.mean;
+}
+
 // Keys that belong to other laws: a mean beside a uniform law would be silently without effect.
-void refuse_other_keys(Document& document, const std::string& path, Law law) {
+// Those of a law in the file that an assignment replaces are gone with it.
+void refuse_other_keys(Document& document, const std::string& path, Law law, bool is_assigned) {
   const std::span<const std::string_view> keys = keys_of(law);
   for (const std::string_view key : all_keys) {
     const std::string key_path = fmt::format("{}.{}", path, key);
     if (std::ranges::find(keys, key) != keys.end()) continue;
     if (document.find(key_path) == nullptr) continue;
+    if (is_assigned && !document.is_assigned(key_path)) continue;
     document.refuse(key_path, fmt::format("not a key of law {}, which has {}", name_of(law),
                                           fmt::join(keys, ", ")));
   }
 }
 
 // The law at `path` where it differs from an outer one, `base`.
-Dispersion read_dispersion(Document& document, const std::string& path, const Dispersion& base) {
+Dispersion read_dispersion(Document& document, const std::string& path, const Dispersion& base,
+                           bool is_assigned) {
   Law law = base.law;
   const bool has_law = document.read(path + ".law", law);
   const bool is_law_refused = !has_law && document.find(path + ".law") != nullptr;
@@ -208,14 +224,17 @@ Dispersion read_dispersion(Document& document, const std::string& path, const Di
   dispersion.law = law;
   for (const std::string_view key : keys_of(law)) {
     const std::string key_path = fmt::format("{}.{}", path, key);
-    const bool is_absent = document.find(key_path) == nullptr;
-    if (is_absent && law != base.law) {
-      document.refuse_absence(key_path, fmt::format("law {} needs it", name_of(law)));
-    } else {
+    if (document.find(key_path) != nullptr || law == base.law) {
       read_key(document, key_path, key, dispersion);
+    } else if (is_assigned && (key == "value" || key == "mean") && base.law != Law::table) {
+      *number_at(dispersion, key) = replaced_centre(document, path, base);
+    } else {
+      document.refuse_absence(
+          key_path, fmt::format("law {} needs it{}", name_of(law),
+                                is_assigned ? ": --set " + key_path + "=..." : std::string()));
     }
   }
-  refuse_other_keys(document, path, law);
+  refuse_other_keys(document, path, law, is_assigned);
   return dispersion;
 }
 
@@ -223,11 +242,16 @@ Dispersion read_dispersion(Document& document, const std::string& path, const Di
 DispersionSet read_dispersions(Document& document) {
   DispersionSet dispersions = nominal_dispersions();
   for (const DrawGroup& group : draw_groups()) {
-    const Dispersion of_group = read_dispersion(document, fmt::format("dispersion.{}", group.name),
-                                                dispersions[group.first]);
+    const std::string path = fmt::format("dispersion.{}", group.name);
+    const bool is_assigned = document.is_assigned(path + ".law");
+    const Dispersion of_group =
+        read_dispersion(document, path, dispersions[group.first], is_assigned);
     for (std::size_t i = group.first; i < group.first + group.count; ++i) {
+      const std::string element = fmt::format("dispersion.{}", drawn_names()[i]);
+      const bool follows_group = document.find(element + ".law") == nullptr;
       dispersions[i] =
-          read_dispersion(document, fmt::format("dispersion.{}", drawn_names()[i]), of_group);
+          read_dispersion(document, element, of_group,
+                          follows_group ? is_assigned : document.is_assigned(element + ".law"));
     }
   }
   return dispersions;

@@ -34,13 +34,13 @@ constexpr Stimulus pushed_along(Axis axis) { return {drag_free, axis}; }
 // rows, Γ_mes,dx is at the session's lines
 //
 //     ½ [T − In]_xj a_c11 Δ_j                              j = x, z, y
-//     a_c1j ½([T]_jj − [T]_xx) Δ_TM sin(2π f_TM t)         j = 2, 3 (y, z)
+//     a_c1j ½([T − In]_jj − [T − In]_xx) Δ_TM sin(2π f_TM t)   j = 2, 3 (y, z)
 //     a_d1j Γ_mes,cj                                       j = 1, 2, 3 (x, y, z)
 //     K2d/K1c² Γ_mes,cx²
 //     ±½ K2k/K1k² Γ_mes,kx²                                of the mass k that moves
 //
-// a_c1j multiplies [T]_jj less [T]_xx because the masses move along axes of their sensors, which
-// are turned against the satellite's by θ, the larger part of a_c1j.
+// a_c1j multiplies the element jj less the element xx because the masses move along axes of their
+// sensors, which are turned against the satellite's by θ, the larger part of a_c1j.
 constexpr std::array<TargetInfo, num_session_targets> targets{{
     {a_c11_delta_x, "a_c11_delta_x", quiet, no_stimulus, common_drag_free, Signal::gradient_xx,
      no_product, 2.0, SignalSet::all},
@@ -147,7 +147,7 @@ double line_frequency_hz(const Session& session, const LineMultiple& line, doubl
     PROOFMASS_EXPECT(i + 1 < session.excitations.size());
     frequency_hz += line.further[i] * session.excitations[i + 1].frequency_hz;
   }
-  return frequency_hz;
+  return std::abs(frequency_hz);
 }
 
 const Excitation* mass_excitation(const Session& session) {

@@ -99,8 +99,8 @@ enum class Product : std::uint8_t {
   common_squared,    ///< Γ_mes,cx², m²/s⁴.
   sensor_1_squared,  ///< Γ_mes,1x², m²/s⁴.
   sensor_2_squared,  ///< Γ_mes,2x², m²/s⁴.
-  modulated_yy,      ///< ½([T̂]_yy − [T̂]_xx) Δ_TM sin(2π f_TM t), m/s².
-  modulated_zz,      ///< ½([T̂]_zz − [T̂]_xx) Δ_TM sin(2π f_TM t), m/s².
+  modulated_yy,      ///< ½([T̂ − În]_yy − [T̂ − În]_xx) Δ_TM sin(2π f_TM t), m/s².
+  modulated_zz,      ///< ½([T̂ − În]_zz − [T̂ − În]_xx) Δ_TM sin(2π f_TM t), m/s².
 };
 
 inline constexpr std::size_t num_fit_lines_max = 2;       ///< Of a session.
@@ -205,7 +205,7 @@ struct Session {
   bool operator==(const Session&) const = default;
 };
 
-/// Frequency of a line of the session, Hz; f_orb = 1/orbit_period_s.
+/// Frequency of a line of the session, Hz, without its sign; f_orb = 1/orbit_period_s.
 [[nodiscard]] double line_frequency_hz(const Session& session, const LineMultiple& line,
                                        double orbit_period_s);
 

@@ -19,6 +19,7 @@ const std::map<std::string, std::string> unheld{
     {"campaign.priority", "how the campaign is served; may be changed at any time"},
     {"campaign.audit_fraction", "how the campaign is served; may be changed at any time"},
     {"campaign.is_log_needed", "whether the file is whole without its log, at this moment"},
+    {"campaign.first_version", "whether budgets are compared"},
     {"delivery.attempt", "told by the worker's lease alone"},
     {"delivery.received_unix_s", "a time of the wall clock; the newest of a worker is held"},
     {"worker.session", "told by the worker alone"},

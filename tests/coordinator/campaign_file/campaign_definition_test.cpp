@@ -90,9 +90,13 @@ TEST(CanonicalDefinition, ReadsBackToTheSameCampaign) {
   }
 }
 
+// But one that came later, at its nominal value: the text of older campaigns remains what it was.
 TEST(CanonicalDefinition, StatesEveryField) {
-  const MicroscopeCampaign campaign;
+  MicroscopeCampaign campaign;
+  EXPECT_THAT(canonical_definition(campaign), Not(HasSubstr("test_spin_rate_rad_s")));
+  campaign.scenario.budget.test_spin_rate_rad_s = -2e-3;
   const std::string definition = canonical_definition(campaign);
+  EXPECT_EQ(canonical_definition(parse_campaign("", definition, {}, {})), definition);
   for_each_field(campaign.scenario, [&](const FieldInfo& field, const auto&) {
     const std::string path(field.path);
     EXPECT_THAT(definition, HasSubstr("[" + path.substr(0, path.rfind('.')) + "]\n"));

@@ -169,6 +169,56 @@ TEST(Overrides, AreRefusedByTheirOwnText) {
             "--set noise.scale=1\nnoise.preset = \"flight_suref\": must be a number");
 }
 
+// The law of the file is gone with its keys; what both have, and the centre, stays.
+TEST(ReadCampaign, ReplacesALawByOneThatIsSet) {
+  const std::string_view file = R"(
+    [dispersion.offcentring_m]
+    minimum = 1e-6
+    maximum = 3e-6
+    y = { maximum = 5e-6 }
+    z = { law = "normal", mean = 4e-6, standard_deviation = 1e-6 }
+    [dispersion.coupling_rad]
+    law = "truncated_normal"
+    mean = 1e-5
+    standard_deviation = 1e-5
+    minimum = 0
+    maximum = 3e-5)";
+  const auto laws = [&](std::vector<std::string> assignments) {
+    return campaign_of(file, {.assignments = std::move(assignments)}).dispersions;
+  };
+  const auto fixed = [](double value) {
+    Dispersion law;
+    law.law = Law::fixed;
+    law.value = value;
+    return law;
+  };
+  DispersionSet dispersions = laws({"dispersion.offcentring_m.law=fixed"});
+  EXPECT_EQ(dispersions[24], fixed(2e-6));
+  EXPECT_EQ(dispersions[25], fixed(2e-6));
+  EXPECT_EQ(dispersions[26].law, Law::normal);
+  dispersions =
+      laws({"dispersion.offcentring_m.z.law=fixed", "dispersion.offcentring_m.y.law=fixed",
+            "dispersion.offcentring_m.y.value=7e-6", "dispersion.coupling_rad.law=normal"});
+  EXPECT_EQ(dispersions[24].law, Law::uniform);
+  EXPECT_EQ(dispersions[25], fixed(7e-6));
+  EXPECT_EQ(dispersions[26], fixed(4e-6));
+  EXPECT_EQ(dispersions[12].law, Law::normal);
+  EXPECT_EQ(dispersions[12].mean, 1e-5);
+  EXPECT_EQ(dispersions[12].standard_deviation, 1e-5);
+  EXPECT_EQ(dispersions[12].maximum, 0.0);
+  EXPECT_EQ(laws({"dispersion.coupling_rad.law=uniform"})[12].maximum, 3e-5);
+  EXPECT_EQ(laws({"dispersion.offcentring_m.law=uniform"}), laws({}));
+
+  const auto refusal = [&](std::vector<std::string> assignments) {
+    return test::refusal_of(file, {.assignments = std::move(assignments)});
+  };
+  EXPECT_EQ(refusal({"dispersion.offcentring_m.law=normal"}),
+            "campaign.toml:2: dispersion.offcentring_m.standard_deviation is missing (law normal "
+            "needs it: --set dispersion.offcentring_m.standard_deviation=...)");
+  EXPECT_EQ(refusal({"dispersion.offcentring_m.law=fixed", "dispersion.offcentring_m.minimum=0"}),
+            "--set dispersion.offcentring_m.minimum=0: not a key of law fixed, which has value");
+}
+
 TEST(Overrides, OfRunsAndSeedAreCheckedLikeTheFile) {
   EXPECT_EQ(test::refusal_of("", {.num_runs = 0}), "--runs 0: must be in [1, 1000000000]");
   EXPECT_EQ(test::refusal_of("", {.seed = 9223372036854775808u}),

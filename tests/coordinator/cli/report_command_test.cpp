@@ -152,9 +152,9 @@ TEST_F(ReportCommand, PrintsWhatTheTablesHoldAsJson) {
   EXPECT_GT(parameter["bias_interval"][1], 30.5e-6);
   EXPECT_EQ(parameter["percentiles"][0]["level"], 0.5);
   EXPECT_TRUE(parameter["percentiles"][3]["interval"].is_null());  // Needs 368 runs.
-  EXPECT_EQ(json["budget"]["terms"].size(), hardy2013_campaign().error_budget()->infos.size());
+  EXPECT_EQ(json["budget"]["terms"].size(), hardy2013_campaign().error_budget()->terms.size());
   EXPECT_EQ(json["budget"]["total"]["before_m_s2"],
-            hardy2013_campaign().error_budget()->before.total);
+            hardy2013_campaign().error_budget()->before(0.0).total);
   const auto& requirement = json["requirements"][0];
   EXPECT_EQ(requirement["answer"], "not met");
   EXPECT_EQ(requirement["num_exceedances"], 30);

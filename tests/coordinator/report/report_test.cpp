@@ -102,6 +102,21 @@ TEST(BudgetTable, ShowsEachTermBesideThePaper) {
                               "  2.0e-13  1.1e-15  3.6e-16"));
 }
 
+// With the worst errors the worst residue of the runs, and else their mean.
+TEST(BudgetTable, IsOfTheResidueOfTheRuns) {
+  CampaignStatistics statistics = paper_statistics(100);
+  statistics.health.resize(num_health_values);
+  statistics.health[budget_level()] = {.worst = 3.5e-11, .mean = 1e-11};
+  const std::vector<std::string> lines =
+      test::lines_of(budget_table(MicroscopeCampaign{}, statistics, {}));
+  EXPECT_THAT(lines, Contains("2·a_d11·Γ_res,x          2.0e-13  3.5e-16  3.2e-17 │"
+                              "  2.0e-14  1.0e-17  3.2e-18"));
+  EXPECT_THAT(lines, Contains("Γ_res is that of the runs: worst 3.50e-11, mean 1.00e-11 m/s²; "
+                              "assumed was 1e-12"));
+  EXPECT_THAT(budget_table(MicroscopeCampaign{}, paper_statistics(100), {}),
+              HasSubstr("Γ_res is assumed: 1e-12 m/s²\n"));
+}
+
 TEST(BudgetTable, HasDashesAfterEstimationWhileNoRunHasAnEstimate) {
   const std::vector<std::string> lines =
       test::lines_of(budget_table(MicroscopeCampaign{}, CampaignStatistics{}, {}));
@@ -201,8 +216,8 @@ TEST(RunTotals, AreThoseOfSingleRuns) {
     errors[index(Parameter::a_c12)] = run == 0 ? 1e-3 : 1e-5;
     errors[index(Parameter::a_c13)] = run == 1 ? -2e-3 : 1e-5;
     result.estimate = errors;
-    for (double& error : errors) error = std::abs(error);
-    totals.push_back(budget.after(errors).total);
+    result.health = test::values_of({.residual_m_s2 = 1e-10});
+    totals.push_back(budget.of_run(result).total);
     passes.add(result);
   }
   RunResult without = test::zero_result({.run = {3}, .status = RunStatus::no_draw});
@@ -409,9 +424,10 @@ TEST_F(StoredReport, IsStoredForSql) {
   detail::Statement total = database.prepare(
       "SELECT before_m_s2, after_worst_m_s2, after_mean_m_s2 FROM budget WHERE term = 'total'");
   ASSERT_TRUE(total.step());
-  EXPECT_EQ(total.real(0), campaign.error_budget()->before.total);
-  EXPECT_EQ(total.real(1), campaign.error_budget()->after(statistics.worst_errors()).total);
-  EXPECT_EQ(total.real(2), campaign.error_budget()->after(statistics.mean_errors()).total);
+  const BudgetColumns columns = budget_columns(*campaign.error_budget(), statistics);
+  EXPECT_EQ(total.real(0), columns.before.total);
+  EXPECT_EQ(total.real(1), columns.after_worst->total);
+  EXPECT_EQ(total.real(2), columns.after_mean->total);
 }
 
 }  // namespace

@@ -74,7 +74,7 @@ TEST_F(ReviewHtml, ShowsTextOfStrangersAsText) {
 // the third does not, as P(Bin(100, 0.05) ≤ 2) = 0.118. So one may exceed, and the margin is 1 %.
 TEST_F(ReviewHtml, BeginsWithTheVerificationMatrix) {
   const Store store = store_with(100);
-  const Review review = review_of(store, 100);
+  Review review = review_of(store, 100);
   const MatrixRow& row = review.matrix.at(static_cast<std::size_t>(Parameter::a_c12));
   EXPECT_NEAR(*row.relative_margin(), 0.01, 1e-12);
   const std::string html = review_html(review);
@@ -85,6 +85,9 @@ TEST_F(ReviewHtml, BeginsWithTheVerificationMatrix) {
   EXPECT_THAT(html, HasSubstr("<strong class=\"met\">met</strong>"));
   EXPECT_THAT(html, HasSubstr("<code>proofmass replay &#39;a campaign.db&#39; --run 99</code>"));
   EXPECT_THAT(html, HasSubstr(">probability (mixed)</th>"));
+  review.interpretation = Interpretation::temporal;
+  EXPECT_THAT(review_html(review), HasSubstr(">probability (temporal)</th>"));
+  EXPECT_THAT(review_html(review), Not(HasSubstr("mixed")));
 }
 
 TEST_F(ReviewHtml, SaysThatACampaignIsNotFinished) {

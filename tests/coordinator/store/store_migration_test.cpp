@@ -22,7 +22,10 @@ namespace {
 
 using detail::Access;
 using detail::Database;
+using ::testing::Each;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// A file of the older version with runs 0 and 1 by `näh`, run 4 by `worker-2`, and a note.
 void make_older(const std::filesystem::path& path) {
@@ -79,6 +82,33 @@ TEST_F(StoreMigration, KeepsResultsAndWhoDeliveredThem) {
   EXPECT_EQ(database.integer("SELECT count(*) FROM pragma_foreign_key_check"), 0);
   EXPECT_EQ(database.text("PRAGMA integrity_check"), "ok");
   EXPECT_EQ(store.commit(test::deliveries_of(0, 5)).num_new, 2u);
+}
+
+// A file keeps the budget of the program that made it, which took one level for all runs. Run 2 has
+// an error of a_d11' of 1, and no other.
+TEST_F(StoreMigration, KeepsABudgetOfAnAssumedLevel) {
+  make_older_file();
+  std::string columns, values;
+  for (const test::ParameterInfo& info : test::parameter_infos()) {
+    columns += ", truth_" + info.column() + ", estimate_" + info.column();
+    values += info.parameter == Parameter::a_d11_prime ? ", 0, 1" : ", 0, 0";
+  }
+  {
+    Database old(file(), Access::read_write);
+    old.execute("INSERT INTO budget_coefficient VALUES ('residual_x', 'a_d11_prime', 2e-12)");
+    old.execute(
+        "INSERT INTO run_result (run_index, status, num_draws, num_rounds,"
+        " health_residual_m_s2" +
+        columns + ") VALUES (2, 1, 1, 1, 3.5e-11" + values +
+        "); INSERT INTO delivery VALUES (2, 1, 0, 1, 10)");
+  }
+  test::RecordingWriter rows;
+  EXPECT_EQ(run_query(file(), "SELECT total_m_s2 FROM run_budget", {}, rows), QueryEnd::complete);
+  EXPECT_EQ(rows.rows, (std::vector<std::vector<test::OwnCell>>{{2e-12}}));
+  Store store = Store::open(file());
+  EXPECT_EQ(Database(file(), Access::read_only).text("SELECT first_version FROM campaign"), "8");
+  EXPECT_THAT(store.parameter_differences(test::campaign_of(5)),
+              Each(Not(HasSubstr("budget_coefficient"))));
 }
 
 TEST_F(StoreMigration, LeadsToTheTablesOfANewFile) {

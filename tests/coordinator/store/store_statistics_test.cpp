@@ -52,17 +52,14 @@ CampaignStatistics distinct_statistics() {
 
 const ResultDigests digest{.results = std::string(64, '5'), .health = std::string(64, '6')};
 
-Budget constant_budget(double entry) {
-  return {.entries = std::vector<double>(num_budget_entries, entry), .total = 10.0 * entry};
-}
-
-/// A budget whose entries are 2 after the worst and 3 after the mean of distinct_statistics().
+/// A budget whose entries are 2 after the worst and 1/8 after the mean of distinct_statistics().
 ErrorBudget constant_budgets(double before) {
   ErrorBudget budget = microscope_budget(Scenario{});
-  budget.before = constant_budget(before);
-  budget.after = [](std::span<const double> errors) {
-    return constant_budget(errors[0] == 1.0 ? 2.0 : 3.0);
-  };
+  for (BudgetTerm& term : budget.terms) {
+    term.before = before;
+    term.coefficients.assign(num_parameters, 0.0);
+    term.coefficients[0] = 2.0;
+  }
   return budget;
 }
 
@@ -190,22 +187,20 @@ TEST_F(StoreStatistics, TellHowOftenAllObjectivesHoldTogether) {
   EXPECT_FALSE(row.step());
 }
 
-// SQL adds up in another order than budget_after_calibration().
+// SQL adds up in another order than the budget. Runs have a residue of their own, or none.
 TEST_F(StoreStatistics, ComeWithTheBudgetOfEachRun) {
   const MicroscopeCampaign campaign = campaign_of(6);
   Store store = Store::create(file(), campaign, "");
   std::vector<Delivery> deliveries = test::deliveries_of(0, 6);
   deliveries[2].result = test::result_of(2, RunStatus::no_draw);
+  deliveries[3].result.health = test::values_of({.residual_m_s2 = 3.5e-11});
+  deliveries[4].result.health = test::values_of({.residual_m_s2 = 1e-13});
   store.commit(deliveries);
   const Database database(file(), Access::read_only);
   Statement row = database.prepare("SELECT run_index, total_m_s2 FROM run_budget");
   for (const Delivery& delivery : deliveries) {
     if (!delivery.result.has_estimate()) continue;
-    std::vector<double> errors(num_parameters);
-    for (const test::ParameterInfo& info : test::parameter_infos()) {
-      errors[index(info.parameter)] = std::abs(delivery.result.error(index(info.parameter)));
-    }
-    const double total = microscope_budget(campaign.scenario).after(errors).total;
+    const double total = microscope_budget(campaign.scenario).of_run(delivery.result).total;
     ASSERT_TRUE(row.step());
     EXPECT_EQ(row.count(0), delivery.result.run.value);
     EXPECT_NEAR(row.real(1), total, 1e-14 * total);
@@ -230,7 +225,7 @@ TEST_F(StoreStatistics, AppearInBudgetWithItsTotalLast) {
     EXPECT_EQ(row.text(7), info.name);
     EXPECT_EQ(row.real(1), factor * 1.0);
     EXPECT_EQ(row.real(2), factor * 2.0);
-    EXPECT_EQ(row.real(3), factor * 3.0);
+    EXPECT_EQ(row.real(3), factor * 0.125);
     EXPECT_EQ(row.real(4), info.paper_before);
     EXPECT_EQ(row.real(5), info.paper_after_worst);
     EXPECT_EQ(row.real(6), info.paper_after_mean);

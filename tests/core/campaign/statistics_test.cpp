@@ -49,6 +49,22 @@ TEST(Statistics, AreThoseOfTheAbsoluteError) {
   }
 }
 
+TEST(Statistics, HaveTheHealthOfRunsWithAnEstimate) {
+  std::vector<RunResult> results;
+  for (const double health : {1.0, 5.0, 3.0}) {
+    results.push_back(run_with_error(results.size(), 1.0));
+    results.back().health = {health, 0.25};
+  }
+  results.push_back(run_with_error(3, 1.0));  // By a program that knew no health.
+  results.push_back(test::zero_result({.run = {4}, .status = RunStatus::lost}));
+  results.back().health = {9.0, 9.0};
+  const CampaignStatistics statistics = statistics_of(results);
+  ASSERT_EQ(statistics.health.size(), 2U);
+  EXPECT_EQ(statistics.health[0].worst, 5.0);
+  EXPECT_EQ(statistics.health[0].mean, 3.0);
+  EXPECT_EQ(statistics.health[1].mean, 0.25);
+}
+
 // Run 0 is within all objectives, run 1 beyond one, run 2 beyond two of them, run 3 has no
 // estimate. 1 of 4 draws, and of 5 with one that was given up: 0.631 to 80.6 % and 0.505 to 71.6 %
 // (scipy.stats.beta.ppf); of the runs with an estimate 2 of 3 are beyond the first, 9.43 to 99.2 %.

@@ -46,6 +46,17 @@ TEST(MicroscopeCampaign, IsValidByDefault) {
   EXPECT_EQ(refusal_after([](MicroscopeCampaign&) {}), "");
 }
 
+TEST(MicroscopeCampaign, IsInterpretedByWhatDiffersFromRunToRun) {
+  MicroscopeCampaign campaign;
+  EXPECT_EQ(campaign.interpretation(), Interpretation::mixed);
+  for (std::size_t i = 1; i < num_drawn; ++i) campaign.dispersions[i].law = Law::fixed;
+  EXPECT_EQ(campaign.interpretation(), Interpretation::mixed);
+  campaign.dispersions[0].law = Law::fixed;
+  EXPECT_EQ(campaign.interpretation(), Interpretation::temporal);
+  campaign.scenario.noise.scale = 0.0;
+  EXPECT_EQ(campaign.interpretation(), Interpretation::ensemble);
+}
+
 TEST(MicroscopeCampaign, RefusesABadName) {
   const std::string rule = " (must be 1 to 64 letters, digits, _, - or .)";
   EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.name = ""; }),

@@ -72,6 +72,19 @@ TEST(LineFrequency, TakesPartsOfTheOrbitAndMultiplesOfTheSpin) {
   EXPECT_DOUBLE_EQ(line_frequency_hz(sessions[0], {-1, 0, 1}, orbit_period_s), 3.5 / 5950.0);
 }
 
+// The lines of a session that spins hold for the spin the other way round, too.
+TEST(LineFrequency, IsNotNegative) {
+  Sessions sessions = hardy2013_sessions();
+  sessions[0].fit_lines = {{2, 0, 2}};
+  sessions[0].known_lines = {{1, 0}, {1, 0, 1}, {1, 0, 2}, {3, 0, 2}};
+  for (const double turns : {4.5, -4.5}) {
+    sessions[0].spin_rate_rad_s = 2.0 * std::numbers::pi * turns / orbit_period_s;
+    EXPECT_DOUBLE_EQ(line_frequency_hz(sessions[0], {2, 0, 2}, orbit_period_s),
+                     (turns > 0.0 ? 11.0 : 7.0) / 5950.0);
+    EXPECT_NO_THROW(validate_sessions(sessions, orbit_period_s, 0.25));
+  }
+}
+
 TEST(TestFrequency, IsThatOfTheEarthsDirectionInTheFrame) {
   Session session;
   EXPECT_DOUBLE_EQ(test_frequency_hz(session, orbit_period_s), 1.0 / 5950.0);
@@ -163,10 +176,10 @@ TEST(ValidateSessions, WantsAFewLinesInsideTheBand) {
             "session[3].known_lines[0] = [0, 250] (is at 2.47 Hz, must be between 0 and the "
             "Nyquist frequency, 2 Hz)");
   EXPECT_EQ(refusal_after([](Sessions& s) {
-              s[0].fit_lines = {{-1, 0}};
+              s[0].fit_lines = {{0, 0}};
             }),
-            "session[0].fit_lines[0] = [-1, 0] (is at -0.000168067 Hz, must be between 0 and the "
-            "Nyquist frequency, 2 Hz)");
+            "session[0].fit_lines[0] = [0, 0] (is at 0 Hz, must be between 0 and the Nyquist "
+            "frequency, 2 Hz)");
   EXPECT_EQ(refusal_after([](Sessions& s) {
               s[0].fit_lines = {{1001, 0}};
             }),
