@@ -34,7 +34,8 @@ __all__ = ["Campaign", "CampaignError", "Columns", "Quantity", "Replay", "Series
            "open", "replay"]
 
 APPLICATION_ID = 1349668211  # "PrMs".
-SCHEMA_VERSION = 8  # The newest user_version that this reader knows, and the oldest there is.
+SCHEMA_VERSION = 9  # The newest user_version that this reader knows.
+OLDEST_SCHEMA_VERSION = 8
 STATUSES = ("completed", "not_converged", "not_finite", "no_draw", "lost")  # 1 to 5 in run_result.
 ROWS_AT_A_TIME = 8192
 
@@ -208,7 +209,7 @@ class Campaign:
         if version > SCHEMA_VERSION:
             self._refuse(f"is newer than this reader: its user_version is {version}, at most "
                          f"{SCHEMA_VERSION} is known")
-        if version < SCHEMA_VERSION:
+        if version < OLDEST_SCHEMA_VERSION:
             self._refuse(f"was made before the first release: its user_version is {version}")
         self._check_that_log_is_there()
         (self.name, seed, self.num_runs, self.definition_text, self.model_version, self.build,

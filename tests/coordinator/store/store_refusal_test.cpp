@@ -151,7 +151,7 @@ TEST_F(StoreRefusal, OfANewerFile) {
   create();
   Database(file(), Access::read_write).execute("PRAGMA user_version = 99");
   const std::string expected =
-      message("is newer than this program: its user_version is 99, the newest known one 8");
+      message("is newer than this program: its user_version is 99, the newest known one 9");
   EXPECT_EQ(error_of_open(), expected);
   EXPECT_EQ(error_of_open_read_only(), expected);
 }
