@@ -12,6 +12,7 @@
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/report/digest.hpp"
+#include "core/campaign/independence.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/comparison.hpp"
@@ -198,11 +199,13 @@ class Pairs {
     }
   }
 
-  void compare(CampaignComparison& comparison) {
+  void compare(const BothErrors& errors, CampaignComparison& comparison) {
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
       ParameterComparison& parameter = comparison.parameters[begin_ + i];
       parameter.bias_interval =
           mean_interval(moments(parameters_[i].differences), default_confidence);
+      parameter.smallest_scale_factor =
+          smallest_scale_factor(errors.first.errors[begin_ + i], parameters_[i], num_quantities());
       parameter.p_values = compare_paired_errors(std::move(parameters_[i]));
     }
   }
@@ -222,7 +225,7 @@ void compare_pairs(const ComparedCampaign& first, const ComparedCampaign& second
       if (begin == 0) errors.add_again(a, b);
       pairs.add(*a, *b, errors);
     });
-    pairs.compare(comparison);
+    pairs.compare(errors, comparison);
   }
 }
 
@@ -248,6 +251,7 @@ void compare_unpaired_runs(const ComparedCampaign& first, const ComparedCampaign
     const ErrorPasses& b = errors.second.errors[i];
     parameter.bias_interval = compare_means(a.errors(), b.errors(), default_confidence).interval;
     parameter.p_values = are_few ? compare_few(first, second, i) : compare_many_errors(a, b);
+    if (!are_few) parameter.smallest_scale_factor = smallest_scale_factor(a, b, num_quantities());
   }
 }
 
@@ -349,6 +353,10 @@ CampaignComparison compare_campaigns(const ComparedCampaign& first,
   comparison.num_first = errors.first.errors.front().count();
   comparison.num_second = errors.second.errors.front().count();
   comparison.why_not_compared = why_too_few(comparison);
+  for (const ComparedCampaign* const side : {&first, &second}) {
+    if (!comparison.why_not_compared.empty()) break;
+    comparison.why_not_compared = why_not_independent(*side->campaign);
+  }
   if (!comparison.why_not_compared.empty()) return comparison;
   errors.begin_second();
   const auto compare = comparison.is_paired() ? compare_pairs : compare_unpaired_runs;

@@ -57,8 +57,10 @@ struct ParameterComparison {
   ComparedAccuracy second;
   std::optional<Interval> bias_interval;  ///< Of second bias − first; empty if nothing varies.
   double tail_limit = 0.0;                ///< tail_limit() of both campaigns, SI.
-  ChangePValues p_values;                 ///< That chance alone makes such a change.
-  ChangePValues adjusted_p_values;        ///< The same, in any test of all parameters.
+  /// See smallest_scale_factor(); empty below num_welch_min runs unless runs are paired.
+  std::optional<double> smallest_scale_factor;
+  ChangePValues p_values;           ///< That chance alone makes such a change.
+  ChangePValues adjusted_p_values;  ///< The same, in any test of all parameters.
 };
 
 /// What two campaigns differ in, and what that does to the accuracy.

@@ -29,15 +29,16 @@ constexpr std::array<TextColumn, 9> bias_columns{{{"parameter", 11, true},
                                                   {"p", 9},
                                                   {"", 2, true}}};
 
-constexpr std::array<TextColumn, 10> scatter_columns{{{"parameter", 11, true},
+constexpr std::array<TextColumn, 11> scatter_columns{{{"parameter", 11, true},
                                                       {"unit", 9, true},
-                                                      {"std A", 9},
-                                                      {"std B", 9},
-                                                      {"p", 9},
+                                                      {"std A", 8},
+                                                      {"std B", 8},
+                                                      {"p", 8},
                                                       {"", 2, true},
-                                                      {"tail A", 9},
-                                                      {"tail B", 9},
-                                                      {"p", 9},
+                                                      {"found", 8},
+                                                      {"tail A", 8},
+                                                      {"tail B", 8},
+                                                      {"p", 8},
                                                       {"", 2, true}}};
 
 constexpr std::array<TextColumn, 6> magnitude_columns{{{"parameter", 11, true},
@@ -155,6 +156,8 @@ std::string scatter_table(const CampaignComparison& comparison) {
       cells.push_back(measured_figure(side.standard_deviation / quantity.display_scale));
     }
     add_p(parameter.adjusted_p_values.scale, cells);
+    const auto& factor = parameter.smallest_scale_factor;
+    cells.push_back(factor ? measured_figure(100.0 * (*factor - 1.0)) + " %" : "-");
     cells.push_back(percent(parameter.first.num_in_tail, comparison.num_first));
     cells.push_back(percent(parameter.second.num_in_tail, comparison.num_second));
     add_p(parameter.adjusted_p_values.tail, cells);
@@ -162,11 +165,12 @@ std::string scatter_table(const CampaignComparison& comparison) {
   }
   const TestNames tests = tests_of(comparison);
   return text + fmt::format(
-                    "p: {} of distances from the mean; tail: beyond twice the root\n"
-                    "mean square of A and B, p: {}\n"
+                    "p: {} of distances from the mean; found: the smallest\n"
+                    "change of the scatter that this finds in {:.0f} % of such campaigns\n"
+                    "tail: beyond twice the root mean square of A and B, p: {}\n"
                     "All p are adjusted for three tests of all parameters (Holm); *: below "
                     "{:.2f}\n",
-                    tests.scatter, tests.tail, significance);
+                    tests.scatter, 100.0 * finding_probability, tests.tail, significance);
 }
 
 std::string magnitude_table(const CampaignComparison& comparison) {
@@ -208,10 +212,14 @@ Json json_of(const Quantity& quantity, const ParameterComparison& parameter) {
             {"second", json_of(parameter.second)},
             {"bias_change", parameter.second.bias - parameter.first.bias},
             {"bias_change_interval", nullptr},
+            {"smallest_scatter_factor", nullptr},
             {"p_values", json_of(parameter.p_values)},
             {"adjusted_p_values", json_of(parameter.adjusted_p_values)}};
   if (parameter.bias_interval) {
     json["bias_change_interval"] = {parameter.bias_interval->lower, parameter.bias_interval->upper};
+  }
+  if (parameter.smallest_scale_factor) {
+    json["smallest_scatter_factor"] = *parameter.smallest_scale_factor;
   }
   return json;
 }

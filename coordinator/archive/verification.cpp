@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <optional>
-#include <sstream>
 #include <utility>
 
 #include "coordinator/archive/resimulation.hpp"
@@ -270,28 +269,6 @@ void check_arguments(const std::filesystem::path& file, const VerifyOptions& opt
 
 constexpr std::size_t name_width = 12;
 constexpr std::size_t verdict_width = 13;
-constexpr std::size_t report_width = 80;
-
-// Text broken between words, from the second line on after `indent` spaces.
-std::string wrapped(const std::string& text, std::size_t indent) {
-  std::istringstream stream(text);
-  std::string lines, word;
-  std::size_t column = indent;
-  while (stream >> word) {
-    const bool is_first = column == indent;
-    if (!is_first && column + 1 + display_width(word) > report_width) {
-      lines += '\n';
-      lines.append(indent, ' ');
-      column = indent;
-    } else if (!is_first) {
-      lines += " ";
-      ++column;
-    }
-    lines += word;
-    column += display_width(word);
-  }
-  return lines;
-}
 
 }  // namespace
 

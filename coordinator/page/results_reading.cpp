@@ -25,7 +25,7 @@ std::vector<RunRange> missing_from(const RunSet& runs, std::uint64_t first, std:
 }  // namespace
 
 ResultsReading::ResultsReading(const Store& store)
-    : campaign_(store.id()), results_(stored_campaign(store)->objectives()) {}
+    : campaign_(store.id()), results_(*stored_campaign(store)) {}
 
 bool ResultsReading::is_of(const Store& store) const { return campaign_ == store.id(); }
 

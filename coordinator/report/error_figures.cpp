@@ -70,6 +70,13 @@ void FigurePasses::add(const RunResult& result) {
   add_convergence();
 }
 
+void leave_out_intervals(QuantityFigures& figures) {
+  for (ConvergencePoint& point : figures.convergence) {
+    point.mean_interval.reset();
+    point.deviation_interval.reset();
+  }
+}
+
 bool FigurePasses::end_pass() {
   // Where runs have no estimate, the last count is not reached.
   const bool has_last = !quantities_.empty() && !quantities_[0].convergence.empty() &&

@@ -38,6 +38,9 @@ struct QuantityFigures {
   std::vector<ConvergencePoint> convergence;  ///< At most 42, the last of all runs.
 };
 
+/// For draws that are not independent.
+void leave_out_intervals(QuantityFigures& figures);
+
 /// The numbers of runs at which convergence is shown: 40 from 5 on, equally spaced on a logarithmic
 /// axis. Ascending, without repetition.
 /// @param num_runs  The last one, unless it is 0.

@@ -9,11 +9,13 @@
 #include "coordinator/report/review.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/report/review_tables.hpp"
+#include "core/campaign/independence.hpp"
 
 namespace proofmass::coordinator {
 
-LiveResults::LiveResults(std::vector<double> objectives)
-    : objectives_(std::move(objectives)),
+LiveResults::LiveResults(const Campaign& campaign)
+    : objectives_(campaign.objectives()),
+      are_draws_independent_(why_not_independent(campaign).empty()),
       statistics_(objectives_),
       magnitudes_(objectives_.size()) {}
 
@@ -23,6 +25,12 @@ void LiveResults::add(const RunResult& result) {
   for (std::size_t i = 0; i < magnitudes_.size(); ++i) {
     magnitudes_[i].add(std::abs(result.error(i)));
   }
+}
+
+CampaignStatistics LiveResults::statistics() const {
+  CampaignStatistics statistics = statistics_.statistics();
+  if (!are_draws_independent_) leave_out_intervals(statistics);
+  return statistics;
 }
 
 std::string LiveResults::html() const {

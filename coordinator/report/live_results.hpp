@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "coordinator/report/error_bins.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/campaign/statistics.hpp"
 
@@ -13,13 +14,12 @@ namespace proofmass::coordinator {
 /// 17 kB a quantity, so that a copy costs little.
 class LiveResults {
  public:
-  /// @param objectives  Largest acceptable |error| of each quantity, SI.
-  explicit LiveResults(std::vector<double> objectives);
+  explicit LiveResults(const Campaign& campaign);
 
   /// @param result  Its numbers are in range; the run was not added before.
   void add(const RunResult& result);
 
-  [[nodiscard]] CampaignStatistics statistics() const { return statistics_.statistics(); }
+  [[nodiscard]] CampaignStatistics statistics() const;
 
   /// A fragment of HTML for a page with review_style(): the accuracy table and the histograms of
   /// |error| of a review report. Headings are of level 3.
@@ -27,6 +27,7 @@ class LiveResults {
 
  private:
   std::vector<double> objectives_;
+  bool are_draws_independent_;
   RunningStatistics statistics_;
   std::vector<MagnitudeBins> magnitudes_;  ///< Of each quantity.
 };

@@ -98,6 +98,12 @@ std::vector<std::string> matrix_notes(const Review& review) {
   std::vector<std::string> notes{
       fmt::format("Statistical interpretation in the terms of ECSS-E-ST-60-10C: {}. {}",
                   name_of(review.interpretation), draw_sentence(review.interpretation)),
+      "Verdicts: " +
+          (review.matrix.empty() ? std::string("none") : rule_text(review.matrix.front().answer)) +
+          ". With the confidence c of a row a requirement that does not hold is called met with "
+          "probability 1 − c at most, the consumer's risk; so is one that holds called not met. "
+          "The producer's risk, that one that holds is not called met, is the smaller the better "
+          "it holds and the more draws there are.",
       "A draw without an estimate counts as an exceedance. Allowed are the exceedances with which "
       "so many draws meet the requirement.",
       "Bound: with the confidence of the row, the stated part of all draws stays below it (order "
@@ -159,6 +165,10 @@ ReviewTable matrix_table(const Review& review) {
                                 {.title = "its run", .is_text = true}},
                     .rows = {},
                     .notes = matrix_notes(review)};
+  if (!review.why_not_independent.empty()) {
+    table.notes = {fmt::format("No verdicts: {}.", review.why_not_independent)};
+    return table;
+  }
   for (const MatrixRow& row : review.matrix) table.rows.push_back(matrix_cells(review, row));
   return table;
 }

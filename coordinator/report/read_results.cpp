@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "coordinator/report/summarise.hpp"
+#include "core/campaign/independence.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 
@@ -161,6 +162,7 @@ ReadResults read_results(const Store& store, const Campaign& campaign,
       });
     }
     results.statistics = statistics.passes.statistics();
+    if (!why_not_independent(campaign).empty()) leave_out_intervals(results.statistics);
     results.digests = digest.finish();
     if (totals) results.totals = totals->passes.totals();
   });

@@ -12,6 +12,8 @@
 #include "coordinator/report/text_cells.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/model.hpp"
+#include "core/statistics/comparison.hpp"
+#include "core/statistics/distribution.hpp"
 #include "core/statistics/interval.hpp"
 
 namespace proofmass::coordinator {
@@ -139,17 +141,29 @@ std::string error_row(const Quantity& quantity, const AccuracyStatistic& accurac
   for (const PercentileStatistic& percentile : accuracy.percentiles) {
     cells.push_back(measured_figure(percentile.value / scale));
   }
-  cells.push_back(measured_figure(100.0 * accuracy.beyond_objective.lower));
-  cells.push_back(measured_figure(100.0 * accuracy.beyond_objective.upper));
+  const bool is_known = accuracy.beyond_objective.upper - accuracy.beyond_objective.lower < 1.0;
+  for (const double share : {accuracy.beyond_objective.lower, accuracy.beyond_objective.upper}) {
+    cells.push_back(is_known ? measured_figure(100.0 * share) : "-");
+  }
   return row_of(error_columns, cells);
+}
+
+/// That chance alone makes such a bias, by Student's law; 1 where nothing is known.
+double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
+  if (num_runs < 2 || error.bias == 0.0) return 1.0;
+  if (error.standard_deviation <= 0.0) return 0.0;
+  const auto n = static_cast<double>(num_runs);
+  return student_two_sided(error.bias * std::sqrt(n) / error.standard_deviation, n - 1.0);
 }
 
 std::string joint_text(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
   constexpr std::size_t margin = 2;
-  return line_of(fmt::format("all objectives together: {} of {} runs,",
-                             statistics.num_within_objectives, statistics.num_runs + num_given_up),
-                 interval_percent(*statistics.within_objectives(num_given_up)) + " of all draws",
-                 margin);
+  const std::string seen =
+      fmt::format("all objectives together: {} of {} runs", statistics.num_within_objectives,
+                  statistics.num_runs + num_given_up);
+  const std::optional<Interval> share = statistics.within_objectives(num_given_up);
+  if (!share) return seen + "\n";
+  return line_of(seen + ",", interval_percent(*share) + " of all draws", margin);
 }
 
 // Contributions before estimation and after it, with the worst and the mean errors.
@@ -217,6 +231,22 @@ std::string summary_text(std::string_view name, std::uint64_t seed, std::uint64_
   return text;
 }
 
+std::string bias_sentence(const CampaignStatistics& statistics) {
+  std::vector<double> p_values;
+  for (const AccuracyStatistic& accuracy : statistics.accuracy) {
+    p_values.push_back(bias_p_value(accuracy.error, statistics.num_estimated));
+  }
+  const std::vector<double> adjusted = holm_adjusted(p_values);
+  std::string names;
+  for (std::size_t i = 0; i < adjusted.size(); ++i) {
+    if (adjusted[i] >= 1.0 - default_confidence) continue;
+    names += (names.empty() ? "" : ", ") + std::string(model().results().quantities[i].symbol);
+  }
+  return fmt::format(
+      "Bias: each interval holds by itself. Of all {} together (Holm, 5 %) {}.", adjusted.size(),
+      names.empty() ? "no bias differs from 0" : "the bias differs from 0 of " + names);
+}
+
 std::string given_up_text(std::span<const RunRange> given_up) {
   if (given_up.empty()) return "";
   constexpr std::size_t columns_max = 76;  // And an ellipsis.
@@ -259,6 +289,11 @@ std::string interval_table(const CampaignStatistics& statistics, std::uint64_t n
     text += interval_row(model().results().quantities[i], statistics.accuracy[i],
                          statistics.num_estimated);
   }
+  if (!statistics.are_draws_independent) {
+    return text +
+           "no intervals: a table of the dispersion is not declared independent, so that\n"
+           "  the draws may be those of a design\n";
+  }
   if (statistics.num_estimated < num_runs_of_bootstrap) {
     text += "std: an interval from fewer than 200 runs is too narrow, see core/statistics\n";
   }
@@ -273,6 +308,7 @@ std::string error_table(const CampaignStatistics& statistics, std::uint64_t num_
   for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
     text += error_row(model().results().quantities[i], statistics.accuracy[i]);
   }
+  if (statistics.are_draws_independent) text += wrapped(bias_sentence(statistics), 2) + "\n";
   return text + joint_text(statistics, num_given_up);
 }
 

@@ -12,6 +12,7 @@
 #include "coordinator/report/review_tables.hpp"
 #include "coordinator/report/verification_matrix.hpp"
 #include "core/campaign/campaign.hpp"
+#include "core/campaign/independence.hpp"
 #include "core/model.hpp"
 #include "core/model_rules.hpp"
 
@@ -138,6 +139,7 @@ Json json_of(const RequirementAnswer& answer) {
   const Requirement& requirement = answer.requirement;
   Json json{{"requirement", answer.text},
             {"answer", name_of(check.verdict)},
+            {"rule", check.is_of_fixed_size ? "fixed size" : "sequential"},
             {"parameter", nullptr},
             {"limit", nullptr},
             {"coverage", requirement.tolerance.coverage},
@@ -177,7 +179,7 @@ std::string report_json(const Store& store, const Campaign& campaign,
                         std::span<const StatedRequirement> stated) {
   MatrixPasses matrix(matrix_requirements({stated.begin(), stated.end()}, campaign.objectives()),
                       campaign.objectives(), num_runs_in(store.given_up_runs()),
-                      campaign.error_budget());
+                      store.num_runs_fixed(), campaign.error_budget());
   const std::array<ResultPasses*, 1> further{&matrix};
   CheckedResults checked;
   store.read_one_state([&] { checked = read_checked_results(store, campaign, further); });
@@ -206,8 +208,10 @@ std::string report_json(const Store& store, const Campaign& campaign,
             {"budget", budget_of(campaign, checked.results)},
             {"requirements", Json::array()},
             {"matrix", Json::array()}};
+  json["why_not_independent"] = why_not_independent(campaign);
   for (const RequirementAnswer& answer : answers) json["requirements"].push_back(json_of(answer));
   for (const MatrixRow& row : matrix.rows()) {
+    if (!statistics.are_draws_independent) break;
     json["matrix"].push_back(json_of(row, campaign.interpretation()));
   }
   constexpr int indent = 2;

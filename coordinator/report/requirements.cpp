@@ -59,8 +59,11 @@ void check(const Store& store, std::span<const double> objectives,
       errors.push_back(required_value(result, requirement.parameter, budget));
     }
   });
-  answer.check = is_of_errors ? check_requirement(requirement, errors, answer.missing.total())
-                              : check_requirement(requirement, exceedances.of(num_runs));
+  answer.num_fixed = store.num_runs_fixed();
+  answer.check =
+      is_of_errors
+          ? check_requirement(requirement, errors, answer.missing.total(), answer.num_fixed)
+          : check_requirement(requirement, exceedances.of(num_runs), answer.num_fixed);
 }
 
 constexpr std::size_t margin = 13;
@@ -108,10 +111,7 @@ std::string bound_line(const RequirementAnswer& answer) {
   const Tolerance& tolerance = answer.requirement.tolerance;
   if (answer.requirement.subject == Requirement::Subject::all_objectives) return "";
   if (!check.bound) {
-    // Runs without an estimate are the largest errors.
-    const auto least = wilks_num_runs(tolerance, check.num_without_estimate + 1);
-    return fmt::format("Bound        none: {} for {} with {}\n",
-                       least ? fmt::format("{} draws at least,", *least) : "no number of draws",
+    return fmt::format("Bound        none of so few draws, for {} with {}\n",
                        given_percent(tolerance.coverage), given_percent(tolerance.confidence));
   }
   const Quantity quantity = requirement_subject(answer.requirement.parameter);
@@ -172,6 +172,13 @@ ExceedanceCount Exceedances::of(std::uint64_t num_runs) const {
           .num_without_estimate = num_without_estimate};
 }
 
+std::string rule_text(const RequirementAnswer& answer) {
+  if (answer.check.is_of_fixed_size) {
+    return fmt::format("{} draws, a number fixed before the first result", answer.check.num_runs);
+  }
+  return "sequential: holds however often one looks and goes on";
+}
+
 std::string_view name_of(Verdict verdict) {
   switch (verdict) {
     case Verdict::met:
@@ -228,8 +235,8 @@ std::vector<RequirementAnswer> check_requirements(const Store& store,
 
 std::string requirement_text(const RequirementAnswer& answer) {
   const bool is_joint = answer.requirement.subject == Requirement::Subject::all_objectives;
-  return fmt::format("Requirement  {}\nAnswer       {}\n{}{}{}", answer.text,
-                     name_of(answer.check.verdict),
+  return fmt::format("Requirement  {}\nAnswer       {}\nRule         {}\n{}{}{}", answer.text,
+                     name_of(answer.check.verdict), rule_text(answer),
                      is_joint ? holding_lines(answer) : exceedance_lines(answer),
                      bound_line(answer), needed_line(answer));
 }

@@ -74,8 +74,13 @@ struct RequirementAnswer {
   std::string text;
   Requirement requirement;
   RequirementCheck check;
-  MissingEstimates missing;  ///< The exceedances for want of an estimate.
+  MissingEstimates missing;                     ///< The exceedances for want of an estimate.
+  std::optional<std::uint64_t> num_fixed = {};  ///< See decide().
 };
+
+/// What the verdict rests on: `299 draws, a number fixed before the first result` or `sequential:
+/// holds however often one looks and goes on`.
+[[nodiscard]] std::string rule_text(const RequirementAnswer& answer);
 
 /// Holds requirements against the results in a campaign database; runs without an estimate, and
 /// those that were given up, count as exceedances.
@@ -88,7 +93,8 @@ struct RequirementAnswer {
     const Store& store, std::span<const double> objectives, std::span<const std::string> texts,
     const std::optional<ErrorBudget>& budget = std::nullopt);
 
-/// Answer, the bound by which it was decided, the tolerance bound, and the draws it takes; lines of
+/// Answer, what it rests on, the bound by which it was decided, the tolerance bound, and the draws
+/// it takes; lines of
 /// at most 80 characters unless the requirement is longer.
 [[nodiscard]] std::string requirement_text(const RequirementAnswer& answer);
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "coordinator/report/summarise.hpp"
+#include "core/campaign/independence.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 
@@ -41,13 +42,15 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
                 .budget = campaign.error_budget(),
                 .figures = {},
                 .matrix = {},
+                .why_not_independent = {},
                 .causes = {},
                 .spectra = {},
                 .execution = {},
                 .stop = {}};
   review.num_given_up = num_runs_in(store.given_up_runs());
   FigurePasses figures(review.objectives.size(), num_runs_in(store.finished_runs()));
-  MatrixPasses matrix(std::move(stated), review.objectives, review.num_given_up, review.budget);
+  MatrixPasses matrix(std::move(stated), review.objectives, review.num_given_up,
+                      store.num_runs_fixed(), review.budget);
   const std::array<ResultPasses*, 2> further{&figures, &matrix};
   CheckedResults checked = read_checked_results(store, campaign, further);
   review.results = std::move(checked.results);
@@ -55,6 +58,10 @@ Review read_of_one_state(const Store& store, const Campaign& campaign,
   review.missing = missing_of(review.results.statistics, review.num_given_up);
   review.figures = figures.figures();
   review.matrix = matrix.rows();
+  review.why_not_independent = why_not_independent(campaign);
+  if (!review.why_not_independent.empty()) {
+    for (QuantityFigures& quantity : review.figures) leave_out_intervals(quantity);
+  }
   return review;
 }
 
@@ -71,10 +78,12 @@ std::optional<RunIndex> worst_run_of(const Review& review) {
 Review read_review(const Store& store, const Campaign& campaign, std::string_view database,
                    std::vector<StatedRequirement> stated, WithCauses with_causes) {
   Review review;
+  if (!stated.empty()) require_independent(campaign, "requirement", stated.front().requirement);
   stated = matrix_requirements(std::move(stated), campaign.objectives());
   store.read_one_state([&] {
     review = read_of_one_state(store, campaign, std::move(stated));
-    if (with_causes == WithCauses::yes) review.causes = find_causes(store, campaign);
+    if (with_causes == WithCauses::yes && review.why_not_independent.empty())
+      review.causes = find_causes(store, campaign);
     review.execution = store.execution();
     review.stop = stop_text(store);
   });

@@ -44,8 +44,10 @@ struct Review {
   std::optional<ErrorBudget> budget;
   std::vector<QuantityFigures> figures;  ///< Of each quantity.
   std::vector<MatrixRow> matrix;         ///< That of all objectives together is the last one.
-  std::optional<Causes> causes;          ///< Empty if runs are too few, or not asked for.
-  std::optional<RunSpectra> spectra;     ///< Of worst_run_of(); empty if not asked for.
+  /// See why_not_independent(); then the matrix has no verdicts to be shown.
+  std::string why_not_independent;
+  std::optional<Causes> causes;       ///< Empty if runs are too few, or not asked for.
+  std::optional<RunSpectra> spectra;  ///< Of worst_run_of(); empty if not asked for.
   Execution execution;
   std::string stop;  ///< See stop_text().
 };

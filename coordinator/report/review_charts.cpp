@@ -13,15 +13,13 @@
 namespace proofmass::coordinator {
 namespace {
 
-/// P(at most this many of n draws exceed) if each does with this probability.
-double probability_to_meet(std::uint64_t num_runs, const Tolerance& tolerance,
-                           double exceedance_probability) {
-  const std::uint64_t order = wilks_order(tolerance, num_runs);
-  if (order == 0) return 0.0;  // No number of exceedances is few enough.
+/// P(no more of so many draws exceed than are allowed) if each does with this probability.
+double probability_to_meet(const RequirementCheck& check, double exceedance_probability) {
+  if (check.bound_order == 0) return 0.0;  // No number of exceedances is few enough.
   if (exceedance_probability <= 0.0) return 1.0;
   if (exceedance_probability >= 1.0) return 0.0;
-  return binomial_at_most(static_cast<double>(order) - 1.0, static_cast<double>(num_runs),
-                          exceedance_probability);
+  return binomial_at_most(static_cast<double>(check.num_allowed),
+                          static_cast<double>(check.num_runs), exceedance_probability);
 }
 
 bool is_same(const Tolerance& a, const Tolerance& b) {
@@ -48,25 +46,22 @@ Markers observed_fractions(const Review& review, const Tolerance& tolerance) {
     if (!is_same(row.answer.requirement.tolerance, tolerance) || check.num_runs == 0) continue;
     const double seen =
         static_cast<double>(check.num_exceedances) / static_cast<double>(check.num_runs);
-    markers.points.push_back(
-        {100.0 * seen, 100.0 * probability_to_meet(check.num_runs, tolerance, seen)});
+    markers.points.push_back({100.0 * seen, 100.0 * probability_to_meet(check, seen)});
   }
   return markers;
 }
 
 Chart characteristic_chart(const Review& review, const MatrixRow& first, std::size_t number) {
   const Tolerance& tolerance = first.answer.requirement.tolerance;
-  const std::uint64_t num_runs = first.answer.check.num_runs;
+  const RequirementCheck& check = first.answer.check;
   const double end = largest_shown(review, tolerance);
   constexpr int num_points = 120;
-  Line line{.name = fmt::format("{} draws", num_runs)};
+  Line line{.name = fmt::format("{} draws", check.num_runs)};
   for (int i = 0; i <= num_points; ++i) {
     const double probability = end * i / num_points;
-    line.points.push_back(
-        {100.0 * probability, 100.0 * probability_to_meet(num_runs, tolerance, probability)});
+    line.points.push_back({100.0 * probability, 100.0 * probability_to_meet(check, probability)});
   }
   const double allowed = 1.0 - tolerance.coverage;
-  const std::uint64_t order = wilks_order(tolerance, num_runs);
   return {
       .text = {.id = fmt::format("characteristic-{}", number),
                .title =
@@ -75,12 +70,14 @@ Chart characteristic_chart(const Review& review, const MatrixRow& first, std::si
                .description = fmt::format(
                    "Probability that {} draws meet such a requirement, against the probability "
                    "with which a draw exceeds its limit. {} Where {} of all draws exceed it, the "
-                   "requirement is called met with a probability of {} %.",
-                   num_runs,
-                   order == 0 ? "So few draws never meet it."
-                              : fmt::format("At most {} of them may exceed it.", order - 1),
+                   "requirement is called met with a probability of {} %, the consumer's risk; "
+                   "where fewer do, what lacks to 100 % is the producer's risk.",
+                   check.num_runs,
+                   check.bound_order == 0
+                       ? "So few draws never meet it."
+                       : fmt::format("At most {} of them may exceed it.", check.num_allowed),
                    given_percent(allowed),
-                   figure_text(100.0 * probability_to_meet(num_runs, tolerance, allowed)))},
+                   figure_text(100.0 * probability_to_meet(check, allowed)))},
       .x = {.label = "draws that exceed the limit, % of all draws", .from = 0.0, .to = 100.0 * end},
       .y = {.label = "campaigns that meet the requirement, %", .from = 0.0, .to = 100.0},
       .layers = {std::move(line),
@@ -109,6 +106,7 @@ std::string strongest_sentence(const Causes& causes) {
 }  // namespace
 
 std::vector<Chart> characteristic_charts(const Review& review) {
+  if (!review.why_not_independent.empty()) return {};
   std::vector<Chart> charts;
   std::vector<Tolerance> shown;
   for (const MatrixRow& row : review.matrix) {

@@ -166,8 +166,8 @@ std::string heading_markup(const Review& review) {
       statistics.num_estimated, review.identity.seed, markup_text(review.identity.model_version));
   if (statistics.num_runs + review.num_given_up < review.identity.num_runs) {
     html +=
-        "<p><strong>The campaign is not finished: all figures are of the runs so far, and "
-        "verdicts hold for a number of runs that was fixed beforehand only.</strong></p>\n";
+        "<p><strong>The campaign is not finished: all figures are of the runs so "
+        "far.</strong></p>\n";
   }
   return html;
 }

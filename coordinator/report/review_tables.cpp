@@ -78,10 +78,12 @@ std::vector<ReviewCell> inference_cells(const Review& review, std::size_t index)
   for (const PercentileStatistic& percentile : accuracy.percentiles) {
     cells.push_back(scaled_cell(percentile.value, scale));
   }
-  cells.push_back({.text = measured_figure(100.0 * accuracy.beyond_objective.lower),
-                   .value = accuracy.beyond_objective.lower});
-  cells.push_back({.text = measured_figure(100.0 * accuracy.beyond_objective.upper),
-                   .value = accuracy.beyond_objective.upper});
+  const Interval& beyond = accuracy.beyond_objective;
+  for (const double share : {beyond.lower, beyond.upper}) {
+    const bool is_known = beyond.upper - beyond.lower < 1.0;
+    cells.push_back(is_known ? ReviewCell{.text = measured_figure(100.0 * share), .value = share}
+                             : no_figure());
+  }
   return cells;
 }
 
@@ -164,6 +166,10 @@ ReviewTable inference_table(const Review& review) {
                     .rows = {},
                     .notes = {joint_sentence(review)}};
   if (review.results.statistics.num_estimated == 0) return table;
+  table.notes.push_back(
+      review.why_not_independent.empty()
+          ? bias_sentence(review.results.statistics)
+          : fmt::format("No intervals and no verdicts: {}.", review.why_not_independent));
   for (std::size_t i = 0; i < review.objectives.size(); ++i) {
     table.rows.push_back(inference_cells(review, i));
   }

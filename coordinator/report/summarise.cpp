@@ -21,7 +21,7 @@ StopCheck check_exceedances(const StopRule& rule, const Store& store,
   Exceedances exceedances(rule.requirement, objectives);
   ResultReader reader = store.results({RunIndex{0}, num_runs});
   while (const std::optional<RunResult> result = reader.next()) exceedances.add(*result);
-  return check_stop_rule(rule, exceedances.of(num_runs));
+  return check_stop_rule(rule, exceedances.of(num_runs), store.num_runs_fixed());
 }
 
 /// The rule against the runs [0, num_runs): errors of those that have an estimate, or how many of

@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <utility>
 #include <vector>
 
 namespace proofmass::coordinator {
 namespace {
+
+constexpr std::size_t columns_max = 80;
 
 std::string spaces(std::size_t width, std::string_view text) {
   const std::size_t taken = display_width(text);
@@ -52,8 +55,27 @@ std::string right_aligned(std::string_view text, std::size_t width) {
   return spaces(width, text) + std::string(text);
 }
 
+std::string wrapped(const std::string& text, std::size_t indent) {
+  std::istringstream stream(text);
+  std::string lines, word;
+  std::size_t column = indent;
+  while (stream >> word) {
+    const bool is_first = column == indent;
+    if (!is_first && column + 1 + display_width(word) > columns_max) {
+      lines += '\n';
+      lines.append(indent, ' ');
+      column = indent;
+    } else if (!is_first) {
+      lines += " ";
+      ++column;
+    }
+    lines += word;
+    column += display_width(word);
+  }
+  return lines;
+}
+
 std::string line_of(std::string_view first, std::string_view second, std::size_t margin) {
-  constexpr std::size_t columns_max = 80;
   const bool fits = display_width(first) + 1 + display_width(second) <= columns_max;
   return fits ? fmt::format("{} {}\n", first, second)
               : fmt::format("{}\n{:{}}{}\n", first, "", margin, second);

@@ -18,6 +18,10 @@ using wire::shortened;
 [[nodiscard]] std::string left_aligned(std::string_view text, std::size_t width);
 [[nodiscard]] std::string right_aligned(std::string_view text, std::size_t width);
 
+/// Text broken between words to lines of at most 80 columns, from the second one on after `indent`
+/// spaces. No end of the last line.
+[[nodiscard]] std::string wrapped(const std::string& text, std::size_t indent);
+
 /// Two parts of a line with a space between; below each other, the second behind `margin` spaces,
 /// if they take more than the 80 columns of a terminal.
 [[nodiscard]] std::string line_of(std::string_view first, std::string_view second,

@@ -79,6 +79,7 @@ std::optional<double> MatrixRow::relative_margin() const {
 
 MatrixPasses::MatrixPasses(std::vector<StatedRequirement> stated,
                            std::span<const double> objectives, std::uint64_t num_given_up,
+                           std::optional<std::uint64_t> num_fixed,
                            const std::optional<ErrorBudget>& budget)
     : objectives_(objectives.begin(), objectives.end()),
       budget_(budget),
@@ -89,6 +90,7 @@ MatrixPasses::MatrixPasses(std::vector<StatedRequirement> stated,
     const Requirement requirement = parse_requirement(row.stated.requirement);
     row.answer.text = row.stated.requirement;
     row.answer.requirement = requirement;
+    row.answer.num_fixed = num_fixed;
     const bool is_joint = requirement.subject == Requirement::Subject::all_objectives;
     if (!is_joint) row.limit = requirement.limit;
     if (is_joint && has_finite(objectives)) row.limit = 1.0;
@@ -130,7 +132,7 @@ void MatrixPasses::add(const RunResult& result) {
 }
 
 std::optional<std::size_t> MatrixPasses::place_of_bound(const MatrixRow& row) const {
-  const std::uint64_t order = wilks_order(row.answer.requirement.tolerance, num_runs_);
+  const std::uint64_t order = row.answer.check.bound_order;
   // Runs without an estimate are the largest errors.
   const std::uint64_t num_missing = num_runs_ - num_estimated_;
   if (!row.limit || order <= num_missing) return std::nullopt;
@@ -142,7 +144,8 @@ void MatrixPasses::end_first_pass() {
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     RequirementAnswer& answer = rows_[i].answer;
     answer.missing = missing_;
-    answer.check = check_requirement(answer.requirement, exceedances_[i].of(num_runs_));
+    answer.check =
+        check_requirement(answer.requirement, exceedances_[i].of(num_runs_), answer.num_fixed);
     const std::size_t key = key_of(answer.requirement);
     rows_[i].worst = values_.at(key).worst;
     if (const auto place = place_of_bound(rows_[i])) places[key].insert(*place);
@@ -174,8 +177,8 @@ void MatrixPasses::fill_bounds() {
     const Requirement& requirement = row.answer.requirement;
     row.bound = values_.at(key_of(requirement)).selection.value_at(*place);
     if (requirement.subject == Requirement::Subject::all_objectives) continue;
-    row.answer.check.bound = ToleranceBound{
-        .value = *row.bound, .order = wilks_order(requirement.tolerance, num_runs_), .index = 0};
+    row.answer.check.bound =
+        ToleranceBound{.value = *row.bound, .order = row.answer.check.bound_order, .index = 0};
   }
 }
 

@@ -64,10 +64,12 @@ class MatrixPasses final : public ResultPasses {
   /// @param stated      Their order is that of the rows.
   /// @param objectives  Of the campaign, SI.
   /// @param given_up    Runs that have no result, and count as exceedances.
+  /// @param num_fixed   As for decide().
   /// @param budget      Of the campaign, for requirements about it.
   /// @throws ConfigError as parse_requirement().
   MatrixPasses(std::vector<StatedRequirement> stated, std::span<const double> objectives,
-               std::uint64_t num_given_up, const std::optional<ErrorBudget>& budget = std::nullopt);
+               std::uint64_t num_given_up, std::optional<std::uint64_t> num_fixed,
+               const std::optional<ErrorBudget>& budget = std::nullopt);
 
   void add(const RunResult& result) override;
   [[nodiscard]] bool end_pass() override;

@@ -198,6 +198,10 @@ std::string Store::definition() const {
   return impl_->database.text("SELECT definition FROM campaign");
 }
 
+std::optional<std::uint64_t> Store::num_runs_fixed() const {
+  return detail::read_num_runs_fixed(impl_->database);
+}
+
 std::string Store::model_version() const {
   const std::string version = impl_->database.text("SELECT model_version FROM campaign");
   // It is shown, and compared with ours, which has no control characters.

@@ -117,6 +117,9 @@ class Store {
   [[nodiscard]] std::string name() const;
   [[nodiscard]] std::uint64_t seed() const;
   [[nodiscard]] std::uint64_t num_runs() const;  ///< Runs wanted, finished or not.
+  /// Runs that were asked for before the first result was there; see decide(). Empty if an older
+  /// program began the campaign, or if it began with a stop rule.
+  [[nodiscard]] std::optional<std::uint64_t> num_runs_fixed() const;
   [[nodiscard]] std::string definition() const;
   [[nodiscard]] std::string model_version() const;  ///< That of the program that made the file.
   [[nodiscard]] std::string build() const;          ///< The same.

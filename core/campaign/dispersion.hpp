@@ -33,6 +33,8 @@ struct Dispersion {
   double value = 0.0;
   std::string file;    ///< For `table`: path as written in the campaign file.
   std::string column;  ///< For `table`: heading of the column.
+  /// For `table`: the values are independent draws of one law, and not those of a design.
+  bool is_independent = false;
 
   bool operator==(const Dispersion&) const = default;
 

@@ -30,9 +30,22 @@ AccuracyStatistic accuracy_of(const ErrorExtremes& extremes, const Moments& magn
 
 std::optional<Interval> CampaignStatistics::within_objectives(std::uint64_t num_given_up) const {
   const std::uint64_t num_draws = num_runs + num_given_up;
-  if (num_draws == 0) return std::nullopt;
+  if (num_draws == 0 || !are_draws_independent) return std::nullopt;
   return probability_interval(static_cast<double>(num_within_objectives),
                               static_cast<double>(num_draws), default_confidence);
+}
+
+void leave_out_intervals(CampaignStatistics& statistics) {
+  statistics.are_draws_independent = false;
+  for (AccuracyStatistic& accuracy : statistics.accuracy) {
+    accuracy.beyond_objective = {
+        .lower = 0.0, .upper = 1.0, .confidence = accuracy.beyond_objective.confidence};
+    accuracy.mean_interval.reset();
+    accuracy.deviation_interval.reset();
+    for (PercentileStatistic& percentile : accuracy.percentiles) percentile.interval.reset();
+    accuracy.error.bias_interval.reset();
+    accuracy.error.deviation_interval.reset();
+  }
 }
 
 ErrorStatistic error_statistic(const Moments& about) {

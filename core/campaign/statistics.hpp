@@ -73,10 +73,11 @@ struct CampaignStatistics {
   std::vector<AccuracyStatistic> accuracy;
   /// Of each health quantity, over the runs that have an estimate; empty if they have none.
   std::vector<HealthStatistic> health = {};
+  bool are_draws_independent = true;  ///< Else there is no interval; see leave_out_intervals().
 
   /// Of the share of runs within all objectives among all draws, 95 %.
   /// @param num_given_up  Runs that have no result, beside num_runs; they count as beyond.
-  /// @return Nothing if there is no run.
+  /// @return Nothing if there is no run, or if draws are not independent.
   [[nodiscard]] std::optional<Interval> within_objectives(std::uint64_t num_given_up) const;
   /// The worst |error| of each quantity, SI.
   [[nodiscard]] std::vector<double> worst_errors() const;
@@ -96,6 +97,10 @@ struct BudgetColumns {
 };
 [[nodiscard]] BudgetColumns budget_columns(const ErrorBudget& budget,
                                            const CampaignStatistics& statistics);
+
+/// Leaves what was seen of a campaign whose draws are not independent: no interval is true of it.
+/// That of the share beyond an objective, which is always there, becomes 0 to 1.
+void leave_out_intervals(CampaignStatistics& statistics);
 
 /// The largest |error| of a quantity, and the runs beyond its objective.
 struct ErrorExtremes {

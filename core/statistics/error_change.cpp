@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/random/normal.hpp"
 #include "core/statistics/interval.hpp"
 
 namespace proofmass {
@@ -13,8 +14,8 @@ constexpr double tail_factor = 2.0;
 /// Mean of |x| in standard deviations, for a normal x.
 constexpr double normal_deviation = 0.8;
 
-constexpr double location_weight = 0.7;
-constexpr double scale_weight = 0.2;
+constexpr double location_weight = 0.5;
+constexpr double scale_weight = 0.4;
 constexpr double tail_weight = 0.1;
 
 double mean_of(std::span<const double> first, std::span<const double> second) {
@@ -63,8 +64,24 @@ void ErrorPasses::begin_second(double limit) {
 
 void ErrorPasses::add_again(double error) {
   errors_.add(error);
-  deviations_.add(std::abs(error - mean_));
+  const double deviation = error - mean_;
+  deviations_.add(std::abs(deviation));
+  if (deviation != 0.0) sign_sum_.add(std::copysign(1.0, deviation));
+  signed_square_sum_.add(deviation * std::abs(deviation));
   if (std::abs(error) > limit_) ++num_in_tail_;
+}
+
+Moments ErrorPasses::scale_moments() const {
+  Moments scale = deviations();
+  if (scale.count < 2) return scale;
+  const auto n = static_cast<double>(scale.count);
+  const double sign = sign_sum_.value() / n;
+  const double covariance = signed_square_sum_.value() / (n - 1.0);
+  const double deviation = errors().standard_deviation;
+  const double variance = scale.standard_deviation * scale.standard_deviation +
+                          sign * (sign * deviation * deviation - 2.0 * covariance);
+  scale.standard_deviation = std::sqrt(std::max(variance, 0.0));
+  return scale;
 }
 
 double tail_limit(const ErrorPasses& first, const ErrorPasses& second) {
@@ -75,8 +92,8 @@ double tail_limit(const ErrorPasses& first, const ErrorPasses& second) {
 ChangePValues compare_many_errors(const ErrorPasses& first, const ErrorPasses& second) {
   return {
       .location = compare_means(first.errors(), second.errors(), default_confidence).mean_p_value,
-      .scale =
-          compare_means(first.deviations(), second.deviations(), default_confidence).mean_p_value,
+      .scale = compare_means(first.scale_moments(), second.scale_moments(), default_confidence)
+                   .mean_p_value,
       .tail = fisher_exact_p_value({.num_first = first.count(),
                                     .tail_first = first.num_in_tail(),
                                     .num_second = second.count(),
@@ -112,6 +129,42 @@ ChangePValues compare_paired_errors(PairedErrors pairs) {
           .scale = compare_differences(std::move(pairs.deviation_differences), default_confidence)
                        .rank_p_value,
           .tail = sign_test_p_value(pairs.num_only_first, pairs.num_only_second)};
+}
+
+namespace {
+
+/// The normal deviate that a test statistic must have in the mean to be found.
+double found_deviate(std::size_t num_parameters) {
+  const double level =
+      (1.0 - default_confidence) * scale_weight / static_cast<double>(num_parameters);
+  return inverse_normal(1.0 - 0.5 * level) + inverse_normal(finding_probability);
+}
+
+}  // namespace
+
+// (f − 1)² = z²(c₁²/m + f² c₂²/n) with the relative deviations c of the distances from the mean.
+std::optional<double> smallest_scale_factor(const ErrorPasses& first, const ErrorPasses& second,
+                                            std::size_t num_parameters) {
+  const auto share = [&](const Moments& scale) {
+    const double relative = found_deviate(num_parameters) * scale.standard_deviation / scale.mean;
+    return relative * relative / static_cast<double>(scale.count);
+  };
+  const double a = share(first.scale_moments());
+  const double b = share(second.scale_moments());
+  if (!(a < 1.0 && b < 1.0)) return std::nullopt;
+  return (1.0 + std::sqrt(1.0 - (1.0 - a) * (1.0 - b))) / (1.0 - b);
+}
+
+// A signed-rank test needs no more than 1/0.864 times the pairs of Student's t, whatever the law.
+std::optional<double> smallest_scale_factor(const ErrorPasses& first, const PairedErrors& pairs,
+                                            std::size_t num_parameters) {
+  constexpr double least_efficiency = 0.864;
+  const auto n = static_cast<double>(pairs.deviation_differences.size());
+  const double deviation = moments(pairs.deviation_differences).standard_deviation;
+  const double change = found_deviate(num_parameters) * deviation / std::sqrt(least_efficiency * n);
+  const double mean = first.deviations().mean;
+  if (!(mean > 0.0)) return std::nullopt;
+  return 1.0 + change / mean;
 }
 
 std::vector<ChangePValues> adjusted_changes(std::span<const ChangePValues> changes) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,7 +28,10 @@ class ErrorPasses {
   [[nodiscard]] double square_sum() const { return square_sum_.value(); }  ///< Σx², likewise.
   [[nodiscard]] Moments errors() const { return errors_.moments(); }
   [[nodiscard]] Moments deviations() const { return deviations_.moments(); }  ///< Of |x − mean|.
-  [[nodiscard]] std::size_t num_in_tail() const { return num_in_tail_; }      ///< |x| > limit.
+  /// Of |x − mean| − s (x − mean), s being the mean sign of x − mean: the same mean, and the
+  /// scatter that the mean of |x − mean| has, as the mean of a skew law moves it.
+  [[nodiscard]] Moments scale_moments() const;
+  [[nodiscard]] std::size_t num_in_tail() const { return num_in_tail_; }  ///< |x| > limit.
 
  private:
   std::size_t count_ = 0;
@@ -38,6 +42,8 @@ class ErrorPasses {
   std::size_t num_in_tail_ = 0;
   MomentSums errors_{0.0};
   MomentSums deviations_{0.0};
+  CompensatedSum sign_sum_;           ///< Of x − mean.
+  CompensatedSum signed_square_sum_;  ///< Of (x − mean) |x − mean|.
 };
 
 /// Where the tail begins: at twice the root mean square of all errors of both campaigns, beyond
@@ -53,8 +59,8 @@ struct ChangePValues {
 };
 
 /// Of campaigns with draws of their own, both passes done: Welch's t of the errors; Welch's t of
-/// |error − mean| (Levene's test, which holds for any law of many values); Fisher's exact test of
-/// the counts in the tail.
+/// scale_moments() (Levene's test, with the scatter that holds for skew laws, too); Fisher's exact
+/// test of the counts in the tail. README.md compares the second one with others.
 /// @pre num_welch_min values on either side.
 [[nodiscard]] ChangePValues compare_many_errors(const ErrorPasses& first,
                                                 const ErrorPasses& second);
@@ -85,9 +91,20 @@ struct PairedErrors {
 /// is in the tail (McNemar).
 [[nodiscard]] ChangePValues compare_paired_errors(PairedErrors pairs);
 
+/// The smallest factor by which the scatter of the second campaign may be larger and is found with
+/// this probability by the test of compare_many_errors(), if the p-values of so many parameters are
+/// adjusted together. It gives "no change" a meaning. Empty if no factor is found so.
+inline constexpr double finding_probability = 0.9;
+[[nodiscard]] std::optional<double> smallest_scale_factor(const ErrorPasses& first,
+                                                          const ErrorPasses& second,
+                                                          std::size_t num_parameters);
+/// The same of compare_paired_errors(). @param first  The errors of the first campaign.
+[[nodiscard]] std::optional<double> smallest_scale_factor(const ErrorPasses& first,
+                                                          const PairedErrors& pairs,
+                                                          std::size_t num_parameters);
+
 /// Corrects the p-values of all parameters together by holm_adjusted() with weights: location has
-/// seven tenths, scale two and tail one, as a bias is what is looked for first; a change of the
-/// scale costs a few runs more for it.
+/// five tenths, scale four and tail one.
 [[nodiscard]] std::vector<ChangePValues> adjusted_changes(std::span<const ChangePValues> changes);
 
 /// P-value of Fisher's exact test: of two groups of `num_first` and `num_second`, of which

@@ -12,17 +12,127 @@
 namespace proofmass {
 namespace {
 
-Verdict verdict(const Tolerance& tolerance, double num_exceedances, double num_runs) {
-  const double allowed_rate = 1.0 - tolerance.coverage;
-  if (num_runs <= 0.0) return Verdict::undecided;
-  if (tolerance.is_shown(binomial_at_most(num_exceedances, num_runs, allowed_rate))) {
-    return Verdict::met;
+/// The largest count in [0, num_runs] for which `holds`, plus one; 0 if it never does. What holds
+/// for a count holds for all smaller ones.
+template <typename Holds>
+std::uint64_t end_of_counts(std::uint64_t num_runs, const Holds& holds) {
+  std::uint64_t end = 0;
+  std::uint64_t fails = num_runs + 1;
+  while (fails > end) {
+    const std::uint64_t middle = end + (fails - end) / 2;
+    if (holds(static_cast<double>(middle))) {
+      end = middle + 1;
+    } else {
+      fails = middle;
+    }
   }
-  if (tolerance.is_shown(binomial_at_least(num_exceedances, num_runs, allowed_rate))) {
-    return Verdict::not_met;
-  }
-  return Verdict::undecided;
+  return end;
 }
+
+/// The verdicts of decide() about one tolerance.
+class VerdictRule {
+ public:
+  VerdictRule(const Tolerance& tolerance, std::optional<std::uint64_t> num_fixed)
+      : tolerance_(tolerance), allowed_rate_(1.0 - tolerance.coverage), num_fixed_(num_fixed) {
+    tolerance.validate();
+    met_confidence_ = not_met_confidence_ = tolerance.confidence;
+    if (!num_fixed || *num_fixed == 0) return;
+    const auto n = static_cast<double>(*num_fixed);
+    const std::uint64_t order = wilks_order(tolerance, *num_fixed);
+    if (order > 0) {
+      met_confidence_ += binomial_at_most(static_cast<double>(order - 1), n, allowed_rate_);
+    }
+    const std::uint64_t first_not_met = end_of_counts(*num_fixed, [&](double k) {
+      return !tolerance.is_shown(binomial_at_least(k, n, allowed_rate_));
+    });
+    if (first_not_met <= *num_fixed) {
+      not_met_confidence_ +=
+          binomial_at_least(static_cast<double>(first_not_met), n, allowed_rate_);
+    }
+  }
+
+  [[nodiscard]] bool is_fixed(std::uint64_t num_runs) const { return num_fixed_ == num_runs; }
+
+  [[nodiscard]] Decision decide(double num_exceedances, std::uint64_t num_runs) const {
+    if (num_runs == 0) return {};
+    const auto n = static_cast<double>(num_runs);
+    Decision decision;
+    decision.is_of_fixed_size = is_fixed(num_runs);
+    decision.verdict = verdict(num_exceedances, num_runs);
+    decision.exceedance = decision.is_of_fixed_size
+                              ? probability_bounds(num_exceedances, n, tolerance_.confidence)
+                              : Interval{.lower = lower_bound(num_exceedances, n),
+                                         .upper = upper_bound(num_exceedances, n),
+                                         .confidence = tolerance_.confidence};
+    return decision;
+  }
+
+  [[nodiscard]] Verdict verdict(double num_exceedances, std::uint64_t num_runs) const {
+    if (is_fixed(num_runs)) return fixed_verdict(num_exceedances, static_cast<double>(num_runs));
+    if (shows_less(num_exceedances, num_runs)) return Verdict::met;
+    return shows_more(num_exceedances, num_runs) ? Verdict::not_met : Verdict::undecided;
+  }
+
+  /// One more than the exceedances with which so many runs meet it; 0 if none do.
+  [[nodiscard]] std::uint64_t bound_order(std::uint64_t num_runs) const {
+    if (is_fixed(num_runs)) return wilks_order(tolerance_, num_runs);
+    return end_of_counts(num_runs, [&](double k) { return shows_less(k, num_runs); });
+  }
+
+  /// Runs that meet it with so many exceedances among them.
+  [[nodiscard]] std::optional<std::uint64_t> runs_to_meet(const ExceedanceCount& count) const {
+    const auto k = static_cast<double>(count.num_exceedances);
+    const bool is_fixed_ahead = num_fixed_ && *num_fixed_ > count.num_runs;
+    if (is_fixed_ahead && fixed_verdict(k, static_cast<double>(*num_fixed_)) == Verdict::met) {
+      return num_fixed_;
+    }
+    std::uint64_t too_few = count.num_runs;
+    std::uint64_t enough = count.num_runs;
+    do {
+      too_few = enough;
+      enough = std::min(std::max(2 * enough, std::uint64_t{1}), num_runs_max);
+      if (enough == too_few) return std::nullopt;
+    } while (!shows_less(k, enough));
+    while (enough - too_few > 1) {
+      const std::uint64_t middle = too_few + (enough - too_few) / 2;
+      (shows_less(k, middle) ? enough : too_few) = middle;
+    }
+    return enough;
+  }
+
+ private:
+  [[nodiscard]] Verdict fixed_verdict(double k, double n) const {
+    if (tolerance_.is_shown(binomial_at_most(k, n, allowed_rate_))) return Verdict::met;
+    if (tolerance_.is_shown(binomial_at_least(k, n, allowed_rate_))) return Verdict::not_met;
+    return Verdict::undecided;
+  }
+
+  [[nodiscard]] bool shows_less(double k, std::uint64_t num_runs) const {
+    const auto n = static_cast<double>(num_runs);
+    return met_confidence_ < 1.0 && k <= n && num_runs > 0 &&
+           evidence_of_less(k, n, allowed_rate_) * (1.0 - met_confidence_) >= 1.0;
+  }
+
+  [[nodiscard]] bool shows_more(double k, std::uint64_t num_runs) const {
+    return not_met_confidence_ < 1.0 && num_runs > 0 &&
+           evidence_of_more(k, static_cast<double>(num_runs), allowed_rate_) *
+                   (1.0 - not_met_confidence_) >=
+               1.0;
+  }
+
+  [[nodiscard]] double upper_bound(double k, double n) const {
+    return met_confidence_ < 1.0 ? sequential_bounds(k, n, met_confidence_).upper : 1.0;
+  }
+  [[nodiscard]] double lower_bound(double k, double n) const {
+    return not_met_confidence_ < 1.0 ? sequential_bounds(k, n, not_met_confidence_).lower : 0.0;
+  }
+
+  Tolerance tolerance_;
+  double allowed_rate_;
+  std::optional<std::uint64_t> num_fixed_;
+  double met_confidence_ = 0.0;      ///< Of sequential looks; 1 if nothing is left for them.
+  double not_met_confidence_ = 0.0;  ///< The same of the other verdict.
+};
 
 /// The runs that it takes for so many exceedances if they come as often as in those of `check`.
 std::uint64_t runs_with(std::uint64_t num_exceedances, const RequirementCheck& check) {
@@ -31,11 +141,11 @@ std::uint64_t runs_with(std::uint64_t num_exceedances, const RequirementCheck& c
 
 /// Runs that decide, looked for where an exceedance has just come: counts are whole, and there they
 /// keep the rate best. By one exceedance fewer may do, where runs_with() rounds.
-std::optional<std::uint64_t> runs_to_decide(const Tolerance& tolerance,
+std::optional<std::uint64_t> runs_to_decide(const VerdictRule& rule,
                                             const RequirementCheck& check) {
   const auto decides = [&](std::uint64_t num_exceedances) {
-    const auto num_runs = static_cast<double>(runs_with(num_exceedances, check));
-    return verdict(tolerance, static_cast<double>(num_exceedances), num_runs) != Verdict::undecided;
+    return rule.verdict(static_cast<double>(num_exceedances), runs_with(num_exceedances, check)) !=
+           Verdict::undecided;
   };
   std::uint64_t too_few = check.num_exceedances;
   std::uint64_t enough = check.num_exceedances;
@@ -50,12 +160,6 @@ std::optional<std::uint64_t> runs_to_decide(const Tolerance& tolerance,
   }
   const std::uint64_t num_runs = runs_with(enough, check);
   return num_runs <= num_runs_max ? std::optional(num_runs) : std::nullopt;
-}
-
-void add_runs_needed(const Tolerance& tolerance, RequirementCheck& check) {
-  check.num_runs_at_best = wilks_num_runs(tolerance, check.num_exceedances + 1);
-  check.num_runs_at_this_rate =
-      check.num_exceedances == 0 ? check.num_runs_at_best : runs_to_decide(tolerance, check);
 }
 
 }  // namespace
@@ -99,51 +203,55 @@ bool exceeds(const Requirement& requirement, std::span<const double> errors,
 }
 
 RequirementCheck check_requirement(const Requirement& requirement, std::span<const double> errors,
-                                   std::uint64_t num_without_estimate) {
+                                   std::uint64_t num_without_estimate,
+                                   std::optional<std::uint64_t> num_fixed) {
   PROOFMASS_EXPECT(requirement.subject == Requirement::Subject::parameter);
   const auto num_above =
       std::ranges::count_if(errors, [&](double error) { return error >= requirement.limit; });
   RequirementCheck check = check_requirement(
-      requirement, {.num_runs = errors.size() + num_without_estimate,
-                    .num_exceedances = static_cast<std::uint64_t>(num_above) + num_without_estimate,
-                    .num_without_estimate = num_without_estimate});
-  check.bound = wilks_upper(errors, requirement.tolerance, num_without_estimate);
+      requirement,
+      {.num_runs = errors.size() + num_without_estimate,
+       .num_exceedances = static_cast<std::uint64_t>(num_above) + num_without_estimate,
+       .num_without_estimate = num_without_estimate},
+      num_fixed);
+  check.bound = upper_bound_of_order(errors, check.bound_order, num_without_estimate);
   return check;
 }
 
-RequirementCheck check_requirement(const Requirement& requirement, const ExceedanceCount& count) {
+RequirementCheck check_requirement(const Requirement& requirement, const ExceedanceCount& count,
+                                   std::optional<std::uint64_t> num_fixed) {
   PROOFMASS_EXPECT(count.num_exceedances <= count.num_runs);
-  const Tolerance& tolerance = requirement.tolerance;
-  tolerance.validate();
-  RequirementCheck check;
-  check.num_runs = count.num_runs;
-  check.num_exceedances = count.num_exceedances;
-  check.num_without_estimate = count.num_without_estimate;
-  const std::uint64_t order = wilks_order(tolerance, check.num_runs);
-  check.num_allowed = order == 0 ? 0 : order - 1;
-
-  const auto num_exceedances = static_cast<double>(check.num_exceedances);
-  const auto num_runs = static_cast<double>(check.num_runs);
-  check.verdict = verdict(tolerance, num_exceedances, num_runs);
-  if (check.num_runs > 0) {
-    check.exceedance = probability_bounds(num_exceedances, num_runs, tolerance.confidence);
-  }
-  if (check.verdict == Verdict::undecided) add_runs_needed(tolerance, check);
+  const VerdictRule rule(requirement.tolerance, num_fixed);
+  Decision decision = rule.decide(static_cast<double>(count.num_exceedances), count.num_runs);
+  RequirementCheck check{.verdict = decision.verdict,
+                         .is_of_fixed_size = decision.is_of_fixed_size,
+                         .num_runs = count.num_runs,
+                         .num_exceedances = count.num_exceedances,
+                         .num_without_estimate = count.num_without_estimate,
+                         .num_allowed = 0,
+                         .bound_order = rule.bound_order(count.num_runs),
+                         .bound = {},
+                         .exceedance = decision.exceedance,
+                         .num_runs_at_best = {},
+                         .num_runs_at_this_rate = {}};
+  if (check.bound_order > 0) check.num_allowed = check.bound_order - 1;
+  if (check.verdict != Verdict::undecided) return check;
+  check.num_runs_at_best = rule.runs_to_meet(count);
+  check.num_runs_at_this_rate =
+      check.num_exceedances == 0 ? check.num_runs_at_best : runs_to_decide(rule, check);
   return check;
 }
 
-Decision decide(const Tolerance& tolerance, const ExceedanceCount& count) {
+Decision decide(const Tolerance& tolerance, const ExceedanceCount& count,
+                std::optional<std::uint64_t> num_fixed) {
   PROOFMASS_EXPECT(count.num_exceedances <= count.num_runs);
-  tolerance.validate();
-  if (count.num_runs == 0) return {};
-  const auto num_exceedances = static_cast<double>(count.num_exceedances);
-  const auto num_runs = static_cast<double>(count.num_runs);
-  Decision decision;
-  decision.exceedance = sequential_bounds(num_exceedances, num_runs, tolerance.confidence);
-  const double allowed_rate = 1.0 - tolerance.coverage;
-  if (decision.exceedance->upper <= allowed_rate) decision.verdict = Verdict::met;
-  if (decision.exceedance->lower >= allowed_rate) decision.verdict = Verdict::not_met;
-  return decision;
+  return VerdictRule(tolerance, num_fixed)
+      .decide(static_cast<double>(count.num_exceedances), count.num_runs);
+}
+
+std::optional<std::uint64_t> runs_to_meet(const Tolerance& tolerance, const ExceedanceCount& count,
+                                          std::optional<std::uint64_t> num_fixed) {
+  return VerdictRule(tolerance, num_fixed).runs_to_meet(count);
 }
 
 }  // namespace proofmass

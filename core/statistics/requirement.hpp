@@ -55,18 +55,17 @@ enum class Verdict {
 
 struct RequirementCheck {
   Verdict verdict = Verdict::undecided;
-  std::uint64_t num_runs = 0;  ///< As in ExceedanceCount; so are the next two.
+  bool is_of_fixed_size = false;  ///< By the binomial law, else sequential; see decide().
+  std::uint64_t num_runs = 0;     ///< As in ExceedanceCount; so are the next two.
   std::uint64_t num_exceedances = 0;
   std::uint64_t num_without_estimate = 0;
   std::uint64_t num_allowed = 0;  ///< Exceedances with which so many runs would meet it.
+  std::uint64_t bound_order = 0;  ///< Of `bound`, see ToleranceBound; 0 if runs are too few.
   /// With this confidence at least `coverage` of all errors are below it; empty if runs are too
   /// few, and for all objectives. The requirement is met if and only if it is below the limit.
   std::optional<ToleranceBound> bound;
-  /// Of the probability of an exceedance, exact, each bound one-sided with the confidence of the
-  /// requirement: the latter is met if `upper` is 1 − coverage or less, and not met if `lower` is
-  /// 1 − coverage or more. Empty without runs.
-  std::optional<Interval> exceedance;
-  /// If undecided: all runs it takes to meet the requirement if none of the further ones exceeds.
+  std::optional<Interval> exceedance;  ///< As in Decision. Empty without runs.
+  /// If undecided: see runs_to_meet().
   std::optional<std::uint64_t> num_runs_at_best;
   /// If undecided: all runs it takes to decide, either way, if errors go on to exceed as often as
   /// they did, one in num_runs/num_exceedances; the last of them exceeds. Empty if that is just as
@@ -74,32 +73,49 @@ struct RequirementCheck {
   std::optional<std::uint64_t> num_runs_at_this_rate;
 };
 
-/// Verdict by the binomial law of the exceedances, with q = 1 − coverage and k of n exceeding: met
-/// if P(Bin(n, q) ≤ k) ≤ 1 − confidence, not met if P(Bin(n, q) ≥ k) ≤ 1 − confidence. It is that
-/// of a number of runs which was fixed beforehand; see decide() for others.
+/// The verdict of decide(), with what it takes to get one.
 ///
 /// @param errors                |estimate − truth| of the parameter, SI, in run order.
 /// @param num_without_estimate  Runs that have no error; each counts as an exceedance.
+/// @param num_fixed             As for decide().
 /// @pre The requirement is one of a parameter.
 /// @throws InvalidArgument if an error is not finite.
 [[nodiscard]] RequirementCheck check_requirement(const Requirement& requirement,
                                                  std::span<const double> errors,
-                                                 std::uint64_t num_without_estimate);
+                                                 std::uint64_t num_without_estimate,
+                                                 std::optional<std::uint64_t> num_fixed);
 
 /// The same of a count, and without a bound.
 [[nodiscard]] RequirementCheck check_requirement(const Requirement& requirement,
-                                                 const ExceedanceCount& count);
+                                                 const ExceedanceCount& count,
+                                                 std::optional<std::uint64_t> num_fixed);
 
-/// A verdict that may be asked for after any number of runs and again after more, until it is one:
-/// if the requirement does not hold, "met" is ever answered with probability 1 − confidence at
-/// most, and likewise "not met" if it holds. That takes more runs than check_requirement(): 384
-/// without an exceedance for 99 % with 95 %, where that takes 299.
 struct Decision {
   Verdict verdict = Verdict::undecided;
-  /// Of the probability of an exceedance, each bound one-sided; see sequential_bounds(). The
-  /// verdict compares them with 1 − coverage.
+  bool is_of_fixed_size = false;
+  /// Of the probability of an exceedance, each bound one-sided: the requirement is met if `upper`
+  /// is 1 − coverage or less, and not met if `lower` is 1 − coverage or more. Empty without runs.
   std::optional<Interval> exceedance;
 };
-[[nodiscard]] Decision decide(const Tolerance& tolerance, const ExceedanceCount& count);
+
+/// A verdict that may be asked for after any number of runs and again after more: if the
+/// requirement does not hold, "met" is ever answered with probability 1 − confidence at most (the
+/// consumer's risk), and likewise "not met" if it holds.
+///
+/// With q = 1 − coverage and k of n exceeding, at n = num_fixed the verdict is "met" if
+/// P(Bin(n, q) ≤ k) ≤ 1 − confidence and "not met" if P(Bin(n, q) ≥ k) ≤ 1 − confidence. At any
+/// other n it is that of sequential_bounds(), with the rest of 1 − confidence that the one at
+/// num_fixed leaves: README.md says why.
+///
+/// @param num_fixed  Runs that were asked for before any result was there. Empty if that is not
+///                   known or was left open: then no look is one of a fixed number of runs.
+[[nodiscard]] Decision decide(const Tolerance& tolerance, const ExceedanceCount& count,
+                              std::optional<std::uint64_t> num_fixed);
+
+/// All runs it takes until decide() says "met" if none of the further ones exceeds: the plan of
+/// those who go on. Empty above num_runs_max.
+[[nodiscard]] std::optional<std::uint64_t> runs_to_meet(const Tolerance& tolerance,
+                                                        const ExceedanceCount& count,
+                                                        std::optional<std::uint64_t> num_fixed);
 
 }  // namespace proofmass

@@ -148,13 +148,14 @@ StopCheck check_stop_rule(const StopRule& rule, const ValuePasses& errors) {
   return check;
 }
 
-StopCheck check_stop_rule(const StopRule& rule, const ExceedanceCount& count) {
+StopCheck check_stop_rule(const StopRule& rule, const ExceedanceCount& count,
+                          std::optional<std::uint64_t> num_fixed) {
   PROOFMASS_EXPECT(is_about_exceedances(rule) && count.num_exceedances <= count.num_runs);
   if (count.num_runs == 0) return {};
   StopCheck check;
   const auto num_runs = static_cast<double>(count.num_runs);
   if (rule.statistic == StopRule::Statistic::verdict) {
-    const Decision decision = decide(rule.requirement.tolerance, count);
+    const Decision decision = decide(rule.requirement.tolerance, count, num_fixed);
     check.estimate = static_cast<double>(count.num_exceedances) / num_runs;
     check.interval = decision.exceedance;
     check.is_reached = decision.verdict != Verdict::undecided;

@@ -80,7 +80,9 @@ struct StopCheck {
 /// that meet all objectives, with its Clopper-Pearson interval. That of `verdict` is the fraction
 /// that exceed, with the bounds of decide(), each one-sided and with the requirement's confidence;
 /// it has no relative_half_width and is reached if there is a verdict.
+/// @param num_fixed  As for decide().
 /// @pre is_about_exceedances(rule).
-[[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, const ExceedanceCount& count);
+[[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, const ExceedanceCount& count,
+                                        std::optional<std::uint64_t> num_fixed);
 
 }  // namespace proofmass

@@ -57,8 +57,13 @@ std::uint64_t wilks_order(const Tolerance& tolerance, std::uint64_t num_runs) {
 
 std::optional<ToleranceBound> wilks_upper(std::span<const double> values,
                                           const Tolerance& tolerance, std::uint64_t num_unknown) {
+  return upper_bound_of_order(values, wilks_order(tolerance, values.size() + num_unknown),
+                              num_unknown);
+}
+
+std::optional<ToleranceBound> upper_bound_of_order(std::span<const double> values,
+                                                   std::uint64_t order, std::uint64_t num_unknown) {
   detail::check_values("values", values, 0);
-  const std::uint64_t order = wilks_order(tolerance, values.size() + num_unknown);
   if (order <= num_unknown) return std::nullopt;
   std::vector<double> descending(values.begin(), values.end());
   const auto place = descending.begin() + static_cast<std::ptrdiff_t>(order - num_unknown - 1);

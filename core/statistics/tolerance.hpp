@@ -47,4 +47,9 @@ struct ToleranceBound {
                                                         const Tolerance& tolerance,
                                                         std::uint64_t num_unknown = 0);
 
+/// The value of this order; empty if it is 0 or one of the unknown ones.
+[[nodiscard]] std::optional<ToleranceBound> upper_bound_of_order(std::span<const double> values,
+                                                                 std::uint64_t order,
+                                                                 std::uint64_t num_unknown);
+
 }  // namespace proofmass

@@ -25,6 +25,7 @@
 #include "coordinator/report/review_html.hpp"
 #include "coordinator/report/review_markdown.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/independence.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 
@@ -58,6 +59,7 @@ std::vector<RequirementAnswer> answers_of(const Store& store, const Campaign& ca
   std::vector<std::string> texts;
   for (const StatedRequirement& each : stated) texts.push_back(each.requirement);
   try {
+    if (!texts.empty()) require_independent(campaign, "requirement", texts.front());
     return check_requirements(store, campaign.objectives(), texts, campaign.error_budget());
   } catch (const ConfigError& error) {
     throw UsageError(error.what());

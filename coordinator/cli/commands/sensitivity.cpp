@@ -16,6 +16,7 @@
 #include "coordinator/report/sensitivity.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/dispersion.hpp"
+#include "core/campaign/independence.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
@@ -59,6 +60,7 @@ int print_sensitivity(const SensitivityOptions& options) {
   std::optional<RunIndex> explained;
   if (options.run) explained = RunIndex{*options.run};
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
+  require_independent(*campaign, "campaign", campaign->name);
   const DrawnRuns drawn = read_drawn_runs(store, *campaign, sensitivity_runs_max, explained);
   if (drawn.runs.size() < sensitivity_values_min) {
     throw Error(fmt::format("runs with an estimate = {} (sensitivities need {} at least)",

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <variant>
 
+#include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/integrity.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
@@ -224,6 +225,7 @@ void insert_campaign(Database& database, const Campaign& campaign, std::string_v
   insert_parameters(database, campaign);
   insert_data_tables(database, campaign.definition(TableColumns::left_out).tables);
   insert_dispersion_values(database, campaign, 0);
+  fix_num_runs(database);
   write_table_digest(database);
 }
 
@@ -288,6 +290,7 @@ void extend_campaign(Database& database, const Campaign& campaign, std::string_v
   insert_dispersion_values(database, campaign, stored_num_runs(database));
   database.prepare("UPDATE campaign SET num_runs = ?, definition = ?")
       .run(campaign.num_runs, definition);
+  fix_num_runs(database);
   write_table_digest(database);
 }
 

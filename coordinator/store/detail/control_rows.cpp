@@ -92,6 +92,20 @@ StopPlan read_stop_plan(const Database& database) {
           .failures_max = select.optional_count(2)};
 }
 
+std::optional<std::uint64_t> read_num_runs_fixed(const Database& database) {
+  Statement select = database.prepare("SELECT num_runs_fixed FROM campaign");
+  if (!select.step()) database.refuse_as_damaged("it has no campaign");
+  return select.optional_count(0);
+}
+
+void fix_num_runs(const Database& database) {
+  database
+      .prepare(
+          "UPDATE campaign SET num_runs_fixed = iif(stop_rule = '', num_runs, NULL)"
+          " WHERE NOT EXISTS (SELECT 1 FROM delivery)")
+      .run();
+}
+
 void write_stop_plan(const Database& database, const StopPlan& plan) {
   database
       .prepare(
@@ -99,6 +113,7 @@ void write_stop_plan(const Database& database, const StopPlan& plan) {
           " phase = iif(phase = 'finished' AND ?1 <> ''"
           " AND (stop_rule, num_runs_max, failures_max) IS NOT (?1, ?2, ?3), 'active', phase)")
       .run(plan.stop_rule, plan.num_runs_max, plan.failures_max);
+  fix_num_runs(database);
   write_table_digest(database);
 }
 

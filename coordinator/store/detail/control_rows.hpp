@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -18,6 +19,12 @@ void write_control(const Database& database, const CampaignControl& control);
 [[nodiscard]] StopPlan read_stop_plan(const Database& database);
 /// A new plan with a rule, not checked yet, leaves a campaign unfinished: `finished` is `active`.
 void write_stop_plan(const Database& database, const StopPlan& plan);
+
+/// See Store::num_runs_fixed().
+[[nodiscard]] std::optional<std::uint64_t> read_num_runs_fixed(const Database& database);
+/// While there is no result, nobody can have looked at one: the runs that are asked for now are
+/// fixed, unless a stop rule decides about their number.
+void fix_num_runs(const Database& database);
 
 /// The row of `stop_check` with the most runs.
 [[nodiscard]] std::optional<StoredStopCheck> read_last_stop_check(const Database& database,

@@ -26,9 +26,11 @@ namespace {
 void add_campaign(const Database& database, Sha256& hash) {
   Statement row = database.prepare(
       "SELECT name, seed, num_runs, definition, model_version, build, created_utc, campaign_uid,"
-      " owner, stop_rule, num_runs_max, failures_max FROM campaign");
+      " owner, stop_rule, num_runs_max, failures_max, num_runs_fixed FROM campaign");
   if (!row.step()) database.refuse_as_damaged("it has no campaign");
-  for (int column = 0; column < row.num_columns(); ++column) hash.add(row.shown(column));
+  const int num_columns = row.num_columns();
+  for (int column = 0; column < num_columns - 1; ++column) hash.add(row.shown(column));
+  if (row.optional_count(num_columns - 1)) hash.add(row.shown(num_columns - 1));
 }
 
 void add_data_tables(const Database& database, Sha256& hash) {

@@ -13,7 +13,8 @@ namespace proofmass::coordinator::detail {
 
 /// SHA-256 of what defines a campaign, 64 hexadecimal digits: of the row of `campaign`, as text
 /// (`NULL` without a value), name, seed, num_runs, definition, model_version, build, created_utc,
-/// campaign_uid, owner, stop_rule, num_runs_max and failures_max; then of each table of
+/// campaign_uid, owner, stop_rule, num_runs_max, failures_max and, if it is not NULL,
+/// num_runs_fixed, which files of version 8 did not have; then of each table of
 /// shared data the number of rows and, by `position`, position and numbers; then the number of rows
 /// of `dispersion_value` and, by `quantity` and `run_index`, quantity, run and value. Integers have
 /// 64 bits; layout as in Sha256.

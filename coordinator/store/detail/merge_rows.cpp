@@ -8,6 +8,7 @@
 
 #include "coordinator/store/detail/control_rows.hpp"
 #include "coordinator/store/detail/entry_rows.hpp"
+#include "coordinator/store/detail/integrity.hpp"
 #include "coordinator/store/store_error.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -62,6 +63,9 @@ MergedPart MergeRows::add(const Database& part) {
   add_losses(part, workers);
   add_failures(part);
   add_comparisons(part, workers);
+  // min() of a NULL is NULL: what one part does not know, the whole does not.
+  whole_.prepare("UPDATE campaign SET num_runs_fixed = min(num_runs_fixed, ?)")
+      .run(read_num_runs_fixed(part));
   return merged;
 }
 
@@ -75,6 +79,7 @@ void MergeRows::finish() {
   const bool is_finished = whole_.count("SELECT count(*) FROM delivery") == num_runs_;
   control.phase = is_finished ? wire::CampaignPhase::finished : wire::CampaignPhase::active;
   write_control(whole_, control);
+  write_table_digest(whole_);
 }
 
 MergeRows::WorkerKeys MergeRows::add_workers(const Database& part) {

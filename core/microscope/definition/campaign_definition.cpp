@@ -14,6 +14,7 @@
 #include "core/definition/document.hpp"
 #include "core/microscope/campaign/regressor_lines.hpp"
 #include "core/model.hpp"
+#include "core/statistics/independence.hpp"
 
 namespace proofmass {
 namespace {
@@ -100,6 +101,26 @@ void check_magnitudes(const MicroscopeCampaign& campaign) {
   }
 }
 
+/// @throws ConfigError if a column that is declared independent is none such.
+void check_independence(const MicroscopeCampaign& campaign) {
+  const std::vector<std::size_t> drawn = campaign.table_quantities();
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    const Dispersion& law = campaign.dispersions[drawn[i]];
+    if (!law.is_independent) continue;
+    const IndependencePValues p_values = independence_p_values(campaign.table_columns[i]);
+    const bool is_serial = p_values.serial < independence_p_value_min;
+    if (!is_serial && p_values.regular >= independence_p_value_min) continue;
+    throw ConfigError(
+        fmt::format("dispersion.{}.independent", drawn_names()[drawn[i]]), "true",
+        fmt::format("column \"{}\" {}, p = {:.1g}; leave the key out if it is a design, or shuffle "
+                    "or draw the rows at random",
+                    law.column,
+                    is_serial ? "depends on the order of its rows"
+                              : "covers its range more evenly than independent draws do",
+                    is_serial ? p_values.serial : p_values.regular));
+  }
+}
+
 }  // namespace
 
 EnvironmentTable parse_environment(std::string_view text, const std::string& name,
@@ -141,6 +162,7 @@ MicroscopeCampaign read_campaign(Document& document, DataFiles& files) {
     campaign.validate();
     check_magnitudes(campaign);
     check_regressors(campaign.scenario);
+    check_independence(campaign);
   } catch (const ConfigError& error) {
     throw document.located(error);
   }

@@ -99,7 +99,8 @@ class Comparison {
     for (std::size_t i = 0; i < num_drawn; ++i) {
       const Dispersion& first = first_.dispersions[i];
       const Dispersion& second = second_.dispersions[i];
-      if (first.law == Law::table && second.law == Law::table) {
+      if (first.law == Law::table && second.law == Law::table &&
+          first.is_independent == second.is_independent) {
         compare_column(i);
       } else if (detail::dispersion_text(first) != detail::dispersion_text(second)) {
         differ("dispersion." + drawn_names()[i], detail::dispersion_text(first),

@@ -170,6 +170,7 @@ std::vector<Entry> dispersion_entries(const Dispersion& dispersion) {
     entries.push_back(number != nullptr ? real_entry(key, *number)
                                         : text_entry(key, *text_at(fields, key)));
   }
+  if (dispersion.is_independent) entries.push_back({"independent", "true", "", "true"});
   return entries;
 }
 

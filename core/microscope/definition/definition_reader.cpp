@@ -173,8 +173,17 @@ std::vector<Session> read_sessions(Document& document) {
   return sessions;
 }
 
-constexpr std::array<std::string_view, 7> all_keys{
-    "minimum", "maximum", "mean", "standard_deviation", "value", "file", "column"};
+constexpr std::string_view independent_key = "independent";
+constexpr std::array<std::string_view, 8> all_keys{
+    "minimum", "maximum", "mean", "standard_deviation", "value", "file", "column", independent_key};
+
+// The only key of a law that may be absent: a table is no draw unless somebody says so.
+void read_independence(Document& document, const std::string& path, Dispersion& dispersion) {
+  const toml::node* const found = document.find(path);
+  if (found == nullptr) return;
+  if (!found->is_boolean()) return document.refuse(path, "must be true or false");
+  dispersion.is_independent = found->value_or(false);
+}
 
 bool read_key(Document& document, const std::string& path, std::string_view key,
               Dispersion& dispersion) {
@@ -202,6 +211,7 @@ void refuse_other_keys(Document& document, const std::string& path, Law law, boo
   for (const std::string_view key : all_keys) {
     const std::string key_path = fmt::format("{}.{}", path, key);
     if (std::ranges::find(keys, key) != keys.end()) continue;
+    if (law == Law::table && key == independent_key) continue;
     if (document.find(key_path) == nullptr) continue;
     if (is_assigned && !document.is_assigned(key_path)) continue;
     document.refuse(key_path, fmt::format("not a key of law {}, which has {}", name_of(law),
@@ -233,6 +243,9 @@ Dispersion read_dispersion(Document& document, const std::string& path, const Di
           key_path, fmt::format("law {} needs it{}", name_of(law),
                                 is_assigned ? ": --set " + key_path + "=..." : std::string()));
     }
+  }
+  if (law == Law::table) {
+    read_independence(document, fmt::format("{}.{}", path, independent_key), dispersion);
   }
   refuse_other_keys(document, path, law, is_assigned);
   return dispersion;

@@ -153,7 +153,8 @@ class CommentedWriter {
         "\n# What is drawn for each run, by its law: uniform (minimum, maximum), normal (mean,\n"
         "# standard_deviation), truncated_normal (all four), fixed (value), or table (file, "
         "column: a\n"
-        "# comma-separated file with headings, one row a run). A table such as\n"
+        "# comma-separated file with headings, one row a run; independent = true: its rows are\n"
+        "# independent draws, else no interval or verdict follows from them). A table such as\n"
         "# [dispersion.offcentring_m.x] changes the law of one element.\n";
     for (const DrawGroup& group : draw_groups()) write_group(group);
   }

@@ -79,7 +79,7 @@ TEST_F(SeveralComparison, HasTheStatisticsOfAllRunsOfEach) {
 }
 
 // Holm's method over both comparisons: the smallest of their 2·30 p-values is multiplied by the
-// weights of all, 2·10 (of 0.7, 0.2 and 0.1 for each parameter), over its own, 0.2.
+// weights of all, 2·10 (of 0.5, 0.4 and 0.1 for each parameter), over its own, 0.4.
 TEST_F(SeveralComparison, CorrectsForAllCampaignsTogether) {
   write("a.db", 1.0);
   write("b.db", 1.0);
@@ -92,7 +92,7 @@ TEST_F(SeveralComparison, CorrectsForAllCampaignsTogether) {
   ASSERT_LT(smallest, 1e-6);
   for (const ParameterComparison& parameter : members[2].comparison->parameters) {
     if (parameter.p_values.scale != smallest) continue;
-    EXPECT_NEAR(parameter.adjusted_p_values.scale / smallest, 100.0, 1e-9);
+    EXPECT_NEAR(parameter.adjusted_p_values.scale / smallest, 50.0, 1e-9);
   }
   for (const ParameterComparison& parameter : members[1].comparison->parameters) {
     EXPECT_EQ(parameter.adjusted_p_values.scale, 1.0);

@@ -22,7 +22,7 @@ using ::testing::Not;
 class LiveResultsTest : public test::ReviewTest {
  protected:
   static LiveResults results_in(const Store& store) {
-    LiveResults results(test::campaign_of(1).objectives());
+    LiveResults results(test::campaign_of(1));
     store.for_each_result([&](const RunResult& result) { results.add(result); });
     return results;
   }
@@ -44,7 +44,7 @@ TEST_F(LiveResultsTest, ShowTheTableOfAReview) {
 }
 
 TEST(LiveResults, AreEmptyAtFirst) {
-  const LiveResults results(test::campaign_of(1).objectives());
+  const LiveResults results(test::campaign_of(1));
   EXPECT_EQ(test::malformed_part(results.html()), "");
   EXPECT_THAT(results.html(), HasSubstr("no data"));
 }

@@ -18,7 +18,7 @@ std::string answer_to(const std::string& text, std::size_t num_runs, std::size_t
   const Requirement requirement = parse_requirement(text);
   return requirement_text({.text = text,
                            .requirement = requirement,
-                           .check = check_requirement(requirement, errors, 0),
+                           .check = check_requirement(requirement, errors, 0, num_runs),
                            .missing = {}});
 }
 
@@ -27,6 +27,7 @@ TEST(RequirementText, SaysThatItIsMet) {
   EXPECT_EQ(answer_to("a_c12 < 9e-4 for 99% with 95%", 299, 0),
             "Requirement  a_c12 < 9e-4 for 99% with 95%\n"
             "Answer       met\n"
+            "Rule         299 draws, a number fixed before the first result\n"
             "Exceeding    0 of 299 runs; at most 0.9969 % of all draws, with 95 %\n"
             "Allowed      1 % of all draws\n"
             "Bound        99 % of all draws below 0.0001 rad, with 95 %\n");
@@ -35,11 +36,10 @@ TEST(RequirementText, SaysThatItIsMet) {
 TEST(RequirementText, SaysHowManyDrawsItTakes) {
   const std::string text = answer_to("a_c12 < 9e-4 for 99% with 95%", 100, 0);
   EXPECT_THAT(text, testing::HasSubstr("Answer       undecided\n"));
-  EXPECT_THAT(text,
-              testing::HasSubstr("Bound        none: 299 draws at least, for 99 % with 95 %\n"));
-  EXPECT_THAT(text, testing::HasSubstr("Draws        299 meet the requirement if no further one "
+  EXPECT_THAT(text, testing::HasSubstr("Bound        none of so few draws, for 99 % with 95 %\n"));
+  EXPECT_THAT(text, testing::HasSubstr("Draws        377 meet the requirement if no further one "
                                        "exceeds the limit,\n"
-                                       "             299 decide if they go on to exceed it as "
+                                       "             377 decide if they go on to exceed it as "
                                        "often\n"));
 }
 
@@ -49,17 +49,10 @@ TEST(RequirementText, BreaksALineOfManyRuns) {
                                  "90.94 % and at most 91.04 % of all draws, each with 95 %\n"));
 }
 
-// 1 − 1e-9 with 1 − 1e-9 takes 2e10 draws, which is more than a campaign may have.
-TEST(RequirementText, SaysThatNoNumberOfDrawsGivesABound) {
-  EXPECT_THAT(answer_to("k2c < 1000 for 99.9999999% with 99.9999999%", 100, 0),
-              testing::HasSubstr(
-                  "Bound        none: no number of draws for 99.9999999 % with 99.9999999 %\n"));
-}
-
-// One in a hundred, as often as allowed: with 473 draws one may exceed it [Wilks1941].
+// One in a hundred, as often as allowed: with 663 draws one may exceed it (sequential).
 TEST(RequirementText, SaysThatNoNumberOfDrawsDecides) {
   EXPECT_THAT(answer_to("a_c12 < 9e-4 for 99% with 95%", 100, 1),
-              testing::HasSubstr("Draws        473 meet the requirement if no further one "
+              testing::HasSubstr("Draws        663 meet the requirement if no further one "
                                  "exceeds the limit,\n"
                                  "             none decide if"));
 }
@@ -72,19 +65,19 @@ TEST(RequirementText, SaysThatItIsNotMet) {
   EXPECT_THAT(text, testing::Not(testing::HasSubstr("Draws")));
 }
 
-// With five unknown draws the sixth largest error is the first that can be a bound; 0.99 with 0.95
-// then takes 1049 draws (scipy: P(Bin(1049, 0.01) ≤ 5) = 4.99 %, of 1048 5.02 %).
+// With five unknown draws the sixth largest error is the first that can be a bound.
 TEST(RequirementText, SaysHowManyDrawsExceedForWantOfAnEstimate) {
   const Requirement requirement = parse_requirement("a_c12 < 9e-4 for 99% with 95%");
   const std::vector<double> errors(395, 1e-4);
-  const std::string text = requirement_text({.text = "",
-                                             .requirement = requirement,
-                                             .check = check_requirement(requirement, errors, 5),
-                                             .missing = {.num_not_finite = 1, .num_no_draw = 4}});
+  const std::string text =
+      requirement_text({.text = "",
+                        .requirement = requirement,
+                        .check = check_requirement(requirement, errors, 5, 400),
+                        .missing = {.num_not_finite = 1, .num_no_draw = 4}});
   EXPECT_THAT(text, testing::HasSubstr("Exceeding    5 of 400 runs;\n"));
   EXPECT_THAT(text, testing::HasSubstr("\n             5 of them for want of an estimate:\n"
                                        "             1 not finite, 4 without draw\n"));
-  EXPECT_THAT(text, testing::HasSubstr("Bound        none: 1049 draws at least, "));
+  EXPECT_THAT(text, testing::HasSubstr("Bound        none of so few draws, "));
 }
 
 // A bound that rounds to what is allowed has the digits that tell it apart: 1 − 0.05^(1/299) is
@@ -100,15 +93,16 @@ TEST(RequirementText, TellsOfAllObjectives) {
   const auto answer_to_count = [&](std::uint64_t num_exceedances, double coverage) {
     Requirement asked = requirement;
     asked.tolerance.coverage = coverage;
-    return requirement_text(
-        {.text = "all objectives for 95% with 90%",
-         .requirement = asked,
-         .check = check_requirement(asked, {.num_runs = 100, .num_exceedances = num_exceedances}),
-         .missing = {}});
+    return requirement_text({.text = "all objectives for 95% with 90%",
+                             .requirement = asked,
+                             .check = check_requirement(
+                                 asked, {.num_runs = 100, .num_exceedances = num_exceedances}, 100),
+                             .missing = {}});
   };
   EXPECT_THAT(answer_to_count(3, 0.95),
               testing::StartsWith("Requirement  all objectives for 95% with 90%\n"
                                   "Answer       undecided\n"
+                                  "Rule         100 draws, a number fixed before the first result\n"
                                   "Holding      97 of 100 runs;\n"
                                   "             at least 93.44 % and at most 98.89 % of all draws, "
                                   "each with 90 %\n"
@@ -121,10 +115,12 @@ TEST(RequirementText, TellsOfAllObjectives) {
               testing::EndsWith(" decide if they go on to exceed one as often\n"));
   EXPECT_THAT(answer_to_count(3, 0.90),
               testing::HasSubstr("Answer       met\n"
+                                 "Rule         100 draws, a number fixed before the first result\n"
                                  "Holding      97 of 100 runs; at least 93.44 % of all draws, with "
                                  "90 %\n"));
   EXPECT_THAT(answer_to_count(3, 0.99),
               testing::HasSubstr("Answer       not met\n"
+                                 "Rule         100 draws, a number fixed before the first result\n"
                                  "Holding      97 of 100 runs; at most 98.89 % of all draws, with "
                                  "90 %\n"));
 }
@@ -187,6 +183,45 @@ TEST_F(StoredRequirement, IsOfErrorsOfEitherSign) {
   EXPECT_EQ(
       check_requirements(store, MicroscopeCampaign{}.objectives(), texts)[0].check.num_exceedances,
       4U);
+}
+
+// 64 runs without an exceedance are enough for 95 % with 95 % if their number was fixed (59), and
+// too few for a rule that lets one look and go on (79): see decide().
+TEST_F(StoredRequirement, IsOfAFixedSizeUntilTheCampaignIsExtended) {
+  const std::vector<std::string> texts{"k2c < 1e9 for 95% with 95%"};
+  const auto answer = [&](const Store& store) {
+    return check_requirements(store, MicroscopeCampaign{}.objectives(), texts)[0];
+  };
+  Store store = Store::create(file(), test::campaign_of(60), "");
+  EXPECT_EQ(store.num_runs_fixed(), 60U);
+  store.extend(test::campaign_of(64), "");  // Nobody can have seen a result.
+  EXPECT_EQ(store.num_runs_fixed(), 64U);
+  store.commit(test::deliveries_of(0, 63));
+  EXPECT_FALSE(answer(store).check.is_of_fixed_size);  // It may yet be stopped.
+  EXPECT_EQ(answer(store).check.verdict, Verdict::undecided);
+  EXPECT_EQ(answer(store).check.num_runs_at_best, 64U);
+  store.commit(test::deliveries_of(63, 64));
+  EXPECT_TRUE(answer(store).check.is_of_fixed_size);
+  EXPECT_EQ(answer(store).check.verdict, Verdict::met);
+  store.extend(test::campaign_of(70), "");
+  store.commit(test::deliveries_of(64, 70));
+  EXPECT_EQ(store.num_runs_fixed(), 64U);
+  EXPECT_FALSE(answer(store).check.is_of_fixed_size);
+  EXPECT_EQ(answer(store).check.verdict, Verdict::undecided);
+  EXPECT_THAT(requirement_text(answer(store)),
+              testing::HasSubstr("Rule         sequential: holds however often one looks and "
+                                 "goes on\n"));
+}
+
+TEST_F(StoredRequirement, IsSequentialWithAStopRule) {
+  Store store = Store::create(file(), test::campaign_of(60), "");
+  store.set_stop_plan({.stop_rule = "std(k2c) within 5%", .num_runs_max = 60, .failures_max = {}});
+  EXPECT_FALSE(store.num_runs_fixed().has_value());
+  store.set_stop_plan({});
+  EXPECT_EQ(store.num_runs_fixed(), 60U);
+  store.commit(test::deliveries_of(0, 60));
+  store.set_stop_plan({.stop_rule = "std(k2c) within 5%", .num_runs_max = 60, .failures_max = {}});
+  EXPECT_EQ(store.num_runs_fixed(), 60U);
 }
 
 }  // namespace

@@ -32,9 +32,10 @@ RunResult result_with(std::uint64_t run, double error) {
 
 std::vector<MatrixRow> rows_of(const std::vector<StatedRequirement>& stated,
                                const std::vector<RunResult>& results,
-                               std::uint64_t num_given_up = 0) {
+                               std::uint64_t num_given_up = 0,
+                               std::optional<std::uint64_t> num_fixed = {}) {
   const std::vector<double> objectives = ones();
-  MatrixPasses passes(stated, objectives, num_given_up);
+  MatrixPasses passes(stated, objectives, num_given_up, num_fixed);
   do {
     for (const RunResult& result : results) passes.add(result);
   } while (passes.end_pass());
@@ -60,8 +61,8 @@ TEST(MatrixPasses, AgreeWithTheErrorsThemselves) {
     const std::vector<RunResult> results = some_results(count);
     std::vector<double> errors;
     for (const RunResult& result : results) errors.push_back(std::abs(result.error(a_c12)));
-    const RequirementCheck expected =
-        check_requirement(parse_requirement(text, quantity_names(model().results())), errors, 2);
+    const RequirementCheck expected = check_requirement(
+        parse_requirement(text, quantity_names(model().results())), errors, 2, {});
     std::vector<RunResult> with_lost = results;
     for (std::uint64_t run = count; run < count + 2; ++run) {
       with_lost.push_back(
@@ -138,6 +139,18 @@ TEST(MatrixRequirements, EndWithAllObjectivesTogether) {
   EXPECT_EQ(matrix_requirements({stated("k2c < 1 for 9% with 9%")}, objectives).size(), 2U);
   const std::vector<double> none(num_parameters, std::numeric_limits<double>::infinity());
   EXPECT_TRUE(matrix_requirements({}, none).empty());
+}
+
+// Of 100 runs 2 may exceed 0.95 with 0.9 if their number was fixed, else 0; the bound goes with it.
+TEST(MatrixPasses, BoundByTheRuleOfTheirVerdict) {
+  const std::vector<StatedRequirement> one{stated("a_c12 < 0.6 for 95% with 90%")};
+  const std::vector<RunResult> results = some_results(100);
+  const MatrixRow fixed = rows_of(one, results, 0, 100)[0];
+  const MatrixRow open = rows_of(one, results)[0];
+  EXPECT_TRUE(fixed.answer.check.is_of_fixed_size);
+  EXPECT_FALSE(open.answer.check.is_of_fixed_size);
+  EXPECT_GT(fixed.answer.check.num_allowed, open.answer.check.num_allowed);
+  EXPECT_LT(*fixed.bound, *open.bound);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/statistics/distribution.hpp"
 #include "tests/core/statistics/columns.hpp"
 
 namespace proofmass {
@@ -145,15 +146,97 @@ void print(const std::string& name, const Case& one, const Found& found) {
 double normal_error(double normal, double) { return normal; }
 double product_error(double normal, double other) { return normal * other; }
 
-// A bias of half a standard deviation: Welch's t of two hundred errors exceeds the 0.7/10 · 5 %
-// that are left to it in 73 % (a normal deviate of mean 0.5/√0.02 = 3.54 exceeds 2.92). Standard
+// A bias of half a standard deviation: Welch's t of two hundred errors exceeds the 0.5/10 · 5 %
+// that are left to it in 70 % (a normal deviate of mean 0.5/√0.02 = 3.54 exceeds 3.02). Standard
 // error of 1,000 repetitions: 1.4 %. The mean of |error|, the only test there was, found it in 4 %.
 TEST(ErrorChange, FindsABiasOfHalfAStandardDeviation) {
   const Case one{100, 100, 1000};
   const Found found =
       found_in(one, normal_error, [](double normal, double) { return normal + 0.5; });
   print("bias 0.5", one, found);
-  EXPECT_NEAR(found.location, 73.0, 4.2);
+  EXPECT_NEAR(found.location, 70.0, 4.2);
+}
+
+/// The error of K2c, −3 a_d11' K2d with some noise: each factor is the difference of two uniform
+/// draws.
+double k2c_error(double normal, double other) {
+  const auto triangular = [](double deviate) {
+    const double u = normal_cumulative(deviate);
+    return u < 0.5 ? std::sqrt(2.0 * u) - 1.0 : 1.0 - std::sqrt(2.0 - 2.0 * u);
+  };
+  return triangular(normal) * triangular(other);
+}
+
+// 20 % more scatter of K2c was found in 66 % with a weight of 0.2; see README.md.
+TEST(ErrorChange, FindsALargerScatterOfK2c) {
+  const Case one{1000, 1000, 300};
+  const Found found = found_in(
+      one, k2c_error, [](double normal, double other) { return 1.2 * k2c_error(normal, other); });
+  print("K2c, scatter x 1.2", one, found);
+  EXPECT_GT(found.scale, 68.0);
+}
+
+/// Both passes of the errors of a campaign.
+ErrorPasses passes_of(const Values& values) {
+  ErrorPasses passes;
+  for (const double error : values) passes.add(error);
+  passes.begin_second(1.0);
+  for (const double error : values) passes.add_again(error);
+  return passes;
+}
+
+// The factor is that of a first campaign; others are drawn with it. Nine tenths of 400 have a
+// standard error of 1.5 %, and the factor varies by some percent with the campaign it is of.
+TEST(ErrorChange, IsFoundWithTheProbabilityThatGoesWithTheSmallestFactor) {
+  const double level = significance * 0.4 / num_columns;
+  for (const auto& [name, draw] : {std::pair<std::string, Draw>("normal", normal_error),
+                                   std::pair<std::string, Draw>("K2c", k2c_error)}) {
+    const auto errors = [&](std::uint64_t repetition, std::uint32_t column) {
+      return errors_of(1000, {.seed = 83, .repetition = repetition, .column = column}, draw);
+    };
+    const double factor =
+        *smallest_scale_factor(passes_of(errors(0, 0)), passes_of(errors(0, 1)), num_columns);
+    int num_found = 0, num_found_in_pairs = 0;
+    double factor_of_pairs = 0.0;
+    for (std::uint64_t repetition = 0; repetition <= 400; ++repetition) {
+      const Values first = errors(repetition, 0);
+      Values second = errors(repetition, 1);
+      PairedErrors pairs;  // Of which two thirds of the scatter are common.
+      Values common = errors(repetition, 2);
+      for (std::size_t i = 0; i < common.size(); ++i) {
+        const double factor_now = repetition == 0 ? 1.0 : factor_of_pairs;
+        pairs.add({.error = 2.0 * common[i] + first[i], .mean = 0.0},
+                  {.error = factor_now * (2.0 * common[i] + second[i]), .mean = 0.0}, 1e9);
+        common[i] = 2.0 * common[i] + first[i];
+      }
+      if (repetition == 0) {
+        factor_of_pairs = *smallest_scale_factor(passes_of(common), pairs, num_columns);
+        continue;
+      }
+      for (double& error : second) error *= factor;
+      if (compare_many(first, second).scale < level) ++num_found;
+      if (compare_paired_errors(std::move(pairs)).scale < level) ++num_found_in_pairs;
+    }
+    std::cout << fmt::format("{}: factor {:.3f} found in {:.1f} %, of pairs {:.3f} in {:.1f} %\n",
+                             name, factor, num_found / 4.0, factor_of_pairs,
+                             num_found_in_pairs / 4.0);
+    EXPECT_NEAR(num_found / 4.0, 90.0, 7.0) << name;
+    EXPECT_GT(num_found_in_pairs / 4.0, 83.0) << name;
+  }
+}
+
+// The mean of an exponential law moves the distances from it: by their own scatter alone, a test of
+// 5 % found a change in 11 % of pairs of campaigns without one. Standard error 0.7 %.
+TEST(ErrorChange, OfScaleIsRarelyFoundInASkewLawWithoutOne) {
+  int num_found = 0;
+  for (std::uint64_t repetition = 0; repetition < 1000; ++repetition) {
+    const auto errors = [&](std::uint32_t column) {
+      return test::column_of(300, {.seed = 84, .repetition = repetition, .column = column},
+                             [](double u) { return -std::log(u); });
+    };
+    if (compare_many(errors(0), errors(1)).scale < significance) ++num_found;
+  }
+  EXPECT_LE(num_found / 10.0, 7.1);
 }
 
 TEST(ErrorChange, FindsALargerScatter) {

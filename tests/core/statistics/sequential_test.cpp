@@ -7,6 +7,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "core/error.hpp"
@@ -134,10 +139,12 @@ Fate fate_of(const Rule& rule, double rate, std::uint64_t num_runs_max) {
 
 constexpr Tolerance tolerance_99_95{.coverage = 0.99, .confidence = 0.95};
 
-Verdict decided(const ExceedanceCount& count) { return decide(tolerance_99_95, count).verdict; }
+Verdict decided(const ExceedanceCount& count) {
+  return decide(tolerance_99_95, count, std::nullopt).verdict;
+}
 
 Verdict fixed_count(const ExceedanceCount& count) {
-  return check_requirement({.tolerance = tolerance_99_95}, count).verdict;
+  return decide(tolerance_99_95, count, count.num_runs).verdict;
 }
 
 // On the border, where both verdicts are hardest to avoid, each may come with probability 5 %. What
@@ -182,12 +189,142 @@ TEST(Decide, TakesMoreRunsThanACountThatWasFixedBeforehand) {
 }
 
 TEST(Decide, GivesTheBoundsThatItDecidesBy) {
-  const Decision decision = decide(tolerance_99_95, {.num_runs = 384});
+  const Decision decision = decide(tolerance_99_95, {.num_runs = 384}, std::nullopt);
   EXPECT_EQ(decision.verdict, Verdict::met);
   EXPECT_NEAR(decision.exceedance->upper, 0.0098126382, 1e-9);
-  const Decision other = decide(tolerance_99_95, {.num_runs = 128, .num_exceedances = 20});
+  const Decision other =
+      decide(tolerance_99_95, {.num_runs = 128, .num_exceedances = 20}, std::nullopt);
   EXPECT_EQ(other.verdict, Verdict::not_met);
   EXPECT_NEAR(other.exceedance->lower, 0.0777337667, 1e-9);
+}
+
+/// What a report says: met, or how many draws meet it if no further one exceeds.
+struct Said {
+  bool is_met = false;
+  std::uint64_t num_runs_next = 0;
+};
+using Report = std::function<Said(const ExceedanceCount&)>;
+
+/// Probability of so many exceedances more, as far as it is no less than 1e-12 beyond their mean.
+std::vector<double> law_of_more(std::uint64_t num_runs, double rate) {
+  std::vector<double> law;
+  for (std::uint64_t k = 0; k <= num_runs; ++k) {
+    law.push_back(binomial_probability(k, num_runs, rate));
+    if (law.back() < 1e-12 && static_cast<double>(k) > static_cast<double>(num_runs) * rate) break;
+  }
+  return law;
+}
+
+/// Probability that a user has ever been told "met" who asks for so many draws at first and then
+/// goes on to the number that the report names, again and again: after 0, 1, 2 ... extensions.
+/// Exact but for paths that are less probable than 1e-5.
+std::vector<double> ever_met(const Report& report, std::uint64_t num_first, int num_extensions,
+                             double rate) {
+  struct Path {
+    double probability = 0.0;
+    std::uint64_t num_next = 0;
+  };
+  std::map<std::pair<std::uint64_t, std::uint64_t>, Path> undecided{{{0, 0}, {1.0, num_first}}};
+  std::vector<double> met;
+  std::map<std::uint64_t, std::vector<double>> laws;
+  for (int look = 0; look <= num_extensions; ++look) {
+    std::map<std::pair<std::uint64_t, std::uint64_t>, Path> reached;
+    for (const auto& [counts, path] : undecided) {
+      std::vector<double>& law = laws[path.num_next - counts.first];
+      if (law.empty()) law = law_of_more(path.num_next - counts.first, rate);
+      for (std::size_t i = 0; i < law.size(); ++i) {
+        reached[{path.num_next, counts.second + i}].probability += path.probability * law[i];
+      }
+    }
+    met.push_back(met.empty() ? 0.0 : met.back());
+    undecided.clear();
+    for (const auto& [counts, path] : reached) {
+      if (path.probability < 1e-5) continue;
+      const Said said = report({.num_runs = counts.first, .num_exceedances = counts.second});
+      if (said.is_met) met.back() += path.probability;
+      if (said.is_met || said.num_runs_next <= counts.first) continue;
+      undecided[counts] = {path.probability, said.num_runs_next};
+    }
+  }
+  return met;
+}
+
+/// What the program says to a campaign that asked for so many draws before its first result. After
+/// the first look the number of runs that meet it depends on the exceedances alone.
+Report report_after(std::optional<std::uint64_t> num_fixed) {
+  const auto known = std::make_shared<std::map<std::uint64_t, std::uint64_t>>();
+  return [num_fixed, known](const ExceedanceCount& count) {
+    const auto [entry, is_new] = known->try_emplace(count.num_exceedances);
+    if (is_new) {
+      const std::uint64_t k = count.num_exceedances;
+      const ExceedanceCount before{.num_runs = std::max(num_fixed.value_or(0), k),
+                                   .num_exceedances = k};
+      entry->second = runs_to_meet(tolerance_99_95, before, num_fixed).value_or(0);
+    }
+    const bool is_met = count.num_runs == num_fixed
+                            ? decide(tolerance_99_95, count, num_fixed).verdict == Verdict::met
+                            : entry->second != 0 && entry->second <= count.num_runs;
+    return Said{.is_met = is_met, .num_runs_next = entry->second};
+  };
+}
+
+/// What a verdict of a fixed number at each look says.
+Said said_of_fixed_count(const ExceedanceCount& count) {
+  return {.is_met = fixed_count(count) == Verdict::met,
+          .num_runs_next = std::max(count.num_runs,
+                                    *wilks_num_runs(tolerance_99_95, count.num_exceedances + 1))};
+}
+
+/// A verdict of a fixed number at the first look, and then the sequential one with all of the 5 %.
+Report report_of_both() {
+  return [then = report_after(std::nullopt)](const ExceedanceCount& count) {
+    Said said = then(count);
+    if (count.num_runs == 299) said.is_met = fixed_count(count) == Verdict::met;
+    return said;
+  };
+}
+
+// Just as often as allowed, where every "met" is an error, of which 5 % are allowed in all.
+TEST(Decide, KeepsTheConsumersRiskOfThoseWhoGoOnAsTheReportSays) {
+  for (const std::uint64_t num_first : {100U, 299U}) {
+    const std::vector<double> met = ever_met(report_after(num_first), num_first, 30, 0.01);
+    EXPECT_LE(met[30], 0.05) << num_first;
+    for (const std::size_t i : {0U, 1U, 2U, 30U}) {
+      RecordProperty("met_percent_" + std::to_string(num_first) + "_" + std::to_string(i),
+                     std::to_string(100.0 * met[i]));
+    }
+  }
+  EXPECT_LE(ever_met(report_after(std::nullopt), 299, 30, 0.01)[30], 0.05);
+}
+
+// What was said before: a fixed number at each look. And why a fixed number at first and the
+// sequential rule from then on, each with 5 %, are no remedy: two chances are more than one.
+TEST(Decide, WouldNotKeepItWithOtherRules) {
+  const std::vector<double> fixed = ever_met(said_of_fixed_count, 299, 30, 0.01);
+  EXPECT_GT(fixed[1], 0.06);
+  EXPECT_GT(fixed[2], 0.09);
+  EXPECT_GT(fixed[30], 0.25);
+  EXPECT_GT(ever_met(report_of_both(), 299, 30, 0.01)[30], 0.06);
+}
+
+// It is no empty promise: a requirement that holds is met.
+TEST(Decide, MeetsARequirementThatHolds) {
+  EXPECT_GT(ever_met(report_after(299), 299, 3, 0.001)[3], 0.9);
+}
+
+// P(Bin(299, 0.01) = 0) = 4.95 % are spent at the first look: 0.05 % are left, evidence of 2,156.
+TEST(Decide, LeavesTheRestOfTheRiskToThoseWhoGoOn) {
+  const auto verdict_at = [](std::uint64_t num_runs) {
+    return decide(tolerance_99_95, {.num_runs = num_runs}, 299).verdict;
+  };
+  EXPECT_TRUE(decide(tolerance_99_95, {.num_runs = 299}, 299).is_of_fixed_size);
+  EXPECT_EQ(verdict_at(299), Verdict::met);
+  EXPECT_EQ(verdict_at(300), Verdict::undecided);
+  const std::uint64_t next = *runs_to_meet(tolerance_99_95, {.num_runs = 300}, 299);
+  EXPECT_EQ(verdict_at(next - 1), Verdict::undecided);
+  EXPECT_EQ(verdict_at(next), Verdict::met);
+  EXPECT_GT(evidence_of_less(0.0, static_cast<double>(next), 0.01),
+            1.0 / (0.05 - std::pow(0.99, 299.0)));
 }
 
 }  // namespace

@@ -138,25 +138,25 @@ TEST(CheckStopRule, IsNotReachedByAnIntervalAboutZero) {
 // 97 of 100: 91.48 to 99.38 % (scipy.stats.beta.ppf), half of which is 4.07 % of 97 %.
 TEST(CheckStopRule, KnowsHowOftenAllObjectivesHold) {
   const ExceedanceCount count{.num_runs = 100, .num_exceedances = 3};
-  const StopCheck check = check_stop_rule(parse_stop_rule("all objectives within 4%"), count);
+  const StopCheck check = check_stop_rule(parse_stop_rule("all objectives within 4%"), count, {});
   EXPECT_EQ(check.estimate, 0.97);
   EXPECT_NEAR(check.interval->lower, 0.91482394702572, 1e-13);
   EXPECT_NEAR(check.interval->upper, 0.9937700284616936, 1e-13);
   EXPECT_NEAR(*check.relative_half_width, 0.0407, 1e-4);
   EXPECT_FALSE(check.is_reached);
-  EXPECT_TRUE(check_stop_rule(parse_stop_rule("all objectives within 4.1%"), count).is_reached);
+  EXPECT_TRUE(check_stop_rule(parse_stop_rule("all objectives within 4.1%"), count, {}).is_reached);
 }
 
 TEST(CheckStopRule, IsReachedWhenARequirementIsDecided) {
   const StopRule rule = parse_stop_rule("a_c12 < 9e-4 for 99% with 95% decided");
-  EXPECT_FALSE(check_stop_rule(rule, ExceedanceCount{}).is_reached);
-  EXPECT_FALSE(check_stop_rule(rule, ExceedanceCount{.num_runs = 256}).is_reached);
-  const StopCheck met = check_stop_rule(rule, ExceedanceCount{.num_runs = 384});
+  EXPECT_FALSE(check_stop_rule(rule, ExceedanceCount{}, {}).is_reached);
+  EXPECT_FALSE(check_stop_rule(rule, ExceedanceCount{.num_runs = 256}, {}).is_reached);
+  const StopCheck met = check_stop_rule(rule, ExceedanceCount{.num_runs = 384}, {});
   EXPECT_TRUE(met.is_reached);
   EXPECT_LT(met.interval->upper, 0.01);
   EXPECT_FALSE(met.relative_half_width.has_value());
   const StopCheck not_met =
-      check_stop_rule(rule, ExceedanceCount{.num_runs = 128, .num_exceedances = 20});
+      check_stop_rule(rule, ExceedanceCount{.num_runs = 128, .num_exceedances = 20}, {});
   EXPECT_TRUE(not_met.is_reached);
   EXPECT_EQ(not_met.estimate, 20.0 / 128.0);
 }

@@ -1,0 +1,86 @@
+#include "core/statistics/independence.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "core/statistics/detail/check.hpp"
+#include "core/statistics/distribution.hpp"
+#include "core/statistics/order.hpp"
+
+namespace proofmass {
+namespace {
+
+constexpr std::size_t num_values_min = 20;
+constexpr std::size_t num_lags = 5;
+/// Values of so many on average at one level are levels, and not rounded numbers.
+constexpr std::size_t num_at_level_min = 5;
+
+/// The correlation of independent values is normal with the variance 1/n.
+double serial_p_value(std::span<const double> values) {
+  std::vector<double> ranks = average_ranks(values);
+  const auto n = static_cast<double>(ranks.size());
+  double squares = 0.0;
+  for (double& rank : ranks) {
+    rank -= 0.5 * (n + 1.0);
+    squares += rank * rank;
+  }
+  if (squares <= 0.0) return 1.0;
+  double least = 1.0;
+  for (std::size_t lag = 1; lag <= num_lags; ++lag) {
+    double products = 0.0;
+    for (std::size_t i = lag; i < ranks.size(); ++i) products += ranks[i] * ranks[i - lag];
+    least = std::min(least, 2.0 * normal_cumulative(-std::abs(products) * std::sqrt(n) / squares));
+  }
+  return std::min(1.0, least * static_cast<double>(num_lags));
+}
+
+/// Of levels that each have as many values as the others: Pearson's χ², which is too small there,
+/// by the cube root of Wilson and Hilferty.
+double level_p_value(std::span<const double> ascending, std::size_t num_levels) {
+  const auto expected = static_cast<double>(ascending.size()) / static_cast<double>(num_levels);
+  double chi_square = 0.0;
+  for (auto begin = ascending.begin(); begin != ascending.end();) {
+    const auto end = std::upper_bound(begin, ascending.end(), *begin);
+    const double excess = static_cast<double>(end - begin) - expected;
+    chi_square += excess * excess / expected;
+    begin = end;
+  }
+  const double freedom = static_cast<double>(num_levels) - 1.0;
+  const double spread = 2.0 / (9.0 * freedom);
+  return normal_cumulative((std::cbrt(chi_square / freedom) - 1.0 + spread) / std::sqrt(spread));
+}
+
+/// Two neighbouring gaps a and b of ordered independent values are exponential with nearly the
+/// same mean, so that |a − b|/(a + b) is uniform, whatever the law.
+double gap_p_value(std::span<const double> ascending) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (std::size_t i = 2; i < ascending.size(); i += 2) {
+    const double first = ascending[i - 1] - ascending[i - 2];
+    const double second = ascending[i] - ascending[i - 1];
+    sum += first + second > 0.0 ? std::abs(first - second) / (first + second) : 1.0;
+    count += 1.0;
+  }
+  return normal_cumulative((sum / count - 0.5) * std::sqrt(12.0 * count));
+}
+
+double regular_p_value(std::span<const double> values) {
+  std::vector<double> ascending(values.begin(), values.end());
+  std::ranges::sort(ascending);
+  std::vector<double> levels = ascending;
+  levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
+  if (levels.size() * num_at_level_min > values.size()) return gap_p_value(ascending);
+  return levels.size() < 2 ? 1.0 : level_p_value(ascending, levels.size());
+}
+
+}  // namespace
+
+IndependencePValues independence_p_values(std::span<const double> values) {
+  detail::check_values("values", values, 0);
+  if (values.size() < num_values_min) return {};
+  return {.serial = serial_p_value(values), .regular = regular_p_value(values)};
+}
+
+}  // namespace proofmass
