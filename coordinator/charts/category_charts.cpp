@@ -12,7 +12,7 @@
 namespace proofmass::coordinator {
 namespace {
 
-constexpr double bar_height = 13.0;
+constexpr double bar_height = 15.0;
 constexpr double group_gap = 9.0;
 
 /// How a series differs from the others beside its colour: filled, pale, empty.
@@ -47,9 +47,9 @@ AxisRange range_of_values(const BarChart& chart) {
   return range_of(chart.x, from, to, 5);
 }
 
-double widest(std::span<const std::string> labels, double size) {
+double widest(std::span<const std::string> labels) {
   double width = 0.0;
-  for (const std::string& label : labels) width = std::max(width, text_width(label, size));
+  for (const std::string& label : labels) width = std::max(width, text_width(label));
   return width;
 }
 
@@ -75,7 +75,7 @@ void draw_group(const BarChart& chart, std::size_t category, double top, const A
     const std::string colour = writer.colour(series.ink);
     writer.outlined_rectangle({x.begin, bar_top + 1.0, end - x.begin, bar_height - 2.0}, colour,
                               opacity_of_series(i), {.colour = colour, .width = 1.0});
-    writer.text({end + 5.0, bar_top + bar_height - 2.0}, figure_text(*value), {.size = 12.0});
+    writer.text({end + 5.0, bar_top + bar_height - 2.0}, figure_text(*value));
   }
 }
 
@@ -98,7 +98,7 @@ void draw_cells(const HeatMap& map, Point corner, SvgWriter& writer) {
                               {.colour = writer.colour("--chart-grid"), .width = 1.0});
     if (cell.label.empty()) continue;
     writer.text({box.left + cell_width / 2.0, box.bottom() - 7.0}, cell.label,
-                {.size = 12.0, .anchor = Anchor::middle});
+                {.anchor = Anchor::middle});
   }
 }
 
@@ -117,7 +117,7 @@ std::vector<std::string> column_labels(const HeatMap& map) {
 double draw_chart(const BarChart& chart, Point corner, double width, SvgWriter& writer) {
   constexpr double value_margin = 84.0;
   const std::vector<std::string> labels = shortened_labels(chart.categories, 26);
-  const double left = widest(labels, label_size) + 10.0;
+  const double left = widest(labels) + 10.0;
   double height = draw_title(chart.text.title, corner, width, writer);
   height += draw_legend(legend_of_series(chart), {corner.x, corner.y + height}, width, writer);
   const double group_height = bar_height * static_cast<double>(chart.series.size()) + group_gap;
@@ -131,7 +131,7 @@ double draw_chart(const BarChart& chart, Point corner, double width, SvgWriter& 
   for (std::size_t i = 0; i < labels.size(); ++i) {
     const double top = box.top + group_height * static_cast<double>(i) + group_gap / 2.0;
     writer.text({box.left - 6.0, top + (group_height - group_gap) / 2.0 + 4.5}, labels[i],
-                {.size = label_size, .anchor = Anchor::end});
+                {.anchor = Anchor::end});
     draw_group(chart, i, top, x, writer);
   }
   writer.line({box.left, box.top}, {box.left, box.bottom()}, {.colour = writer.colour(Ink::text)});
@@ -139,24 +139,23 @@ double draw_chart(const BarChart& chart, Point corner, double width, SvgWriter& 
 }
 
 double width_of(const HeatMap& map) {
-  return widest(row_labels(map), 12.0) + 8.0 +
-         cell_width * static_cast<double>(map.columns.size()) +
-         turned_width * widest(column_labels(map), 12.0);
+  return widest(row_labels(map)) + 8.0 + cell_width * static_cast<double>(map.columns.size()) +
+         turned_width * widest(column_labels(map));
 }
 
 double draw_chart(const HeatMap& map, Point corner, double width, SvgWriter& writer) {
   const std::vector<std::string> rows = row_labels(map);
   const std::vector<std::string> columns = column_labels(map);
-  const double head = turned_height * widest(columns, 12.0) + 14.0;
-  const Point place{corner.x + widest(rows, 12.0) + 8.0,
+  const double head = turned_height * widest(columns) + 14.0;
+  const Point place{corner.x + widest(rows) + 8.0,
                     corner.y + draw_title(map.text.title, corner, width, writer) + head};
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const double x = place.x + cell_width * (static_cast<double>(i) + 0.5);
-    writer.text({x, place.y - 7.0}, columns[i], {.size = 12.0, .rotation = turned_degrees});
+    writer.text({x, place.y - 7.0}, columns[i], {.rotation = turned_degrees});
   }
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double y = place.y + cell_height * (static_cast<double>(i) + 1.0) - 7.0;
-    writer.text({place.x - 6.0, y}, rows[i], {.size = 12.0, .anchor = Anchor::end});
+    writer.text({place.x - 6.0, y}, rows[i], {.anchor = Anchor::end});
   }
   draw_cells(map, place, writer);
   return place.y + cell_height * static_cast<double>(rows.size()) + 4.0 - corner.y;

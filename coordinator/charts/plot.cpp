@@ -109,20 +109,20 @@ std::vector<const LimitLine*> vertical_limits(const Chart& chart, const AxisMap&
   return limits;
 }
 
-constexpr double limit_row_height = 16.0;
+constexpr double limit_row_height = 18.0;
 
 /// Labels of vertical lines stand one below the other above the box, each with a line down to it.
 void draw_limit_labels(std::span<const LimitLine* const> limits, const AxisMap& x, const Box& box,
                        SvgWriter& writer) {
   double row = static_cast<double>(limits.size());
   for (const LimitLine* limit : limits) {
-    const double baseline = box.top - limit_row_height * row + 11.0;
+    const double baseline = box.top - limit_row_height * row + 9.0;
     const double at = x.at(limit->value);
     const bool is_left = at < box.left + 0.5 * box.width;
     writer.line({at, baseline - 10.0}, {at, box.top},
                 {.colour = writer.colour(limit->ink), .width = 2.0, .dash = limit->dash});
     writer.text({at + (is_left ? 5.0 : -5.0), baseline}, limit->label,
-                {.size = label_size, .anchor = is_left ? Anchor::start : Anchor::end});
+                {.anchor = is_left ? Anchor::start : Anchor::end});
     row -= 1.0;
   }
 }
@@ -133,7 +133,7 @@ std::size_t num_ticks_for(double length, double least) {
 
 double label_margin(const AxisRange& range) {
   double width = 20.0;
-  for (const Tick& tick : range.ticks) width = std::max(width, text_width(tick.label, label_size));
+  for (const Tick& tick : range.ticks) width = std::max(width, text_width(tick.label));
   return width + 10.0;
 }
 
@@ -157,7 +157,7 @@ double draw_head(const Chart& chart, Point corner, double width, SvgWriter& writ
   double height = draw_title(chart.text.title, corner, width, writer);
   height += draw_legend(legend_of(chart), {corner.x, corner.y + height}, width, writer);
   if (chart.y.label.empty()) return height + 8.0;
-  writer.text({corner.x, corner.y + height + 13.0}, chart.y.label, {.size = label_size});
+  writer.text({corner.x, corner.y + height + 13.0}, chart.y.label);
   return height + 24.0;
 }
 
@@ -188,7 +188,7 @@ double draw_chart(const Chart& chart, Point corner, double width, SvgWriter& wri
   draw_limit_labels(limits, area.x, area.box, writer);
   if (!extents.has_data) {
     writer.text({area.box.left + area.box.width / 2.0, area.box.top + area.box.height / 2.0},
-                "no data", {.size = label_size, .anchor = Anchor::middle});
+                "no data", {.anchor = Anchor::middle});
   }
   return area.box.bottom() + x_axis_height - corner.y;
 }

@@ -62,8 +62,6 @@ void draw_x_axis(const AxisMap& x, const Axis& axis, const Box& box, SvgWriter& 
 /// The same on its left; the label is not drawn.
 void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer);
 
-inline constexpr double title_size = 15.0;
-inline constexpr double label_size = 13.0;
 inline constexpr double x_axis_height = 42.0;  ///< Of the ticks and label below a plot.
 
 /// The axis between two ends of the data; a range of its own if there is none.

@@ -53,7 +53,7 @@ void draw(const Markers& markers, const PlotArea& area, SvgWriter& writer) {
     if (i >= markers.labels.size()) continue;
     const bool is_left = centre.x < area.box.left + 0.6 * area.box.width;
     writer.text({centre.x + (is_left ? 8.0 : -8.0), centre.y - 4.0}, markers.labels[i],
-                {.size = label_size, .anchor = is_left ? Anchor::start : Anchor::end});
+                {.anchor = is_left ? Anchor::start : Anchor::end});
   }
 }
 
@@ -83,9 +83,8 @@ void draw(const LimitLine& limit, const PlotArea& area, SvgWriter& writer) {
   if (!area.y.contains(limit.value)) return;
   const double y = area.y.at(limit.value);
   writer.line({area.box.left, y}, {area.box.right(), y}, stroke);
-  const double above = y - 5.0 > area.box.top + label_size ? y - 5.0 : y + label_size + 2.0;
-  writer.text({area.box.right() - 2.0, above}, limit.label,
-              {.size = label_size, .anchor = Anchor::end});
+  const double above = y - 5.0 > area.box.top + text_size ? y - 5.0 : y + text_size + 2.0;
+  writer.text({area.box.right() - 2.0, above}, limit.label, {.anchor = Anchor::end});
 }
 
 }  // namespace

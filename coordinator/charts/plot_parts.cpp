@@ -14,9 +14,9 @@ namespace {
 constexpr double line_height = 19.0;
 
 /// Lines of whole words, as far as words fit; at most three.
-std::vector<std::string> wrapped_lines(std::string_view text, double size, double width) {
+std::vector<std::string> wrapped_lines(std::string_view text, double width) {
   constexpr std::size_t num_lines_max = 3;
-  const auto num_columns = static_cast<std::size_t>(std::max(width / text_width("m", size), 8.0));
+  const auto num_columns = static_cast<std::size_t>(std::max(width / text_width("m"), 8.0));
   std::vector<std::string> lines{""};
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(' ', begin), text.size());
@@ -89,9 +89,9 @@ bool AxisMap::has(double value) const {
 
 double draw_title(std::string_view title, Point corner, double width, SvgWriter& writer) {
   double height = 0.0;
-  for (const std::string& line : wrapped_lines(title, title_size, width)) {
+  for (const std::string& line : wrapped_lines(title, width)) {
     height += line_height;
-    writer.text({corner.x, corner.y + height - 4.0}, line, {.size = title_size, .is_bold = true});
+    writer.text({corner.x, corner.y + height - 4.0}, line, {.is_bold = true});
   }
   return height + 3.0;
 }
@@ -101,12 +101,12 @@ double draw_legend(std::span<const LegendEntry> entries, Point corner, double wi
   if (entries.empty()) return 0.0;
   Point place{corner.x, corner.y + 14.0};
   for (const LegendEntry& entry : entries) {
-    const double needed = sample_width + 1.06 * text_width(entry.name, label_size) + 14.0;
+    const double needed = sample_width + 1.06 * text_width(entry.name) + 14.0;
     if (place.x > corner.x && place.x + needed > corner.x + width) {
       place = {corner.x, place.y + line_height};
     }
     draw_sample(entry, place, writer);
-    writer.text({place.x + sample_width, place.y}, entry.name, {.size = label_size});
+    writer.text({place.x + sample_width, place.y}, entry.name);
     place.x += needed;
   }
   return place.y - corner.y + 8.0;
@@ -126,23 +126,21 @@ void draw_x_axis(const AxisMap& x, const Axis& axis, const Box& box, SvgWriter& 
   for (const Tick& tick : x.range.ticks) {
     const double at = x.at(tick.value);
     writer.line({at, box.top}, {at, box.bottom()}, {.colour = writer.colour("--chart-grid")});
-    const double half = text_width(tick.label, label_size) / 2.0;
+    const double half = text_width(tick.label) / 2.0;
     if (!space.take(at - half, at + half + 3.0)) continue;
-    writer.text({at, box.bottom() + 16.0}, tick.label,
-                {.size = label_size, .anchor = Anchor::middle});
+    writer.text({at, box.bottom() + 16.0}, tick.label, {.anchor = Anchor::middle});
   }
   writer.line({box.left, box.bottom()}, {box.right(), box.bottom()},
               {.colour = writer.colour(Ink::text)});
   writer.text({box.left + box.width / 2.0, box.bottom() + 34.0}, axis.label,
-              {.size = label_size, .anchor = Anchor::middle});
+              {.anchor = Anchor::middle});
 }
 
 void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer) {
   for (const Tick& tick : y.range.ticks) {
     const double at = y.at(tick.value);
     writer.line({box.left, at}, {box.right(), at}, {.colour = writer.colour("--chart-grid")});
-    writer.text({box.left - 6.0, at + 4.5}, tick.label,
-                {.size = label_size, .anchor = Anchor::end});
+    writer.text({box.left - 6.0, at + 4.5}, tick.label, {.anchor = Anchor::end});
   }
   writer.line({box.left, box.top}, {box.left, box.bottom()}, {.colour = writer.colour(Ink::text)});
 }

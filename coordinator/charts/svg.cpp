@@ -17,6 +17,7 @@ namespace {
 constexpr double margin = 6.0;
 constexpr double picture_width = 480.0;
 constexpr double timeline_width = 900.0;
+constexpr double embedded_scale = 440.0 / picture_width;
 
 double width_of_picture(const Picture& picture) {
   if (std::holds_alternative<Timeline>(picture)) return timeline_width;
@@ -39,16 +40,17 @@ void check_ids(const Picture& picture) {
 std::string opening(const ChartText& text, SvgUse use, double width, double height) {
   const std::string size =
       use == SvgUse::embedded
-          ? "width=\"100%\""
+          ? fmt::format("width=\"{}\"", coordinate(embedded_scale * width))
           : fmt::format("xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\"",
                         coordinate(width), coordinate(height));
   const std::string_view fill = use == SvgUse::plain ? "#1d2228" : "var(--chart-text,#1d2228)";
   return fmt::format(
       "<svg {} viewBox=\"0 0 {} {}\" role=\"img\" aria-labelledby=\"{}-title {}-description\" "
-      "font-family=\"system-ui,'Noto Sans','DejaVu Sans',sans-serif\" fill=\"{}\">\n"
+      "font-family=\"system-ui,'Noto Sans','DejaVu Sans',sans-serif\" font-size=\"{}\" "
+      "fill=\"{}\">\n"
       "<title id=\"{}-title\">{}</title>\n<desc id=\"{}-description\">{}</desc>\n",
-      size, coordinate(width), coordinate(height), text.id, text.id, fill, text.id,
-      wire::markup_text(text.title), text.id, wire::markup_text(text.description));
+      size, coordinate(width), coordinate(height), text.id, text.id, coordinate(text_size), fill,
+      text.id, wire::markup_text(text.title), text.id, wire::markup_text(text.description));
 }
 
 }  // namespace

@@ -19,9 +19,9 @@ enum class SvgUse : std::uint8_t {
   plain,
 };
 
-/// The picture as SVG, the same bytes for the same picture. It takes the width that it is given and
-/// has its own proportions; texts of a picture 480 wide are readable at 360 pixels. For screen
-/// readers it is one image with title and description.
+/// The picture as SVG, the same bytes for the same picture. All texts of all pictures have one
+/// size. In a page, a picture 480 wide takes 440 pixels; texts are still readable at 360. For
+/// screen readers it is one image with title and description.
 ///
 /// Data that are not finite, or not above 0 on a logarithmic axis, are left out. Without data the
 /// axes are drawn with `no data` between them.

@@ -74,9 +74,9 @@ std::string coordinate(double value) {
   return text == "-0" ? "0" : text;
 }
 
-double text_width(std::string_view text, double size) {
+double text_width(std::string_view text) {
   constexpr double width_of_letter = 0.58;
-  return width_of_letter * size * static_cast<double>(wire::display_width(text));
+  return width_of_letter * text_size * static_cast<double>(wire::display_width(text));
 }
 
 std::string SvgWriter::colour(std::string_view property) const {
@@ -97,9 +97,8 @@ void SvgWriter::text(Point place, std::string_view text, const TextStyle& style)
           : fmt::format(" transform=\"rotate({} {} {})\"", coordinate(style.rotation),
                         coordinate(place.x), coordinate(place.y));
   markup_ +=
-      fmt::format("<text x=\"{}\" y=\"{}\" font-size=\"{}\"{}{}{}>{}</text>\n", coordinate(place.x),
-                  coordinate(place.y), coordinate(style.size),
-                  anchors.at(static_cast<std::size_t>(style.anchor)),
+      fmt::format("<text x=\"{}\" y=\"{}\"{}{}{}>{}</text>\n", coordinate(place.x),
+                  coordinate(place.y), anchors.at(static_cast<std::size_t>(style.anchor)),
                   style.is_bold ? " font-weight=\"600\"" : "", rotation, wire::markup_text(text));
 }
 

@@ -14,14 +14,16 @@ namespace proofmass::coordinator {
 enum class Anchor : std::uint8_t { start, middle, end };
 
 struct TextStyle {
-  double size = 14.0;
   Anchor anchor = Anchor::start;
   bool is_bold = false;
   double rotation = 0.0;  ///< Degrees, clockwise, about the place of the text.
 };
 
+/// The height of all texts.
+inline constexpr double text_size = 13.0;
+
 /// Width of a text by the mean width of letters, about 5 % too large for most.
-[[nodiscard]] double text_width(std::string_view text, double size);
+[[nodiscard]] double text_width(std::string_view text);
 
 struct Box {
   double left = 0.0;
@@ -50,7 +52,7 @@ class SvgWriter {
   [[nodiscard]] std::string colour(Ink ink) const;
 
   /// @param place  Of the start, middle or end of the text's baseline.
-  void text(Point place, std::string_view text, const TextStyle& style);
+  void text(Point place, std::string_view text, const TextStyle& style = {});
   void rectangle(const Box& box, std::string_view fill, double opacity = 1.0);
   void outlined_rectangle(const Box& box, std::string_view fill, double opacity,
                           const Stroke& stroke);

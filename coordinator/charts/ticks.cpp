@@ -132,11 +132,19 @@ void add_ticks(AxisRange& range, int decade, std::span<const double> of_decade) 
 
 std::string figure_text(double value) {
   if (value == 0.0) return "0";
+  if (!std::isfinite(value)) return fmt::format("{}", value);
   const std::string scientific = fmt::format("{:.2e}", value);
   const int exponent = std::stoi(scientific.substr(scientific.find('e') + 1));
   if (exponent < -3 || exponent > 4) return from_scientific(scientific);
   // Rounded to three digits first, and then written without an exponent.
   return with_minus(fmt::format("{:.10g}", std::stod(scientific)));
+}
+
+std::string unit_text(std::string_view unit) {
+  if (!unit.starts_with("1e")) return std::string(unit);
+  const std::size_t end = std::min(unit.find(' '), unit.size());
+  return "10" + superscript(std::stoi(std::string(unit.substr(2, end - 2)))) +
+         std::string(unit.substr(end));
 }
 
 AxisRange linear_range(const Axis& axis, double from, double to, std::size_t num_ticks_max) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "coordinator/charts/chart.hpp"
@@ -10,8 +11,10 @@ namespace proofmass::coordinator {
 
 /// A number as people write it: at most three significant digits, U+2212 as its minus sign, and
 /// powers of ten in superscripts outside of 0.001 to 99,999: `−0.25`, `1240`, `2.5×10⁻⁹`, `10⁶`.
-/// @param value  Finite.
 [[nodiscard]] std::string figure_text(double value);
+
+/// A unit in the same spelling: `10⁻⁴ rad` for `1e-4 rad`.
+[[nodiscard]] std::string unit_text(std::string_view unit);
 
 /// A place on an axis that has a line and a label.
 struct Tick {

@@ -51,8 +51,8 @@ double draw_chart(const Timeline& timeline, Point corner, double width, SvgWrite
   for (std::size_t i = 0; i < timeline.lanes.size(); ++i) {
     const TimelineLane& lane = timeline.lanes[i];
     const double top = box.top + lane_height * static_cast<double>(i);
-    writer.text({corner.x, top + lane_height - 4.0}, wire::shortened(lane.label, label_columns_max),
-                {.size = 12.0});
+    writer.text({corner.x, top + lane_height - 4.0},
+                wire::shortened(lane.label, label_columns_max));
     draw_bars(lane, x, top, writer);
     draw_marks(lane, x, top, writer);
   }

@@ -7,6 +7,7 @@
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/program.hpp"
+#include "coordinator/cli/standard_output.hpp"
 #include "core/error.hpp"
 #include "proto/link/whole_file.hpp"
 
@@ -39,8 +40,21 @@ void write_output_file(const std::filesystem::path& output, IfThere if_there,
       if_there == IfThere::replace ? wire::IfExists::replace : wire::IfExists::refuse);
 }
 
+void check_document(const std::filesystem::path& file, IfThere if_there) {
+  if (file.empty() || file == "-") return;
+  check_output_file(file, if_there, "- writes to standard output");
+}
+
+void write_document(const std::filesystem::path& file, IfThere if_there, std::string_view text) {
+  if (file == "-") return write_standard_output(text);
+  write_output_file(file, if_there, text);
+}
+
 void check_new_file(std::string_view argument, const std::filesystem::path& file) {
   std::error_code error;
+  if (file == "-") {
+    throw UsageError(fmt::format("{} = - (must be a file; ./- is one of that name)", argument));
+  }
   if (std::filesystem::exists(file, error)) {
     throw UsageError(fmt::format("{} = {} (exists already)", argument, file.string()));
   }

@@ -22,6 +22,10 @@ void check_output_file(const std::filesystem::path& output, IfThere if_there,
 void write_output_file(const std::filesystem::path& output, IfThere if_there,
                        std::string_view text);
 
+/// Both for a text whose file may be `-`, standard output.
+void check_document(const std::filesystem::path& file, IfThere if_there);
+void write_document(const std::filesystem::path& file, IfThere if_there, std::string_view text);
+
 /// Checks that a file can be made which replaces nothing.
 /// @param argument  What names the file, for the message.
 /// @throws UsageError `argument = path (exists already)`, or Error if the directory that is to hold

@@ -186,10 +186,13 @@ int colour_of(Tone tone) {
   return 0;
 }
 
-bool takes_paint(std::FILE* stream) {
+bool takes_escapes(std::FILE* stream) {
   const std::string_view terminal = value_of_variable("TERM");
-  return isatty(fileno(stream)) != 0 && value_of_variable("NO_COLOR").empty() &&
-         !terminal.empty() && terminal != "dumb";
+  return isatty(fileno(stream)) != 0 && !terminal.empty() && terminal != "dumb";
+}
+
+bool takes_paint(std::FILE* stream) {
+  return takes_escapes(stream) && value_of_variable("NO_COLOR").empty();
 }
 
 std::string painted(std::string_view text) {

@@ -21,8 +21,11 @@ enum class Tone : std::uint8_t {
 /// and on white.
 [[nodiscard]] int colour_of(Tone tone);
 
-/// True if what is written to the stream may be painted: it is a terminal, NO_COLOR is not set or
-/// empty (https://no-color.org), and TERM is neither unset nor `dumb`.
+/// True if the stream is a terminal that obeys control sequences: TERM is neither unset nor `dumb`.
+[[nodiscard]] bool takes_escapes(std::FILE* stream);
+
+/// True if what is written to the stream may be painted, too: NO_COLOR is not set or empty
+/// (https://no-color.org).
 [[nodiscard]] bool takes_paint(std::FILE* stream);
 
 /// Tables and notes of any command with their verdicts, counts beyond an objective, failures and

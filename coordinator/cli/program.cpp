@@ -8,6 +8,8 @@
 #include <iostream>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/commands/commands.hpp"
@@ -71,13 +73,19 @@ int run_proofmass(int argc, char** argv) {
   app.require_subcommand(1);
   wire::add_option_file(app, "TOML file with options, a section a command", "PROOFMASS_CONFIG");
   Command chosen;
-  for (const auto add : {add_run, add_sweep, add_init, add_check, add_keygen}) add(app, chosen);
-  for (const auto add :
-       {add_report,  add_sensitivity, add_plot,   add_query,   add_verify,  add_export,
-        add_replay,  add_backup,      add_merge,  add_compare, add_list,    add_tag,
-        add_note,    add_submit,      add_status, add_watch,   add_control, add_workers,
-        add_release, add_factory,     add_fetch}) {
-    add(app, chosen);
+  // As `--help` lists them: the usual ones first.
+  const std::vector<std::pair<const char*, std::vector<std::function<void(CLI::App&, Command&)>>>>
+      groups{
+          {"Run a campaign", {add_run, add_init, add_check, add_sweep}},
+          {"Look at its results", {add_report, add_plot, add_list}},
+          {"Ask further questions", {add_query, add_sensitivity, add_replay, add_compare}},
+          {"Serve campaigns to other machines",
+           {add_keygen, add_submit, add_status, add_watch, add_fetch, add_control, add_workers,
+            add_release, add_factory}},
+          {"Keep databases", {add_verify, add_backup, add_export, add_merge, add_tag, add_note}}};
+  for (const auto& [title, commands] : groups) {
+    app.group(title);  // A command begins with the group of its program.
+    for (const auto& add : commands) add(app, chosen);
   }
   app.footer(exit_codes_text({exit_not_met, exit_interrupted}));
   wire::add_manual_option(app, {"proofmass-coordinator", "proofmass-worker"});

@@ -1,7 +1,6 @@
 #include "coordinator/cli/progress_display.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -75,7 +74,7 @@ std::string progress_line(const wire::CampaignStatus& status) {
 }
 
 DisplayMode display_mode_for(std::FILE* stream) {
-  return isatty(fileno(stream)) != 0 ? DisplayMode::bar : DisplayMode::lines;
+  return takes_escapes(stream) ? DisplayMode::bar : DisplayMode::lines;
 }
 
 ProgressDisplay::ProgressDisplay(DisplayMode mode, std::FILE* stream)

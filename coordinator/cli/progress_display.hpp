@@ -62,7 +62,7 @@ class ProgressDisplay {
   bool is_failure_shown_ = false;
 };
 
-/// `bar` if the stream is a terminal, `lines` otherwise.
+/// `bar` if the stream takes_escapes(), `lines` otherwise.
 [[nodiscard]] DisplayMode display_mode_for(std::FILE* stream);
 
 }  // namespace proofmass::coordinator

@@ -64,7 +64,7 @@ input, select, button { font: inherit; color: inherit; background: var(--ground)
   border: 1px solid var(--faint); border-radius: 4px; padding: 0.25rem 0.5rem; max-width: 100%; }
 .pages a, .pages span { display: inline-block; padding: 0.25rem 0.5rem; }
 .pages .off { color: var(--faint); }
-.attempts svg { display: block; height: auto; min-width: 56rem; max-width: 75rem; }
+.attempts svg { display: block; height: auto; width: 100%; min-width: 56rem; max-width: 75rem; }
 @media (max-width: 34rem) {
   main { padding: 0.3rem 0.6rem 2rem; }
   th, td { padding: 0.25rem 0.45rem; }

@@ -1,10 +1,14 @@
 #include "coordinator/report/causes.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "coordinator/report/sensitivity.hpp"
+#include "core/model.hpp"
 #include "core/statistics/correlation.hpp"
 #include "core/statistics/interval.hpp"
 #include "core/statistics/sensitivity.hpp"
@@ -86,8 +90,13 @@ void add_correlated(const DrawnRuns& drawn, std::size_t quantity,
 }  // namespace
 
 std::optional<Causes> find_causes(const Store& store, const Campaign& campaign) {
-  const DrawnRuns drawn = read_drawn_runs(store, campaign, cause_runs_max);
+  DrawnRuns drawn = read_drawn_runs(store, campaign, cause_runs_max);
   if (drawn.runs.size() < sensitivity_values_min) return std::nullopt;
+  const std::vector<Quantity>& quantities = model().results().quantities;
+  for (std::size_t i = 0; i < quantities.size(); ++i) {  // The last columns are the truths.
+    drawn.names.end()[static_cast<std::ptrdiff_t>(i) - std::ssize(quantities)] =
+        fmt::format("true {}", quantities[i].symbol);
+  }
   Causes causes{.num_runs = drawn.runs.size(),
                 .num_with_estimate = drawn.num_with_estimate,
                 .terms = {},

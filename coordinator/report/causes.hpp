@@ -14,9 +14,9 @@ namespace proofmass::coordinator {
 /// A part of the sum that explains the error of a quantity, see explanatory_terms().
 struct CauseTerm {
   std::size_t quantity = 0;
-  std::string name;    ///< A drawn quantity, a true parameter, or a product: `truth_a × truth_b`.
-  double slope = 0.0;  ///< SI.
-  double share = 0.0;  ///< Of the error's variance, beyond the terms before it.
+  std::string name;      ///< A drawn quantity, a true parameter, or a product: `true a × true b`.
+  double slope = 0.0;    ///< SI.
+  double share = 0.0;    ///< Of the error's variance, beyond the terms before it.
   double p_value = 1.0;  ///< That chance alone explains as much.
 };
 

@@ -5,7 +5,7 @@
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/review_charts.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/report/review_tables.hpp"
 #include "core/model.hpp"
 
 namespace proofmass::coordinator {
@@ -15,7 +15,7 @@ const Quantity& quantity_at(std::size_t index) { return model().results().quanti
 
 /// `|error| of offset, nm`; of a pure number without a unit.
 std::string axis_label(std::string_view what, const Quantity& quantity) {
-  const std::string_view unit = quantity.display_unit == "1" ? "" : quantity.display_unit;
+  const std::string unit = quantity.display_unit == "1" ? "" : unit_text(quantity.display_unit);
   return unit.empty() ? std::string(what) : fmt::format("{}, {}", what, unit);
 }
 
@@ -35,9 +35,9 @@ std::string objective_sentence(const Review& review, std::size_t index) {
   const std::uint64_t beyond = review.results.statistics.num_estimated == 0
                                    ? 0
                                    : review.results.statistics.accuracy[index].num_beyond_objective;
-  return fmt::format("{} {} the objective of {} {}.", beyond,
+  return fmt::format("{} {} the objective of {}.", beyond,
                      beyond == 1 ? "run exceeds" : "runs exceed",
-                     figure_text(objective / quantity.display_scale), quantity.display_unit);
+                     quantity_text(objective, quantity));
 }
 
 std::string worst_sentence(const Review& review, std::size_t index) {
@@ -115,9 +115,8 @@ std::string convergence_sentence(const Review& review, std::size_t index) {
                         figure_text(std::max(last.mean_interval->lower, 0.0) / scale),
                         figure_text(last.mean_interval->upper / scale));
   }
-  return text + fmt::format(", and the standard deviation {} {}.",
-                            figure_text(last.standard_deviation / scale),
-                            quantity_at(index).display_unit);
+  return text + fmt::format(", and the standard deviation {}.",
+                            quantity_text(last.standard_deviation, quantity_at(index)));
 }
 
 /// Half the width of an interval over the value in its middle, percent.
@@ -163,13 +162,13 @@ Chart error_chart(const Review& review, std::size_t index) {
   add_interval(error.bias_interval, error.bias, scale,
                fmt::format("bias {} with 95 % interval", figure_text(error.bias / scale)), chart);
   chart.text.description = fmt::format(
-      "Histogram of the errors with their signs. The bias is {}{}, the standard deviation {} {}.",
+      "Histogram of the errors with their signs. The bias is {}{}, the standard deviation {}.",
       figure_text(error.bias / scale),
       error.bias_interval
           ? fmt::format(" (95 %: {} to {})", figure_text(error.bias_interval->lower / scale),
                         figure_text(error.bias_interval->upper / scale))
           : "",
-      figure_text(error.standard_deviation / scale), quantity.display_unit);
+      quantity_text(error.standard_deviation, quantity));
   return chart;
 }
 

@@ -74,7 +74,6 @@ HtmlCell cell_of(const ReviewCell& cell, bool is_first) {
   HtmlCell html(text);
   html.is_text = is_first || cell.kind != ReviewCell::Kind::figure;
   html.value = cell.value;
-  if (cell.kind == ReviewCell::Kind::command) html.markup = "<code>" + text + "</code>";
   if (cell.kind == ReviewCell::Kind::verdict) {
     const std::string_view kind = cell.text == "met"       ? "met"
                                   : cell.text == "not met" ? "unmet"
@@ -135,14 +134,14 @@ td{white-space:nowrap}
 td.words{white-space:normal}
 tbody th{font-weight:600;position:sticky;left:0;background:var(--chart-ground)}
 .met{color:var(--met)}.unmet{color:var(--unmet)}.open{color:var(--open)}
+td strong{white-space:nowrap}
 .note{font-size:.9rem;margin:.3rem 0;max-width:48rem}
 code{font-family:ui-monospace,monospace;font-size:.9em}
-figure{margin:.5rem 0;min-width:0}
-figure svg{display:block;height:auto}
-.charts{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(22rem,100%),1fr));gap:1rem}
-.wide svg{min-width:40rem;max-width:64rem}
-.overview svg{max-width:44rem}
-.single svg{max-width:36rem}
+figure{margin:.5rem 0;max-width:100%}
+figure svg{display:block;height:auto;max-width:100%}
+.scroll figure,.scroll svg{max-width:none}
+.flow{display:flex;flex-wrap:wrap;align-items:flex-start;gap:.5rem 1rem}
+.flow>div{max-width:100%}
 )";
 }
 

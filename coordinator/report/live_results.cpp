@@ -47,8 +47,8 @@ std::string LiveResults::html() const {
     review.figures.push_back(std::move(figures));
   }
   return "<h3>Accuracy so far</h3>\n" + html_table(review_accuracy_table(review)) +
-         "<h3>Errors so far</h3>\n<div class=\"overview\">\n" + "<figure>\n" +
-         svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n</div>\n";
+         "<h3>Errors so far</h3>\n<figure>\n" +
+         svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n";
 }
 
 }  // namespace proofmass::coordinator

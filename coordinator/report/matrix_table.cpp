@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/review_tables.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "core/model.hpp"
 #include "core/model_rules.hpp"
 
 namespace proofmass::coordinator {
@@ -24,63 +25,62 @@ ReviewCell count_cell(std::uint64_t count) {
   return {.text = std::to_string(count), .value = static_cast<double>(count)};
 }
 
-ReviewCell percent_cell(double fraction) {
-  return {.text = given_percent(fraction), .value = fraction};
+Quantity quantity_of(const MatrixRow& row) {
+  return requirement_subject(row.answer.requirement.parameter);
+}
+
+/// `|error| of a_c12`, or the budget or a term of it.
+std::string subject_of(const MatrixRow& row) {
+  if (is_joint_row(row)) return "all objectives";
+  const std::string symbol(quantity_of(row).symbol);
+  const bool is_error =
+      row.answer.requirement.parameter < model().results().quantities.size();
+  return is_error ? "|error| of " + symbol : symbol;
 }
 
 /// In the unit of the tables; a ratio to the objectives without one.
-ReviewCell value_cell(const MatrixRow& row, const std::optional<double>& value,
-                      std::string (*figure)(double)) {
+ReviewCell value_cell(const MatrixRow& row, const std::optional<double>& value) {
   if (!value) return words_cell("none");
-  if (is_joint_row(row)) return {.text = figure(*value) + " × objective", .value = *value};
-  const Quantity quantity = requirement_subject(row.answer.requirement.parameter);
-  const std::string text = figure(*value / quantity.display_scale);
-  if (quantity.display_unit == "1") return {.text = text, .value = *value};
-  // A unit such as 1e-4 rad begins with a number.
-  const bool is_multiple = quantity.display_unit.starts_with("1e");
-  return {.text = fmt::format("{} {}{}", text, is_multiple ? "× " : "", quantity.display_unit),
+  return {.text = is_joint_row(row) ? figure_text(*value) + " × objective"
+                                    : quantity_text(*value, quantity_of(row)),
           .value = *value};
 }
-
-std::string margin_figure(double value) { return signed_figure(100.0 * value) + " %"; }
 
 ReviewCell margin_cell(const MatrixRow& row) {
   const std::optional<double> margin = row.relative_margin();
   if (!margin) return words_cell("none");
-  return {.text = margin_figure(*margin), .value = *margin};
+  return {.text = figure_text(100.0 * *margin) + " %", .value = *margin};
 }
 
+/// `|error| of a_c12, for 95 % with 90 %`, after the words of the project.
 std::string statement_of(const MatrixRow& row) {
-  if (row.stated.text.empty()) return row.stated.requirement;
-  return fmt::format("{}: {}", row.stated.text, row.stated.requirement);
+  const Tolerance& tolerance = row.answer.requirement.tolerance;
+  const std::string text =
+      fmt::format("{}, for {} with {}", subject_of(row), given_percent(tolerance.coverage),
+                  given_percent(tolerance.confidence));
+  return row.stated.text.empty() || is_default(row) ? text
+                                                    : fmt::format("{} ({})", row.stated.text, text);
 }
 
-std::vector<ReviewCell> matrix_cells(const Review& review, const MatrixRow& row) {
+std::vector<ReviewCell> matrix_cells(const MatrixRow& row) {
   const RequirementCheck& check = row.answer.check;
-  const Tolerance& tolerance = row.answer.requirement.tolerance;
   std::vector<ReviewCell> cells{
-      words_cell(row.stated.id),
+      words_cell(requirement_name(row)),
       words_cell(statement_of(row)),
-      value_cell(row, row.limit, given_figure),
-      words_cell(name_of(review.interpretation)),
-      percent_cell(tolerance.coverage),
-      percent_cell(tolerance.confidence),
+      value_cell(row, row.limit),
       count_cell(check.num_runs),
       count_cell(check.num_without_estimate),
       count_cell(check.num_exceedances),
       count_cell(check.num_allowed),
-      value_cell(row, row.bound, measured_figure),
+      value_cell(row, row.bound),
       margin_cell(row),
       {.text = std::string(name_of(check.verdict)), .kind = Kind::verdict}};
   if (!row.worst) {
-    cells.insert(cells.end(), {words_cell("none"), words_cell("")});
+    cells.insert(cells.end(), {words_cell("none"), words_cell("none")});
     return cells;
   }
-  cells.push_back(value_cell(row, row.worst->value, measured_figure));
-  cells.push_back({.text = fmt::format("proofmass replay {} --run {}", shell_word(review.database),
-                                       row.worst->run.value),
-                   .value = static_cast<double>(row.worst->run.value),
-                   .kind = Kind::command});
+  cells.push_back(value_cell(row, row.worst->value));
+  cells.push_back(count_cell(row.worst->run.value));
   return cells;
 }
 
@@ -113,10 +113,7 @@ std::vector<std::string> matrix_notes(const Review& review) {
         "All objectives together: limit and bound are of the largest ratio of an |error| to its "
         "objective in a draw.");
   }
-  const bool has_default = std::ranges::any_of(review.matrix, [](const MatrixRow& row) {
-    return row.stated.text.starts_with("Objective of ") || row.stated.id == "all";
-  });
-  if (has_default) {
+  if (std::ranges::any_of(review.matrix, is_default)) {
     notes.push_back(fmt::format(
         "Rows made of the objectives of the campaign ask for {} of all draws with {} confidence, "
         "which is the default of the program and not a demand of a project.",
@@ -126,6 +123,16 @@ std::vector<std::string> matrix_notes(const Review& review) {
 }
 
 }  // namespace
+
+bool is_default(const MatrixRow& row) {
+  return row.stated.text.starts_with("Objective of ") ||
+         row.stated.text == joint_requirement().text;
+}
+
+std::string requirement_name(const MatrixRow& row) {
+  return is_default(row) && !is_joint_row(row) ? std::string(quantity_of(row).symbol)
+                                               : row.stated.id;
+}
 
 std::string shell_word(std::string_view text) {
   const auto is_plain = [](char c) {
@@ -141,35 +148,28 @@ std::string shell_word(std::string_view text) {
 }
 
 ReviewTable matrix_table(const Review& review) {
-  const std::string_view interpretation = name_of(review.interpretation);
-  const auto interpreted = [&](std::string_view title) {
-    return fmt::format("{} ({})", title, interpretation);
-  };
   ReviewTable table{.id = "matrix",
                     .caption = fmt::format("Verification matrix (statistical interpretation: {})",
-                                           interpretation),
+                                          name_of(review.interpretation)),
                     .columns = {{.title = "id", .is_text = true},
                                 {.title = "requirement", .is_text = true},
                                 {.title = "limit"},
-                                {.title = "interpretation", .is_text = true},
-                                {.title = interpreted("probability")},
-                                {.title = interpreted("confidence")},
                                 {.title = "draws"},
                                 {.title = "without estimate"},
                                 {.title = "exceedances"},
                                 {.title = "allowed"},
-                                {.title = interpreted("bound")},
+                                {.title = "bound"},
                                 {.title = "margin"},
                                 {.title = "verdict", .is_text = true},
                                 {.title = "worst value"},
-                                {.title = "its run", .is_text = true}},
+                                {.title = "in run"}},
                     .rows = {},
                     .notes = matrix_notes(review)};
   if (!review.why_not_independent.empty()) {
     table.notes = {fmt::format("No verdicts: {}.", review.why_not_independent)};
     return table;
   }
-  for (const MatrixRow& row : review.matrix) table.rows.push_back(matrix_cells(review, row));
+  for (const MatrixRow& row : review.matrix) table.rows.push_back(matrix_cells(row));
   return table;
 }
 

@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <span>
 #include <string_view>
 
 #include "coordinator/charts/svg.hpp"
 #include "coordinator/report/html_table.hpp"
 #include "coordinator/report/review_charts.hpp"
+#include "coordinator/report/review_summary.hpp"
 #include "coordinator/report/review_tables.hpp"
 #include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
@@ -32,10 +35,10 @@ a{color:inherit}
 nav ul{display:flex;flex-wrap:wrap;gap:.2rem 1rem;padding:0;margin:.5rem 0;list-style:none}
 p{max-width:48rem}
 td.words{overflow-wrap:anywhere;min-width:6rem}
-#matrix{font-size:.8rem}
-#matrix th,#matrix td{padding:.2rem .4rem}
-#matrix td:nth-child(2){min-width:13rem}
-#matrix td:last-child{min-width:14rem}
+#matrix{font-size:.85rem}
+#matrix th,#matrix td{padding:.25rem .4rem}
+#matrix td:nth-child(2){min-width:16rem}
+#summary{max-width:60rem;padding-left:1.3rem}
 .skip{position:absolute;left:-99rem}
 .skip:focus{position:static}
 @page{size:A4 landscape;margin:12mm}
@@ -43,15 +46,13 @@ td.words{overflow-wrap:anywhere;min-width:6rem}
 body{font-size:10pt}
 nav,.skip{display:none}
 .scroll{overflow:visible}
-table{font-size:7pt}
-th,td{padding:.1rem .25rem}
-td{white-space:normal}
-#matrix td:nth-child(2),#matrix td:last-child{min-width:8rem}
-section{break-before:page}
-section:first-of-type{break-before:auto}
+table,#matrix{font-size:7.5pt}
+th,td,#matrix th,#matrix td{padding:.1rem .25rem}
+#matrix td:nth-child(2){min-width:13rem}
+h2,h3{break-after:avoid}
 figure,tr{break-inside:avoid}
-.charts{grid-template-columns:1fr 1fr 1fr}
-.wide svg{min-width:0}
+.flow{gap:.5rem}
+figure{zoom:.74}
 }
 )";
 
@@ -68,22 +69,26 @@ std::string figure_of(const Picture& picture) {
 /// A chart that is wider than a phone scrolls.
 std::string wide_figure_of(const HeatMap& map) {
   return fmt::format(
-      "<div class=\"scroll wide\" role=\"region\" aria-label=\"{}\" tabindex=\"0\">\n{}</div>\n",
+      "<div class=\"scroll\" role=\"region\" aria-label=\"{}\" tabindex=\"0\">\n{}</div>\n",
       markup_text(map.text.title), figure_of(map));
 }
 
 std::string table_or_nothing(const ReviewTable& table) {
-  return table.rows.empty() ? "" : html_table(table);
+  return table.rows.empty() ? "" : "<div>\n" + html_table(table) + "</div>\n";
+}
+
+/// Figures and tables beside each other, as many as there is room for.
+std::string flow(std::string_view markup) {
+  return fmt::format("<div class=\"flow\">\n{}</div>\n", markup);
 }
 
 std::string error_figures_markup(const Review& review) {
-  std::string html =
-      "<div class=\"overview\">\n" + figure_of(magnitude_overview(review)) + "</div>\n";
+  std::string html;
   const std::vector<Quantity>& quantities = model().results().quantities;
   for (std::size_t i = 0; i < quantities.size(); ++i) {
-    html += fmt::format("<h3>{}</h3>\n<div class=\"charts\">\n{}{}{}</div>\n",
-                        markup_text(quantities[i].symbol), figure_of(magnitude_chart(review, i)),
-                        figure_of(error_chart(review, i)), figure_of(convergence_chart(review, i)));
+    html += fmt::format("<h3>{}</h3>\n", markup_text(quantities[i].symbol)) +
+            flow(figure_of(magnitude_chart(review, i)) + figure_of(error_chart(review, i)) +
+                 figure_of(convergence_chart(review, i)));
   }
   return html;
 }
@@ -92,18 +97,18 @@ std::string characteristics_markup(const Review& review) {
   std::string html;
   for (const Chart& chart : characteristic_charts(review)) html += figure_of(chart);
   if (html.empty()) return "";
-  return fmt::format(
-      "<p>How probable it is that a campaign of as many draws meets a requirement ({}), if that "
-      "part of all draws exceeds its limit. A steep curve tells good instruments from bad ones; "
-      "more draws make it steeper.</p>\n<div class=\"charts\">\n{}</div>\n",
-      name_of(review.interpretation), html);
+  return html +
+         fmt::format(
+             "<p class=\"note\">How probable it is that a campaign of as many draws meets a "
+             "requirement ({}), if that part of all draws exceeds its limit. A steep curve tells "
+             "good instruments from bad ones; more draws make it steeper.</p>\n",
+             name_of(review.interpretation));
 }
 
 std::string budget_markup(const Review& review) {
   const std::optional<BarChart> chart = budget_chart(review);
   if (!chart) return "";
-  return "<div class=\"single\">\n" + figure_of(*chart) + "</div>\n" +
-         html_table(review_budget_table(review));
+  return flow(table_or_nothing(review_budget_table(review)) + figure_of(*chart));
 }
 
 std::string causes_markup(const Review& review) {
@@ -130,15 +135,18 @@ std::string spectra_markup(const Review& review) {
       "<p>Run {} has the largest error of all runs beside its objective. It was simulated again, "
       "bit "
       "for bit. Without the fitted lines, noise is left, and lines that the session does not fit. "
-      "{}</p>\n<div class=\"charts\">\n",
+      "{}</p>\n",
       spectra.run.value, markup_text(spectra.sessions.front().noise_meaning));
-  for (const Chart& chart : spectrum_charts(spectra)) html += figure_of(chart);
-  return html + "</div>\n" + html_table(spectrum_table(spectra));
+  std::string figures;
+  for (const Chart& chart : spectrum_charts(spectra)) figures += figure_of(chart);
+  return html + flow(figures + table_or_nothing(spectrum_table(spectra)));
 }
 
 std::string execution_markup(const Review& review) {
-  std::string html = html_table(identity_table(review)) + html_table(execution_table(review)) +
-                     table_or_nothing(host_table(review)) + "<h3>How to reproduce it</h3>\n<ul>\n";
+  std::string html =
+      flow(table_or_nothing(identity_table(review)) + table_or_nothing(execution_table(review)) +
+           table_or_nothing(host_table(review))) +
+      "<h3>How to reproduce it</h3>\n<ul>\n";
   for (const auto& [command, effect] : reproducing_commands(review)) {
     html += fmt::format("<li><code>{}</code> {}</li>\n", markup_text(command), markup_text(effect));
   }
@@ -148,28 +156,24 @@ std::string execution_markup(const Review& review) {
 std::vector<Section> sections_of(const Review& review) {
   return {{"verification", "Verification matrix", html_table(matrix_table(review))},
           {"results", "Accuracy",
-           html_table(review_accuracy_table(review)) + table_or_nothing(inference_table(review))},
+           flow(table_or_nothing(review_accuracy_table(review)) + characteristics_markup(review)) +
+               table_or_nothing(inference_table(review))},
           {"distributions", "Errors by parameter", error_figures_markup(review)},
-          {"characteristics", "Operating characteristics", characteristics_markup(review)},
           {"budget-section", "Budget", budget_markup(review)},
           {"causes-section", "Causes of the errors", causes_markup(review)},
           {"spectra-section", "Spectra of the worst run", spectra_markup(review)},
           {"how", "How it was run", execution_markup(review)}};
 }
 
-std::string heading_markup(const Review& review) {
-  const CampaignStatistics& statistics = review.results.statistics;
-  std::string html = fmt::format(
-      "<h1>Campaign {}</h1>\n<p>{} of {} runs are finished, {} of them with an "
-      "estimate. Seed {}, model {}.</p>\n",
-      markup_text(review.identity.name), statistics.num_runs, review.identity.num_runs,
-      statistics.num_estimated, review.identity.seed, markup_text(review.identity.model_version));
-  if (statistics.num_runs + review.num_given_up < review.identity.num_runs) {
-    html +=
-        "<p><strong>The campaign is not finished: all figures are of the runs so "
-        "far.</strong></p>\n";
+std::string summary_markup(const Review& review, std::span<const Section> sections) {
+  std::string html =
+      fmt::format("<h1>Campaign {}</h1>\n<ol id=\"summary\">\n", markup_text(review.identity.name));
+  for (const auto& [text, source] : review_summary(review)) {
+    const auto section = std::ranges::find(sections, source, &Section::title);
+    html += fmt::format("<li>{} (<a href=\"#{}\">{}</a>)</li>\n", markup_text(text), section->id,
+                        section->title);
   }
-  return html;
+  return html + "</ol>\n";
 }
 
 }  // namespace
@@ -177,8 +181,9 @@ std::string heading_markup(const Review& review) {
 std::string review_html(const Review& review) {
   std::string navigation;
   std::string content;
-  for (const Section& section : sections_of(review)) {
-    if (section.content.empty()) continue;
+  std::vector<Section> sections = sections_of(review);
+  std::erase_if(sections, [](const Section& section) { return section.content.empty(); });
+  for (const Section& section : sections) {
     navigation += fmt::format("<li><a href=\"#{}\">{}</a></li>\n", section.id, section.title);
     content += fmt::format(
         "<section id=\"{0}\" aria-labelledby=\"{0}-title\">\n<h2 "
@@ -194,8 +199,8 @@ std::string review_html(const Review& review) {
       "<header>\n{}<nav aria-label=\"Sections\"><ul>\n{}</ul></nav>\n</header>\n"
       "<main id=\"content\">\n{}</main>\n<footer><p>Made by Proofmass from {}.</p></footer>\n"
       "</body>\n</html>\n",
-      policy, markup_text(review.identity.name), review_style(), page_style, heading_markup(review),
-      navigation, content, markup_text(review.database));
+      policy, markup_text(review.identity.name), review_style(), page_style,
+      summary_markup(review, sections), navigation, content, markup_text(review.database));
 }
 
 }  // namespace proofmass::coordinator

@@ -7,7 +7,8 @@
 namespace proofmass::coordinator {
 
 /// The report of a review as one page of HTML, which needs no other file, no network and no script
-/// and allows none. It begins with the verification matrix. The same bytes for the same review.
+/// and allows none. It begins with review_summary() and the verification matrix. The same bytes for
+/// the same review.
 [[nodiscard]] std::string review_html(const Review& review);
 
 }  // namespace proofmass::coordinator

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "coordinator/report/review_summary.hpp"
 #include "coordinator/report/review_tables.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -35,8 +36,7 @@ std::string markdown_table(const ReviewTable& table) {
   for (const std::vector<ReviewCell>& row : table.rows) {
     text += "|";
     for (const ReviewCell& cell : row) {
-      const bool is_command = cell.kind == ReviewCell::Kind::command;
-      text += fmt::format(" {} |", is_command ? code_span(cell.text) : markdown_text(cell.text));
+      text += fmt::format(" {} |", markdown_text(cell.text));
     }
     text += "\n";
   }
@@ -67,10 +67,11 @@ std::string markdown_text(std::string_view text) {
 }
 
 std::string review_markdown(const Review& review) {
-  std::string text =
-      fmt::format("# Campaign {}\n\n{} of {} runs are finished, {} of them with an estimate.\n\n",
-                  markdown_text(review.identity.name), review.results.statistics.num_runs,
-                  review.identity.num_runs, review.results.statistics.num_estimated);
+  std::string text = fmt::format("# Campaign {}\n\n", markdown_text(review.identity.name));
+  for (const auto& [sentence, source] : review_summary(review)) {
+    text += fmt::format("- {} ({})\n", markdown_text(sentence), source);
+  }
+  text += "\n";
   text += section("Verification matrix", {matrix_table(review)}) +
           section("Accuracy", {review_accuracy_table(review), inference_table(review)}) +
           section("Budget", {review_budget_table(review)}) +

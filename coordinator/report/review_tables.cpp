@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/report/text_cells.hpp"
 #include "core/model.hpp"
 
 namespace proofmass::coordinator {
@@ -21,8 +21,10 @@ ReviewCell heading_cell(std::string_view text) {
 
 ReviewCell no_figure() { return {.text = "–"}; }
 
+ReviewCell figure_cell(double value) { return {.text = figure_text(value), .value = value}; }
+
 ReviewCell scaled_cell(double value, double scale) {
-  return {.text = signed_figure(value / scale), .value = value};
+  return {.text = figure_text(value / scale), .value = value};
 }
 
 void add_interval_cells(const std::optional<Interval>& interval, double scale, double least,
@@ -40,10 +42,9 @@ std::vector<ReviewCell> accuracy_cells(const Review& review, std::size_t index) 
   const CampaignStatistics& statistics = review.results.statistics;
   const double scale = quantity.display_scale;
   const double objective = review.objectives[index];
-  std::vector<ReviewCell> cells{heading_cell(quantity.symbol), heading_cell(quantity.display_unit)};
-  cells.push_back(std::isfinite(objective)
-                      ? ReviewCell{.text = given_figure(objective / scale), .value = objective}
-                      : no_figure());
+  std::vector<ReviewCell> cells{heading_cell(quantity.symbol),
+                                heading_cell(unit_text(quantity.display_unit))};
+  cells.push_back(std::isfinite(objective) ? scaled_cell(objective, scale) : no_figure());
   if (statistics.num_estimated == 0) {
     cells.insert(cells.end(), 5, no_figure());
   } else {
@@ -60,9 +61,8 @@ std::vector<ReviewCell> accuracy_cells(const Review& review, std::size_t index) 
   for (const double PublishedAccuracy::*figure :
        {&PublishedAccuracy::worst, &PublishedAccuracy::mean,
         &PublishedAccuracy::standard_deviation}) {
-    cells.push_back(quantity.published
-                        ? ReviewCell{.text = given_figure((*quantity.published).*figure / scale)}
-                        : no_figure());
+    cells.push_back(quantity.published ? scaled_cell((*quantity.published).*figure, scale)
+                                       : no_figure());
   }
   return cells;
 }
@@ -71,7 +71,8 @@ std::vector<ReviewCell> inference_cells(const Review& review, std::size_t index)
   const Quantity& quantity = model().results().quantities[index];
   const AccuracyStatistic& accuracy = review.results.statistics.accuracy[index];
   const double scale = quantity.display_scale;
-  std::vector<ReviewCell> cells{heading_cell(quantity.symbol), heading_cell(quantity.display_unit)};
+  std::vector<ReviewCell> cells{heading_cell(quantity.symbol),
+                                heading_cell(unit_text(quantity.display_unit))};
   add_interval_cells(accuracy.mean_interval, scale, 0.0, cells);
   add_interval_cells(accuracy.deviation_interval, scale, 0.0, cells);
   add_interval_cells(accuracy.error.bias_interval, scale, -magnitude_max, cells);
@@ -81,14 +82,9 @@ std::vector<ReviewCell> inference_cells(const Review& review, std::size_t index)
   const Interval& beyond = accuracy.beyond_objective;
   for (const double share : {beyond.lower, beyond.upper}) {
     const bool is_known = beyond.upper - beyond.lower < 1.0;
-    cells.push_back(is_known ? ReviewCell{.text = measured_figure(100.0 * share), .value = share}
-                             : no_figure());
+    cells.push_back(is_known ? scaled_cell(share, 0.01) : no_figure());
   }
   return cells;
-}
-
-ReviewCell budget_cell(const std::optional<double>& value) {
-  return value ? ReviewCell{.text = fmt::format("{:.1e}", *value), .value = value} : no_figure();
 }
 
 std::string joint_sentence(const Review& review) {
@@ -111,9 +107,25 @@ std::string digest_words(const Review& review) {
                    " (not checked: there is no stored one of these runs)";
 }
 
-std::string hours(double seconds) { return measured_figure(seconds / 3600.0) + " h"; }
+std::string hours(double seconds) { return figure_text(seconds / 3600.0) + " h"; }
 
 }  // namespace
+
+std::string quantity_text(double value, const Quantity& quantity) {
+  const std::string figure = figure_text(value / quantity.display_scale);
+  if (quantity.display_unit == "1") return figure;
+  const std::string unit = unit_text(quantity.display_unit);
+  if (!unit.starts_with("10")) return figure + " " + unit;
+  const bool has_power = figure.find("×10") != std::string::npos || figure.starts_with("10⁻");
+  return has_power ? figure_text(value) + unit.substr(std::min(unit.find(' '), unit.size()))
+                   : figure + "×" + unit;
+}
+
+std::string name_in_symbols(std::string_view name) {
+  const std::vector<Quantity>& quantities = model().results().quantities;
+  const auto found = std::ranges::find(quantities, name, &Quantity::name);
+  return std::string(found == quantities.end() ? name : found->symbol);
+}
 
 ReviewTable review_accuracy_table(const Review& review) {
   const std::string ours = "this campaign";
@@ -195,12 +207,12 @@ ReviewTable review_budget_table(const Review& review) {
   table.caption = std::string(budget.title);
   const BudgetColumns columns = budget_columns(budget, review.results.statistics);
   const auto add = [&](const BudgetEntryInfo& info, const auto& value_of) {
-    std::vector<ReviewCell> cells{heading_cell(info.label), budget_cell(value_of(columns.before))};
+    std::vector<ReviewCell> cells{heading_cell(info.label), figure_cell(value_of(columns.before))};
     for (const auto& after : {columns.after_worst, columns.after_mean}) {
-      cells.push_back(after ? budget_cell(value_of(*after)) : no_figure());
+      cells.push_back(after ? figure_cell(value_of(*after)) : no_figure());
     }
     for (const double figure : {info.paper_before, info.paper_after_worst, info.paper_after_mean}) {
-      cells.push_back({.text = fmt::format("{:.1e}", figure)});
+      cells.push_back(figure_cell(figure));
     }
     table.rows.push_back(std::move(cells));
   };
@@ -215,9 +227,9 @@ ReviewTable review_budget_table(const Review& review) {
   if (!budget.note.empty()) table.notes.push_back(budget.note);
   if (const std::optional<RunTotals>& totals = review.results.totals) {
     table.notes.push_back(fmt::format(
-        "Totals of single runs: median {:.1e}, 95 % of these runs below {:.1e}, worst {:.1e} (run "
-        "{}).",
-        totals->median, totals->percentile_95, totals->worst, totals->worst_run.value));
+        "Totals of single runs: median {}, 95 % of these runs below {}, worst {} (run {}).",
+        figure_text(totals->median), figure_text(totals->percentile_95), figure_text(totals->worst),
+        totals->worst_run.value));
   }
   return table;
 }
@@ -234,12 +246,11 @@ ReviewTable cause_table(const Review& review) {
                     .notes = {}};
   if (!review.causes) return table;
   for (const CauseTerm& term : review.causes->terms) {
-    table.rows.push_back(
-        {heading_cell(model().results().quantities[term.quantity].symbol),
-         heading_cell(term.name),
-         {.text = fmt::format("{:.3g}", term.slope), .value = term.slope},
-         {.text = fmt::format("{:.1f}", 100.0 * term.share), .value = term.share},
-         {.text = term.p_value < 1e-9 ? "<1e-09" : measured_figure(term.p_value)}});
+    table.rows.push_back({heading_cell(model().results().quantities[term.quantity].symbol),
+                          heading_cell(term.name),
+                          figure_cell(term.slope),
+                          scaled_cell(term.share, 0.01),
+                          {.text = term.p_value < 1e-9 ? "<10⁻⁹" : figure_text(term.p_value)}});
   }
   table.notes.push_back(fmt::format(
       "Computed from {} of {} runs with an estimate{}. Of the variance: beyond that of the terms "

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "coordinator/report/review.hpp"
@@ -14,7 +15,7 @@ struct ReviewCell {
   std::string text;
   std::optional<double> value = {};  ///< In full precision and SI units, for programs.
 
-  enum class Kind : std::uint8_t { figure, words, command, verdict };
+  enum class Kind : std::uint8_t { figure, words, verdict };
   Kind kind = Kind::figure;
 };
 
@@ -32,6 +33,18 @@ struct ReviewTable {
   std::vector<std::vector<ReviewCell>> rows;
   std::vector<std::string> notes;  ///< Sentences below it.
 };
+
+/// A value of a quantity in its display unit, as a report spells it: `32.4 nm`, `11.6×10⁻⁴ rad`.
+[[nodiscard]] std::string quantity_text(double value, const Quantity& quantity);
+
+/// A name, or the symbol of the quantity that has it: sessions are called after what they are for.
+[[nodiscard]] std::string name_in_symbols(std::string_view name);
+
+/// True of a requirement that nobody stated: an objective of the campaign, or all together.
+[[nodiscard]] bool is_default(const MatrixRow& row);
+
+/// The id of a requirement; of an objective of the campaign, the symbol of its parameter.
+[[nodiscard]] std::string requirement_name(const MatrixRow& row);
 
 [[nodiscard]] ReviewTable matrix_table(const Review& review);
 

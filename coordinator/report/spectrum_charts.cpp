@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/report/review_tables.hpp"
-#include "coordinator/report/text_cells.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -52,25 +52,26 @@ std::string spectrum_description(const SessionSpectrum& spectrum, RunIndex run) 
 }
 
 Chart spectrum_chart(const SessionSpectrum& spectrum, RunIndex run) {
-  return {.text = {.id = "spectrum-" + spectrum.session,
-                   .title = fmt::format("{}: {}", spectrum.session, spectrum.meaning),
-                   .description = spectrum_description(spectrum, run)},
-          .x = {.label = "frequency, Hz", .scale = Scale::logarithmic},
-          .y = {.label = fmt::format("{}/√Hz", spectrum.unit), .scale = Scale::logarithmic},
-          .layers = {
-              line_of(spectrum, "measured", &SpectrumPoint::measured, Ink::first, Dash::solid),
-              line_of(spectrum, "without fitted lines", &SpectrumPoint::residual, Ink::third,
-                      Dash::solid),
-              line_of(spectrum, "noise model", &SpectrumPoint::expected, Ink::text, Dash::dashed),
-              line_markers(spectrum, true, "line of the estimate", Ink::fourth, Shape::diamond),
-              line_markers(spectrum, false, "other fitted line", Ink::second, Shape::triangle)}};
+  return {
+      .text = {.id = "spectrum-" + spectrum.session,
+               .title = fmt::format("{}: {}", name_in_symbols(spectrum.session), spectrum.meaning),
+               .description = spectrum_description(spectrum, run)},
+      .x = {.label = "frequency, Hz", .scale = Scale::logarithmic},
+      .y = {.label = fmt::format("{}/√Hz", spectrum.unit), .scale = Scale::logarithmic},
+      .layers = {
+          line_of(spectrum, "measured", &SpectrumPoint::measured, Ink::first, Dash::solid),
+          line_of(spectrum, "without fitted lines", &SpectrumPoint::residual, Ink::third,
+                  Dash::solid),
+          line_of(spectrum, "noise model", &SpectrumPoint::expected, Ink::text, Dash::dashed),
+          line_markers(spectrum, true, "line of the estimate", Ink::fourth, Shape::diamond),
+          line_markers(spectrum, false, "other fitted line", Ink::second, Shape::triangle)}};
 }
 
 /// A line of the estimate, and the noise about it.
 std::vector<ReviewCell> line_cells(const SessionSpectrum& spectrum, const SpectrumLine& line) {
-  return {{.text = spectrum.session, .kind = ReviewCell::Kind::words},
-          {.text = measured_figure(1e3 * line.frequency_hz), .value = line.frequency_hz},
-          {.text = measured_figure(line.amplitude), .value = line.amplitude},
+  return {{.text = name_in_symbols(spectrum.session), .kind = ReviewCell::Kind::words},
+          {.text = figure_text(1e3 * line.frequency_hz), .value = line.frequency_hz},
+          {.text = figure_text(line.amplitude), .value = line.amplitude},
           {.text = spectrum.unit, .kind = ReviewCell::Kind::words},
           spectrum.noise_ratio ? ReviewCell{.text = ratio_text(*spectrum.noise_ratio),
                                             .value = spectrum.noise_ratio->value}

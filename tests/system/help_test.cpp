@@ -37,11 +37,11 @@ class Help : public testing::Test {
 
 /// The commands that the help of `proofmass` lists.
 std::vector<std::string> commands_in(const std::string& text) {
-  std::istringstream stream(text.substr(text.find("Subcommands:\n")));
-  std::string line;
-  std::getline(stream, line);
+  const std::size_t begin = text.find("Run a campaign:\n");
+  std::istringstream stream(text.substr(begin, text.find("Exit codes:\n") - begin));
   std::vector<std::string> commands;
-  while (std::getline(stream, line) && line.starts_with("  ")) {
+  for (std::string line; std::getline(stream, line);) {
+    if (!line.starts_with("  ") || line.at(2) == ' ') continue;  // A title, or a line that goes on.
     commands.push_back(line.substr(2, line.find(' ', 2) - 2));
   }
   return commands;

@@ -38,7 +38,7 @@ SHORTEN = {"orbits": "2", "sample_period_s": "1", "runs": str(NUM_RUNS)}
 TOKEN = "a-token-for-this-test-only"
 HOSTILE = "<script>alert(1)</script> \x1b[31m \"quoted\""
 HOSTILE_SHOWN = "<script>alert(1)</script> \\u001b[31m \"quoted\""
-SCALES = {"nm": 1e-9, "1e-4 rad": 1e-4, "1e-6": 1e-6, "1e-6 rad": 1e-6, "s²/m": 1.0}
+SCALES = {"nm": 1e-9, "10⁻⁴ rad": 1e-4, "10⁻⁶": 1e-6, "10⁻⁶ rad": 1e-6, "s²/m": 1.0}
 PACKAGES = ("playwright-core@1", "axe-core@4")
 
 
@@ -116,8 +116,11 @@ def add_hostile_event(database):
 
 def figure(value):
     """Three significant digits, as the program writes them."""
-    text = f"{value:#.3g}"
-    return text.rstrip(".") if "e" not in text else f"{value:.2g}"
+    mantissa, exponent = f"{value:.2e}".split("e")
+    if value != 0 and not -4 < int(exponent) < 5:
+        power = "10" + str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        return power if float(mantissa) == 1 else f"{float(mantissa):g}×{power}"
+    return f"{float(f'{value:.2e}'):.10g}"
 
 
 def accuracy_cells(database, page):

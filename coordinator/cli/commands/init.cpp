@@ -15,9 +15,9 @@ struct InitOptions {
 };
 
 int write_example(const InitOptions& options) {
-  check_output_file(options.file, options.if_there, "give another name");
-  write_output_file(options.file, options.if_there, model().example());
-  fmt::print("wrote {}\n", options.file.string());
+  check_document(options.file, options.if_there);
+  write_document(options.file, options.if_there, model().example());
+  if (options.file != "-") fmt::print("wrote {}\n", options.file.string());
   return exit_done;
 }
 
@@ -26,7 +26,7 @@ int write_example(const InitOptions& options) {
 void add_init(CLI::App& app, Command& chosen) {
   auto [command, options] = add_command<InitOptions>(
       app, chosen, "init", "Write an example of a campaign file, commented", write_example);
-  command.add_option("FILE", options.file, "File to write")
+  command.add_option("FILE", options.file, "File to write; - for standard output")
       ->type_name(campaign_file_type)
       ->capture_default_str();
   add_force_flag(command, options.if_there);

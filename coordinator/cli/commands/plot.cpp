@@ -49,9 +49,7 @@ void check_plot_arguments(const PlotOptions& options) {
   if (options.output != "-" && !is_picture) {
     refuse_output(options.output, "must end in .svg or .png, or be - for SVG on standard output");
   }
-  if (options.output != "-") {
-    check_output_file(options.output, options.if_there, "- writes to standard output");
-  }
+  check_document(options.output, options.if_there);
 }
 
 const Picture& chosen_picture(const std::vector<NamedPicture>& pictures, const std::string& name) {
@@ -96,14 +94,7 @@ void write_picture(const Picture& picture, const PlotOptions& options) {
     write_png(picture, options);
     return;
   }
-  const std::string svg = svg_of(picture, SvgUse::standalone);
-  if (options.output == "-") {
-    write_standard_output(svg);
-    return;
-  }
-  wire::write_whole_file(
-      "output", options.output, svg, picture_mode,
-      options.if_there == IfThere::replace ? wire::IfExists::replace : wire::IfExists::refuse);
+  write_document(options.output, options.if_there, svg_of(picture, SvgUse::standalone));
 }
 
 /// The spectra are not computed: to tell their names, no run has to be simulated.

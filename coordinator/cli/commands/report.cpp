@@ -108,19 +108,6 @@ void check_standard_output(const ReportOptions& options) {
   take(options.markdown, "--markdown");
 }
 
-void check_document(const std::filesystem::path& file, IfThere if_there) {
-  if (file.empty() || file == "-") return;
-  check_output_file(file, if_there, "- writes to standard output");
-}
-
-void write_document(const std::filesystem::path& file, IfThere if_there, const std::string& text) {
-  if (file == "-") {
-    write_standard_output(text);
-  } else {
-    write_output_file(file, if_there, text);
-  }
-}
-
 /// @return What print_report() returns.
 int write_documents(const ReportOptions& options, const Store& store, const Campaign& campaign,
                     const std::vector<StatedRequirement>& stated) {

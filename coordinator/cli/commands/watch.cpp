@@ -1,7 +1,6 @@
 #include "coordinator/cli/commands/watch.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -124,7 +123,7 @@ void keep_only(wire::StatusReply& status, const std::string& name) {
 
 WatchMode mode_for(OutputFormat format) {
   if (format == OutputFormat::json) return WatchMode::json;
-  return isatty(fileno(stdout)) != 0 ? WatchMode::screen : WatchMode::lines;
+  return takes_escapes(stdout) ? WatchMode::screen : WatchMode::lines;
 }
 
 }  // namespace

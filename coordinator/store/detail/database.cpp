@@ -36,7 +36,20 @@ int open_flags(Access access) {
   return common | SQLITE_OPEN_READONLY;
 }
 
-// An absolute path is never mistaken for `:memory:` or a URI.
+// An absolute path is never mistaken for `:memory:` or a URI. SQLite follows links to it, and keeps
+// room for the ending `-journal` in 512 bytes.
+std::string checked_path(const std::filesystem::path& path) {
+  constexpr std::size_t size_max = 504;
+  const std::filesystem::path absolute = std::filesystem::absolute(path);
+  std::error_code ignored;
+  const std::size_t size = std::filesystem::weakly_canonical(absolute, ignored).native().size();
+  if (size <= size_max) return absolute.string();
+  throw StoreError(fmt::format(
+      "campaign database = {} (has a path of {} bytes, and SQLite opens none of more than {}: use "
+      "directories with shorter names)",
+      path.string(), size, size_max));
+}
+
 std::string name_of(const std::filesystem::path& path, Access access) {
   switch (access) {
     case Access::memory:
@@ -46,7 +59,7 @@ std::string name_of(const std::filesystem::path& path, Access access) {
     case Access::immutable:
       return file_uri(path, "immutable=1");
     default:
-      return std::filesystem::absolute(path).string();
+      return checked_path(path);
   }
 }
 
@@ -127,7 +140,7 @@ int copy_all(sqlite3* from, sqlite3* to, const char* name = "main") {
 
 std::string file_uri(const std::filesystem::path& file, std::string_view parameter) {
   std::string uri = "file://";
-  for (const char character : std::filesystem::absolute(file).string()) {
+  for (const char character : checked_path(file)) {
     const bool has_meaning = character == '%' || character == '?' || character == '#';
     uri += has_meaning ? fmt::format("%{:02X}", static_cast<int>(character))
                        : std::string(1, character);

@@ -24,6 +24,7 @@ inline constexpr int busy_timeout_ms = 5000;
 enum class Fold { what_no_reader_needs, all_and_empty_it };
 
 /// The URI of a database file with a parameter of SQLite's: `file:///a/b.db?mode=ro`.
+/// @throws StoreError if the path is longer than SQLite takes.
 [[nodiscard]] std::string file_uri(const std::filesystem::path& file, std::string_view parameter);
 
 struct FinalizeStatement {

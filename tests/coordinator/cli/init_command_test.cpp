@@ -7,6 +7,7 @@
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/program.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
+#include "core/model.hpp"
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
@@ -40,6 +41,20 @@ TEST(Init, ReplacesAFileOnlyIfItMust) {
   EXPECT_EQ(test::answer_of({"init", file, "--force"}).exit_code, exit_done);
 }
 
+// As report and plot do; a database needs a file.
+TEST(Init, WritesToStandardOutput) {
+  const test::TemporaryDirectory directory;
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(directory / "");
+  const test::Answer answer = test::answer_of({"init", "-"});
+  const bool is_empty = std::filesystem::is_empty(directory / "");
+  std::filesystem::current_path(before);
+  EXPECT_EQ(answer.output, model().example());
+  EXPECT_TRUE(is_empty);
+  EXPECT_EQ(test::answer_of({"backup", "a.db", "-"}).error,
+            "destination = - (must be a file; ./- is one of that name)");
+}
+
 TEST(Init, SaysWhyAFileCannotBeWritten) {
   const test::TemporaryDirectory directory;
   const auto file = directory / "none" / "a.toml";
@@ -60,6 +75,15 @@ TEST(Init, LeavesNothingOnAFullDisk) {
   EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
   EXPECT_EQ(answer.error, "output = " + file.string() + " (File too large)");
   EXPECT_TRUE(std::filesystem::is_empty(file.parent_path()));
+}
+
+TEST(Help, ListsTheUsualCommandsFirst) {
+  const std::string text = test::answer_of({"--help"}).output;
+  EXPECT_THAT(text, testing::ContainsRegex("Run a campaign:\n  run .*\n\nLook at its results:\n  "
+                                           "report .*\n\nAsk further questions:\n  query "
+                                           ".*\n\nServe campaigns to other machines:\n  keygen "
+                                           ".*\n\nKeep databases:\n  verify "));
+  EXPECT_THAT(text, Not(HasSubstr("Subcommands:")));
 }
 
 TEST(Help, BeginsWithThePurposeOfTheModel) {

@@ -23,7 +23,7 @@ ReviewTable review_table(const std::string& text) {
                       {.title = "upper", .group = text}},
           .rows = {{{.text = text},
                     {.text = "1.23e-4", .value = 1.2345e-4},
-                    {.text = text, .kind = ReviewCell::Kind::command}}},
+                    {.text = text, .kind = ReviewCell::Kind::words}}},
           .notes = {text}};
 }
 

@@ -85,6 +85,31 @@ TEST_F(DatabaseTest, ReportsWhyAFileCannotBeOpened) {
                 " (unable to open database file: No such file or directory)");
 }
 
+// SQLite keeps room for `-journal` in 512 bytes.
+TEST_F(DatabaseTest, SaysThatAPathIsTooLong) {
+  std::filesystem::path path = directory();
+  constexpr std::size_t size_max = 504;
+  while (path.native().size() + 200 < size_max) path /= std::string(150, 'd');
+  std::filesystem::create_directories(path);
+  path /= std::string(size_max - path.native().size() - 1, 'f');
+  ASSERT_EQ(path.native().size(), size_max);
+  Database(path, Access::create).execute("CREATE TABLE t (x)");
+  EXPECT_NO_THROW(Database(path, Access::read_only));
+  const std::filesystem::path longer = path.native() + "f";
+  std::filesystem::rename(path, longer);
+  const std::filesystem::path link = directory() / "link";
+  std::filesystem::create_symlink(longer, link);
+  for (const Access access :
+       {Access::create, Access::read_write, Access::read_only, Access::immutable}) {
+    for (const std::filesystem::path& name : {longer, link}) {
+      EXPECT_EQ(store_error_of([&] { Database(name, access); }),
+                "campaign database = " + name.string() +
+                    " (has a path of 505 bytes, and SQLite opens none of more than 504: use "
+                    "directories with shorter names)");
+    }
+  }
+}
+
 TEST_F(DatabaseTest, IsAFileWhateverItsName) {
   const std::filesystem::path before = std::filesystem::current_path();
   std::filesystem::current_path(directory());
