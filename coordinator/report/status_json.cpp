@@ -37,7 +37,7 @@ std::string dumped(const nlohmann::ordered_json& json, JsonLayout layout) {
 
 nlohmann::ordered_json campaign_object(const wire::CampaignStatus& campaign) {
   StatusJson json{{"name", campaign.name},
-                  {"phase", wire::name_of(campaign.phase)},
+                  {"phase", wire::phase_name(campaign)},
                   {"priority", campaign.priority},
                   {"num_runs", campaign.num_runs},
                   {"num_done", campaign.num_done},
