@@ -16,6 +16,7 @@
 #include "coordinator/dispatch/workers.hpp"
 #include "proto/wire/definition_codec.hpp"
 #include "tests/system/simulated_network_execution.hpp"
+#include "tests/system/simulated_network_liar.hpp"
 #include "tests/system/simulated_network_time.hpp"
 
 namespace proofmass::test {
@@ -61,7 +62,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
   /// @pre It does not run.
   void start();
   void kill();
-  void receive(const wire::Packet& packet, const std::string& key = honest_key);
+  void receive(const wire::Packet& packet, const coordinator::HostId& from);
   void tick();
   /// Its thread does nothing for so long; what is sent to it waits.
   void stall(Duration duration);
@@ -115,7 +116,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
  private:
   struct Peer {
     wire::SessionId session;
-    std::string key;
+    bool is_honest = true;
     std::uint64_t num_sent = 0;
     bool said_hello = false;
   };
@@ -127,11 +128,12 @@ class PlayedCoordinator final : public coordinator::Outbox {
     std::map<wire::WorkerId, Peer> peers;
     std::map<wire::CampaignId, std::deque<std::function<void(PlayedFile&)>>> writes;
     TimePoint stalled_until{};
-    std::deque<std::pair<wire::Packet, std::string>> waiting;  ///< And the keys of their senders.
+    /// And whence they came.
+    std::deque<std::pair<wire::Packet, coordinator::HostId>> waiting;
   };
 
-  wire::WorkerId meet(wire::SessionId session, const std::string& key);
-  void handle(wire::WorkerId worker, const wire::Packet& packet, const std::string& key);
+  wire::WorkerId meet(wire::SessionId session, const coordinator::HostId& from);
+  void handle(wire::WorkerId worker, const wire::Packet& packet, const coordinator::HostId& from);
   void serve(wire::CampaignId id);
   void go_on();
   void check_sent(wire::WorkerId worker, const wire::Message& message) const;

@@ -31,9 +31,9 @@ TEST_F(ServiceSnapshotTest, TellsWhatEachWorkerDoes) {
   silent.num_lent = 5;
   silent.heard_at = now - state.config.suspect_after - 1s;
   Worker& quarantined = add_worker(4);
-  quarantined.host.name = "bad";
+  quarantined.host.address = "bad";
   quarantined.heard_at = silent.heard_at;
-  state.quarantined.insert(quarantined.host);
+  state.quarantined[quarantined.host] = TimePoint::max();
 
   ServiceSnapshot snapshot;
   add_workers(state, now, SnapshotDepth::with_workers, snapshot);
