@@ -14,7 +14,8 @@ class ServiceSnapshotTest : public ::testing::Test {
   Worker& add_worker(std::uint64_t id) {
     Worker& worker = state.workers[WorkerId{id}];
     worker.name = "w" + std::to_string(id);
-    worker.host = {.key = "", .name = "host"};
+    worker.host = {.key = "", .address = "10.0.0.7"};
+    worker.host_name = "host";
     worker.registered_at = now - 100s;
     worker.heard_at = now - 1s;
     return worker;
