@@ -300,8 +300,14 @@ void lend(State& state, WorkerId id, TimePoint now, Outbox& outbox) {
 
 void lend_to_hungry(State& state, TimePoint now, Outbox& outbox) {
   if (is_reattaching(state, now)) return;
-  auto next = state.hungry.begin();
-  while (next != state.hungry.end() && has_runs_to_lend(state)) lend(state, *next++, now, outbox);
+  // In turn: one that gives runs back must not get them again and again.
+  for (std::size_t count = state.hungry.size(); count > 0 && has_runs_to_lend(state); --count) {
+    auto next = state.hungry.upper_bound(state.fed_last);
+    if (next == state.hungry.end()) next = state.hungry.begin();
+    if (next == state.hungry.end()) return;
+    state.fed_last = *next;
+    lend(state, state.fed_last, now, outbox);
+  }
 }
 
 bool is_passed_over(const State& state, const Worker& worker, TimePoint now) {

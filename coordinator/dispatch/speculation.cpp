@@ -156,8 +156,15 @@ class Copying {
   std::map<std::pair<CampaignId, Attempt>, RunSet> runs_;
 };
 
-/// True if there may be no copy of the lease: it is of an audit, or of a suspect.
-bool is_exclusive(const Lease& lease) { return lease.kind == LeaseKind::audit || lease.is_alone; }
+/// True if there may be no copy of the lease: it is of an audit, or has a suspect.
+bool is_exclusive(const State& state, const Lease& lease) {
+  if (lease.kind == LeaseKind::audit || lease.is_alone) return true;
+  const auto& suspects = state.campaigns.at(lease.campaign).suspects;
+  return std::ranges::any_of(lease.remaining.ranges(), [&](const RunRange& range) {
+    const auto next = suspects.lower_bound(range.first);
+    return next != suspects.end() && next->first.value < range.end();
+  });
+}
 
 /// Lends what there may be no copy of to the idle worker instead.
 void take_over(State& state, LeaseId id, WorkerId idle, TimePoint now, Outbox& outbox) {
@@ -179,8 +186,9 @@ void copy(State& state, std::vector<WorkerId> idle, TimePoint now, Outbox& outbo
     const bool is_late = is_overdue(state, lease, now);
     // By then it is known whether its batch hangs.
     const bool had_its_time = now - lease.lent_at > 6 * state.config.hung_after_min;
-    if (is_exclusive(lease) && is_late && had_its_time) exclusive.push_back(id);
-    if (!is_exclusive(lease) && (is_late || lease.attempt >= often)) overdue.push_back(id);
+    const bool has_no_copy = is_exclusive(state, lease);
+    if (has_no_copy && is_late && had_its_time) exclusive.push_back(id);
+    if (!has_no_copy && (is_late || lease.attempt >= often)) overdue.push_back(id);
   }
   // Another one is the first each time.
   std::ranges::sort(idle, {}, [&](WorkerId id) { return mixed(id.value + state.next_lease); });

@@ -304,6 +304,7 @@ struct State {
   std::uint64_t num_slots_expected = 0;  ///< Of workers that are still to come.
   LentSlots lately_lent;      ///< What was longer ago than half of a run takes may be missing.
   std::set<WorkerId> hungry;  ///< Workers that were lent less than they would take.
+  WorkerId fed_last;          ///< The one of these that was last lent some.
   std::map<HostId, Host> hosts;
   /// Hosts that are lent nothing until then, but for one round to workers that have delivered.
   std::map<HostId, TimePoint> quarantined;

@@ -43,6 +43,24 @@ void PlayedCoordinator::check_reject(const wire::Reject& reject, const Peer& pee
   EXPECT_TRUE(may_come_again || !peer.is_honest) << reject.text;
 }
 
+/// Nobody gets what it was not given, unless which runs that were is forgotten.
+void PlayedCoordinator::check_adoptions(wire::WorkerId worker) const {
+  const coordinator::State& state = life_->state;
+  const auto found = state.workers.find(worker);
+  if (found == state.workers.end() || state.attached.contains(found->second.session)) return;
+  const auto lent = lent_.find(found->second.session);
+  for (const coordinator::LeaseId id : found->second.leases) {
+    const coordinator::Lease& lease = state.leases.at(id);
+    if (!lease.is_adopted) continue;
+    for (const RunRange& range : lease.remaining.ranges()) {
+      for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
+        EXPECT_TRUE(lent != lent_.end() && lent->second.contains({lease.campaign, run}))
+            << "claimed and never lent";
+      }
+    }
+  }
+}
+
 void PlayedCoordinator::check_lease(const wire::RunLease& lease) const {
   const PlayedFile& file = files_.at(lease.campaign);
   EXPECT_GE(lease.attempt.value, 1U);

@@ -109,6 +109,7 @@ void PlayedCoordinator::receive(const wire::Packet& packet, const coordinator::H
     coordinator::reject_unregistered(worker, *this);
   } else {
     handle(worker, packet, from);
+    check_adoptions(worker);
   }
   after_event();
 }
@@ -296,6 +297,10 @@ void PlayedCoordinator::send(wire::WorkerId worker, wire::Message message) {
   check_sent(worker, message);
   if (const auto* const lease = std::get_if<wire::RunLease>(&message)) {
     attempt_max_ = std::max(attempt_max_, lease->attempt.value);
+    auto& lent = lent_[life_->peers.at(worker).session];
+    for (RunIndex run = lease->runs.first; run.value < lease->runs.end(); ++run.value) {
+      lent.insert({lease->campaign, run});
+    }
   }
   if (const auto* const not_served = std::get_if<wire::NotServed>(&message)) {
     ++num_events_[not_served->ranges.empty() ? "campaign_not_served" : "runs_not_served"];

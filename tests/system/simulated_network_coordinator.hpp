@@ -141,6 +141,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
   void check_forget(const wire::Forget& forget) const;
   void check_not_served(const wire::NotServed& not_served) const;
   void check_reject(const wire::Reject& reject, const Peer& peer) const;
+  void check_adoptions(wire::WorkerId worker) const;
   void after_event();
   /// Does it later and in order, unless the process has ended by then; a failing file waits.
   void write_later(wire::CampaignId id, std::function<void(PlayedFile&)> write);
@@ -154,6 +155,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
   std::size_t num_workers_max_ = 4096;
   bool may_crash_ = true;
   std::set<wire::SessionId> attached_;
+  std::map<wire::SessionId, std::set<RunKey>> lent_;  ///< By all coordinators.
   std::optional<Life> life_;
   /// As it was encoded last: a campaign has one definition for long.
   std::map<const Campaign*, std::pair<std::shared_ptr<const Campaign>, wire::EncodedDefinition>>

@@ -37,6 +37,7 @@ Liar::Liar(const Draws& draws, const Poison& poison, Randomness& random, Send se
       random_(random),
       send_(std::move(send)),
       habit_(static_cast<Habit>(random.below(6))),
+      is_single_minded_(random.happens(0.5)),
       truthfulness_(random.happens(0.5) ? 0.2 : 0.0) {
   const std::uint64_t num_sessions = 1 + random_.below(4);
   for (std::uint64_t i = 0; i < num_sessions; ++i) sessions_.push_back({random_.number()});
@@ -45,6 +46,12 @@ Liar::Liar(const Draws& draws, const Poison& poison, Randomness& random, Send se
 
 void Liar::hear(const wire::Packet& packet) {
   auto& lent = lent_.at(packet.header.session);
+  if (std::holds_alternative<wire::Welcome>(packet.message)) {
+    registered_.insert(packet.header.session);
+  }
+  if (std::holds_alternative<wire::Reject>(packet.message)) {
+    registered_.erase(packet.header.session);
+  }
   if (const auto* const lease = std::get_if<wire::RunLease>(&packet.message)) {
     for (RunIndex run = lease->runs.first; run.value < lease->runs.end(); ++run.value) {
       lent[{lease->campaign, run}] = lease->attempt;
@@ -61,7 +68,8 @@ void Liar::speak(const std::vector<wire::SessionId>& honest,
   hosts_ = hosts;
   session_ = any_of(sessions_, random_);
   const std::size_t kind = next_kind();
-  if (kind == kind_of<wire::Hello>() && random_.happens(0.5)) begin_again();
+  const bool crashes = kind == kind_of<wire::Hello>() && habit_ == Habit::crash;
+  if (crashes || (kind == kind_of<wire::Hello>() && random_.happens(0.5))) begin_again();
   send_(session_, lie(kind));
 }
 
@@ -76,9 +84,14 @@ void Liar::begin_again() {
 
 /// Mostly it asks for runs and then does what is its habit.
 std::size_t Liar::next_kind() {
-  if (random_.happens(0.15)) return random_.below(num_kinds);
+  if (is_single_minded_) {
+    if (!registered_.contains(session_)) return kind_of<wire::Hello>();
+  } else if (random_.happens(0.15)) {
+    return random_.below(num_kinds);
+  } else if (random_.happens(0.2)) {
+    return kind_of<wire::Hello>();
+  }
   if (random_.happens(0.4)) return kind_of<wire::Heartbeat>();
-  if (random_.happens(0.2)) return kind_of<wire::Hello>();
   switch (habit_) {
     case Habit::hoard:
     case Habit::stall:
@@ -156,6 +169,10 @@ wire::Message Liar::lie(std::type_identity<wire::Heartbeat>) {
     heartbeat.computing.push_back({.campaign = held.campaign,
                                    .ranges = held.ranges,
                                    .num_steps_done = seems_to_advance ? num_steps_done_ : 1});
+  }
+  if (is_single_minded_) {
+    heartbeat.num_runs_max = 4096;
+    return heartbeat;
   }
   if (random_.happens(0.3)) heartbeat.computing.clear();
   if (random_.happens(0.2)) heartbeat.held.clear();

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -55,11 +56,13 @@ class Liar {
   Randomness& random_;
   Send send_;
   Habit habit_;
-  double truthfulness_;  ///< Probability that it delivers what it was lent, as it should.
+  bool is_single_minded_;  ///< Does nothing that its habit does not need.
+  double truthfulness_;    ///< Probability that it delivers what it was lent, as it should.
   std::vector<wire::SessionId> sessions_;
   wire::SessionId session_;  ///< The one that speaks.
   wire::SessionId former_;   ///< Its own that "crashed".
   std::map<wire::SessionId, std::map<RunKey, wire::Attempt>> lent_;
+  std::set<wire::SessionId> registered_;
   std::vector<wire::SessionId> honest_;
   std::vector<std::string> hosts_;
   std::uint32_t num_steps_done_ = 0;
