@@ -71,7 +71,7 @@ std::string table_of(std::span<const TextColumn> columns, const std::vector<Thin
 
 std::vector<std::string> campaign_cells(const CampaignStatus& campaign) {
   return {campaign.name,
-          std::string(wire::name_of(campaign.phase)),
+          std::string(wire::phase_name(campaign)),
           std::to_string(campaign.priority),
           std::to_string(campaign.num_done),
           std::to_string(campaign.num_runs),
@@ -159,7 +159,7 @@ std::string workers_table(const wire::WorkersReply& workers, std::size_t line_wi
 
 std::string campaign_line(const CampaignStatus& campaign) {
   std::string text =
-      fmt::format("{} {}: {} of {}, {} %", campaign.name, wire::name_of(campaign.phase),
+      fmt::format("{} {}: {} of {}, {} %", campaign.name, wire::phase_name(campaign),
                   campaign.num_done, counted(campaign.num_runs, "run"), percent_done(campaign));
   if (!is_over(campaign)) {
     if (campaign.rate_hz > 0.0) text += fmt::format(", {} runs/s", rate(campaign));

@@ -85,7 +85,8 @@ void scale_times(ServiceConfig& config, double factor) {
   for (Duration* const time :
        {&dispatch.heartbeat_interval, &dispatch.suspect_after, &dispatch.lost_after,
         &dispatch.lost_after_if_behind, &dispatch.arrival_max, &dispatch.hung_after_min,
-        &dispatch.reattach_wait, &config.writer.retry_after}) {
+        &dispatch.reattach_wait, &dispatch.lease_duration_max, &dispatch.lone_witness_wait,
+        &dispatch.quarantine_duration, &config.writer.retry_after}) {
     *time = std::chrono::duration_cast<Duration>(factor * *time);
   }
 }

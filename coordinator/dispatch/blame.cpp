@@ -56,12 +56,34 @@ void withdraw(State& state, CampaignId id, const HostId& host) {
 }
 
 void quarantine(State& state, const HostId& host, std::uint32_t num_crashes, Outbox& outbox) {
-  state.quarantined.insert(host);
+  state.quarantined[host] = state.ticked_at + state.config.quarantine_duration;
   for (const auto& [id, campaign] : state.campaigns) withdraw(state, id, host);
-  wire::Fields fields{{"host", host.name}, {"crashes", num_crashes}};
+  wire::Fields fields{{"host", state.hosts.at(host).name}, {"crashes", num_crashes}};
+  if (!host.address.empty()) fields.emplace_back("address", host.address);
   if (!host.key.empty()) fields.emplace_back("key", host.key);
   outbox.log(
       {.severity = Severity::error, .kind = "host_quarantined", .fields = std::move(fields)});
+}
+
+bool is_proven(const State& state, const HostId& id) {
+  const auto host = state.hosts.find(id);
+  return host != state.hosts.end() && host->second.num_results > 0;
+}
+
+/// Crashes of the run without those on hosts that have delivered nothing.
+std::uint32_t num_credible(const State& state, const Suspicion& suspicion) {
+  std::uint32_t count = suspicion.num_crashes;
+  for (const auto& [host, on_host] : suspicion.hosts) {
+    if (!is_proven(state, host)) count -= on_host.num_crashes;
+  }
+  return count;
+}
+
+/// The smaller, the sooner the host may try the run. A crash says more than a trial without a
+/// result, which any worker can make up.
+std::uint32_t share_of_trials(const Suspicion& suspicion, const HostId& id) {
+  const auto host = suspicion.hosts.find(id);
+  return host == suspicion.hosts.end() ? 0 : 4 * host->second.num_crashes + host->second.num_trials;
 }
 
 /// A run that is stored cannot become a suspect. Its audit is given up instead.
@@ -80,13 +102,14 @@ void count_audit_crash(State& state, CampaignId id, RunIndex run, Outbox& outbox
 /// If several runs may be the cause, runs that are suspects already are left out: they will be
 /// tried alone, and only then does a crash tell more about them.
 RunSet blame_runs(CampaignState& campaign, const RunSet& accused, Certainty certainty,
-                  const HostId& host) {
+                  const HostId& host, TimePoint now) {
   RunSet blamed;
   for (const RunRange& range : accused.ranges()) {
     for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
       if (certainty == Certainty::ambiguous && campaign.suspects.contains(run)) continue;
       Suspicion& suspicion = campaign.suspects[run];
       Suspicion::OnHost& on_host = suspicion.hosts[host];
+      suspicion.tried_at = now;
       ++suspicion.num_crashes;
       ++on_host.num_crashes;
       if (certainty == Certainty::certain) ++on_host.num_alone;
@@ -121,7 +144,8 @@ RunsByCampaign blame(State& state, WorkerId id, RunsByCampaign accused, Certaint
   const RunsByCampaign audits = split_audits(state, accused);
   RunsByCampaign blamed;
   for (const auto& [campaign, runs] : accused) {
-    blamed[campaign] = blame_runs(state.campaigns.at(campaign), runs, certainty, host);
+    blamed[campaign] =
+        blame_runs(state.campaigns.at(campaign), runs, certainty, host, state.ticked_at);
   }
   if (!accused.empty()) return blamed;
   for (const auto& [campaign, runs] : audits) {
@@ -156,27 +180,32 @@ RunsByCampaign blame_batch(State& state, WorkerId id, const wire::ComputedBatch&
 }
 
 bool is_guilty(const State& state, const Suspicion& suspicion) {
-  std::uint32_t num_credible = suspicion.num_crashes;
-  std::uint32_t num_witnesses = 0;
-  for (const auto& [name, on_host] : suspicion.hosts) {
-    if (on_host.num_alone > 0) ++num_witnesses;
-    const auto host = state.hosts.find(name);
-    const bool is_proven = host != state.hosts.end() && host->second.num_results > 0;
-    if (!is_proven) num_credible -= on_host.num_crashes;
+  const auto num_witnesses = std::ranges::count_if(
+      suspicion.hosts, [](const auto& item) { return item.second.num_alone > 0; });
+  return num_witnesses >= 2 && suspicion.num_crashes >= state.config.crashes_per_run_max;
+}
+
+void give_up_untried(State& state, Outbox& outbox) {
+  if (!state.leases.empty() || state.workers.empty()) state.idle_since = state.ticked_at;
+  if (state.ticked_at - state.idle_since < state.config.lone_witness_wait) return;
+  for (const CampaignId id : state.served) {
+    std::erase_if(state.campaigns.at(id).pending_suspects, [&](const auto& item) {
+      const Suspicion& suspicion = state.campaigns.at(id).suspects.at(item.first);
+      if (num_credible(state, suspicion) < state.config.crashes_per_run_max) return false;
+      give_up(state, id, item.first, outbox);
+      return true;
+    });
   }
-  const std::uint32_t crashes_max = state.config.crashes_per_run_max;
-  return num_credible >= crashes_max ||
-         (num_witnesses >= 2 && suspicion.num_crashes >= crashes_max);
 }
 
 void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
   CampaignState& campaign = state.campaigns.at(id);
   const Suspicion suspicion = campaign.suspects.at(run);
   // The run is the cause, and not the hosts that have shown that they can compute.
-  for (const auto& [name, on_host] : suspicion.hosts) {
-    const auto host = state.hosts.find(name);
-    if (host == state.hosts.end() || host->second.num_results == 0) continue;
-    host->second.num_crashes -= std::min(host->second.num_crashes, on_host.num_crashes);
+  for (const auto& [id_of_host, on_host] : suspicion.hosts) {
+    if (!is_proven(state, id_of_host)) continue;
+    Host& host = state.hosts.at(id_of_host);
+    host.num_crashes -= std::min(host.num_crashes, on_host.num_crashes);
   }
   campaign.suspects.erase(run);
   campaign.given_up.add({run, 1});
@@ -188,11 +217,17 @@ void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
 }
 
 bool may_try(const State& state, const Suspicion& suspicion, const Worker& worker) {
-  if (!suspicion.hosts.contains(worker.host)) return true;
-  return std::none_of(state.hosts.begin(), state.hosts.end(), [&](const auto& item) {
-    const auto& [name, host] = item;
-    return host.num_workers > 0 && !state.quarantined.contains(name) &&
-           !suspicion.hosts.contains(name);
+  const auto own = suspicion.hosts.find(worker.host);
+  if (own == suspicion.hosts.end()) return true;
+  const std::uint32_t crashes_max = state.config.crashes_per_run_max;
+  const bool has_spoken = own->second.num_alone > 0 ? is_proven(state, worker.host)
+                                                    : own->second.num_trials >= crashes_max;
+  if (has_spoken && suspicion.num_crashes >= crashes_max) return false;
+  if (state.ticked_at - suspicion.tried_at >= state.config.lease_duration_max) return true;
+  return std::ranges::none_of(state.hosts, [&](const auto& item) {
+    const auto& [host, content] = item;
+    return content.num_workers > 0 && !state.quarantined.contains(host) &&
+           share_of_trials(suspicion, host) < share_of_trials(suspicion, worker.host);
   });
 }
 

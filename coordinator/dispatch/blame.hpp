@@ -18,15 +18,21 @@ RunsByCampaign blame_crash(State& state, WorkerId worker, Outbox& outbox);
 RunsByCampaign blame_batch(State& state, WorkerId worker, const wire::ComputedBatch& batch,
                            Outbox& outbox);
 
-/// True if a run crashed so often that it must be the cause: on hosts that have delivered results,
-/// or, alone, on two different ones.
+/// True if a run crashed so often, on two hosts at least while it ran alone, that it must be the
+/// cause.
 [[nodiscard]] bool is_guilty(const State& state, const Suspicion& suspicion);
+
+/// Gives up suspects that crashed as often on hosts that have delivered results, and that no other
+/// host has tried for long although nothing else was lent.
+void give_up_untried(State& state, Outbox& outbox);
 
 /// The run is not lent again. @pre It is a suspect, and has no place.
 void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox);
 
-/// True if the worker may be lent this suspect. A suspect is tried on a host on which it has not
-/// crashed yet, as long as there is one: otherwise a bad host could make a good run be given up.
+/// True if the worker may be lent this suspect. A suspect is tried on the host that has tried it
+/// least, and on which it has crashed least, if a worker there takes it soon: otherwise a bad host
+/// could make a good run be given up, or keep it. A host whose word does not suffice any more, or
+/// that has often brought nothing, does not get it again.
 [[nodiscard]] bool may_try(const State& state, const Suspicion& suspicion, const Worker& worker);
 
 }  // namespace proofmass::coordinator::detail

@@ -182,6 +182,8 @@ void on_removed(State& state, CampaignId id, Outbox& outbox) {
   state.campaigns.erase(id);
   std::erase(state.order, id);
   std::erase(state.served, id);
+  for (auto& [session, runs] : state.lent_before) runs.erase(id);
+  for (auto& [host_id, host] : state.hosts) host.step_time_s.erase(id);
   for (auto& [worker_id, worker] : state.workers) {
     worker.run_time_s.erase(id);
     worker.unleased.erase(id);

@@ -32,8 +32,21 @@ struct Adoption {
   CampaignId campaign_id;
   TimePoint now;
 
-  /// Those of the runs that are pending are lent to the worker from now on.
-  void adopt(Attempt held_as, const RunSet& runs) const {
+  /// Those of the runs that were lent to the worker before. What was lent before this coordinator
+  /// started is not known by runs.
+  [[nodiscard]] RunSet claimable(const RunSet& runs) const {
+    const SessionId session = state.workers.at(id).session;
+    if (state.attached.contains(session)) return runs;
+    const auto found = state.lent_before.find(session);
+    if (found == state.lent_before.end()) return {};
+    const auto before = found->second.find(campaign_id);
+    return before == found->second.end() ? RunSet() : before->second.overlap(runs);
+  }
+
+  /// Those of the runs that are pending, and were lent to the worker before, are lent to it from
+  /// now on.
+  void adopt(Attempt held_as, const RunSet& claimed) const {
+    const RunSet runs = claimable(claimed);
     auto& pending = state.campaigns.at(campaign_id).pending;
     for (auto next = pending.begin(); next != pending.end();) {
       const Attempt attempt = next->first;
@@ -53,6 +66,7 @@ struct Adoption {
   [[nodiscard]] bool adopt_suspect(const HeldByAttempt& held, const RunSet& rest) const {
     auto& suspects = state.campaigns.at(campaign_id).pending_suspects;
     if (rest.size() != 1 || state.workers.at(id).num_lent > 0) return false;
+    if (claimable(rest).empty()) return false;
     const auto found = suspects.find(rest.first());
     if (found == suspects.end()) return false;
     const auto held_as = std::find_if(held.begin(), held.end(), [&](const auto& item) {
@@ -77,6 +91,7 @@ struct Adoption {
                              .known_as = held_as,
                              .is_alone = is_alone,
                              .is_retracted = is_paused,
+                             .is_adopted = true,
                              .remaining = runs,
                              .lent_at = now,
                              .audited = {}});
@@ -212,25 +227,26 @@ bool is_same(const wire::ComputedBatch& a, const wire::ComputedBatch& b) {
   return a.campaign == b.campaign && a.ranges == b.ranges;
 }
 
-void add_step_time(State& state, const Progress& before, const wire::ComputedBatch& batch,
-                   TimePoint now) {
-  const auto campaign = state.campaigns.find(batch.campaign);
-  if (campaign == state.campaigns.end()) return;
+void add_step_time(State& state, const HostId& host, const Progress& before,
+                   const wire::ComputedBatch& batch, TimePoint now) {
+  if (!state.campaigns.contains(batch.campaign)) return;
+  double& step_time_s = state.hosts.at(host).step_time_s[batch.campaign];
   const double time_s = seconds(now - before.advanced_at) /
                         static_cast<double>(batch.num_steps_done - before.batch.num_steps_done);
-  campaign->second.step_time_s = running_mean(campaign->second.step_time_s, time_s);
+  step_time_s = running_mean(step_time_s, time_s);
 }
 
-/// How long a batch may take for a step. Before anything is known, as if a step usually took a
-/// tenth of what is waited at least; a run takes longer than any of its steps.
-Duration patience(const State& state, CampaignId id) {
+/// How long a batch may take for a step, by what this host has shown: others may say anything.
+/// Before anything is known, as if a step usually took a tenth of what is waited at least; a run
+/// takes longer than any of its steps.
+Duration patience(const State& state, const Worker& worker, CampaignId id) {
   const DispatchConfig& config = state.config;
+  const std::map<CampaignId, double>& steps = state.hosts.at(worker.host).step_time_s;
   double step_time_s = 0.1 * seconds(config.hung_after_min);
-  const auto campaign = state.campaigns.find(id);
-  if (campaign != state.campaigns.end()) {
-    if (campaign->second.run_time_s > 0.0) step_time_s = campaign->second.run_time_s;
-    if (campaign->second.step_time_s > 0.0) step_time_s = campaign->second.step_time_s;
-  }
+  const auto run = worker.run_time_s.find(id);
+  if (run != worker.run_time_s.end()) step_time_s = run->second;
+  const auto step = steps.find(id);
+  if (step != steps.end()) step_time_s = step->second;
   return std::max(config.hung_after_min, bounded_duration(config.hung_after_steps * step_time_s));
 }
 
@@ -285,7 +301,7 @@ void note_progress(State& state, Worker& worker, const wire::Heartbeat& heartbea
                      [&](const Progress& progress) { return is_same(progress.batch, batch); });
     if (before != worker.computing.end() && !was_silent) {
       if (batch.num_steps_done > before->batch.num_steps_done) {
-        add_step_time(state, *before, batch, now);
+        add_step_time(state, worker.host, *before, batch, now);
       } else {
         advanced_at = before->advanced_at;
       }
@@ -299,7 +315,7 @@ const wire::ComputedBatch* hung_batch(const State& state, const Worker& worker, 
   // Only heartbeats tell how far batches are: without them nothing is known, whatever else arrives.
   if (now - worker.heartbeat_at >= state.config.suspect_after) return nullptr;
   for (const Progress& progress : worker.computing) {
-    if (now - progress.advanced_at >= patience(state, progress.batch.campaign)) {
+    if (now - progress.advanced_at >= patience(state, worker, progress.batch.campaign)) {
       return &progress.batch;
     }
   }

@@ -193,8 +193,19 @@ void take_off(State& state, LeaseId id, RunRange runs) {
   state.leases.erase(found);
 }
 
+/// What the worker may claim if it still holds it.
+void note_lent_before(State& state, const Lease& lease, const RunSet& runs) {
+  auto& sessions = state.lent_before;
+  const SessionId session = state.workers.at(lease.worker).session;
+  if (sessions.size() >= state.config.num_workers_max && !sessions.contains(session)) {
+    sessions.erase(sessions.begin());
+  }
+  sessions[session][lease.campaign].add(runs);
+}
+
 void note_unleased(State& state, LeaseId id, RunRange runs) {
   const Lease& lease = state.leases.at(id);
+  note_lent_before(state, lease, RunSet(runs));
   Worker& worker = state.workers.at(lease.worker);
   worker.unleased[lease.campaign].add(runs);
   worker.clear_at = std::max(worker.clear_at, lease.lent_at + state.config.arrival_max);
@@ -203,6 +214,7 @@ void note_unleased(State& state, LeaseId id, RunRange runs) {
 void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const RunSet& blamed,
           Outbox& outbox) {
   const Lease lease = state.leases.at(id);
+  note_lent_before(state, lease, runs);
   const RunSet guilty = runs.overlap(blamed);
   RunSet others = runs;
   others.remove(guilty);
@@ -216,8 +228,9 @@ void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const
     make_pending(state, lease.campaign, std::move(open), after(lease.attempt), outbox);
   }
   if (lease.kind == LeaseKind::audit) {
+    // Whoever was to check it does not: then any worker may.
     add_to_audit(state.campaigns.at(lease.campaign),
-                 {.first_worker = lease.audited, .attempt = after(lease.attempt)}, runs);
+                 {.first_worker = {}, .attempt = after(lease.attempt)}, runs);
   }
 }
 

@@ -60,7 +60,7 @@ std::uint64_t rounds_with_room(const State& state, const CampaignState& campaign
 std::uint64_t rounds_wanted(const State& state, CampaignId id, const CampaignState& campaign,
                             const Worker& worker) {
   const double time_s = run_time_s(campaign, id, worker);
-  if (time_s <= 0.0) return 1;
+  if (time_s <= 0.0 || state.quarantined.contains(worker.host)) return 1;
   const double by_time = std::ceil(state.config.lease_work_s / time_s);
   const auto rounds = static_cast<std::uint64_t>(
       std::clamp(by_time, 2.0, static_cast<double>(wire::runs_per_lease_max)));
@@ -242,6 +242,9 @@ bool lend_suspect(const Borrower& borrower) {
   if (worker.num_lent > 0 || !is_clear) return true;
   const auto [run, attempt] = *found;
   campaign.pending_suspects.erase(found);
+  Suspicion& suspicion = campaign.suspects.at(run);
+  suspicion.tried_at = borrower.now;
+  ++suspicion.hosts[worker.host].num_trials;
   Lease lease = borrower.lease_of(RunSet(RunRange{run, 1}), attempt);
   lease.is_alone = true;
   lease.num_slots = 1;
@@ -297,13 +300,19 @@ void lend(State& state, WorkerId id, TimePoint now, Outbox& outbox) {
 
 void lend_to_hungry(State& state, TimePoint now, Outbox& outbox) {
   if (is_reattaching(state, now)) return;
-  auto next = state.hungry.begin();
-  while (next != state.hungry.end() && has_runs_to_lend(state)) lend(state, *next++, now, outbox);
+  // In turn: one that gives runs back must not get them again and again.
+  for (std::size_t count = state.hungry.size(); count > 0 && has_runs_to_lend(state); --count) {
+    auto next = state.hungry.upper_bound(state.fed_last);
+    if (next == state.hungry.end()) next = state.hungry.begin();
+    if (next == state.hungry.end()) return;
+    state.fed_last = *next;
+    lend(state, state.fed_last, now, outbox);
+  }
 }
 
 bool is_passed_over(const State& state, const Worker& worker, TimePoint now) {
-  return worker.num_alone > 0 || now - worker.heard_at >= state.config.suspect_after ||
-         state.quarantined.contains(worker.host);
+  const bool is_barred = worker.num_results == 0 && state.quarantined.contains(worker.host);
+  return worker.num_alone > 0 || now - worker.heard_at >= state.config.suspect_after || is_barred;
 }
 
 bool may_be_lent(const State& state, const Worker& worker, TimePoint now) {
@@ -364,7 +373,10 @@ void finish_if_done(State& state, CampaignId id, Outbox& outbox) {
   campaign.phase = Phase::finished;
   sort_served(state);
   const std::uint64_t num_elsewhere = campaign.elsewhere.size();
-  outbox.log({.kind = num_elsewhere == 0 ? "campaign_finished" : "part_finished",
+  const bool has_failed = campaign.given_up.size() > campaign.definition->num_runs / 2;
+  const char* const kind = has_failed ? "campaign_failed" : "campaign_finished";
+  outbox.log({.severity = has_failed ? Severity::error : Severity::info,
+              .kind = num_elsewhere == 0 ? kind : "part_finished",
               .fields = {{"runs", campaign.definition->num_runs - num_elsewhere},
                          {"given_up", campaign.given_up.size()},
                          {"duplicates", campaign.num_duplicates},

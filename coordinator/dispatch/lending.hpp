@@ -11,8 +11,8 @@ void lend(State& state, WorkerId worker, TimePoint now, Outbox& outbox);
 /// As lend(), for all workers that would take more, while there are runs to lend.
 void lend_to_hungry(State& state, TimePoint now, Outbox& outbox);
 
-/// True if nothing is lent to the worker: it is silent, its host is under quarantine, or it tries a
-/// suspect.
+/// True if nothing is lent to the worker: it is silent, its host is under quarantine and it has
+/// delivered nothing, or it tries a suspect.
 [[nodiscard]] bool is_passed_over(const State& state, const Worker& worker, TimePoint now);
 
 /// True if the worker wants runs, and is not passed over. Runs are shared among the slots of such

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <map>
 #include <optional>
 #include <string>
@@ -49,6 +50,7 @@ struct Intake {
     const RunIndex run = computed.result.run;
     if (detail::close_run(state, campaign_id, run, id, holders)) {
       campaign.delivered[run] = {.attempt = attempt, .waiting = {id}};
+      state.finished_at = state.ticked_at;
       if (!computed.result.is_completed()) ++campaign.num_without_estimate;
       outbox.store(id, leased(std::move(computed)));
       return;
@@ -113,8 +115,34 @@ void reopen_if_unfinished(State& state, CampaignState& campaign) {
   detail::sort_served(state);
 }
 
+/// What the worker only said that it holds was not lent to it.
+bool is_lent_to(const State& state, const CampaignState& campaign, RunIndex run, WorkerId id) {
+  const auto is_of = [&](LeaseId lease) {
+    return state.leases.at(lease).worker == id && !state.leases.at(lease).is_adopted;
+  };
+  if (const auto first = campaign.lent.find(run); first && is_of(*first)) return true;
+  const auto copies = campaign.copies.find(run);
+  return copies != campaign.copies.end() && std::ranges::any_of(copies->second.leases, is_of);
+}
+
+/// True if the result does not begin with the run's draw. Only of an open run that was not lent to
+/// the worker: a draw takes longer than all else here.
+bool is_made_up(const State& state, const CampaignState& campaign, const RunResult& result,
+                WorkerId id) {
+  if (result.run.value >= campaign.definition->num_runs) return false;
+  if (is_lent_to(state, campaign, result.run, id)) return false;
+  if (campaign.committed.contains(result.run) || campaign.delivered.contains(result.run)) {
+    return false;
+  }
+  const RunDraw draw = campaign.definition->draw(result.run);
+  return draw.num_draws != result.num_draws ||
+         !std::ranges::equal(draw.truth, result.truth, {}, std::bit_cast<std::uint64_t, double>,
+                             std::bit_cast<std::uint64_t, double>);
+}
+
 /// The rule that a result of the batch breaks, as `run 7: num_draws = 0 (...)`; empty if none does.
-std::string broken_rule(const CampaignState& campaign, const wire::ResultBatch& batch) {
+std::string broken_rule(const State& state, const CampaignState& campaign,
+                        const wire::ResultBatch& batch, WorkerId id) {
   const std::int64_t num_rounds_max = campaign.definition->num_rounds_max();
   const std::uint32_t num_draws_max = model().results().num_draws_max;
   for (const wire::ComputedRun& computed : batch.results) {
@@ -122,6 +150,9 @@ std::string broken_rule(const CampaignState& campaign, const wire::ResultBatch& 
         broken_count_rules(computed.result, num_draws_max, num_rounds_max);
     if (!broken.empty()) {
       return fmt::format("run {}: {}", computed.result.run.value, broken.front());
+    }
+    if (is_made_up(state, campaign, computed.result, id)) {
+      return fmt::format("run {}: truth (must be what the run draws)", computed.result.run.value);
     }
   }
   return {};
@@ -138,17 +169,22 @@ bool is_of_short_batch(const State& state, const CampaignState& campaign, RunInd
 /// Learns how long a run takes in its slot. Short batches say too little of it, unless nothing is
 /// known.
 void count_run_time(const State& state, Worker& worker, CampaignId id, CampaignState& campaign,
-                    const wire::ComputedRun& computed) {
+                    const wire::ComputedRun& computed, TimePoint now) {
   const bool is_known = campaign.run_time_s > 0.0;
   if (is_known && is_of_short_batch(state, campaign, computed.result.run)) return;
-  const double elapsed_s = std::max(computed.elapsed_s, 1e-9);  // 0 means that none is known.
+  const std::optional<LeaseId> lease = campaign.lent.find(computed.result.run);
+  const Duration lent_for = lease ? now - state.leases.at(*lease).lent_at : Duration::zero();
+  // A worker may say anything; 0 means that none is known.
+  const double elapsed_s =
+      std::clamp(computed.elapsed_s, 1e-9, seconds(lent_for + state.config.lease_duration_max));
   double& own_s = worker.run_time_s[id];
   own_s = running_mean(own_s, elapsed_s);
   campaign.run_time_s = running_mean(campaign.run_time_s, elapsed_s);
 }
 
 /// The worker and its host can compute: what they show with every result.
-void count_results(State& state, Worker& worker, CampaignId id, const wire::ResultBatch& batch) {
+void count_results(State& state, Worker& worker, CampaignId id, const wire::ResultBatch& batch,
+                   TimePoint now) {
   CampaignState& campaign = state.campaigns.at(id);
   const auto num_results = static_cast<std::uint64_t>(
       std::count_if(batch.results.begin(), batch.results.end(),
@@ -158,10 +194,11 @@ void count_results(State& state, Worker& worker, CampaignId id, const wire::Resu
   host.num_crashes = 0;
   host.num_results += num_results;
   worker.num_results += num_results;
+  worker.num_retracts = 0;
   const auto unleased = worker.unleased.find(id);
   for (const wire::ComputedRun& computed : batch.results) {
     if (is_foreign(campaign, computed)) continue;
-    count_run_time(state, worker, id, campaign, computed);
+    count_run_time(state, worker, id, campaign, computed, now);
     if (unleased != worker.unleased.end()) unleased->second.remove(computed.result.run);
   }
   if (unleased != worker.unleased.end() && unleased->second.empty()) {
@@ -183,11 +220,15 @@ void on_results(State& state, WorkerId id, wire::ResultBatch batch, TimePoint no
   if (!foreign.empty()) {
     outbox.send(id, wire::NotServed{.campaign = batch.campaign, .ranges = foreign.ranges()});
   }
-  if (const std::string broken = broken_rule(campaign, batch); !broken.empty()) {
+  if (const std::string broken = broken_rule(state, campaign, batch, id); !broken.empty()) {
+    outbox.log({.severity = Severity::error,
+                .kind = "results_refused",
+                .fields = {{"worker", id.value}, {"name", worker->name}, Field::reason(broken)}},
+               batch.campaign);
     outbox.send(id, wire::Reject{.reason = wire::RejectReason::malformed, .text = broken});
     return on_gone(state, id, LossReason::protocol, now, outbox);
   }
-  count_results(state, *worker, batch.campaign, batch);
+  count_results(state, *worker, batch.campaign, batch, now);
   Intake intake{state, id, batch.campaign, campaign, batch.attempt, outbox, {}, {}};
   for (wire::ComputedRun& computed : batch.results) {
     if (!is_foreign(campaign, computed)) intake.take(std::move(computed));

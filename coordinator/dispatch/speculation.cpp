@@ -9,6 +9,7 @@
 
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
+#include "core/math/hash.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -58,13 +59,18 @@ std::uint64_t retract_from(State& state, WorkerId id, std::uint64_t count_max, T
     send_retract(id, campaign, waiting.take_last(count), outbox);
     num_left -= count;
   }
-  if (num_left < num_before) worker.retracted_at = now;
+  if (num_left < num_before) {
+    worker.retracted_at = now;
+    ++worker.num_retracts;
+  }
   return num_before - num_left;
 }
 
 /// True if the worker answers, and has had the time to.
 bool may_be_asked(const State& state, const Worker& worker, TimePoint now) {
-  return now - worker.heard_at < state.config.suspect_after &&
+  constexpr int unanswered_max = 3;
+  return worker.num_retracts < unanswered_max &&
+         now - worker.heard_at < state.config.suspect_after &&
          now - worker.retracted_at >= state.config.heartbeat_interval;
 }
 
@@ -78,12 +84,13 @@ std::uint64_t retract(State& state, std::uint64_t count_max, TimePoint now, Outb
   return num_asked;
 }
 
-/// True if the lease takes far longer than it usually would, or its worker may be gone.
+/// True if the lease takes far longer than it usually would, or its worker may be gone. A lease has
+/// its time before any usual one is known, too.
 bool is_overdue(const State& state, const Lease& lease, TimePoint now) {
   const Worker& worker = state.workers.at(lease.worker);
   if (now - worker.heard_at >= state.config.suspect_after) return true;
   const double run_time_s = state.campaigns.at(lease.campaign).run_time_s;
-  if (run_time_s <= 0.0) return false;
+  if (run_time_s <= 0.0) return now - lease.lent_at > state.config.lease_duration_max;
   const double usual_s = std::max(run_time_s, state.config.lease_work_s);
   return seconds(now - lease.lent_at) > 2.0 * usual_s;
 }
@@ -127,10 +134,19 @@ class Copying {
   }
 
  private:
+  /// Copies that are themselves too slow do not count, and a host gets one at a time: workers that
+  /// compute nothing must not keep a run from the others.
   [[nodiscard]] bool may_copy(const Copies& copies) const {
-    return copies.leases.size() < copies_max &&
-           std::none_of(copies.leases.begin(), copies.leases.end(),
-                        [&](LeaseId lease) { return state_.leases.at(lease).worker == id_; });
+    std::size_t num_recent = 0;
+    for (const LeaseId id : copies.leases) {
+      const Lease& lease = state_.leases.at(id);
+      const Worker& holder = state_.workers.at(lease.worker);
+      if (lease.worker == id_) return false;
+      if (now_ - lease.lent_at > state_.config.lease_duration_max) continue;
+      if (holder.host == state_.workers.at(id_).host) return false;
+      ++num_recent;
+    }
+    return num_recent < copies_max;
   }
 
   State& state_;
@@ -140,20 +156,66 @@ class Copying {
   std::map<std::pair<CampaignId, Attempt>, RunSet> runs_;
 };
 
-void copy(State& state, const std::vector<WorkerId>& idle, TimePoint now, Outbox& outbox) {
+/// True if there may be no copy of the lease: it is of an audit, or has a suspect.
+bool is_exclusive(const State& state, const Lease& lease) {
+  if (lease.kind == LeaseKind::audit || lease.is_alone) return true;
+  const auto& suspects = state.campaigns.at(lease.campaign).suspects;
+  return std::ranges::any_of(lease.remaining.ranges(), [&](const RunRange& range) {
+    const auto next = suspects.lower_bound(range.first);
+    return next != suspects.end() && next->first.value < range.end();
+  });
+}
+
+/// Lends what there may be no copy of to the idle worker instead.
+void take_over(State& state, LeaseId id, WorkerId idle, TimePoint now, Outbox& outbox) {
+  const auto found = state.leases.find(id);
+  if (found == state.leases.end() || found->second.worker == idle) return;
+  const RunSet runs = found->second.remaining;
+  send_retract(found->second.worker, found->second.campaign, runs, outbox);
+  for (const RunRange& range : runs.ranges()) note_unleased(state, id, range);
+  lose(state, id, runs, LossReason::retracted, {}, outbox);
+  lend(state, idle, now, outbox);
+}
+
+void copy(State& state, std::vector<WorkerId> idle, TimePoint now, Outbox& outbox) {
   std::vector<LeaseId> overdue;
+  std::vector<LeaseId> exclusive;
+  constexpr Attempt often{4};  // It comes back again and again.
   for (const auto& [id, lease] : state.leases) {
-    const bool is_wanted = lease.kind == LeaseKind::first && !lease.is_alone;
-    if (is_wanted && is_lent(state.campaigns.at(lease.campaign)) && is_overdue(state, lease, now)) {
-      overdue.push_back(id);
+    if (lease.kind == LeaseKind::copy || !is_lent(state.campaigns.at(lease.campaign))) continue;
+    const bool is_late = is_overdue(state, lease, now);
+    // By then it is known whether its batch hangs.
+    const bool had_its_time = now - lease.lent_at > 6 * state.config.hung_after_min;
+    const bool has_no_copy = is_exclusive(state, lease);
+    if (has_no_copy && is_late && had_its_time) exclusive.push_back(id);
+    if (!has_no_copy && (is_late || lease.attempt >= often)) overdue.push_back(id);
+  }
+  // Another one is the first each time.
+  std::ranges::sort(idle, {}, [&](WorkerId id) { return mixed(id.value + state.next_lease); });
+  for (const LeaseId id : exclusive) {
+    for (const WorkerId worker : idle) {
+      if (state.workers.at(worker).num_lent == 0) take_over(state, id, worker, now, outbox);
     }
   }
   if (overdue.empty()) return;
   for (const WorkerId id : idle) {
+    if (state.workers.at(id).num_lent > 0) continue;
     Copying copying(state, id, now);
     for (const LeaseId lease : overdue) copying.take_from(state.leases.at(lease));
     copying.lend(outbox);
   }
+}
+
+/// Says that workers hold runs and finish none, although others could compute them.
+void note_standstill(State& state, std::size_t num_idle, TimePoint now, Outbox& outbox) {
+  if (state.leases.empty()) state.finished_at = now;
+  if (now - state.finished_at < state.config.lease_duration_max) return;
+  outbox.log({.severity = Severity::warning,
+              .kind = "nothing_finished",
+              .fields = {{"for_s", static_cast<std::uint64_t>(seconds(now - state.finished_at))},
+                         {"leases", state.leases.size()},
+                         {"idle_workers", num_idle}}});
+  state.finished_at = now;
 }
 
 /// Then workers are idle although this is not the end.
@@ -168,6 +230,7 @@ void speculate(State& state, TimePoint now, Outbox& outbox) {
   if (!state.is_lending || is_reattaching(state, now) || waits_for_a_store(state)) return;
   std::vector<WorkerId> idle = idle_workers(state, now);
   if (idle.empty()) return;
+  note_standstill(state, idle.size(), now, outbox);
   std::uint64_t num_wanted = 0;
   for (const WorkerId id : idle) num_wanted += room(state.workers.at(id));
   std::uint64_t num_coming = retract(state, num_wanted, now, outbox);
@@ -175,7 +238,7 @@ void speculate(State& state, TimePoint now, Outbox& outbox) {
     num_coming -= std::min(num_coming, room(state.workers.at(idle.back())));
     idle.pop_back();
   }
-  copy(state, idle, now, outbox);
+  copy(state, std::move(idle), now, outbox);
 }
 
 }  // namespace proofmass::coordinator::detail

@@ -13,11 +13,15 @@ namespace proofmass::coordinator {
 State initial_state(const DispatchConfig& config, std::set<SessionId> awaited, TimePoint now) {
   State state;
   state.config = config;
+  state.attached = awaited;
   state.awaited = std::move(awaited);
   state.awaited_until = now + config.reattach_wait;
   state.num_slots_expected = config.num_slots_expected;
   state.hello_allowance = config.hellos_per_s_max;
   state.hello_allowance_at = now;
+  state.ticked_at = now;
+  state.finished_at = now;
+  state.idle_since = now;
   return state;
 }
 
@@ -62,8 +66,8 @@ bool is_quiet(const State& state) {
 }
 
 bool is_quarantined(const State& state, const std::string& host) {
-  return std::any_of(state.quarantined.begin(), state.quarantined.end(),
-                     [&](const HostId& id) { return id.name == host; });
+  return std::ranges::any_of(
+      state.quarantined, [&](const auto& item) { return state.hosts.at(item.first).name == host; });
 }
 
 std::string runs_held_text(const State& state, WorkerId worker) {

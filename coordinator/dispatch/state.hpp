@@ -40,12 +40,11 @@ using Duration = std::chrono::steady_clock::duration;
       std::chrono::duration<double>(std::min(duration_s, duration_s_max)));
 }
 
-/// A computer, as the workers with one key name it. What these workers say about it, and their
-/// crashes there, count for this key alone, so that one key cannot put the hosts of another one
-/// under quarantine.
+/// A computer, by what its workers cannot choose. What they say, and their crashes, count for it
+/// alone, whatever they call themselves.
 struct HostId {
-  std::string key;   ///< Public key of the workers; empty without keys.
-  std::string name;  ///< As the workers give it.
+  std::string key;      ///< Public key of the workers; empty without keys.
+  std::string address;  ///< Of their connections, as the coordinator sees it.
   auto operator<=>(const HostId&) const = default;
 };
 
@@ -59,6 +58,8 @@ struct DispatchConfig {
   /// Runs that a heartbeat does not list, this long after they were lent, did not arrive. Longer
   /// than a message and its answer ever take while the worker is not suspect.
   Duration arrival_max = std::chrono::seconds(12);
+  /// Of a lease before a run time is known: then its runs are copied to idle workers.
+  Duration lease_duration_max = std::chrono::minutes(2);
   double lease_work_s = 1.5;  ///< Work that a slot is lent at a time, once run times are known.
   /// Slots of all workers that are known to come: the first ones to register then leave the others
   /// their part of a small campaign.
@@ -76,8 +77,12 @@ struct DispatchConfig {
   /// `hung_after_min`, hangs.
   double hung_after_steps = 50.0;
   Duration hung_after_min = std::chrono::seconds(60);
-  std::uint32_t crashes_per_run_max = 3;   ///< Then a run is given up.
+  std::uint32_t crashes_per_run_max = 3;  ///< Then a run is given up.
+  /// A run that one host alone saw crash waits for others to try it: so long, while nothing is
+  /// lent.
+  Duration lone_witness_wait = std::chrono::minutes(5);
   std::uint32_t crashes_per_host_max = 5;  ///< In a row, without a finished run; then quarantine.
+  Duration quarantine_duration = std::chrono::minutes(10);
   /// After a start with workers that should still be attached, nothing is lent until all of them
   /// have said what they hold, or until this has passed.
   Duration reattach_wait = std::chrono::seconds(15);
@@ -99,6 +104,7 @@ struct Worker {
   SessionId session;
   std::string name;
   HostId host;
+  std::string host_name;  ///< As it says.
   std::uint64_t process_id = 0;
   std::uint32_t num_slots = 1;
   TimePoint registered_at;
@@ -122,7 +128,8 @@ struct Worker {
   /// Until then it may get runs that were taken off its leases: a heartbeat without them proves
   /// nothing.
   TimePoint clear_at;
-  TimePoint retracted_at;  ///< When runs were last asked back for idle workers.
+  TimePoint retracted_at;  ///< When runs were last asked back for idle workers, ...
+  int num_retracts = 0;    ///< ... and how often since it last gave some back or delivered one.
   /// Running mean of what a run takes in its slot, by campaign; nothing if not known yet.
   std::map<CampaignId, double> run_time_s;
 };
@@ -143,6 +150,7 @@ struct Lease {
   LeaseKind kind = LeaseKind::first;
   bool is_alone = false;      ///< Of one run, which is suspected.
   bool is_retracted = false;  ///< The worker is asked, at each heartbeat, to give back what it can.
+  bool is_adopted = false;    ///< Held before it was lent: when it began is not known.
   std::uint64_t num_runs = 0;  ///< In `remaining` when it was opened.
   /// Slots that these were lent for: at least one a run, and more for the last runs of a campaign.
   std::uint64_t num_slots = 0;
@@ -169,13 +177,16 @@ using Phase = wire::CampaignPhase;
 
 /// What speaks against a run.
 struct Suspicion {
-  /// Crashes on one host, and those among them in which the worker computed nothing else.
+  /// Crashes on one host, those among them in which the worker computed nothing else, and how often
+  /// the run was lent there alone.
   struct OnHost {
     std::uint32_t num_crashes = 0;
     std::uint32_t num_alone = 0;
+    std::uint32_t num_trials = 0;
   };
   std::uint32_t num_crashes = 0;
   std::map<HostId, OnHost> hosts;  ///< Of the present epoch.
+  TimePoint tried_at{};            ///< When it was last lent alone.
 };
 
 /// A result on its way to the store, with the workers that wait for the acknowledgement; the first
@@ -221,7 +232,6 @@ struct CampaignState {
   std::map<RunIndex, std::uint32_t> audit_crashes;  ///< Of runs in the two above.
   std::uint64_t num_comparing = 0;                  ///< Results on their way to be compared.
   double run_time_s = 0.0;                 ///< Running mean over all workers; 0 if not known yet.
-  double step_time_s = 0.0;                ///< Running mean of what a step takes in its slot.
   std::string storage_failure;             ///< Why nothing can be stored; empty if all is well.
   std::uint64_t num_committed_here = 0;    ///< Without those that were finished before.
   std::uint64_t num_without_estimate = 0;  ///< Delivered here, with a status that has none.
@@ -251,10 +261,13 @@ struct StoredCampaign {
 
 /// A computer with workers, or with a history.
 struct Host {
+  std::string name;               ///< As its first worker gave it; for people.
   std::uint32_t num_workers = 0;  ///< Registered.
   std::uint32_t num_crashes = 0;  ///< Since one of its workers last delivered a result.
   std::uint64_t num_results = 0;
   TimePoint left_at;  ///< Its last worker was heard then, if it has none.
+  /// Running mean of what a step takes in its slot, by campaign; nothing if not known yet.
+  std::map<CampaignId, double> step_time_s = {};
 };
 
 /// Slots for which runs were lent, and when; at most so many times.
@@ -291,11 +304,21 @@ struct State {
   std::uint64_t num_slots_expected = 0;  ///< Of workers that are still to come.
   LentSlots lately_lent;      ///< What was longer ago than half of a run takes may be missing.
   std::set<WorkerId> hungry;  ///< Workers that were lent less than they would take.
+  WorkerId fed_last;          ///< The one of these that was last lent some.
   std::map<HostId, Host> hosts;
-  std::set<HostId> quarantined;  ///< Hosts that are lent nothing.
+  /// Hosts that are lent nothing until then, but for one round to workers that have delivered.
+  std::map<HostId, TimePoint> quarantined;
   /// Sessions that should be attached and have not said yet what they hold.
   std::set<SessionId> awaited;
   TimePoint awaited_until{};
+  /// Sessions that were lent runs before this coordinator started: which, is not known.
+  std::set<SessionId> attached;
+  /// Runs that were taken off the leases of a session, which it may still hold; of
+  /// `num_workers_max` sessions at most.
+  std::map<SessionId, std::map<CampaignId, RunSet>> lent_before;
+  TimePoint ticked_at{};    ///< About now.
+  TimePoint finished_at{};  ///< When a run last finished, or was said to be long ago.
+  TimePoint idle_since{};   ///< No run has been lent since then.
   bool is_lending = true;   ///< False once the service ends, ...
   bool is_stopped = false;  ///< ... and this is true if it does not even wait for results.
   /// Messages of workers have arrived that have not been handled. Set by the caller: then silence,

@@ -47,10 +47,10 @@ std::optional<wire::Reject> refusal(const State& state, const HostId& host,
   return std::nullopt;
 }
 
-/// Forgets the host of this key that has been without workers for the longest, if there are too
-/// many: a key that makes up names must not fill the memory, nor make those of others forgotten.
+/// Forgets the address of this key that has been without workers for the longest, if there are too
+/// many: a key that has many must not fill the memory, nor make those of others forgotten.
 void limit_hosts(State& state, const std::string& key) {
-  const auto first = state.hosts.lower_bound({.key = key, .name = ""});
+  const auto first = state.hosts.lower_bound({.key = key, .address = ""});
   auto oldest = state.hosts.end();
   std::size_t count = 0;
   for (auto host = first; host != state.hosts.end() && host->first.key == key; ++host, ++count) {
@@ -68,6 +68,7 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   worker.session = session;
   worker.name = hello.worker_name;
   worker.host = host;
+  worker.host_name = hello.host;
   worker.process_id = hello.process_id;
   worker.num_slots = hello.num_slots;
   worker.registered_at = now;
@@ -77,7 +78,9 @@ void register_worker(State& state, WorkerId id, SessionId session, const HostId&
   state.num_slots += worker.num_slots;
   state.num_slots_expected -= std::min<std::uint64_t>(state.num_slots_expected, worker.num_slots);
   detail::set_eligible(state, worker, true);
-  ++state.hosts[host].num_workers;
+  Host& known = state.hosts[host];
+  if (known.name.empty()) known.name = hello.host;
+  ++known.num_workers;
   limit_hosts(state, host.key);
   outbox.log({.kind = "worker_registered",
               .fields = {{"worker", id.value},
@@ -160,6 +163,16 @@ void welcome(State& state, WorkerId id, Outbox& outbox) {
   if (!state.is_lending) outbox.send(id, wire::Drain{});
 }
 
+void end_quarantines(State& state, Outbox& outbox) {
+  std::erase_if(state.quarantined, [&](const auto& item) {
+    const bool is_over = state.ticked_at >= item.second;
+    if (is_over) {
+      outbox.log({.kind = "host_released", .fields = {{"host", state.hosts.at(item.first).name}}});
+    }
+    return is_over;
+  });
+}
+
 void send_to_all(const State& state, const wire::Message& message, Outbox& outbox) {
   for (const auto& [id, worker] : state.workers) outbox.send(id, message);
 }
@@ -168,13 +181,13 @@ void send_to_all(const State& state, const wire::Message& message, Outbox& outbo
 struct Handler {
   State& state;
   WorkerId worker;
-  const std::string& key;
+  const HostId& from;
   const wire::Header& header;
   TimePoint now;
   Outbox& outbox;
 
   void operator()(const wire::Hello& hello) const {
-    on_hello(state, worker, header.session, key, hello, now, outbox);
+    on_hello(state, worker, header.session, from, hello, now, outbox);
   }
   void operator()(const wire::Heartbeat& heartbeat) const {
     on_heartbeat(state, worker, heartbeat, header.sequence, now, outbox);
@@ -212,24 +225,23 @@ void reject_unregistered(WorkerId id, Outbox& outbox) {
                                .text = "this worker is not registered"});
 }
 
-void on_packet(State& state, WorkerId id, const std::string& key, wire::Packet&& packet,
-               TimePoint now, Outbox& outbox) {
-  const Handler handle{state, id, key, packet.header, now, outbox};
+void on_packet(State& state, WorkerId id, const HostId& from, wire::Packet&& packet, TimePoint now,
+               Outbox& outbox) {
+  const Handler handle{state, id, from, packet.header, now, outbox};
   const bool is_of_worker = wire::visit_if<wire::WorkerMessage>(std::move(packet.message), handle);
   PROOFMASS_EXPECT(is_of_worker);
 }
 
-void on_hello(State& state, WorkerId id, SessionId session, const std::string& key,
+void on_hello(State& state, WorkerId id, SessionId session, const HostId& from,
               const wire::Hello& hello, TimePoint now, Outbox& outbox) {
   if (!take_hello_allowance(state, now)) return;
   if (state.is_stopped) return outbox.send(id, wire::Stop{});
-  const HostId host{.key = key, .name = hello.host};
-  if (hello.former) note_former(state, host, *hello.former, outbox);
+  if (hello.former) note_former(state, from, *hello.former, outbox);
   const bool is_new = !state.workers.contains(id);
-  auto reject = is_new ? refusal(state, host, hello) : std::nullopt;
+  auto reject = is_new ? refusal(state, from, hello) : std::nullopt;
   if (reject && reject->reason == wire::RejectReason::full) {
     make_room(state, now, outbox);
-    reject = refusal(state, host, hello);
+    reject = refusal(state, from, hello);
   }
   if (reject) {
     state.awaited.erase(session);
@@ -238,7 +250,7 @@ void on_hello(State& state, WorkerId id, SessionId session, const std::string& k
                 .fields = {{"name", hello.worker_name}, Field::remark(reject->text)}});
     outbox.send(id, *reject);
   } else {
-    if (is_new) register_worker(state, id, session, host, hello, now, outbox);
+    if (is_new) register_worker(state, id, session, from, hello, now, outbox);
     state.workers.at(id).heard_at = now;
     welcome(state, id, outbox);
   }
@@ -246,11 +258,13 @@ void on_hello(State& state, WorkerId id, SessionId session, const std::string& k
 }
 
 bool on_release_host(State& state, const std::string& host, TimePoint now, Outbox& outbox) {
-  const auto is_named = [&](const HostId& id) { return id.name == host; };
-  if (std::erase_if(state.quarantined, is_named) == 0) return false;
-  for (auto& [id, content] : state.hosts) {
-    if (is_named(id)) content.num_crashes = 0;
-  }
+  const std::size_t num_released = std::erase_if(state.quarantined, [&](const auto& item) {
+    Host& released = state.hosts.at(item.first);
+    if (released.name != host && item.first.address != host) return false;
+    released.num_crashes = 0;
+    return true;
+  });
+  if (num_released == 0) return false;
   outbox.log({.kind = "host_released", .fields = {{"host", host}}});
   detail::lend_to_hungry(state, now, outbox);
   return true;
@@ -303,8 +317,11 @@ void on_give_back(State& state, WorkerId id, const wire::GiveBack& give_back, Ti
       if (!lost.empty()) detail::lose(state, lease_id, lost, give_back.reason, {}, outbox);
     }
   }
-  detail::lend(state, id, now, outbox);
+  if (give_back.reason == LossReason::retracted) worker->num_retracts = 0;
+  // The others first: it may give back again what it is lent.
+  state.hungry.erase(id);
   detail::settle(state, now, outbox);
+  detail::lend(state, id, now, outbox);
 }
 
 void on_bye(State& state, WorkerId id, const wire::Bye& bye, TimePoint now, Outbox& outbox) {
@@ -326,6 +343,9 @@ void on_gone(State& state, WorkerId id, LossReason reason, TimePoint now, Outbox
 }
 
 void on_tick(State& state, TimePoint now, Outbox& outbox) {
+  state.ticked_at = now;
+  end_quarantines(state, outbox);
+  detail::give_up_untried(state, outbox);
   if (!state.awaited.empty() && now >= state.awaited_until) state.awaited.clear();
   const Duration lost_after =
       state.is_behind ? state.config.lost_after_if_behind : state.config.lost_after;

@@ -23,17 +23,17 @@ namespace proofmass::coordinator {
 /// Answers a message of a worker that is not registered, or of another epoch.
 void reject_unregistered(WorkerId id, Outbox& outbox);
 /// Calls the event of the message: one of those below, or on_results().
-/// @param key  Public key of the connection; empty without keys.
+/// @param from  The key and the address of the connection.
 /// @param packet  Moved from: a constant one, whose results would be copied, does not compile.
 /// @pre The message is one of a worker.
-void on_packet(State& state, WorkerId id, const std::string& key, wire::Packet&& packet,
-               TimePoint now, Outbox& outbox);
+void on_packet(State& state, WorkerId id, const HostId& from, wire::Packet&& packet, TimePoint now,
+               Outbox& outbox);
 /// Registers a worker, or answers again if it is registered already.
-/// @param key  Public key of the connection; empty without keys. What is said about a host counts
-///             for workers with this key only.
-void on_hello(State& state, WorkerId id, SessionId session, const std::string& key,
+/// @param from  The key and the address of the connection: whatever the worker calls its host.
+void on_hello(State& state, WorkerId id, SessionId session, const HostId& from,
               const wire::Hello& hello, TimePoint now, Outbox& outbox);
 /// Workers of a quarantined host are taken again, whatever their keys.
+/// @param host  Its address, or the name that its workers gave.
 /// @return False if it is not quarantined.
 bool on_release_host(State& state, const std::string& host, TimePoint now, Outbox& outbox);
 /// Answers with a part of the definition.

@@ -12,6 +12,7 @@
 #include "coordinator/net/outcome.hpp"
 #include "coordinator/store/campaign_peek.hpp"
 #include "core/error.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -27,7 +28,9 @@ void CampaignService::review_notices(CampaignId id, Served& served) {
   if (phase_of(id) == Phase::active) served.is_end_told = false;
   if (!served.is_end_told && is_finished_and_settled(id, served)) {
     served.is_end_told = true;
-    tell(served, CampaignNotice::Kind::finished, {});
+    const bool has_failed = wire::has_failed(status_of_served(id));
+    tell(served, has_failed ? CampaignNotice::Kind::failed : CampaignNotice::Kind::finished,
+         has_failed ? "most of its runs were given up" : "");
   }
   const bool has_failed = !campaign.storage_failure.empty();
   if (has_failed && !served.is_storage_failure_told) {

@@ -400,7 +400,7 @@ void CampaignService::begin_summary(CampaignId id, Served& served) {
 wire::DoneReply CampaignService::done_reply(CampaignId id) const {
   const wire::CampaignStatus status = status_of(id);
   return {.text = fmt::format("campaign {}: {}, {} runs, {} of them done", status.name,
-                              wire::name_of(status.phase), status.num_runs, status.num_done)};
+                              wire::phase_name(status), status.num_runs, status.num_done)};
 }
 
 }  // namespace proofmass::coordinator

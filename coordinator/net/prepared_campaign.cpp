@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <functional>
@@ -22,6 +23,8 @@
 #include "core/runs.hpp"
 #include "proto/link/kill_point.hpp"
 #include "proto/link/machine.hpp"
+#include "proto/wire/client_codec.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -150,11 +153,22 @@ std::optional<CampaignPeek> peek_without_log(const std::filesystem::path& file) 
   }
 }
 
+/// Any program may have written the file, and clients refuse a list in which one name is wrong.
+void require_shown(const std::filesystem::path& file, std::string_view name, std::string_view owner,
+                   int priority) {
+  const bool has_names = wire::is_name(name) && (owner.empty() || wire::is_name(owner));
+  if (has_names && std::abs(std::int64_t{priority}) <= wire::priority_max) return;
+  throw Error(fmt::format(
+      "campaign database = {} (its name, owner or priority breaks the rules of a campaign file)",
+      file.string()));
+}
+
 FileOutcome opened(const CampaignDirectory& directory, const std::filesystem::path& file,
                    const KnownCampaigns& known, const NumFiles& num_files,
                    const CoordinatorStart& start) {
   const std::optional<FileStamp> stamp = stamp_of(file);  // Before anything is read.
   if (const std::optional<CampaignPeek> peek = peek_without_log(file)) {
+    require_shown(file, peek->name, peek->owner, peek->priority);
     const bool is_known = known.ids.contains(peek->id) || known.names.contains(peek->name);
     const auto found = num_files.find(peek->name);
     const bool has_rival = is_known || found == num_files.end() || found->second > 1;
@@ -231,6 +245,7 @@ PreparedCampaign prepare(ServedCampaign campaign, GivenUpRuns given_up,
   Store& store = campaign.store;
   StoredCampaign stored = stored_campaign_of(campaign, given_up);
   const CampaignControl control = store.control();
+  require_shown(campaign.file, campaign.definition->name, store.owner(), control.priority);
   const StopPlan plan = store.stop_plan();
   const std::uint64_t num_failures = store.num_without_estimate();
   std::vector<SessionId> sessions = store.attached_sessions();

@@ -27,7 +27,7 @@ namespace {
 /// Workers with several keys may run there.
 std::set<std::string> quarantined_hosts(const State& state) {
   std::set<std::string> names;
-  for (const HostId& host : state.quarantined) names.insert(host.name);
+  for (const auto& [host, until] : state.quarantined) names.insert(state.hosts.at(host).name);
   return names;
 }
 

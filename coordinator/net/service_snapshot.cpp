@@ -19,7 +19,7 @@ std::string_view name_of(WorkerActivity activity) {
 wire::WorkerStatus status_of(const State& state, WorkerId id, const Worker& worker, TimePoint now) {
   return {.id = id,
           .name = worker.name,
-          .host = worker.host.name,
+          .host = worker.host_name,
           .process_id = worker.process_id,
           .num_slots = worker.num_slots,
           .num_lent = worker.num_lent,

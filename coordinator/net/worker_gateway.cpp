@@ -25,6 +25,13 @@ std::string revoked_text(const Address& address) {
   return fmt::format("key = {} (is not authorized any more)", address.key);
 }
 
+/// A Unix domain socket's address ends with the process.
+HostId host_of(const Address& from) {
+  constexpr std::string_view local = "localhost";
+  return {.key = from.key,
+          .address = from.host.starts_with(local) ? std::string(local) : from.host};
+}
+
 bool is_of_a_worker(const wire::Message& message) {
   return wire::visit_if<wire::WorkerMessage>(message, [](const auto&) {});
 }
@@ -86,7 +93,7 @@ void WorkerGateway::receive(const Incoming& message, TimePoint now, Outbox& outb
     callbacks_.on_leaving(*worker, bye->reason);
   }
   if (is_a<wire::ResultBatch>(packet->message)) wire::kill_point(KillPoint::after_receive);
-  on_packet(state_, *worker, message.from.key, *std::move(packet), now, outbox);
+  on_packet(state_, *worker, host_of(message.from), *std::move(packet), now, outbox);
 }
 
 std::optional<wire::Packet> WorkerGateway::decode(const Incoming& message, TimePoint now,

@@ -23,7 +23,7 @@ void WorkerHistory::note_lent(CampaignId campaign, WorkerId id) {
   const Worker& worker = found->second;
   writer_.record_worker_joined(campaign, {.session = worker.session,
                                           .name = worker.name,
-                                          .host = worker.host.name,
+                                          .host = worker.host_name,
                                           .process_id = worker.process_id,
                                           .num_slots = worker.num_slots});
 }

@@ -25,7 +25,7 @@ std::string fact(std::string_view name, std::string_view value) {
 std::string facts_of(const CampaignSnapshot& campaign) {
   const wire::CampaignStatus& status = campaign.status;
   std::string html =
-      "<dl>" + fact("phase", wire::name_of(status.phase)) + fact("done", grouped(status.num_done)) +
+      "<dl>" + fact("phase", wire::phase_name(status)) + fact("done", grouped(status.num_done)) +
       fact("of runs", grouped(status.num_runs)) +
       fact("runs/s", status.rate_hz > 0.0 ? measured_figure(status.rate_hz) : "–") +
       fact("time left", status.remaining_s ? duration_text(*status.remaining_s) : "–") +

@@ -217,7 +217,7 @@ PageContent overview_page(const PageSnapshot& snapshot, const PageRequest& reque
   for (std::size_t i = list.first; i < list.end; ++i) {
     const CampaignStatus& campaign = campaigns[i].status;
     rows.push_back(
-        {campaign_link(campaign), std::string(wire::name_of(campaign.phase)),
+        {campaign_link(campaign), std::string(wire::phase_name(campaign)),
          progress_bar(campaign.num_done, campaign.num_runs, "progress of " + campaign.name),
          grouped(campaign.num_done), grouped(campaign.num_runs), rate_cell(campaign),
          time_left_cell(campaign), std::to_string(campaign.priority)});

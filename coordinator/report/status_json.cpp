@@ -30,7 +30,7 @@ StatusJson factory_object(const wire::FactoryStatus& factory) {
 
 StatusJson campaign_object(const wire::CampaignStatus& campaign) {
   StatusJson json{{"name", campaign.name},
-                  {"phase", wire::name_of(campaign.phase)},
+                  {"phase", wire::phase_name(campaign)},
                   {"priority", campaign.priority},
                   {"num_runs", campaign.num_runs},
                   {"num_done", campaign.num_done},

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/error.hpp"
 #include "proto/client.pb.h"
 #include "proto/wire/definition_codec.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -70,14 +72,19 @@ std::string sendable(std::string_view text) {
   return result;
 }
 
+/// Of what a reply may say; 0 for what is none.
+double sendable(double magnitude) {
+  return std::isfinite(magnitude) && magnitude > 0.0 ? magnitude : 0.0;
+}
+
 void write_report(const FactoryReport& report, proto::FactoryReport& message) {
-  message.set_name(report.name);
-  message.set_batch_system(report.batch_system);
+  message.set_name(name_from(report.name));
+  message.set_batch_system(name_from(report.batch_system));
   message.set_phase(static_cast<proto::FactoryPhase>(report.phase));
   message.set_num_wanted(report.num_wanted);
   message.set_num_registered(report.num_registered);
   message.set_num_queued(report.num_queued);
-  message.set_wait_s(report.wait_s);
+  message.set_wait_s(sendable(report.wait_s));
   message.set_reason(sendable(report.reason));
   message.set_interval_s(report.interval_s);
 }
@@ -88,33 +95,35 @@ void write(const FactoryReport& report, proto::RequestEnvelope& envelope) {
 
 void write_factory(const FactoryStatus& factory, proto::FactoryStatus& message) {
   write_report(factory.report, *message.mutable_report());
-  message.set_owner(factory.owner);
-  message.set_silent_s(factory.silent_s);
+  if (!factory.owner.empty()) message.set_owner(name_from(factory.owner));
+  message.set_silent_s(sendable(factory.silent_s));
 }
 
 void write_campaign(const CampaignStatus& campaign, proto::CampaignStatus& message) {
-  message.set_name(campaign.name);
+  message.set_name(name_from(campaign.name));
   message.set_phase(static_cast<proto::CampaignPhase>(campaign.phase));
-  message.set_priority(campaign.priority);
-  message.set_num_runs(campaign.num_runs);
-  message.set_num_done(campaign.num_done);
+  message.set_priority(std::clamp(campaign.priority, -priority_max, priority_max));
+  const std::uint64_t num_runs = std::clamp<std::uint64_t>(campaign.num_runs, 1, num_runs_max);
+  const std::uint64_t num_given_up = std::min(campaign.num_given_up, num_runs);
+  message.set_num_runs(num_runs);
+  message.set_num_done(std::min(campaign.num_done, num_runs - num_given_up));
   message.set_num_without_estimate(campaign.num_without_estimate);
-  message.set_num_given_up(campaign.num_given_up);
+  message.set_num_given_up(num_given_up);
   message.set_num_lent(campaign.num_lent);
   message.set_num_duplicates(campaign.num_duplicates);
   message.set_num_audited(campaign.num_audited);
   message.set_num_mismatches(campaign.num_mismatches);
-  message.set_rate_hz(campaign.rate_hz);
-  if (campaign.remaining_s) message.set_remaining_s(*campaign.remaining_s);
+  message.set_rate_hz(sendable(campaign.rate_hz));
+  if (campaign.remaining_s) message.set_remaining_s(sendable(*campaign.remaining_s));
   message.set_storage_failure(sendable(campaign.storage_failure));
-  message.set_owner(campaign.owner);
+  if (!campaign.owner.empty()) message.set_owner(name_from(campaign.owner));
 }
 
 void write(const StatusReply& status, proto::ReplyEnvelope& envelope) {
   proto::StatusReply& message = *envelope.mutable_status();
   message.set_version(status.version);
   message.set_model_version(status.model_version);
-  message.set_uptime_s(status.uptime_s);
+  message.set_uptime_s(sendable(status.uptime_s));
   message.set_num_workers(status.num_workers);
   message.set_num_slots(status.num_slots);
   for (const CampaignStatus& campaign : status.campaigns) {
@@ -127,7 +136,9 @@ void write(const StatusReply& status, proto::ReplyEnvelope& envelope) {
     unserved.set_reason(sendable(file.reason));
   }
   message.set_num_unserved_files(status.num_unserved_files);
-  for (const std::string& host : status.quarantined_hosts) message.add_quarantined_hosts(host);
+  for (const std::string& host : status.quarantined_hosts) {
+    message.add_quarantined_hosts(name_from(host));
+  }
   message.set_num_quarantined_hosts(status.num_quarantined_hosts);
   for (const FactoryStatus& factory : status.factories) {
     write_factory(factory, *message.add_factories());
@@ -136,13 +147,13 @@ void write(const StatusReply& status, proto::ReplyEnvelope& envelope) {
 
 void write_worker(const WorkerStatus& worker, proto::WorkerStatus& message) {
   message.set_worker_id(worker.id.value);
-  message.set_name(worker.name);
-  message.set_host(worker.host);
+  message.set_name(name_from(worker.name));
+  message.set_host(name_from(worker.host));
   message.set_process_id(worker.process_id);
   message.set_num_slots(worker.num_slots);
   message.set_num_lent(worker.num_lent);
   message.set_num_results(worker.num_results);
-  message.set_silent_s(worker.silent_s);
+  message.set_silent_s(sendable(worker.silent_s));
   message.set_is_quarantined(worker.is_quarantined);
 }
 

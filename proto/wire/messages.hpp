@@ -125,7 +125,7 @@ enum class RejectReason : std::uint8_t {
   malformed = 3,       ///< Something sent broke the rules: nothing more is heard on the connection.
   full = 4,            ///< The coordinator serves as many workers as it can; ask later.
   quarantined = 5,     ///< Too much crashed on this host; ask later.
-  revoked = 6,         ///< The worker's key is not on the list any more. Final.
+  revoked = 6,         ///< The worker's key is not on the list any more; ask for minutes.
 };
 
 /// Coordinator → worker: not registered, and why.

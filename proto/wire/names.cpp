@@ -62,6 +62,14 @@ std::string_view name_of(CampaignPhase phase) {
   PROOFMASS_EXPECT(false);
 }
 
+bool has_failed(const CampaignStatus& campaign) {
+  return campaign.phase == CampaignPhase::finished && campaign.num_given_up > campaign.num_runs / 2;
+}
+
+std::string_view phase_name(const CampaignStatus& campaign) {
+  return has_failed(campaign) ? "failed" : name_of(campaign.phase);
+}
+
 std::string_view name_of(FactoryPhase phase) {
   switch (phase) {
     case FactoryPhase::active:

@@ -16,10 +16,15 @@ namespace proofmass::wire {
 /// nothing is left.
 [[nodiscard]] std::string name_from(std::string_view text);
 
+/// True if most runs of the campaign were given up: then it is no success that it is finished.
+[[nodiscard]] bool has_failed(const CampaignStatus& campaign);
+
 /// Names of values for people, logs, JSON and the database: `pause`, `active`, `out_of_memory`.
 [[nodiscard]] std::string_view name_of(ControlAction action);
 [[nodiscard]] std::string_view name_of(CampaignPhase phase);
 [[nodiscard]] std::string_view name_of(FactoryPhase phase);
+/// The phase, or `failed` if the campaign is finished and most of its runs were given up.
+[[nodiscard]] std::string_view phase_name(const CampaignStatus& campaign);
 [[nodiscard]] std::string_view name_of(LossReason reason);
 
 }  // namespace proofmass::wire

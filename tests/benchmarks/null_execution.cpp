@@ -24,7 +24,9 @@ std::vector<RunRange> ranges_of_requests(const std::vector<RunRequest>& requests
 }  // namespace
 
 void NullExecution::define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) {
-  seeds_[campaign] = definition->seed;
+  std::shared_ptr<Campaign> extended = definition->clone();
+  extended->num_runs = num_runs_max;  // It may be.
+  campaigns_[campaign] = std::move(extended);
   advance(now_);
 }
 
@@ -86,7 +88,7 @@ bool NullExecution::drop_batch(std::uint64_t number) { return batches_.erase(num
 
 void NullExecution::forget(wire::CampaignId campaign) {
   waiting_.drop(campaign);
-  seeds_.erase(campaign);
+  campaigns_.erase(campaign);
   std::erase_if(batches_,
                 [&](const auto& entry) { return entry.second.assignment.campaign == campaign; });
   std::erase_if(finished_, [&](const auto& run) { return run.campaign == campaign; });
@@ -121,11 +123,11 @@ int NullExecution::num_steps_done(const Batch& batch) const {
 }
 
 void NullExecution::finish(const worker::Assignment& assignment, double elapsed_s) {
-  const std::uint64_t seed = seeds_.at(assignment.campaign);
+  const Campaign& campaign = *campaigns_.at(assignment.campaign);
   for (const RunRequest& request : assignment.requests) {
     finished_.push_back(
         {.campaign = assignment.campaign,
-         .computed = {.result = null_result(seed, request.run), .elapsed_s = elapsed_s}});
+         .computed = {.result = null_result(campaign, request.run), .elapsed_s = elapsed_s}});
   }
   num_steps_done_ += assignment.requests.size() * num_steps;
 }

@@ -36,7 +36,7 @@ class NullExecution final : public worker::Execution {
   [[nodiscard]] bool has_finished() const { return !finished_.empty(); }
 
   [[nodiscard]] bool is_defined(wire::CampaignId campaign) const override {
-    return seeds_.contains(campaign);
+    return campaigns_.contains(campaign);
   }
   void define(wire::CampaignId campaign, std::shared_ptr<const Campaign> definition) override;
   void submit(wire::RunLease lease) override;
@@ -67,7 +67,7 @@ class NullExecution final : public worker::Execution {
   NullPace pace_;
   TimePoint now_;
   std::optional<TimePoint> due_at_;
-  std::map<wire::CampaignId, std::uint64_t> seeds_;
+  std::map<wire::CampaignId, std::shared_ptr<const Campaign>> campaigns_;
   worker::RunQueue waiting_;
   std::map<std::uint64_t, Batch> batches_;  ///< By number.
   std::uint64_t num_batches_ = 0;           ///< Begun.

@@ -1,6 +1,7 @@
 #include "tests/benchmarks/null_result.hpp"
 
 #include <cstddef>
+#include <utility>
 
 #include "tests/support/microscope_results.hpp"
 
@@ -23,6 +24,19 @@ RunResult null_result(std::uint64_t seed, RunIndex run) {
     result.truth[i] = 1e-4 * made_up(seed, run, i, 0);
     result.estimate[i] = result.truth[i] + 1e-6 * made_up(seed, run, i, 1);
   }
+  return result;
+}
+
+RunResult null_result(const Campaign& campaign, RunIndex run) {
+  RunResult result = null_result(campaign.seed, run);
+  if (!campaign.table_quantities().empty()) return result;
+  RunDraw draw = campaign.draw(run);
+  if (draw.truth.empty()) return result;
+  result.num_draws = draw.num_draws;
+  for (std::size_t i = 0; i < num_parameters; ++i) {
+    result.estimate[i] += draw.truth[i] - result.truth[i];
+  }
+  result.truth = std::move(draw.truth);
   return result;
 }
 

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <thread>
@@ -49,10 +50,12 @@ void pass_time(double run_time_s, const std::function<void(int)>& progress) {
   }
 }
 
-worker::PreparedCampaign prepare(const Campaign& campaign, const NullOptions& options) {
+worker::PreparedCampaign prepare(const Campaign& definition, const NullOptions& options) {
+  std::shared_ptr<Campaign> campaign = definition.clone();
+  campaign->num_runs = num_runs_max;  // It may be extended.
   return {.simulate =
-              [seed = campaign.seed, &options](std::span<const RunRequest> requests,
-                                               const std::function<void(int)>& progress) {
+              [campaign, &options](std::span<const RunRequest> requests,
+                                   const std::function<void(int)>& progress) {
                 if (has(requests, options.poison)) crash();
                 while (has(requests, options.hang)) {
                   std::this_thread::sleep_for(std::chrono::hours(1));
@@ -60,7 +63,7 @@ worker::PreparedCampaign prepare(const Campaign& campaign, const NullOptions& op
                 pass_time(options.run_time_s, progress);
                 std::vector<RunResult> results;
                 for (const RunRequest& request : requests) {
-                  results.push_back(test::null_result(seed, request.run));
+                  results.push_back(test::null_result(*campaign, request.run));
                 }
                 return results;
               },

@@ -2,6 +2,7 @@
 
 #include <variant>
 
+#include "proto/wire/codec.hpp"
 #include "tests/system/simulated_network_coordinator.hpp"
 
 // What a coordinator may send, whatever has happened to it.
@@ -13,6 +14,9 @@ using coordinator::Phase;
 void PlayedCoordinator::check_sent(wire::WorkerId worker, const wire::Message& message) const {
   const auto peer = life_->peers.find(worker);
   ASSERT_TRUE(peer != life_->peers.end()) << "sent to a peer that has said nothing";
+  const auto decoded = wire::decode(
+      wire::encode({.header = {.session = {1}, .epoch = {1}, .sequence = 1}, .message = message}));
+  EXPECT_TRUE(std::holds_alternative<wire::Packet>(decoded)) << "the peer would refuse it";
   if (const auto* const reject = std::get_if<wire::Reject>(&message)) {
     check_reject(*reject, peer->second);
   } else {
@@ -36,7 +40,25 @@ void PlayedCoordinator::check_reject(const wire::Reject& reject, const Peer& pee
   const bool may_come_again = reject.reason == wire::RejectReason::not_registered ||
                               reject.reason == wire::RejectReason::full ||
                               reject.reason == wire::RejectReason::quarantined;
-  EXPECT_TRUE(may_come_again || peer.key == liar_key) << reject.text;
+  EXPECT_TRUE(may_come_again || !peer.is_honest) << reject.text;
+}
+
+/// Nobody gets what it was not given, unless which runs that were is forgotten.
+void PlayedCoordinator::check_adoptions(wire::WorkerId worker) const {
+  const coordinator::State& state = life_->state;
+  const auto found = state.workers.find(worker);
+  if (found == state.workers.end() || state.attached.contains(found->second.session)) return;
+  const auto lent = lent_.find(found->second.session);
+  for (const coordinator::LeaseId id : found->second.leases) {
+    const coordinator::Lease& lease = state.leases.at(id);
+    if (!lease.is_adopted) continue;
+    for (const RunRange& range : lease.remaining.ranges()) {
+      for (RunIndex run = range.first; run.value < range.end(); ++run.value) {
+        EXPECT_TRUE(lent != lent_.end() && lent->second.contains({lease.campaign, run}))
+            << "claimed and never lent";
+      }
+    }
+  }
 }
 
 void PlayedCoordinator::check_lease(const wire::RunLease& lease) const {

@@ -26,6 +26,9 @@ coordinator::DispatchConfig quick_config() {
   config.arrival_max = 8s;
   config.hung_after_min = 20s;
   config.reattach_wait = 10s;
+  config.lease_duration_max = 40s;
+  config.lone_witness_wait = 2min;
+  config.quarantine_duration = 2min;
   return config;
 }
 
@@ -93,19 +96,20 @@ void PlayedCoordinator::kill() {
   }
 }
 
-void PlayedCoordinator::receive(const wire::Packet& packet, const std::string& key) {
+void PlayedCoordinator::receive(const wire::Packet& packet, const coordinator::HostId& from) {
   if (!life_) return;
   if (is_stalled()) {
-    life_->waiting.emplace_back(packet, key);
+    life_->waiting.emplace_back(packet, from);
     return;
   }
-  const wire::WorkerId worker = meet(packet.header.session, key);
+  const wire::WorkerId worker = meet(packet.header.session, from);
   const bool is_hello = std::holds_alternative<wire::Hello>(packet.message);
   if (is_hello) life_->peers.at(worker).said_hello = true;
   if (packet.header.epoch != life_->epoch && !is_hello) {
     coordinator::reject_unregistered(worker, *this);
   } else {
-    handle(worker, packet, key);
+    handle(worker, packet, from);
+    check_adoptions(worker);
   }
   after_event();
 }
@@ -123,19 +127,19 @@ void PlayedCoordinator::stall(Duration duration) {
 void PlayedCoordinator::go_on() {
   life_->stalled_until = TimePoint{};
   if (random_.happens(0.3)) tick();
-  for (const auto& [packet, key] : std::exchange(life_->waiting, {})) {
+  for (const auto& [packet, from] : std::exchange(life_->waiting, {})) {
     ++num_events_["message_waited"];
-    receive(packet, key);
+    receive(packet, from);
   }
   for (const auto& [id, file] : files_) flush(id);
 }
 
 void PlayedCoordinator::handle(wire::WorkerId worker, const wire::Packet& packet,
-                               const std::string& key) {
+                               const coordinator::HostId& from) {
   coordinator::State& state = life_->state;
   const TimePoint now = agenda_.now();
   if (const auto* const hello = std::get_if<wire::Hello>(&packet.message)) {
-    on_hello(state, worker, packet.header.session, key, *hello, now, *this);
+    on_hello(state, worker, packet.header.session, from, *hello, now, *this);
   } else if (const auto* const heartbeat = std::get_if<wire::Heartbeat>(&packet.message)) {
     on_heartbeat(state, worker, *heartbeat, packet.header.sequence, now, *this);
   } else if (const auto* const results = std::get_if<wire::ResultBatch>(&packet.message)) {
@@ -275,11 +279,11 @@ bool PlayedCoordinator::is_done() const {
                      [&](const auto& item) { return is_done(item.first); });
 }
 
-wire::WorkerId PlayedCoordinator::meet(wire::SessionId session, const std::string& key) {
+wire::WorkerId PlayedCoordinator::meet(wire::SessionId session, const coordinator::HostId& from) {
   const auto [found, is_new] = life_->workers.try_emplace(session);
   if (is_new) {
     found->second = {life_->workers.size()};
-    life_->peers[found->second] = {.session = session, .key = key};
+    life_->peers[found->second] = {.session = session, .is_honest = from.address != liar_address};
   }
   return found->second;
 }
@@ -293,6 +297,10 @@ void PlayedCoordinator::send(wire::WorkerId worker, wire::Message message) {
   check_sent(worker, message);
   if (const auto* const lease = std::get_if<wire::RunLease>(&message)) {
     attempt_max_ = std::max(attempt_max_, lease->attempt.value);
+    auto& lent = lent_[life_->peers.at(worker).session];
+    for (RunIndex run = lease->runs.first; run.value < lease->runs.end(); ++run.value) {
+      lent.insert({lease->campaign, run});
+    }
   }
   if (const auto* const not_served = std::get_if<wire::NotServed>(&message)) {
     ++num_events_[not_served->ranges.empty() ? "campaign_not_served" : "runs_not_served"];
@@ -331,6 +339,9 @@ void PlayedCoordinator::flush(wire::CampaignId id) {
 
 void PlayedCoordinator::store(wire::WorkerId, wire::LeasedResult result) {
   const RunIndex run = result.computed.result.run;
+  EXPECT_EQ(result.computed.result.truth,
+            files_.at(result.campaign).stored.definition->draw(run).truth)
+      << "a forged result is stored";
   write_later(result.campaign, [this, id = result.campaign, run](PlayedFile& file) {
     ++file.num_commits[run];
     file.given_up.erase(run);
@@ -350,7 +361,7 @@ void PlayedCoordinator::compare(wire::WorkerId worker, wire::LeasedResult result
 void PlayedCoordinator::record(const coordinator::Loss& loss) {
   ++num_events_[std::string(wire::name_of(loss.reason))];
   const bool is_of_a_crash = coordinator::is_blamed(loss.reason);
-  const bool is_honest = life_->peers.at(loss.worker).key == honest_key;
+  const bool is_honest = life_->peers.at(loss.worker).is_honest;
   EXPECT_TRUE(may_crash_ || !is_of_a_crash || !is_honest) << "a liar has ended an honest worker";
   if (!loss.is_blamed) return;
   write_later(loss.campaign, [loss](PlayedFile& file) {
@@ -377,7 +388,7 @@ void PlayedCoordinator::log(coordinator::Event event, wire::CampaignId campaign)
     std::printf("%9.3f %s\n", now_s, text.c_str());
   }
   if (event.kind == "host_quarantined" && !may_crash_) {
-    EXPECT_EQ(text.find(honest_key), std::string::npos) << text;
+    EXPECT_NE(text.find("address=" + liar_address), std::string::npos) << text;
   }
   if (event.kind == "audit_given_up") {
     ASSERT_EQ(event.fields.at(0).name, "run");

@@ -16,6 +16,7 @@
 #include "coordinator/dispatch/workers.hpp"
 #include "proto/wire/definition_codec.hpp"
 #include "tests/system/simulated_network_execution.hpp"
+#include "tests/system/simulated_network_liar.hpp"
 #include "tests/system/simulated_network_time.hpp"
 
 namespace proofmass::test {
@@ -61,7 +62,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
   /// @pre It does not run.
   void start();
   void kill();
-  void receive(const wire::Packet& packet, const std::string& key = honest_key);
+  void receive(const wire::Packet& packet, const coordinator::HostId& from);
   void tick();
   /// Its thread does nothing for so long; what is sent to it waits.
   void stall(Duration duration);
@@ -115,7 +116,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
  private:
   struct Peer {
     wire::SessionId session;
-    std::string key;
+    bool is_honest = true;
     std::uint64_t num_sent = 0;
     bool said_hello = false;
   };
@@ -127,11 +128,12 @@ class PlayedCoordinator final : public coordinator::Outbox {
     std::map<wire::WorkerId, Peer> peers;
     std::map<wire::CampaignId, std::deque<std::function<void(PlayedFile&)>>> writes;
     TimePoint stalled_until{};
-    std::deque<std::pair<wire::Packet, std::string>> waiting;  ///< And the keys of their senders.
+    /// And whence they came.
+    std::deque<std::pair<wire::Packet, coordinator::HostId>> waiting;
   };
 
-  wire::WorkerId meet(wire::SessionId session, const std::string& key);
-  void handle(wire::WorkerId worker, const wire::Packet& packet, const std::string& key);
+  wire::WorkerId meet(wire::SessionId session, const coordinator::HostId& from);
+  void handle(wire::WorkerId worker, const wire::Packet& packet, const coordinator::HostId& from);
   void serve(wire::CampaignId id);
   void go_on();
   void check_sent(wire::WorkerId worker, const wire::Message& message) const;
@@ -139,6 +141,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
   void check_forget(const wire::Forget& forget) const;
   void check_not_served(const wire::NotServed& not_served) const;
   void check_reject(const wire::Reject& reject, const Peer& peer) const;
+  void check_adoptions(wire::WorkerId worker) const;
   void after_event();
   /// Does it later and in order, unless the process has ended by then; a failing file waits.
   void write_later(wire::CampaignId id, std::function<void(PlayedFile&)> write);
@@ -152,6 +155,7 @@ class PlayedCoordinator final : public coordinator::Outbox {
   std::size_t num_workers_max_ = 4096;
   bool may_crash_ = true;
   std::set<wire::SessionId> attached_;
+  std::map<wire::SessionId, std::set<RunKey>> lent_;  ///< By all coordinators.
   std::optional<Life> life_;
   /// As it was encoded last: a campaign has one definition for long.
   std::map<const Campaign*, std::pair<std::shared_ptr<const Campaign>, wire::EncodedDefinition>>

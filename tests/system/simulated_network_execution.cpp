@@ -29,9 +29,9 @@ std::vector<RunRange> ranges_of(const std::vector<RunKey>& runs) {
 
 }  // namespace
 
-PlayedExecution::PlayedExecution(const Poison& poison, std::size_t num_threads,
+PlayedExecution::PlayedExecution(const Poison& poison, const Draws& draws, std::size_t num_threads,
                                  std::size_t num_lanes)
-    : poison_(poison), num_threads_(num_threads), num_lanes_(num_lanes) {}
+    : poison_(poison), draws_(draws), num_threads_(num_threads), num_lanes_(num_lanes) {}
 
 void PlayedExecution::define(wire::CampaignId campaign, std::shared_ptr<const Campaign>) {
   defined_.insert(campaign);
@@ -122,8 +122,10 @@ PlayedExecution::Outcome PlayedExecution::advance() {
       continue;
     }
     for (const auto& [campaign, run] : batch->runs) {
-      wire::ComputedRun computed{.result = zero_result({.run = run, .num_draws = 1}),
+      const RunDraw& draw = draws_.at({campaign, run});
+      wire::ComputedRun computed{.result = zero_result({.run = run, .num_draws = draw.num_draws}),
                                  .elapsed_s = 0.7};
+      computed.result.truth = draw.truth;
       finished_.push_back({.campaign = campaign, .computed = computed});
     }
     outcome = Outcome::finished;

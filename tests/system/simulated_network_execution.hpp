@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -18,6 +19,9 @@ namespace proofmass::test {
 /// A run of one of several campaigns.
 using RunKey = std::pair<wire::CampaignId, RunIndex>;
 
+/// What runs begin with.
+using Draws = std::map<RunKey, RunDraw>;
+
 /// Runs that do not end as they should, whoever computes them.
 struct Poison {
   std::set<RunKey> crashing;
@@ -27,8 +31,9 @@ struct Poison {
 /// Computes runs in simulated time: in batches, some at a time, step by step.
 class PlayedExecution final : public worker::Execution {
  public:
-  /// @param poison  Outlives this object.
-  PlayedExecution(const Poison& poison, std::size_t num_threads, std::size_t num_lanes);
+  /// @param poison, draws  Outlive this object.
+  PlayedExecution(const Poison& poison, const Draws& draws, std::size_t num_threads,
+                  std::size_t num_lanes);
 
   bool is_defined(wire::CampaignId campaign) const override { return defined_.contains(campaign); }
   /// Nothing depends on what the definition says, and to read it takes longer than all else here.
@@ -69,6 +74,7 @@ class PlayedExecution final : public worker::Execution {
   [[nodiscard]] std::optional<Batch> next_batch();
 
   const Poison& poison_;
+  const Draws& draws_;
   std::size_t num_threads_;
   std::size_t num_lanes_;
   std::set<wire::CampaignId> defined_;

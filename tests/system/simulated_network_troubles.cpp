@@ -31,6 +31,14 @@ void World::draw_troubles() {
   weather_.is_stubborn = random_.happens(0.1);
   weather_.is_full = random_.happens(0.15);
   weather_.has_spools = random_.happens(0.5);
+  weather_.has_liar = random_.happens(0.3);
+  weather_.has_one_key = random_.happens(0.5);
+  if (weather_.has_liar) {
+    weather_.is_full = false;  // It would take the place of the others.
+    // With a second bad host they look like poison.
+    weather_.has_bad_machine = false;
+    weather_.has_accident = false;
+  }
   if (weather_.is_stubborn) {
     // Workers have results of it when it is shut, and leave them to the next process.
     weather_.restart_s = 5.0 + random_.uniform(15.0);
@@ -115,11 +123,31 @@ void World::lie() {
 
 void World::say_as_liar(wire::SessionId session, wire::Message message) {
   const bool is_hello = std::holds_alternative<wire::Hello>(message);
-  coordinator_.receive({.header = {.session = session,
-                                   .epoch = is_hello ? wire::Epoch{} : coordinator_.epoch(),
-                                   .sequence = ++num_liar_messages_},
-                        .message = std::move(message)},
-                       liar_key);
+  coordinator_.receive(
+      {.header = {.session = session,
+                  .epoch = is_hello ? wire::Epoch{} : coordinator_.epoch(),
+                  .sequence = ++num_liar_messages_},
+       .message = std::move(message)},
+      {.key = weather_.has_one_key ? honest_key : liar_key, .address = liar_address});
+}
+
+/// Also when all else is calm: the campaigns must finish nevertheless.
+void World::lie_for_ever() {
+  if (!liar_) {
+    liar_.emplace(draws_, poison_, random_, [this](wire::SessionId session, wire::Message message) {
+      // What waits would be compared with what it is lent later.
+      if (coordinator_.is_running() && !coordinator_.is_stalled()) {
+        say_as_liar(session, std::move(message));
+      }
+    });
+  }
+  std::vector<wire::SessionId> honest;
+  std::vector<std::string> hosts;
+  for (const auto& [session, process] : processes_) honest.push_back(session);
+  for (const Machine& machine : machines_) hosts.push_back(machine.host);
+  for (std::uint64_t i = random_.below(4); i > 0; --i) liar_->speak(honest, hosts);
+  ++incidents_.num_lies;
+  agenda_.add(100ms + random_.duration(2.0), [this] { lie_for_ever(); });
 }
 
 /// Somebody sees that the workers of a host are refused: exchanges it, or has it released.

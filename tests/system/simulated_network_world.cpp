@@ -22,6 +22,7 @@ constexpr Duration deadline = 2h;  // Of simulated time.
 
 World::World(std::uint64_t seed)
     : random_(seed), coordinator_(agenda_, random_, [this](const wire::Packet& packet) {
+        if (liar_ && liar_->has(packet.header.session)) return liar_->hear(packet);
         transmit(packet.header.session, [this, packet] { arrive(packet); });
       }) {
   draw_weather();
@@ -40,6 +41,7 @@ World::World(std::uint64_t seed)
   start_coordinator();
   tick_coordinator();
   plan();
+  if (weather_.has_liar) lie_for_ever();
 }
 
 void World::draw_weather() {
@@ -58,7 +60,7 @@ void World::draw_weather() {
               .failure_s = sometimes(0.3, 20.0, 100.0),
               .pause_s = sometimes(0.3, 10.0, 60.0),
               .cancel_s = sometimes(0.15, 20.0, 100.0),
-              .has_bad_machine = random_.happens(0.2),
+              .has_bad_machine = random_.happens(0.3),
               .has_accident = random_.happens(0.3)};
   if (weather_.has_bad_machine) weather_.has_accident = false;  // Together they look like poison.
 }
@@ -79,6 +81,10 @@ void World::add_campaigns() {
     stored.audit_fraction = fractions.at(random_.below(fractions.size()));
     coordinator_.add_file(id, stored);
     num_runs_wanted_[id] = weather_.extension_s < never_s ? num_runs + 12 : num_runs;
+    campaign.num_runs = num_runs_wanted_[id];
+    for (RunIndex run; run.value < campaign.num_runs; ++run.value) {
+      draws_[{id, run}] = campaign.draw(run);
+    }
     if (weather_.lie_s >= never_s) add_poison(id, num_runs_wanted_[id]);
   }
 }
@@ -274,9 +280,12 @@ void World::start_process(std::size_t machine, std::optional<wire::FormerSession
   config.drain_time = 20s;
   Process& process = processes_[session];
   process.machine = machine;
-  process.execution = std::make_unique<PlayedExecution>(poison_, on.num_threads, on.num_lanes);
-  const auto send = [this](const wire::Packet& packet) {
-    transmit(packet.header.session, [this, packet] { coordinator_.receive(packet); });
+  process.execution =
+      std::make_unique<PlayedExecution>(poison_, draws_, on.num_threads, on.num_lanes);
+  const auto send = [this, machine](const wire::Packet& packet) {
+    transmit(packet.header.session, [this, packet, host = machines_.at(machine).host] {
+      coordinator_.receive(packet, {.key = honest_key, .address = host});
+    });
   };
   process.conversation = std::make_unique<worker::Conversation>(session, hello, *process.execution,
                                                                 send, agenda_.now(), config);

@@ -47,6 +47,8 @@ struct Weather {
   bool has_spools = false;       ///< Results survive a worker's process.
   bool has_bad_machine = false;  ///< One on which every batch crashes.
   bool has_accident = false;     ///< One crash for no reason of ours.
+  bool has_liar = false;         ///< With a valid key; it lies for ever.
+  bool has_one_key = false;      ///< The liar has that of the others.
 };
 
 /// What happened in a world, so that a test can tell that worlds are bad enough.
@@ -131,6 +133,7 @@ class World {
   void end_troubles();
   void lie();
   void say_as_liar(wire::SessionId session, wire::Message message);
+  void lie_for_ever();
   void heed_quarantine(wire::SessionId session);
   void spool(Process& process);
 
@@ -138,6 +141,8 @@ class World {
   Weather weather_;
   Agenda agenda_;
   Poison poison_;
+  Draws draws_;
+  std::optional<Liar> liar_;
   PlayedCoordinator coordinator_;
   std::vector<Machine> machines_;
   std::map<wire::SessionId, Process> processes_;

@@ -71,6 +71,7 @@ void Conversation::handle(const wire::Welcome& welcome, const wire::Header& head
   epoch_ = header.epoch;
   welcome_sequence_ = header.sequence;
   noted_refusals_.clear();
+  revocation_.reset();
   heartbeat_interval_ = std::chrono::duration_cast<Duration>(
       std::chrono::duration<double>(welcome.heartbeat_interval_s));
   send_heartbeat(now);
@@ -87,8 +88,10 @@ void Conversation::handle(const wire::Reject& reject, const wire::Header& header
       if (is_registered_) register_again(now);  // Otherwise a Hello is under way.
       return;
     case wire::RejectReason::incompatible:
-    case wire::RejectReason::revoked:
       return end(Ending::Kind::failed, "refused by the coordinator: " + reject.text);
+    case wire::RejectReason::revoked:
+      if (!revocation_) revocation_.emplace(now, reject.text);
+      return come_again(reject, now);
     case wire::RejectReason::malformed:
     case wire::RejectReason::full:
     case wire::RejectReason::quarantined:
@@ -232,6 +235,9 @@ void Conversation::on_tick(TimePoint now) {
                fmt::format("coordinator = silent for {} s ({})", whole_seconds(now - heard_at_),
                            refusal_.empty() ? "is it running?" : refusal_));
   }
+  if (revocation_ && now - revocation_->first >= config_.refusal_memory) {
+    return end(Ending::Kind::failed, "refused by the coordinator: " + revocation_->second);
+  }
   watch_time(now);
   watch_idleness(now);
   if (ending_) return;
@@ -267,13 +273,14 @@ void Conversation::register_again(TimePoint now) {
   say_hello(now);
 }
 
-/// What stands in the way may pass: there are too many workers, or a person releases the host.
+/// What stands in the way may pass: there are too many workers, a person releases the host, or the
+/// list of keys was cut off for a moment.
 void Conversation::come_again(const wire::Reject& reject, TimePoint now) {
   if (std::exchange(is_refused_, true)) return;  // The answer to a repeated Hello.
   if (now - refused_at_ >= config_.refusal_memory) refusal_delay_ = config_.refusal_delay;
   refused_at_ = now;
   is_registered_ = false;
-  is_closed_out_ = reject.reason == wire::RejectReason::malformed;
+  is_closed_out_ = reject.reason == wire::RejectReason::malformed || revocation_;
   const double jitter = 0.25 * fraction_of(mixed(session_.value + num_sent_));
   hello_due_at_ = now + times(1.0 + jitter, refusal_delay_);
   hello_delay_ = config_.hello_delay;

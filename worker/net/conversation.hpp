@@ -36,7 +36,8 @@ struct ConversationConfig {
   Duration hello_delay = std::chrono::milliseconds(250);
   Duration hello_delay_max = std::chrono::seconds(32);
   /// Between a refusal that is not final and the next Hello; doubles and varies likewise. Refusals
-  /// that are so much apart begin anew.
+  /// that are so much apart begin anew. A worker whose key is revoked for as long, so that it has
+  /// asked four times at least, ends.
   Duration refusal_delay = std::chrono::seconds(15);
   Duration refusal_delay_max = std::chrono::seconds(60);
   Duration refusal_memory = std::chrono::minutes(5);
@@ -180,8 +181,9 @@ class Conversation {
   bool is_refused_ = false;             ///< Since the last Hello.
   Duration refusal_delay_{};
   TimePoint refused_at_;
-  std::set<wire::RejectReason> noted_refusals_;  ///< Since the last Welcome.
-  bool is_closed_out_ = false;                   ///< The next Hello needs another connection.
+  std::set<wire::RejectReason> noted_refusals_;                  ///< Since the last Welcome.
+  std::optional<std::pair<TimePoint, std::string>> revocation_;  ///< The first one since then.
+  bool is_closed_out_ = false;  ///< The next Hello needs another connection.
   bool wants_connection_ = false;
   TimePoint heartbeat_at_;
   std::vector<std::uint64_t> reported_batches_;  ///< By the heartbeat sent last.

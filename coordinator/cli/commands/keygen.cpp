@@ -44,7 +44,7 @@ std::string list_head(KeyRole role) {
   const bool is_client = role == KeyRole::client;
   return fmt::format(
       "# Public keys of the {0}s that may connect, one line `KEY NAME{1}` each.\n{2}"
-      "# Remove a line to revoke a key; a running coordinator notices within a second.\n",
+      "# Remove a line to revoke a key; a running coordinator notices within three seconds.\n",
       to_text(role), is_client ? " [RIGHTS]" : "",
       is_client ? "# RIGHTS: a comma list of observe, submit (and control what the same NAME\n"
                   "# submitted), control (everybody's campaigns); observe,submit if left out.\n"

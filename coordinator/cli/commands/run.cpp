@@ -128,7 +128,8 @@ ServiceConfig service_config(RunStart& start, CampaignFiles& files) {
   config.given_up = GivenUpRuns::retry;
   config.version = PROOFMASS_VERSION;
   config.dispatch.reference_digest = start.reference_digest.get();
-  config.dispatch.reattach_wait = Duration::zero();  // Workers of the last time ended with it.
+  config.dispatch.reattach_wait = Duration::zero();      // Workers of the last time ended with it.
+  config.dispatch.lone_witness_wait = Duration::zero();  // No other host can connect.
   config.dispatch.num_slots_expected = start.num_workers * model().batch_size();
   // All workers may die at once, and runs must be found guilty before the machine is.
   config.dispatch.crashes_per_host_max =

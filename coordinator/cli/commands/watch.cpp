@@ -17,6 +17,7 @@
 #include "coordinator/cli/painting.hpp"
 #include "coordinator/report/text_cells.hpp"
 #include "proto/text/visible_text.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -135,10 +136,10 @@ int watch_until_over(const Ask& ask, const std::optional<std::string>& campaign,
     if (campaign) keep_only(status, *campaign);
     display.update(status);
     if (std::ranges::all_of(status.campaigns, is_over)) {
-      const bool was_cancelled = std::ranges::any_of(status.campaigns, [](const auto& one) {
-        return one.phase == wire::CampaignPhase::cancelled;
+      const bool is_in_vain = std::ranges::any_of(status.campaigns, [](const auto& one) {
+        return one.phase == wire::CampaignPhase::cancelled || wire::has_failed(one);
       });
-      return was_cancelled ? exit_cannot_be_done : exit_done;
+      return is_in_vain ? exit_cannot_be_done : exit_done;
     }
     pause();
   }

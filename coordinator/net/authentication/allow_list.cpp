@@ -102,13 +102,27 @@ AllowList::AllowList(std::filesystem::path file, wire::Domain domain)
   if (is_settled(stamp)) stamp_ = stamp;
 }
 
-std::optional<std::string> AllowList::refresh() {
+/// New keys count at once.
+void AllowList::take(AllowedKeys keys, TimePoint now) {
+  const bool is_confirmed = shorter_ && shorter_->first == keys;
+  if (!is_confirmed) shorter_.emplace(keys, now);
+  AllowedKeys with_former = keys;
+  with_former.insert(keys_.begin(), keys_.end());
+  const bool revokes = with_former.size() > keys.size();
+  const bool is_due = is_confirmed && now - shorter_->second >= look_interval;
+  keys_ = !revokes || is_due ? std::move(keys) : std::move(with_former);
+  if (!revokes || is_due) return shorter_.reset();
+  stamp_.reset();  // Looked at again, though it may not change.
+}
+
+std::optional<std::string> AllowList::refresh(TimePoint now) {
   // Taken before the file is read: a change in between is seen the next time.
   const Stamp stamp = stamp_of(file_);
   if (stamp == stamp_) return std::nullopt;
   stamp_ = is_settled(stamp) ? std::optional(stamp) : std::nullopt;
   try {
-    keys_ = read_allow_list(file_, domain_);
+    if (stamp.error == 0 && stamp.size == 0) refuse(file_, "is empty");
+    take(read_allow_list(file_, domain_), now);
     reported_.clear();
     return std::nullopt;
   } catch (const Error& error) {
@@ -121,7 +135,7 @@ std::optional<std::string> AllowList::refresh() {
 std::optional<std::string> AllowList::refresh_if_due(TimePoint now) {
   if (looked_at_ && now - *looked_at_ < look_interval) return std::nullopt;
   looked_at_ = now;
-  return refresh();
+  return refresh(now);
 }
 
 const AllowedKey* AllowList::owner_of(std::string_view public_key) const {

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "coordinator/net/authentication/rights.hpp"
 #include "proto/link/keys.hpp"
@@ -38,7 +39,8 @@ using AllowedKeys = std::map<std::string, AllowedKey, std::less<>>;
                                            const std::filesystem::path& file);
 
 /// The keys that may connect to one address of the coordinator, from a file that may change at any
-/// time. A key whose line is removed is revoked.
+/// time. A key whose line is removed is revoked when two looks, a second or more apart, agree that
+/// it is gone: an editor or a full disk may leave a part of the file for a moment.
 class AllowList {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -47,9 +49,10 @@ class AllowList {
   ///         anything but keys and names.
   AllowList(std::filesystem::path file, wire::Domain domain);
 
-  /// Reads the file again if it changed. A file that is wrong or gone leaves the list as it was.
+  /// Reads the file again if it changed. A file that is wrong, gone or without any content leaves
+  /// the list as it was.
   /// @return What is wrong, once.
-  [[nodiscard]] std::optional<std::string> refresh();
+  [[nodiscard]] std::optional<std::string> refresh(TimePoint now);
 
   /// As refresh(), but at most once a second.
   [[nodiscard]] std::optional<std::string> refresh_if_due(TimePoint now);
@@ -69,6 +72,7 @@ class AllowList {
   };
   [[nodiscard]] static Stamp stamp_of(const std::filesystem::path& file);
   [[nodiscard]] static bool is_settled(const Stamp& stamp);
+  void take(AllowedKeys keys, TimePoint now);
 
   std::filesystem::path file_;
   wire::Domain domain_;
@@ -76,6 +80,8 @@ class AllowList {
   std::string reported_;
   std::optional<TimePoint> looked_at_;
   AllowedKeys keys_;
+  /// Without the keys that the last look did not find any more, and the time of that look.
+  std::optional<std::pair<AllowedKeys, TimePoint>> shorter_;
 };
 
 }  // namespace proofmass::coordinator

@@ -139,7 +139,7 @@ AllowList& Authenticator::list_of(Domain domain) {
 }
 
 Authenticator::Answer Authenticator::answer(const Handshake& handshake, TimePoint now) {
-  const std::string_view reason = refusal(handshake);
+  const std::string_view reason = refusal(handshake, now);
   if (reason.empty()) return {.status = "200", .text = "OK", .user_id = handshake.public_key};
   refusals_.refused({.domain = handshake.domain,
                      .address = handshake.address,
@@ -149,14 +149,14 @@ Authenticator::Answer Authenticator::answer(const Handshake& handshake, TimePoin
   return {.status = "400", .text = "key not authorized", .user_id = {}};
 }
 
-std::string_view Authenticator::refusal(const Handshake& handshake) {
+std::string_view Authenticator::refusal(const Handshake& handshake, TimePoint now) {
   std::optional<Domain> domain;
   for (const Domain known : {Domain::workers, Domain::clients}) {
     if (handshake.domain == to_text(known)) domain = known;
   }
   if (!domain) return "no such domain";
   if (handshake.public_key.empty()) return "without a key";
-  report(list_of(*domain).refresh());
+  report(list_of(*domain).refresh(now));
   if (list_of(*domain).owner_of(handshake.public_key) != nullptr) return {};
   const Domain other = *domain == Domain::workers ? Domain::clients : Domain::workers;
   if (list_of(other).owner_of(handshake.public_key) == nullptr) return "unknown key";

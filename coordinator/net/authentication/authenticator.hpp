@@ -70,7 +70,7 @@ class Authenticator {
   [[nodiscard]] AllowList& list_of(wire::Domain domain);
   [[nodiscard]] Answer answer(const Handshake& handshake, TimePoint now);
   /// Why the peer is refused; empty if it is admitted.
-  [[nodiscard]] std::string_view refusal(const Handshake& handshake);
+  [[nodiscard]] std::string_view refusal(const Handshake& handshake, TimePoint now);
   void reply(std::string_view id, const Answer& answer);
   void report(const std::optional<std::string>& what_is_wrong) const;
 

@@ -236,6 +236,15 @@ TEST(CampaignLine, SaysHowFarItIsAndHowFast) {
             "up: too many workers crashed; 1 result compared with a second computation: all equal");
 }
 
+TEST(CampaignLine, SaysThatMostRunsWereGivenUp) {
+  wire::CampaignStatus status = campaign("a", 40);
+  status.phase = wire::CampaignPhase::finished;
+  status.num_given_up = 50;
+  EXPECT_TRUE(campaign_line(status).starts_with("a finished: 40 of 100 runs"));
+  status.num_given_up = 51;
+  EXPECT_TRUE(campaign_line(status).starts_with("a failed: 40 of 100 runs"));
+}
+
 TEST(CampaignLine, OfOneThatIsOverHasNoRate) {
   wire::CampaignStatus status = campaign("a", 100);
   status.phase = wire::CampaignPhase::finished;

@@ -106,7 +106,7 @@ class PlayedFleet final : public Outbox {
                             .former = {}};
     for (std::uint64_t i = 1; i <= plan.num_workers; ++i) {
       workers_[WorkerId{i}].threads.resize(plan.num_threads);
-      on_hello(state_, WorkerId{i}, SessionId{i}, "", hello, {}, *this);
+      on_hello(state_, WorkerId{i}, SessionId{i}, {}, hello, {}, *this);
       on_heartbeat(state_, WorkerId{i},
                    {.num_runs_max = wire::runs_per_lease_max, .held = {}, .computing = {}}, 1, {},
                    *this);

@@ -28,6 +28,19 @@ class BlameTest : public DispatchFixture {
     outbox.forget();
   }
 
+  /// Run 0 of campaign one; run 1 is finished, and the first worker is there again.
+  void crash_three_times_on_one_host() {
+    add_campaign(one, 2);
+    add_proven_worker(first, 1, "host");
+    for (int i = 0; i < 3; ++i) {
+      crash(first);
+      EXPECT_TRUE(campaign(one).given_up.empty());
+      replace(first);
+      if (i == 0) complete(first, one, {1});
+    }
+    EXPECT_TRUE(state.leases.empty()) << "it waits for another host";
+  }
+
   /// The worker of this number has a successor, which is lent something; what, nobody looks.
   void replace(WorkerId id, std::uint32_t num_slots = 1, const std::string& host = "host") {
     outbox.forget();
@@ -81,7 +94,7 @@ TEST_F(BlameTest, ACrashIsKnownFromTheNextProcess) {
   outbox.forget();
   wire::Hello successor = hello();
   successor.former = wire::FormerSession{session_of(first), LossReason::crashed, 11};
-  on_hello(state, second, session_of(second), "", successor, now, outbox);
+  say_hello(second, successor);
   EXPECT_EQ(suspects(), Runs{{0}});
   EXPECT_FALSE(state.workers.contains(first));
   outbox.forget();
@@ -121,23 +134,40 @@ TEST_F(BlameTest, ASuspectThatFinishesIsInnocent) {
   outbox.forget();
 }
 
-TEST_F(BlameTest, ARunThatCrashesThreeTimesIsGivenUp) {
-  add_campaign(one, 2);
-  add_proven_worker(first, 1, "host");
-  for (int i = 0; i < 2; ++i) {
-    crash(first);
-    EXPECT_TRUE(campaign(one).given_up.empty());
-    replace(first);
-    if (i == 0) complete(first, one, {1});
-  }
-  crash(first);
+TEST_F(BlameTest, ARunThatCrashesAloneOnTwoHostsIsGivenUp) {
+  crash_three_times_on_one_host();
+  add_worker(second, 1, "other");
+  outbox.forget();
+  crash(second);
   EXPECT_EQ(outbox.take_given_up(), Runs{{0}});
   EXPECT_TRUE(is_finished(campaign(one)));
   EXPECT_EQ(state.hosts.at({"", "host"}).num_crashes, 0U) << "the run was the cause";
   const Strings events = outbox.take_events();
-  EXPECT_EQ(events.at(2), "run_given_up run=0 crashes=3");
+  EXPECT_EQ(events.at(2), "run_given_up run=0 crashes=4");
   EXPECT_EQ(events.at(3),
             "campaign_finished runs=2 given_up=1 duplicates=0 compared=0 mismatches=0");
+  outbox.forget();
+}
+
+// The worker may say so, and start again under other names.
+TEST_F(BlameTest, ARunThatOneHostAloneSawCrashWaitsForAnother) {
+  crash_three_times_on_one_host();
+  add_worker(second, 1, "other");
+  deliver(second, one, {0});
+  EXPECT_EQ(outbox.take_stored(), Runs{{0}});
+  EXPECT_TRUE(campaign(one).given_up.empty());
+  outbox.forget();
+}
+
+TEST_F(BlameTest, ARunIsGivenUpIfNoOtherHostTriesItForLong) {
+  crash_three_times_on_one_host();
+  for (int i = 0; i <= 10; ++i) {
+    EXPECT_TRUE(campaign(one).given_up.empty()) << i;
+    heartbeat(first);
+    on_tick(state, now, outbox);
+    now += 30s;
+  }
+  EXPECT_EQ(outbox.take_given_up(), Runs{{0}});
   outbox.forget();
 }
 
@@ -230,11 +260,11 @@ TEST_F(BlameTest, FiveCrashesInARowQuarantineAHostAndItsBlameIsWithdrawn) {
   EXPECT_TRUE(is_quarantined(state, "bad"));
   EXPECT_EQ(outbox.take_events(),
             (Strings{"worker_gone worker=1 name=w reason=crashed steps=0",
-                     "host_quarantined host=bad crashes=5",
+                     "host_quarantined host=bad crashes=5 address=bad",
                      "runs_lost worker=1 runs=8..9 attempt=1 reason=crashed"}));
   EXPECT_FALSE(outbox.take_losses().at(0).is_blamed);
 
-  on_hello(state, second, session_of(second), "", hello(1, "bad"), now, outbox);
+  say_hello(second, hello(1, "bad"));
   const auto reject = outbox.take_sent<wire::Reject>(second);
   EXPECT_EQ(reject.reason, wire::RejectReason::quarantined);
   EXPECT_EQ(reject.text, "host = bad (too much crashed there)");
@@ -244,12 +274,37 @@ TEST_F(BlameTest, FiveCrashesInARowQuarantineAHostAndItsBlameIsWithdrawn) {
 TEST_F(BlameTest, AWorkerOnAQuarantinedHostIsLentNothingButMayDeliver) {
   add_campaign(one, 3);
   add_worker(first);
-  state.quarantined.insert({"", "host"});
+  state.quarantined[{"", "host"}] = now + 10min;
   outbox.forget();
+  heartbeat(first, {held(one, {{0}, 1})});
+  EXPECT_EQ(runs_held_text(state, first), "0");
   deliver(first, one, {0});
   EXPECT_EQ(outbox.take_stored(), Runs{{0}});
-  heartbeat(first);
-  EXPECT_TRUE(state.leases.empty());
+  outbox.forget();
+}
+
+TEST_F(BlameTest, AWorkerOnAQuarantinedHostThatHasDeliveredIsLentARoundAtATime) {
+  add_campaign(one, 100);
+  add_worker(first, 2);
+  complete(first, one, {0, 1});
+  state.quarantined[{"", "host"}] = now + 10min;
+  complete(first, one, {2, 3, 4, 5});
+  EXPECT_EQ(state.workers.at(first).num_lent, 2U);
+}
+
+TEST_F(BlameTest, AQuarantineEndsByItself) {
+  add_campaign(one, 100);
+  for (int i = 0; i < 5; ++i) {
+    add_worker(first, 2, "bad");
+    crash(first);
+  }
+  outbox.forget();
+  now += 10min;
+  on_tick(state, now, outbox);
+  EXPECT_EQ(outbox.take_events(), Strings{"host_released host=bad"});
+  add_worker(first, 2, "bad");
+  EXPECT_EQ(state.workers.at(first).num_lent, 2U);
+  outbox.forget();
 }
 
 TEST_F(BlameTest, AResultEndsARowOfCrashes) {
@@ -283,7 +338,7 @@ TEST_F(BlameTest, ARunIsNotGivenUpOnTheWordOfOneUnprovenHost) {
 TEST_F(BlameTest, ABatchThatComesNoFurtherIsHung) {
   add_campaign(one, 10);
   add_worker(first, 4);
-  campaign(one).step_time_s = 0.1;
+  state.hosts.at({"", "host"}).step_time_s[one] = 0.1;
   for (std::uint32_t i = 0; i <= 12; ++i, now += 5s) {
     heartbeat(first, {held(one, {{0}, 4})}, {batch({{0}, 2}, 7), batch({{2}, 2}, 50 * i)});
     outbox.forget();
@@ -307,7 +362,7 @@ TEST_F(BlameTest, ABatchThatComesNoFurtherIsHung) {
 TEST_F(BlameTest, ASlowCampaignIsNotHung) {
   add_campaign(one, 10);
   add_worker(first);
-  campaign(one).step_time_s = 10.0;  // Then 500 s are allowed.
+  state.hosts.at({"", "host"}).step_time_s[one] = 10.0;  // Then 500 s are allowed.
   for (int i = 0; i < 99; ++i) {
     heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1})});
     on_tick(state, now, outbox);
@@ -320,7 +375,7 @@ TEST_F(BlameTest, ASlowCampaignIsNotHung) {
 TEST_F(BlameTest, AProcessThatWasStoppedForAWhileIsNotHung) {
   add_campaign(one, 10);
   add_worker(first);
-  campaign(one).step_time_s = 0.1;
+  state.hosts.at({"", "host"}).step_time_s[one] = 0.1;
   heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
   now += 59s;
   heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
@@ -334,7 +389,7 @@ TEST_F(BlameTest, AProcessThatWasStoppedForAWhileIsNotHung) {
 TEST_F(BlameTest, OfAWorkerThatIsSilentNothingIsKnown) {
   add_campaign(one, 10);
   add_worker(first);
-  campaign(one).step_time_s = 0.1;
+  state.hosts.at({"", "host"}).step_time_s[one] = 0.1;
   for (int i = 0; i < 10; ++i, now += 5s) {
     heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
   }
@@ -347,7 +402,7 @@ TEST_F(BlameTest, OfAWorkerThatIsSilentNothingIsKnown) {
 TEST_F(BlameTest, OfAWorkerWhoseHeartbeatsDoNotArriveNothingIsKnown) {
   add_campaign(one, 10);
   add_worker(first, 2);
-  campaign(one).step_time_s = 0.1;
+  state.hosts.at({"", "host"}).step_time_s[one] = 0.1;
   for (int i = 0; i < 10; ++i, now += 5s) {
     heartbeat(first, {held(one, {{0}, 2})}, {batch({{0}, 1}, 5)});
   }
@@ -365,7 +420,7 @@ TEST_F(BlameTest, TheTimeOfAStepIsLearnedFromHeartbeats) {
   heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
   now += 5s;
   heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 15)});
-  EXPECT_DOUBLE_EQ(campaign(one).step_time_s, 0.5);
+  EXPECT_DOUBLE_EQ(state.hosts.at({"", "host"}).step_time_s[one], 0.5);
 }
 
 TEST_F(BlameTest, BlameOutlivesTheCoordinator) {
@@ -387,7 +442,7 @@ TEST_F(BlameTest, ASuspectThatIsAllAWorkerHoldsGoesOnThere) {
   stored.finished = {{{1}, 1}};
   stored.blamed = {{.run = {0}, .num_crashes = 1, .attempt = {1}}};
   on_campaign(state, one, stored, now, outbox);
-  on_hello(state, first, session_of(first), "", hello(), now, outbox);
+  say_hello(first, hello());
   outbox.forget();
   heartbeat(first, {held(one, {{0}, 1}, 2)});
   EXPECT_TRUE(state.leases.at(*campaign(one).lent.find({0})).is_alone);

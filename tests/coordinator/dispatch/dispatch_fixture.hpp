@@ -15,7 +15,7 @@
 #include "core/microscope/simulation/run.hpp"
 #include "tests/coordinator/dispatch/invariants.hpp"
 #include "tests/coordinator/dispatch/recording_outbox.hpp"
-#include "tests/support/microscope_results.hpp"
+#include "tests/support/drawn_result.hpp"
 
 namespace proofmass::test {
 
@@ -41,8 +41,13 @@ class DispatchFixture : public testing::Test {
   static constexpr CampaignId one{101};
   static constexpr CampaignId two{102};
 
+  /// The run times of computed() are believed.
+  DispatchFixture() { config.lease_duration_max = std::chrono::hours(1); }
+
+  /// The coordinator before this one has lent runs to all of them.
   void begin(std::set<SessionId> awaited = {}) {
     state = coordinator::initial_state(config, std::move(awaited), now);
+    state.attached = {session_of(first), session_of(second), session_of(third)};
   }
 
   static StoredCampaign stored_campaign(std::uint64_t num_runs) {
@@ -75,9 +80,14 @@ class DispatchFixture : public testing::Test {
             .former = {}};
   }
 
+  /// Each host has an address of that name.
+  void say_hello(WorkerId id, const wire::Hello& hello, const std::string& key = "") {
+    on_hello(state, id, session_of(id), {.key = key, .address = hello.host}, hello, now, outbox);
+  }
+
   /// A worker that is registered and takes what it is lent.
   void add_worker(WorkerId id, std::uint32_t num_slots = 1, const std::string& host = "host") {
-    on_hello(state, id, session_of(id), "", hello(num_slots, host), now, outbox);
+    say_hello(id, hello(num_slots, host));
     outbox.drop_sent<wire::Welcome>(id);
     (void)outbox.take_events();
     heartbeat(id);
@@ -105,8 +115,8 @@ class DispatchFixture : public testing::Test {
     wire::ComputedRun result;
     result.result.run = {run};
     result.result.status = status;
-    result.result = zero_result(std::move(result.result));
-    result.result.num_draws = status == RunStatus::no_draw ? num_draws_max : 1;
+    result.result = drawn_result(std::move(result.result));
+    if (status == RunStatus::no_draw) result.result.num_draws = num_draws_max;
     if (status == RunStatus::not_converged) {
       result.result.num_rounds = static_cast<std::uint32_t>(EstimationConfig{}.num_rounds_max);
     }

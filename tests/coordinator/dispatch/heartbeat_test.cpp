@@ -68,7 +68,7 @@ TEST_F(HeartbeatTest, AnAdoptedRunIsGivenBackUnderTheAttemptThatTheWorkerKnows) 
   on_tick(state, now, outbox);  // Run 0 is pending for its second attempt.
   add_campaign(two, 1);
   outbox.forget();
-  on_hello(state, first, session_of(first), "", hello(), now, outbox);
+  say_hello(first, hello());
   outbox.forget();
   heartbeat(first, {held(one, {{0}, 1}, 1)}, {}, 1);
   EXPECT_EQ(state.leases.at(*campaign(one).lent.find({0})).attempt, Attempt{2});
@@ -159,7 +159,7 @@ TEST_F(HeartbeatTest, AfterARestartNothingIsLentUntilAllHaveSaidWhatTheyHold) {
   add_worker(first);
   add_worker(third);
   outbox.expect_nothing_more();
-  on_hello(state, second, session_of(second), "", hello(), now, outbox);
+  say_hello(second, hello());
   outbox.forget();
   heartbeat(second, {held(one, {{0}, 1})});
   EXPECT_EQ(state.leases.at(*campaign(one).lent.find({0})).worker, second);
@@ -184,7 +184,7 @@ TEST_F(HeartbeatTest, AfterARestartOneThatCrashedMeanwhileIsNotAwaited) {
   add_campaign(one, 3);
   wire::Hello successor = hello();
   successor.former = wire::FormerSession{session_of(second), LossReason::crashed, 11};
-  on_hello(state, first, session_of(first), "", successor, now, outbox);
+  say_hello(first, successor);
   outbox.forget();
   heartbeat(first);
   (void)outbox.take_sent<wire::RunLease>(first);
@@ -194,7 +194,7 @@ TEST_F(HeartbeatTest, AfterARestartOneThatCrashedMeanwhileIsNotAwaited) {
 TEST_F(HeartbeatTest, AfterARestartAResultIsTakenAtOnce) {
   begin({session_of(first)});
   add_campaign(one, 1);
-  on_hello(state, first, session_of(first), "", hello(), now, outbox);
+  say_hello(first, hello());
   outbox.forget();
   deliver(first, one, {0}, 3);
   EXPECT_EQ(outbox.stored().at(0).attempt, Attempt{3});

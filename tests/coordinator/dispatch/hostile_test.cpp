@@ -32,7 +32,7 @@ TEST(BoundedDuration, IsOfTheSecondsUpToAMillion) {
 // A copy of a run goes out under the attempt after: it must not become 0, which no worker takes.
 TEST_F(HostileTest, TheLargestAttemptFollowsItself) {
   add_campaign(one, 2);
-  on_hello(state, first, session_of(first), "", hello(), now, outbox);
+  say_hello(first, hello());
   heartbeat(first, {held(one, {{0}, 2}, attempt_max)});
   EXPECT_EQ(runs_held_text(state, first), "0..1");
   outbox.forget();
@@ -49,7 +49,7 @@ TEST_F(HostileTest, TheLargestAttemptFollowsItself) {
 
 TEST_F(HostileTest, ARunIsListedTwice) {
   add_campaign(one, 10);
-  on_hello(state, first, session_of(first), "", hello(), now, outbox);
+  say_hello(first, hello());
   heartbeat(first, {held(one, {{0}, 4}), held(one, {{2}, 4}, 2), held(one, {{0}, 10}, 3)});
   check_invariants(state);
   EXPECT_EQ(state.workers.at(first).num_lent, 10U);
@@ -62,7 +62,7 @@ TEST_F(HostileTest, ARunIsListedTwice) {
 
 TEST_F(HostileTest, WhatIsSetAsideIsHeldAndComputedAsWell) {
   add_campaign(one, 10);
-  on_hello(state, first, session_of(first), "", hello(), now, outbox);
+  say_hello(first, hello());
   wire::Heartbeat heartbeat{
       .num_runs_max = 4096, .held = {held(one, {{0}, 6})}, .computing = {{one, {{{0}, 6}}, 1}}};
   heartbeat.set_aside = {held(one, {{3}, 6}, 4), held(one, {{3}, 1}, 5), held(two, {{0}, 1})};
@@ -106,6 +106,88 @@ TEST_F(HostileTest, RunsTakeForEver) {
   now += 5s;
   on_tick(state, now, outbox);
   EXPECT_TRUE(state.workers.contains(first));
+}
+
+// One heartbeat once kept a whole new campaign from all others.
+TEST_F(HostileTest, RunsAreClaimedThatWereNeverLent) {
+  add_campaign(one, 2000);
+  const WorkerId stranger{7};
+  say_hello(stranger, hello(1, "elsewhere"));
+  wire::Heartbeat heartbeat{.held = {held(one, {{0}, 2000})}, .computing = {}};
+  heartbeat.set_aside = {held(one, {{0}, 2000}, 2)};
+  on_heartbeat(state, stranger, heartbeat, 1, now, outbox);
+  EXPECT_TRUE(state.leases.empty());
+  on_removed(state, one, outbox);
+  add_campaign(one, 2000);
+  EXPECT_TRUE(state.leases.empty()) << "nor later, of what is set aside";
+}
+
+TEST_F(HostileTest, WhatWasLentBeforeMayBeClaimedAndNoMore) {
+  add_campaign(one, 10);
+  const WorkerId stranger{7};
+  add_worker(stranger, 4, "elsewhere");
+  on_gone(state, stranger, LossReason::silent, now, outbox);
+  say_hello(stranger, hello(4, "elsewhere"));
+  on_heartbeat(state, stranger, {.held = {held(one, {{0}, 10})}, .computing = {}}, 9, now, outbox);
+  EXPECT_EQ(runs_held_text(state, stranger), "0..3");
+}
+
+// Others computed the campaign, and it was idle, for as long as one worker liked.
+TEST_F(HostileTest, RunsAreHeldAndNeverFinished) {
+  config.lease_duration_max = 2min;
+  begin();
+  add_campaign(one, 8);
+  add_worker(first, 8, "liar");
+  add_worker(second, 8, "honest");
+  ASSERT_EQ(runs_held_text(state, second), "none");
+  outbox.forget();
+  const TimePoint lent_at = now;
+  std::uint32_t num_steps = 0;
+  while (runs_held_text(state, second) == "none" && now - lent_at < 10min) {
+    now += 5s;
+    heartbeat(first, {held(one, {{0}, 8})}, {{one, {{{0}, 8}}, ++num_steps}});
+    heartbeat(second);
+    on_tick(state, now, outbox);
+  }
+  EXPECT_LT(now - lent_at, 3min);
+  EXPECT_EQ(runs_held_text(state, second), "0..7");
+  EXPECT_EQ(outbox.take_events().at(0), "nothing_finished for_s=120 leases=1 idle_workers=1");
+}
+
+TEST_F(HostileTest, AnAuditIsHeldForEver) {
+  config.lease_duration_max = 2min;
+  begin();
+  add_campaign(one, 1, 0, 1.0);
+  add_worker(first, 1, "honest");
+  add_worker(second, 1, "liar");
+  complete(first, one, {0});
+  ASSERT_EQ(runs_held_text(state, second), "0");
+  const TimePoint lent_at = now;
+  while (runs_held_text(state, first) == "none" && now - lent_at < 10h) {
+    now += 5s;
+    heartbeat(first);
+    heartbeat(second, {held(one, {{0}, 1}, 2)}, {{one, {{{0}, 1}}, 1}});
+    on_tick(state, now, outbox);
+  }
+  EXPECT_EQ(runs_held_text(state, first), "0") << "better than nothing";
+}
+
+TEST_F(HostileTest, ATruthIsMadeUpOfARunThatWasNotLent) {
+  add_campaign(one, 10);
+  add_worker(first);
+  outbox.forget();
+  wire::ResultBatch batch{.campaign = one, .attempt = {1}, .results = {computed(7)}};
+  batch.results[0].result.truth[3] += 1e-9;
+  on_results(state, first, batch, now, outbox);
+  EXPECT_EQ(outbox.take_sent<wire::Reject>(first).reason, wire::RejectReason::malformed);
+  EXPECT_EQ(outbox.take_events().at(0),
+            "results_refused worker=1 name=w reason=\"run 7: truth (must be what the run draws)\"");
+  EXPECT_FALSE(state.workers.contains(first));
+  EXPECT_TRUE(outbox.take_stored().empty());
+  deliver(first, one, {7});
+  add_worker(first);
+  deliver(first, one, {7});
+  EXPECT_EQ(outbox.take_stored(), Runs{{7}}) << "as the run draws it";
 }
 
 TEST_F(HostileTest, ACampaignIsRemovedAndAddedWhileAResultIsCompared) {

@@ -22,7 +22,7 @@ class HostsTest : public DispatchFixture {
 
   /// Takes no runs.
   void join(WorkerId id, const std::string& key, const std::string& host = "host") {
-    on_hello(state, id, session_of(id), key, hello(1, host), now, outbox);
+    say_hello(id, hello(1, host), key);
     outbox.forget();
   }
   void join_and_take_runs(WorkerId id, const std::string& key, const std::string& host = "host") {
@@ -36,12 +36,12 @@ class HostsTest : public DispatchFixture {
                const std::string& host = "host") {
     wire::Hello successor = hello(1, host);
     successor.former = wire::FormerSession{session_of(former), LossReason::crashed, 11};
-    on_hello(state, id, session_of(id), key, successor, now, outbox);
+    say_hello(id, successor, key);
     outbox.forget();
   }
   [[nodiscard]] std::uint32_t num_crashes(const std::string& key,
                                           const std::string& host = "host") const {
-    const auto found = state.hosts.find({.key = key, .name = host});
+    const auto found = state.hosts.find({.key = key, .address = host});
     return found == state.hosts.end() ? 0 : found->second.num_crashes;
   }
 };
@@ -90,10 +90,11 @@ TEST_F(HostsTest, AKeyQuarantinesAHostForItselfAlone) {
     crash(WorkerId{i});
     outbox.forget();
   }
-  EXPECT_EQ(state.quarantined, (std::set<HostId>{{other_key, "host"}}));
-  on_hello(state, second, session_of(second), other_key, hello(), now, outbox);
+  EXPECT_EQ(state.quarantined.size(), 1U);
+  EXPECT_TRUE(state.quarantined.contains(HostId{other_key, "host"}));
+  say_hello(second, hello(), other_key);
   EXPECT_EQ(outbox.take_sent<wire::Reject>(second).reason, wire::RejectReason::quarantined);
-  on_hello(state, third, session_of(third), some_key, hello(), now, outbox);
+  say_hello(third, hello(), some_key);
   EXPECT_EQ(outbox.take_sent<wire::Welcome>(third).worker, third);
   outbox.forget();
 }
@@ -127,13 +128,13 @@ TEST_F(HostsTest, ARegistrationThatIsSilentMakesRoomForAnother) {
   now += 1s;
   join(second, some_key);
   now += 14s;  // The first has been silent for 15 s, the second for 14 s.
-  on_hello(state, third, session_of(third), some_key, hello(), now, outbox);
+  say_hello(third, hello(), some_key);
   EXPECT_EQ(outbox.take_losses().at(0).reason, LossReason::silent);
   EXPECT_EQ(outbox.take_sent<wire::Welcome>(third).worker, third);
   EXPECT_FALSE(state.workers.contains(first));
   EXPECT_TRUE(state.workers.contains(second));
   outbox.forget();
-  on_hello(state, first, session_of(first), some_key, hello(), now, outbox);
+  say_hello(first, hello(), some_key);
   EXPECT_EQ(outbox.take_sent<wire::Reject>(first).reason, wire::RejectReason::full);
   outbox.forget();
 }

@@ -58,7 +58,7 @@ class LateResult : public DispatchFixture,
         on_tick(state, now, outbox);
         break;
       case Step::reassign:
-        on_hello(state, second, session_of(second), "", hello(), now, outbox);
+        say_hello(second, hello());
         heartbeat_of(second, {});
         break;
       case Step::late_result:
@@ -115,7 +115,7 @@ TEST_P(LateResult, IsStoredOnceAndBothWorkersGoOn) {
   for (const Step step : GetParam().first) happen(step);
   // A worker that has been given up says Hello again, and repeats what was not acknowledged.
   for (const WorkerId id : {first, second}) {
-    on_hello(state, id, session_of(id), "", hello(), now, outbox);
+    say_hello(id, hello());
     heartbeat_of(id, {});
   }
   deliver(first, one, {0});
@@ -163,7 +163,7 @@ class TrickIssue : public DispatchFixture {
     outbox.forget();
   }
   void come_back(WorkerId id) {
-    on_hello(state, id, session_of(id), "", hello(), now, outbox);
+    say_hello(id, hello());
     heartbeat(id);
   }
   void heartbeat(WorkerId id) {

@@ -152,7 +152,7 @@ TEST_F(LendingTest, LeavesNoneOfTheLastRunsToWorkersThatAreLentNothing) {
   add_worker(third, 160);
   now += state.config.suspect_after;
   add_worker(fourth, 160, "bad");
-  state.quarantined.insert(state.workers.at(fourth).host);
+  state.quarantined[state.workers.at(fourth).host] = now + std::chrono::minutes(10);
   heartbeat(first);
   heartbeat(second, {}, {}, 0);
   on_tick(state, now, outbox);

@@ -88,7 +88,7 @@ TEST_F(NotServedTest, WhatIsSetAsideIsLentToItsHolderOnceTheCampaignIsExtended) 
 
 TEST_F(NotServedTest, WhatIsSetAsideIsLentToItsHolderByTheNextHeartbeat) {
   add_campaign(one, 3);
-  on_hello(state, first, session_of(first), "", hello(), now, outbox);
+  say_hello(first, hello());
   outbox.forget();
   heartbeat_with_set_aside(first, {held(one, {{1}, 1})});
   EXPECT_TRUE(campaign(one).lent.find({1}).has_value());
@@ -117,7 +117,7 @@ TEST_F(NotServedTest, AWorkerWithResultsThatAreSetAsideTriesSuspects) {
   add_worker(first);
   crash(first);
   outbox.forget();
-  on_hello(state, second, session_of(second), "", hello(), now, outbox);
+  say_hello(second, hello());
   outbox.forget();
   heartbeat_with_set_aside(second, {held(two, {{0}, 3})});
   EXPECT_TRUE(outbox.take_sent<wire::RunLease>(second).is_alone);
@@ -130,7 +130,7 @@ TEST_F(NotServedTest, AWorkerWithOtherRunsOfACampaignThatIsNotServedTriesNoSuspe
   add_worker(first);
   crash(first);
   outbox.forget();
-  on_hello(state, second, session_of(second), "", hello(), now, outbox);
+  say_hello(second, hello());
   outbox.forget();
   heartbeat(second, {held(two, {{0}, 3})});
   EXPECT_EQ(outbox.take_sent<wire::NotServed>(second).campaign, two);

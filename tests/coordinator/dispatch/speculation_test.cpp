@@ -101,13 +101,30 @@ TEST_F(TailTest, TwoCopiesOfARunAreEnough) {
   now += 14s;
   for (std::uint64_t id = 3; id <= 5; ++id) {
     heartbeat(WorkerId{1}, {held(one, {{1}, 2})});
+    add_worker(WorkerId{id}, 2, "host-" + std::to_string(id));
+  }
+  heartbeat(second);
+  now += 14s;
+  on_tick(state, now, outbox);
+  EXPECT_EQ(outbox.num_sent(), 2U);
+  EXPECT_EQ(campaign(one).copies.at({1}).leases.size(), 2U);
+  EXPECT_EQ(campaign(one).copies.at({1}).newest, Attempt{3});
+  outbox.forget();
+}
+
+// Workers that compute nothing must not take all of them.
+TEST_F(TailTest, AHostGetsOneCopyOfARunAtATime) {
+  begin_last_round();
+  now += 14s;
+  for (std::uint64_t id = 3; id <= 5; ++id) {
+    heartbeat(WorkerId{1}, {held(one, {{1}, 2})});
     add_worker(WorkerId{id}, 2);
   }
   heartbeat(second);
   now += 14s;
   on_tick(state, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(second).attempt, Attempt{2});
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(third).attempt, Attempt{3});
+  EXPECT_EQ(campaign(one).copies.at({1}).leases.size(), 1U);
+  outbox.forget();
 }
 
 TEST_F(TailTest, ARunOfASuspectWorkerIsCopied) {

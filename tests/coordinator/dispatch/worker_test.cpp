@@ -10,7 +10,7 @@ using namespace std::chrono_literals;
 class WorkerTest : public DispatchFixture {
  protected:
   void refuse(const wire::Hello& said, wire::RejectReason reason, const std::string& text) {
-    on_hello(state, second, session_of(second), "", said, now, outbox);
+    say_hello(second, said);
     const auto reject = outbox.take_sent<wire::Reject>(second);
     EXPECT_EQ(reject.reason, reason);
     EXPECT_EQ(reject.text, text);
@@ -21,7 +21,7 @@ class WorkerTest : public DispatchFixture {
 
 TEST_F(WorkerTest, IsWelcomed) {
   begin();
-  on_hello(state, first, session_of(first), "", hello(3), now, outbox);
+  say_hello(first, hello(3));
   const auto welcome = outbox.take_sent<wire::Welcome>(first);
   EXPECT_EQ(welcome.worker, first);
   EXPECT_EQ(welcome.heartbeat_interval_s, 5.0);
@@ -35,7 +35,7 @@ TEST_F(WorkerTest, IsAnsweredAgainAndKeepsItsLeases) {
   add_campaign(one, 10);
   add_worker(first);
   (void)outbox.take_sent<wire::RunLease>(first);
-  on_hello(state, first, session_of(first), "", hello(), now, outbox);
+  say_hello(first, hello());
   (void)outbox.take_sent<wire::Welcome>(first);
   EXPECT_EQ(state.leases.size(), 1U);
   EXPECT_EQ(state.num_slots, 1U);
@@ -67,14 +67,14 @@ TEST_F(WorkerTest, IsNotAnsweredIfTooManySayHello) {
   config.hellos_per_s_max = 2.0;
   begin();
   for (int i = 0; i < 5; ++i) {
-    on_hello(state, first, session_of(first), "", hello(), now, outbox);
+    say_hello(first, hello());
   }
   (void)outbox.take_sent<wire::Welcome>(first);
   (void)outbox.take_sent<wire::Welcome>(first);
   (void)outbox.take_events();
   outbox.expect_nothing_more();
   now += 500ms;
-  on_hello(state, first, session_of(first), "", hello(), now, outbox);
+  say_hello(first, hello());
   (void)outbox.take_sent<wire::Welcome>(first);
 }
 
@@ -127,7 +127,7 @@ TEST_F(WorkerTest, IsToldWhichCampaignsAreNotServed) {
 TEST_F(WorkerTest, IsLentNothingBeforeItHasSaidWhatItHolds) {
   begin();
   add_campaign(one, 1);
-  on_hello(state, first, session_of(first), "", hello(), now, outbox);
+  say_hello(first, hello());
   (void)outbox.take_sent<wire::Welcome>(first);
   (void)outbox.take_events();
   on_tick(state, now, outbox);
@@ -288,7 +288,7 @@ TEST_F(WorkerTest, MayRegisterToDeliverWhileTheServiceDrains) {
   begin();
   add_campaign(one, 5);
   on_drain(state, outbox);
-  on_hello(state, first, session_of(first), "", hello(), now, outbox);
+  say_hello(first, hello());
   (void)outbox.take_sent<wire::Welcome>(first);
   (void)outbox.take_sent<wire::Drain>(first);
   (void)outbox.take_events();
@@ -305,7 +305,7 @@ TEST_F(WorkerTest, IsToldToStopAgainAndAgain) {
   (void)outbox.take_sent<wire::Stop>(first);
   heartbeat(first);
   (void)outbox.take_sent<wire::Stop>(first);
-  on_hello(state, second, session_of(second), "", hello(), now, outbox);
+  say_hello(second, hello());
   (void)outbox.take_sent<wire::Stop>(second);
 }
 

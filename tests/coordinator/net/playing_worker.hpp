@@ -17,7 +17,7 @@
 #include "core/microscope/simulation/run.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/wire/codec.hpp"
-#include "tests/support/microscope_results.hpp"
+#include "tests/support/drawn_result.hpp"
 
 namespace proofmass::test {
 
@@ -110,7 +110,7 @@ class PlayingWorker {
       result.status = status;
       result.num_draws = status == RunStatus::no_draw ? num_draws_max : 1;
       result.num_rounds = status == RunStatus::no_draw ? 0 : 1;
-      result = zero_result(std::move(result));
+      result = drawn_result(std::move(result));
     }
     send(batch);
   }

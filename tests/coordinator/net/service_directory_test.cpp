@@ -57,6 +57,15 @@ class ServiceWithADirectory : public test::ServiceTest {
     (void)campaign.store.write(entries);
   }
 
+  /// As another program may do it.
+  void change_file(const std::string& name, const std::string& assignment) {
+    sqlite3* file = nullptr;
+    ASSERT_EQ(sqlite3_open((directory / (name + ".db")).c_str(), &file), SQLITE_OK);
+    const std::string sql = "UPDATE campaign SET " + assignment;
+    EXPECT_EQ(sqlite3_exec(file, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+    sqlite3_close(file);
+  }
+
   void start_service() {
     start({});
     client.emplace(service->clients_endpoint());
@@ -353,16 +362,32 @@ TEST_F(ServiceWithADirectory, ArchivesNoFileThatSomebodyReads) {
 // The names say the opposite.
 TEST_F(ServiceWithADirectory, ListsCampaignsInTheOrderInWhichTheyWereMade) {
   for (const auto& [name, year] : {std::pair{"c", 2021}, {"a", 2023}, {"b", 2022}}) {
-    { const ServedCampaign campaign = files.open(test::campaign_of(name, 1), {}, {}); }
-    sqlite3* file = nullptr;
-    ASSERT_EQ(sqlite3_open((directory / (name + std::string(".db"))).c_str(), &file), SQLITE_OK);
-    const std::string sql =
-        "UPDATE campaign SET created_utc = '" + std::to_string(year) + "-01-01T00:00:00Z'";
-    EXPECT_EQ(sqlite3_exec(file, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
-    sqlite3_close(file);
+    make_file(name);
+    change_file(name, "created_utc = '" + std::to_string(year) + "-01-01T00:00:00Z'");
   }
   start_service();
   EXPECT_THAT(served(), ElementsAre("c", "b", "a"));
+}
+
+// Another program may have made the file. Clients refuse a list with such a name as a whole.
+TEST_F(ServiceWithADirectory, ShowsTheOthersBesideACampaignWhoseNamesBreakTheRules) {
+  for (const auto& [name, assignment] : {std::pair{"a", "name = 'a b'"},
+                                         {"b", "name = ''"},
+                                         {"c", "owner = 'x/y'"},
+                                         {"d", "priority = 1000"}}) {
+    make_file(name);
+    change_file(name, assignment);
+    make_finished_file(name + std::string("-ended"));
+    change_file(name + std::string("-ended"), assignment);
+  }
+  make_file("good");
+  start_service();
+  EXPECT_THAT(served(), ElementsAre("good"));
+  const wire::StatusReply status = client->status();
+  ASSERT_EQ(status.unserved_files.size(), 8U);
+  for (const wire::UnservedFile& file : status.unserved_files) {
+    EXPECT_THAT(file.reason, testing::HasSubstr("its name, owner or priority breaks the rules"));
+  }
 }
 
 TEST_F(ServiceWithADirectory, ServesAFileThatIsPutThere) {

@@ -14,7 +14,8 @@ class ServiceSnapshotTest : public ::testing::Test {
   Worker& add_worker(std::uint64_t id) {
     Worker& worker = state.workers[WorkerId{id}];
     worker.name = "w" + std::to_string(id);
-    worker.host = {.key = "", .name = "host"};
+    worker.host = {.key = "", .address = "10.0.0.7"};
+    worker.host_name = "host";
     worker.registered_at = now - 100s;
     worker.heard_at = now - 1s;
     return worker;
@@ -31,9 +32,9 @@ TEST_F(ServiceSnapshotTest, TellsWhatEachWorkerDoes) {
   silent.num_lent = 5;
   silent.heard_at = now - state.config.suspect_after - 1s;
   Worker& quarantined = add_worker(4);
-  quarantined.host.name = "bad";
+  quarantined.host.address = "bad";
   quarantined.heard_at = silent.heard_at;
-  state.quarantined.insert(quarantined.host);
+  state.quarantined[quarantined.host] = TimePoint::max();
 
   ServiceSnapshot snapshot;
   add_workers(state, now, SnapshotDepth::with_workers, snapshot);

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "core/error.hpp"
 #include "proto/wire/names.hpp"
@@ -233,6 +235,51 @@ TEST(StatusReply, SaysWhatIsAmissAndHowMuchThereIs) {
   EXPECT_EQ(status.num_unserved_files, 70U);
   EXPECT_EQ(status.quarantined_hosts, std::vector<std::string>{"n7"});
   EXPECT_EQ(status.num_quarantined_hosts, 300U);
+}
+
+// One campaign, host or factory must not make a reply about all of them unreadable.
+TEST(Replies, AreReadableWhateverTheySay) {
+  std::mt19937_64 random(38);
+  const auto below = [&](std::uint64_t end) { return random() % end; };
+  const auto text = [&] {
+    constexpr std::array lengths{0, 1, 7, 128, 129, 5000};
+    std::string any(static_cast<std::size_t>(lengths.at(below(lengths.size()))), ' ');
+    for (char& c : any) c = static_cast<char>(below(256));
+    return any;
+  };
+  const auto number = [&] {
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    constexpr std::array numbers{0.0, -0.0, 2.5, -1.0, infinite, -infinite, 1e300};
+    return below(9) == 0 ? std::nan("") : numbers.at(below(numbers.size()));
+  };
+  const auto count = [&] { return random() >> below(64); };
+  for (int i = 0; i < 500; ++i) {
+    StatusReply status{.version = "v", .model_version = "m", .uptime_s = number(), .campaigns = {}};
+    status.campaigns.push_back({.name = text(),
+                                .phase = static_cast<CampaignPhase>(1 + below(4)),
+                                .priority = static_cast<int>(random()),
+                                .num_runs = count(),
+                                .num_done = count(),
+                                .num_given_up = count(),
+                                .rate_hz = number(),
+                                .remaining_s = number(),
+                                .storage_failure = text(),
+                                .owner = text()});
+    status.unserved_files = {{text(), text()}};
+    status.quarantined_hosts = {text()};
+    const FactoryReport report{
+        .name = text(), .batch_system = text(), .wait_s = number(), .reason = text()};
+    status.factories = {{.report = report, .owner = text(), .silent_s = number()}};
+    EXPECT_NO_THROW((void)round_trip_reply(status));
+    const WorkerStatus worker{
+        .id = {1 + below(9)}, .name = text(), .host = text(), .silent_s = number()};
+    EXPECT_NO_THROW((void)round_trip_reply(WorkersReply{.workers = {worker}, .num_workers = 1}));
+    EXPECT_NO_THROW((void)round_trip_reply(DoneReply{text()}));
+    EXPECT_NO_THROW((void)round_trip_reply(ErrorReply{text()}));
+    const std::string digest(64, '0');
+    EXPECT_NO_THROW((void)round_trip_reply(AnswerReply{
+        .answer_id = 1, .size = 9, .sha256 = digest, .exit_code = 255, .error_text = text()}));
+  }
 }
 
 TEST(StatusReply, KeepsFactories) {

@@ -26,13 +26,43 @@ class RefusalTest : public ConversationTest {
   }
 };
 
-TEST_F(RefusalTest, IsFinalIfItIsIncompatibleOrItsKeyRevoked) {
-  for (const RejectReason reason : {RejectReason::incompatible, RejectReason::revoked}) {
-    start();
-    (void)take_sent<wire::Hello>();
-    refuse(reason);
-    expect_ending(Ending::Kind::failed, "refused by the coordinator: not now");
+TEST_F(RefusalTest, IsFinalIfItIsIncompatible) {
+  start();
+  (void)take_sent<wire::Hello>();
+  refuse(RejectReason::incompatible);
+  expect_ending(Ending::Kind::failed, "refused by the coordinator: not now");
+}
+
+// The list of keys may have been cut off for a moment: then the handshakes fail, too.
+TEST_F(RefusalTest, IsFinalIfTheKeyIsRevokedForMinutes) {
+  start();
+  (void)take_sent<wire::Hello>();
+  refuse(RejectReason::revoked);
+  const TimePoint revoked_at = now;
+  int num_connections = 0;
+  while (now - revoked_at < 299s) {
+    tick_after(1s);
+    if (conversation->take_reconnection()) ++num_connections;
+    sent.clear();
+    ASSERT_FALSE(conversation->ending().has_value());
   }
+  EXPECT_GE(num_connections, 1);
+  tick_after(1s);
+  expect_ending(Ending::Kind::failed, "refused by the coordinator: not now");
+}
+
+TEST_F(RefusalTest, IsForgottenIfTheKeyIsListedAgain) {
+  start();
+  (void)take_sent<wire::Hello>();
+  refuse(RejectReason::revoked);
+  tick_after(200s);
+  conversation->on_connected(now);
+  receive(welcome);
+  sent.clear();
+  EXPECT_TRUE(conversation->is_registered());
+  tick_after(200s);
+  EXPECT_FALSE(conversation->ending().has_value());
+  sent.clear();
 }
 
 TEST_F(RefusalTest, IsNotFinalIfThereAreTooManyWorkersOrTooMuchCrashed) {

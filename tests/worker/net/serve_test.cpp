@@ -150,7 +150,7 @@ TEST_F(ServeTest, IsNotDisturbedByRubbish) {
   (void)coordinator.receive<wire::Hello>();
   coordinator.send_bytes("rubbish");
   coordinator.send(wire::Stop{});  // Of no coordinator that the worker has registered with.
-  coordinator.send(wire::Reject{.reason = wire::RejectReason::revoked, .text = "enough"});
+  coordinator.send(wire::Reject{.reason = wire::RejectReason::incompatible, .text = "enough"});
   EXPECT_EQ(ending.get().reason, "refused by the coordinator: enough");
 }
 
