@@ -148,12 +148,20 @@ BatchCommand pbs_cancellation(const std::string& id) { return {{"qdel", id}}; }
 // HTCondor.
 
 /// A word of `arguments` in a submit description: in single quotes, which stand twice where they
-/// are meant, as double quotes do within the whole.
+/// are meant, as double quotes do within the whole. HTCondor expands `$(...)` and `$NAME(...)` when
+/// it reads the description, and `$$(...)` when the allocation starts; it has macros for the signs
+/// themselves.
 std::string quoted_for_condor(std::string_view text) {
   std::string quoted = "'";
-  for (const char c : text) {
-    quoted += c;
-    if (c == '\'' || c == '"') quoted += c;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool is_pair = text.substr(i).starts_with("$$");
+    if (is_pair) ++i;
+    if (text[i] == '$') {
+      quoted += is_pair ? "$$(DOLLARDOLLAR)" : "$(DOLLAR)";
+      continue;
+    }
+    quoted += text[i];
+    if (text[i] == '\'' || text[i] == '"') quoted += text[i];
   }
   return quoted + "'";
 }
