@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <iterator>
 #include <limits>
 #include <map>
@@ -57,8 +56,8 @@ class DataFilesIn final : public DataFiles {
     const auto known = texts_.find(file);
     if (known != texts_.end()) return known->second;
     try {
-      detail::require_regular_file(folder_ / file);
-      return texts_[file] = detail::read_text_file(folder_ / file, data_file_size_max);
+      return texts_[file] =
+                 detail::read_text_file(folder_ / file, data_file_size_max, detail::Pipes::refused);
     } catch (const detail::UnreadableFile& error) {
       throw document_.located(ConfigError(path, fmt::format("\"{}\"", file), error.what()));
     }
@@ -78,22 +77,20 @@ class DataFilesIn final : public DataFiles {
 bool is_database(const std::filesystem::path& file) {
   constexpr std::string_view format{"SQLite format 3\0", 16};
   std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error)) return false;
-  std::string beginning(format.size(), '\0');
-  std::ifstream(file, std::ios::binary).read(beginning.data(), std::ssize(beginning));
-  return beginning == format;
+  return std::filesystem::is_regular_file(file, error) &&
+         detail::read_beginning(file, format.size(), detail::Pipes::refused) == format;
 }
 
 std::string read_campaign_text(const std::filesystem::path& file) {
-  if (is_database(file)) {
-    throw DefinitionError(fmt::format(
-        "campaign file = {} (is a campaign database; give the TOML file)", file.string()));
-  }
   try {
-    return detail::read_text_file(file, campaign_file_size_max);
+    if (!is_database(file)) {
+      return detail::read_text_file(file, campaign_file_size_max, detail::Pipes::accepted);
+    }
   } catch (const detail::UnreadableFile& error) {
     throw DefinitionError(fmt::format("{}: {}", file.string(), error.what()));
   }
+  throw DefinitionError(fmt::format(
+      "campaign file = {} (is a campaign database; give the TOML file)", file.string()));
 }
 
 }  // namespace
