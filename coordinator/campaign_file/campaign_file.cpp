@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "coordinator/campaign_file/data_file.hpp"
+#include "core/campaign/name.hpp"
 #include "core/definition/document.hpp"
 #include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
@@ -99,7 +100,13 @@ std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
                                         const Overrides& overrides) {
   Document document(file.string(), read_campaign_text(file), assignments_of(overrides));
   DataFilesIn files(document, file.parent_path());
-  return model().read_campaign(document, files);
+  std::unique_ptr<Campaign> campaign = model().read_campaign(document, files);
+  try {
+    check_campaign_name(campaign->name, NameOrigin::given);
+  } catch (const ConfigError& error) {
+    throw document.located(error);
+  }
+  return campaign;
 }
 
 std::unique_ptr<Campaign> example_campaign() {

@@ -191,10 +191,12 @@ TEST(BatchSystem, StartsLocalWorkersWithTheirProcessAsIdentifier) {
 
 TEST(BatchSystem, RefusesAnswersThatItDoesNotUnderstand) {
   const BatchSystem& slurm = system_of("slurm");
-  EXPECT_EQ(test::message_of<Error>([&] { (void)slurm.id_of(""); }),
-            "sbatch: identifier = \"\" (must be 1 to 64 of [A-Za-z0-9._-])");
+  EXPECT_EQ(
+      test::message_of<Error>([&] { (void)slurm.id_of(""); }),
+      "sbatch: identifier = \"\" (must be 1 to 64 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(test::message_of<Error>([&] { (void)slurm.id_of("$(rm)"); }),
-            "sbatch: identifier = \"$(rm)\" (must be 1 to 64 of [A-Za-z0-9._-])");
+            "sbatch: identifier = \"$(rm)\" (must be 1 to 64 of [A-Za-z0-9._-], a letter or digit "
+            "first)");
   EXPECT_EQ(test::message_of<Error>([&] { (void)slurm.allocations_of(example(), "17\n"); }),
             "squeue: line = \"17\" (must be an identifier and a state)");
 }
