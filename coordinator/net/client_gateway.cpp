@@ -230,7 +230,8 @@ void ClientGateway::respond(std::uint64_t ticket, const wire::ClientReply& reply
   for (const Waiter& waiter : waiters) send(waiter, reply);
 }
 
-void ClientGateway::send(const Waiter& waiter, const wire::ClientReply& reply) {
+void ClientGateway::send(const Waiter& waiter, wire::ClientReply reply) {
+  callbacks_.paths.hide_in(reply);
   std::string bytes;
   try {
     bytes = wire::encode(wire::ReplyPacket{.id = waiter.request, .reply = reply});
