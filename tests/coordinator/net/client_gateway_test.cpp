@@ -51,7 +51,8 @@ class ClientGatewayTest : public testing::Test {
                   before_carrying_out();
                   carried_out.push_back(std::move(respond));
                 },
-            .now = [] { return TimePoint(); }};
+            .now = [] { return TimePoint(); },
+            .paths = ServerPaths("")};
   }
 
   void note(const std::string& routing_id, const std::string& bytes) {
