@@ -28,11 +28,10 @@ TEST(ServerPaths, LeaveOutTheDirectoriesOfOthers) {
 
 TEST(ServerPaths, AreInNoReply) {
   const ServerPaths paths("served");
-  wire::ClientReply status = wire::StatusReply{
-      .campaigns = {{.name = "a", .storage_failure = "file = served/a.db (full)"}},
-      .unserved_files = {{.file = "served/b.db", .reason = "file = /x/b.db (locked)"}}};
-  paths.hide_in(status);
-  const auto& shown = std::get<wire::StatusReply>(status);
+  wire::StatusReply shown;
+  shown.campaigns.emplace_back().storage_failure = "file = served/a.db (full)";
+  shown.unserved_files = {{.file = "served/b.db", .reason = "file = /x/b.db (locked)"}};
+  paths.hide_in(shown);
   EXPECT_EQ(shown.campaigns[0].storage_failure, "file = a.db (full)");
   EXPECT_EQ(shown.unserved_files[0].file, "b.db");
   EXPECT_EQ(shown.unserved_files[0].reason, "file = b.db (locked)");
