@@ -12,6 +12,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/manual_option.hpp"
@@ -56,8 +57,7 @@ wire::Hello hello_for(const Options& options, const ChildStart& start) {
       .reference_digest = model().reference_digest(best_instruction_set()),
       .former = start.former};
   if (!wire::is_name(hello.worker_name)) {
-    throw InvalidArgument(
-        fmt::format("name = {} (must be 1 to 128 of [A-Za-z0-9._-])", hello.worker_name));
+    throw InvalidArgument(fmt::format("name = {} ({})", hello.worker_name, is_name_rule));
   }
   return hello;
 }

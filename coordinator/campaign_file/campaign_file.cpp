@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <iterator>
 #include <limits>
 #include <map>
@@ -11,6 +10,7 @@
 #include <utility>
 
 #include "coordinator/campaign_file/data_file.hpp"
+#include "core/campaign/name.hpp"
 #include "core/definition/document.hpp"
 #include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
@@ -57,8 +57,8 @@ class DataFilesIn final : public DataFiles {
     const auto known = texts_.find(file);
     if (known != texts_.end()) return known->second;
     try {
-      detail::require_regular_file(folder_ / file);
-      return texts_[file] = detail::read_text_file(folder_ / file, data_file_size_max);
+      return texts_[file] =
+                 detail::read_text_file(folder_ / file, data_file_size_max, detail::Pipes::refused);
     } catch (const detail::UnreadableFile& error) {
       throw document_.located(ConfigError(path, fmt::format("\"{}\"", file), error.what()));
     }
@@ -78,22 +78,20 @@ class DataFilesIn final : public DataFiles {
 bool is_database(const std::filesystem::path& file) {
   constexpr std::string_view format{"SQLite format 3\0", 16};
   std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error)) return false;
-  std::string beginning(format.size(), '\0');
-  std::ifstream(file, std::ios::binary).read(beginning.data(), std::ssize(beginning));
-  return beginning == format;
+  return std::filesystem::is_regular_file(file, error) &&
+         detail::read_beginning(file, format.size(), detail::Pipes::refused) == format;
 }
 
 std::string read_campaign_text(const std::filesystem::path& file) {
-  if (is_database(file)) {
-    throw DefinitionError(fmt::format(
-        "campaign file = {} (is a campaign database; give the TOML file)", file.string()));
-  }
   try {
-    return detail::read_text_file(file, campaign_file_size_max);
+    if (!is_database(file)) {
+      return detail::read_text_file(file, campaign_file_size_max, detail::Pipes::accepted);
+    }
   } catch (const detail::UnreadableFile& error) {
     throw DefinitionError(fmt::format("{}: {}", file.string(), error.what()));
   }
+  throw DefinitionError(fmt::format(
+      "campaign file = {} (is a campaign database; give the TOML file)", file.string()));
 }
 
 }  // namespace
@@ -102,7 +100,13 @@ std::unique_ptr<Campaign> read_campaign(const std::filesystem::path& file,
                                         const Overrides& overrides) {
   Document document(file.string(), read_campaign_text(file), assignments_of(overrides));
   DataFilesIn files(document, file.parent_path());
-  return model().read_campaign(document, files);
+  std::unique_ptr<Campaign> campaign = model().read_campaign(document, files);
+  try {
+    check_campaign_name(campaign->name, NameOrigin::given);
+  } catch (const ConfigError& error) {
+    throw document.located(error);
+  }
+  return campaign;
 }
 
 std::unique_ptr<Campaign> example_campaign() {

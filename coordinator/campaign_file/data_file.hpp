@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -14,12 +15,20 @@ class UnreadableFile : public Error {
   using Error::Error;
 };
 
-/// @throws UnreadableFile if it is a pipe, a socket or a device, which may never end.
-void require_regular_file(const std::filesystem::path& file);
+/// What is done with a pipe or a device, which may never end.
+enum class Pipes : std::uint8_t {
+  refused,
+  accepted,  ///< For a file that a user names: `<(make_campaign)`.
+};
+
+/// So many bytes of a file, or all if it has fewer.
+/// @throws UnreadableFile
+[[nodiscard]] std::string read_beginning(const std::filesystem::path& file, std::size_t size_max,
+                                         Pipes pipes);
 
 /// All bytes of a file.
 /// @throws UnreadableFile
-[[nodiscard]] std::string read_text_file(const std::filesystem::path& file,
-                                         std::uintmax_t size_max);
+[[nodiscard]] std::string read_text_file(const std::filesystem::path& file, std::size_t size_max,
+                                         Pipes pipes);
 
 }  // namespace proofmass::coordinator::detail

@@ -18,8 +18,7 @@ constexpr std::size_t requirement_size_max = 200;
 
 std::string read_requirements_text(const std::filesystem::path& file) {
   try {
-    detail::require_regular_file(file);
-    return detail::read_text_file(file, requirements_file_size_max);
+    return detail::read_text_file(file, requirements_file_size_max, detail::Pipes::refused);
   } catch (const detail::UnreadableFile& error) {
     throw DefinitionError(fmt::format("{}: {}", file.string(), error.what()));
   }

@@ -19,6 +19,7 @@
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/draft_file.hpp"
+#include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
@@ -147,6 +148,11 @@ ServedCampaign load_file(const std::filesystem::path& file) {
                             store.model_version(), model().version()));
   }
   std::shared_ptr<const Campaign> definition = stored_campaign(store);
+  try {
+    check_campaign_name(definition->name, NameOrigin::given);
+  } catch (const ConfigError& error) {
+    throw Error(fmt::format("{}: {}", file.string(), error.what()));
+  }
   return {.file = file, .store = std::move(store), .definition = std::move(definition)};
 }
 

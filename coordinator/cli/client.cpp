@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "coordinator/cli/program.hpp"
+#include "core/campaign/name.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
@@ -96,7 +97,7 @@ wire::WorkersReply all_workers(const Ask& ask) {
 
 std::string checked_campaign_name(const std::string& name) {
   if (wire::is_name(name)) return name;
-  throw UsageError(fmt::format("campaign = \"{}\" (must be 1 to 128 of [A-Za-z0-9._-])", name));
+  throw UsageError(fmt::format("campaign = \"{}\" ({})", name, is_name_rule));
 }
 
 }  // namespace proofmass::coordinator

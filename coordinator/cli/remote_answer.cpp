@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "coordinator/cli/standard_output.hpp"
+#include "coordinator/net/answers.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/standard_error.hpp"
@@ -32,6 +33,10 @@ int print_answer(const ClientConnectionConfig& connection, const wire::AnswerReq
                  AnswerText text) {
   return with_connection({.connection = connection}, [&](const Ask& ask) {
     const auto answer = reply_of<wire::AnswerReply>(ask, question);
+    if (answer.size > Answers::size_max) {  // It would have to be held in memory.
+      throw Error(
+          fmt::format("answer = {} bytes (must be at most {})", answer.size, Answers::size_max));
+    }
     std::string bytes;
     read_answer(ask, answer, [&](std::string_view part) { bytes += part; });
     Sha256 hash;

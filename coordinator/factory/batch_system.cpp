@@ -13,6 +13,7 @@
 #include <sstream>
 #include <thread>
 
+#include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
@@ -46,14 +47,10 @@ std::string clock_text(std::chrono::seconds duration) {
 
 /// @throws Error unless it can be part of a worker's name.
 std::string checked_id(std::string_view program, std::string id) {
-  const auto is_allowed = [](char c) {
-    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' ||
-           c == '-' || c == '_';
-  };
   constexpr std::size_t size_max = 64;
-  if (!id.empty() && id.size() <= size_max && std::ranges::all_of(id, is_allowed)) return id;
-  throw Error(fmt::format("{}: identifier = \"{}\" (must be 1 to {} of [A-Za-z0-9._-])", program,
-                          id, size_max));
+  if (id.size() <= size_max && has_name_form(id)) return id;
+  throw Error(fmt::format("{}: identifier = \"{}\" (must be 1 to {} of {})", program, id, size_max,
+                          name_rule));
 }
 
 std::string first_word(std::string_view program, std::string_view output) {
@@ -148,12 +145,20 @@ BatchCommand pbs_cancellation(const std::string& id) { return {{"qdel", id}}; }
 // HTCondor.
 
 /// A word of `arguments` in a submit description: in single quotes, which stand twice where they
-/// are meant, as double quotes do within the whole.
+/// are meant, as double quotes do within the whole. HTCondor expands `$(...)` and `$NAME(...)` when
+/// it reads the description, and `$$(...)` when the allocation starts; it has macros for the signs
+/// themselves.
 std::string quoted_for_condor(std::string_view text) {
   std::string quoted = "'";
-  for (const char c : text) {
-    quoted += c;
-    if (c == '\'' || c == '"') quoted += c;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool is_pair = text.substr(i).starts_with("$$");
+    if (is_pair) ++i;
+    if (text[i] == '$') {
+      quoted += is_pair ? "$$(DOLLARDOLLAR)" : "$(DOLLAR)";
+      continue;
+    }
+    quoted += text[i];
+    if (text[i] == '\'' || text[i] == '"') quoted += text[i];
   }
   return quoted + "'";
 }

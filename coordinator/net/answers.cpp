@@ -108,10 +108,11 @@ Order order_for(const wire::AnswerRequest& request, const ServiceConfig& config,
 
 /// So that no copy takes the space that results need.
 void require_space(const Order& order, const std::filesystem::path& database) {
-  std::error_code ignored;
-  const std::uintmax_t size = std::filesystem::file_size(database, ignored);
-  const std::filesystem::space_info space = std::filesystem::space(order.directory, ignored);
-  if (ignored || space.available >= 2 * size) return;
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(database, error);
+  if (error) return;  // Making the copy says why.
+  const std::filesystem::space_info space = std::filesystem::space(order.directory, error);
+  if (error || space.available >= 2 * size) return;
   throw Error(fmt::format("disk = {} bytes available (must be {}, twice the size of the database)",
                           space.available, 2 * size));
 }
@@ -135,33 +136,53 @@ void limit(pid_t process_id, __rlimit_resource resource, std::uint64_t maximum) 
   if (prlimit(process_id, resource, &wanted, nullptr) != 0 && errno != ESRCH) fail("limits");
 }
 
+/// Closes a descriptor at the end of a scope, or before.
+class Descriptor {
+ public:
+  explicit Descriptor(int number = -1) : number_(number) {}
+  ~Descriptor() { reset(); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  [[nodiscard]] int number() const { return number_; }
+  void reset(int number = -1) {
+    if (number_ >= 0) close(number_);
+    number_ = number;
+  }
+
+ private:
+  int number_;
+};
+
+struct Pipe {
+  Pipe() {
+    std::array<int, 2> ends{};
+    if (pipe2(ends.data(), O_CLOEXEC) != 0) fail("pipe");
+    reading.reset(ends[0]);
+    writing.reset(ends[1]);
+  }
+
+  Descriptor reading;
+  Descriptor writing;
+};
+
 /// A process that answers a question, from its start to its end.
 class AnswerProcess {
  public:
-  AnswerProcess(const Order& order, int output) {
-    std::array<int, 2> ends{};
-    if (pipe2(ends.data(), O_CLOEXEC) != 0) fail("pipe");
-    const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    errors_ = ends[0];
-    try {
-      process_id_ = wire::start_program({.arguments = order.arguments,
-                                         .descriptors = {nothing, output, ends[1]},
-                                         .environment = wire::environment_without_settings()});
-    } catch (const Error&) {
-      close(nothing);
-      close(ends[1]);
-      close(errors_);
-      throw;
-    }
-    close(nothing);
-    close(ends[1]);
+  /// @param answer  Gets what it writes to standard output.
+  AnswerProcess(const Order& order, const UnnamedFile& answer) : answer_(answer) {
+    const Descriptor nothing(open("/dev/null", O_RDONLY | O_CLOEXEC));
+    process_id_ = wire::start_program(
+        {.arguments = order.arguments,
+         .descriptors = {nothing.number(), output_.writing.number(), errors_.writing.number()},
+         .environment = wire::environment_without_settings()});
+    output_.writing.reset();
+    errors_.writing.reset();
   }
   ~AnswerProcess() {
-    if (process_id_ != 0) {
-      kill(process_id_, SIGKILL);
-      (void)wait();
-    }
-    close(errors_);
+    if (process_id_ == 0) return;
+    kill(process_id_, SIGKILL);
+    (void)wait();
   }
   AnswerProcess(const AnswerProcess&) = delete;
   AnswerProcess& operator=(const AnswerProcess&) = delete;
@@ -169,18 +190,26 @@ class AnswerProcess {
   /// The kernel keeps them if this process ends first.
   void set_limits(const Order& order) const {
     limit(process_id_, RLIMIT_CORE, 0);
-    limit(process_id_, RLIMIT_CPU, static_cast<std::uint64_t>(std::ceil(seconds_of(order))));
     if (wire::has_address_space_limit) limit(process_id_, RLIMIT_AS, memory_size_max);
-    if (!order.copy) limit(process_id_, RLIMIT_FSIZE, Answers::size_max);
+    limit(process_id_, RLIMIT_CPU, static_cast<std::uint64_t>(std::ceil(seconds_of(order))));
     setpriority(PRIO_PROCESS, static_cast<id_t>(process_id_), niceness);
   }
 
   /// Waits for the end. @returns What waitpid() says of it; nothing if it was ended before.
+  /// @throws Error if the answer is too large or cannot be written.
   std::optional<int> follow(Clock::time_point deadline, const std::atomic<bool>& is_cancelled) {
-    while (!is_silent_) {
+    std::array<pollfd, 2> items{pollfd{output_.reading.number(), POLLIN, 0},
+                                pollfd{errors_.reading.number(), POLLIN, 0}};
+    while (items[0].fd >= 0 || items[1].fd >= 0) {
       if (is_cancelled || Clock::now() > deadline) return std::nullopt;
-      pollfd item{.fd = errors_, .events = POLLIN, .revents = 0};
-      if (poll(&item, 1, look_interval_ms) > 0) read_errors();
+      if (poll(items.data(), items.size(), look_interval_ms) <= 0) continue;
+      for (pollfd& item : items) {
+        if (item.revents == 0) continue;
+        const bool is_output = item.fd == output_.reading.number();
+        const std::optional<std::string_view> bytes = read_some(item.fd);
+        if (bytes) is_output ? take_output(*bytes) : take_errors(*bytes);
+        if (!bytes) item.fd = -1;
+      }
     }
     return wait();
   }
@@ -188,21 +217,36 @@ class AnswerProcess {
   [[nodiscard]] const std::string& error_text() const { return error_text_; }
 
  private:
-  void read_errors() {
-    std::array<char, 4096> bytes{};
-    const ssize_t size = ::read(errors_, bytes.data(), bytes.size());
-    if (size < 0 && errno == EINTR) return;
-    is_silent_ = size <= 0;
-    if (size <= 0) return;
-    error_text_.append(bytes.data(), static_cast<std::size_t>(size));
+  /// Nothing at the end.
+  std::optional<std::string_view> read_some(int descriptor) {
+    const ssize_t size = ::read(descriptor, bytes_.data(), bytes_.size());
+    if (size < 0 && errno == EINTR) return std::string_view();
+    if (size <= 0) return std::nullopt;
+    return std::string_view(bytes_.data(), static_cast<std::size_t>(size));
+  }
+
+  void take_output(std::string_view bytes) {
+    num_written_ += bytes.size();
+    if (num_written_ > Answers::size_max) {
+      throw Error(fmt::format("answer = more than {} bytes (ask for less, or fetch the database)",
+                              Answers::size_max));
+    }
+    answer_.append(bytes);
+  }
+
+  void take_errors(std::string_view bytes) {
+    error_text_.append(bytes);
     error_text_.resize(std::min(error_text_.size(), wire::reply_text_size_max));
   }
 
   int wait() { return wire::wait_for_end(std::exchange(process_id_, 0)); }
 
+  const UnnamedFile& answer_;
+  Pipe output_;
+  Pipe errors_;
   pid_t process_id_ = 0;
-  int errors_ = -1;         ///< What it writes to standard error.
-  bool is_silent_ = false;  ///< It has closed its standard error: it has ended.
+  std::uint64_t num_written_ = 0;
+  std::vector<char> bytes_ = std::vector<char>(std::size_t{64} << 10);
   std::string error_text_;
 };
 
@@ -211,10 +255,6 @@ int exit_code_of(const std::optional<int>& status, const Order& order) {
   const bool is_out_of_time = !status || (WIFSIGNALED(*status) && WTERMSIG(*status) == SIGXCPU);
   if (is_out_of_time) {
     throw Error(fmt::format("answer = not there after {:.3g} s (ask for less)", seconds_of(order)));
-  }
-  if (WIFSIGNALED(*status) && WTERMSIG(*status) == SIGXFSZ) {
-    throw Error(fmt::format("answer = more than {} bytes (ask for less, or fetch the database)",
-                            Answers::size_max));
   }
   if (!WIFEXITED(*status)) {
     throw Error(fmt::format("answer: the process was {}", wire::end_text(*status)));
@@ -280,6 +320,15 @@ std::string UnnamedFile::read(std::uint64_t offset, std::size_t size_max) const 
   return bytes;
 }
 
+void UnnamedFile::append(std::string_view bytes) const {
+  while (!bytes.empty()) {
+    const ssize_t num_written = write(descriptor_, bytes.data(), bytes.size());
+    if (num_written < 0 && errno == EINTR) continue;
+    if (num_written < 0) fail("write");
+    bytes.remove_prefix(static_cast<std::size_t>(num_written));
+  }
+}
+
 Answers::~Answers() {
   for (const Computing& computing : computing_) *computing.is_cancelled = true;
 }
@@ -322,7 +371,7 @@ void Answers::ask(const wire::AnswerRequest& request, const std::filesystem::pat
     try {
       const CopyRemover remover{order.copy};
       std::unique_ptr<UnnamedFile> file = make_unnamed_file(order.directory);
-      AnswerProcess process(order, file->descriptor());
+      AnswerProcess process(order, *file);
       process.set_limits(order);
       const std::optional<int> status =
           process.follow(Clock::now() + order.duration_max, *is_cancelled);

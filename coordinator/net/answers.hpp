@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/client_gateway.hpp"
@@ -25,8 +26,8 @@ class UnnamedFile {
   UnnamedFile(const UnnamedFile&) = delete;
   UnnamedFile& operator=(const UnnamedFile&) = delete;
 
-  [[nodiscard]] int descriptor() const { return descriptor_; }
-  [[nodiscard]] std::uint64_t size() const;  ///< Bytes.
+  void append(std::string_view bytes) const;  ///< @throws Error if they cannot be written.
+  [[nodiscard]] std::uint64_t size() const;   ///< Bytes.
   /// At most so many bytes from the offset on; fewer only at the end of the file.
   /// @throws Error if it cannot be read.
   [[nodiscard]] std::string read(std::uint64_t offset, std::size_t size_max) const;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <variant>
 
+#include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 
@@ -18,8 +19,10 @@ constexpr std::chrono::seconds told_every(1);
 constexpr std::chrono::seconds silence_max(30);  // Between two parts of a request.
 
 Request read(wire::SubmitRequest&& sent) {
-  return Submission{.campaign = model().campaign_of(std::move(sent.definition),
-                                                    TableColumns::included, "definition"),
+  auto campaign =
+      model().campaign_of(std::move(sent.definition), TableColumns::included, "definition");
+  check_campaign_name(campaign->name, NameOrigin::given);
+  return Submission{.campaign = std::move(campaign),
                     .priority = sent.priority,
                     .audit_fraction = sent.audit_fraction,
                     .stop_rule = std::move(sent.stop_rule),
@@ -227,7 +230,8 @@ void ClientGateway::respond(std::uint64_t ticket, const wire::ClientReply& reply
   for (const Waiter& waiter : waiters) send(waiter, reply);
 }
 
-void ClientGateway::send(const Waiter& waiter, const wire::ClientReply& reply) {
+void ClientGateway::send(const Waiter& waiter, wire::ClientReply reply) {
+  callbacks_.paths.hide_in(reply);
   std::string bytes;
   try {
     bytes = wire::encode(wire::ReplyPacket{.id = waiter.request, .reply = reply});

@@ -16,6 +16,7 @@
 #include "coordinator/net/authentication/rights.hpp"
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/peers.hpp"
+#include "coordinator/net/server_paths.hpp"
 #include "core/campaign/campaign.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/client_messages.hpp"
@@ -109,6 +110,7 @@ class ClientGateway {
     /// Carries out a request that has been checked. May throw instead of responding.
     std::function<void(Request request, const Asker& asker, Respond respond)> carry_out;
     std::function<TimePoint()> now;
+    ServerPaths paths;  ///< Which no reply has.
   };
 
   /// How many connections may wait for the same request, for example one client that connects
@@ -150,7 +152,7 @@ class ClientGateway {
   std::optional<std::uint64_t> begin(const Address& from, std::uint64_t request,
                                      std::string_view bytes);
   void respond(std::uint64_t ticket, const wire::ClientReply& reply);
-  void send(const Waiter& waiter, const wire::ClientReply& reply);
+  void send(const Waiter& waiter, wire::ClientReply reply);
 
   Background& background_;
   Callbacks callbacks_;

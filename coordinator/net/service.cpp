@@ -17,6 +17,7 @@
 #include "coordinator/net/directory_service.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
 #include "coordinator/net/request_service.hpp"
+#include "coordinator/net/server_paths.hpp"
 #include "coordinator/net/service_context.hpp"
 #include "coordinator/net/service_sockets.hpp"
 #include "coordinator/net/timing.hpp"
@@ -103,6 +104,10 @@ class Service::Impl final : public Outbox {
                              .num_messages_unsent = worker_gateway_.num_unsent(),
                              .num_connections_refused = num_connections_refused()};
     add_workers(state_, now(), depth, snapshot);
+    paths_.hide_in(snapshot.status);
+    for (CampaignSnapshot& campaign : snapshot.campaigns) {
+      campaign.status.storage_failure = paths_.hidden_in(campaign.status.storage_failure);
+    }
     return snapshot;
   }
 
@@ -226,7 +231,8 @@ class Service::Impl final : public Outbox {
                 [this](Request request, const Asker& asker, Respond respond) {
                   request_service_.carry_out(std::move(request), asker, std::move(respond));
                 },
-            .now = [this] { return now(); }};
+            .now = [this] { return now(); },
+            .paths = paths_};
   }
 
   [[nodiscard]] bool is_allowed(wire::Domain domain, const std::string& key, TimePoint time) {
@@ -418,6 +424,7 @@ class Service::Impl final : public Outbox {
 
   WakingTime time_{std::chrono::steady_clock::now()};
   ServiceConfig config_;
+  ServerPaths paths_{config_.answer_directory.parent_path()};
   Log log_;
   CoordinatorStart start_;
   ServiceSockets sockets_;

@@ -13,6 +13,7 @@
 #include <iterator>
 #include <utility>
 
+#include "coordinator/net/server_paths.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {
@@ -53,7 +54,7 @@ std::shared_ptr<const CampaignEvents> read_events_of(const DetailSubject& campai
     now->given_up = history.given_up(page_given_up_max);
     now->attempts = history.recent_attempts(page_attempts_max, page_losses_max);
   } catch (const std::exception& error) {
-    now->failure = error.what();
+    now->failure = ServerPaths(campaign.file.parent_path()).hidden_in(error.what());
   }
   return now;
 }
@@ -86,7 +87,7 @@ std::shared_ptr<const CampaignResults> read_results_of(const DetailSubject& camp
     now->num_runs = reading.num_read();
     now->reading = std::make_shared<const ResultsReading>(std::move(reading));
   } catch (const std::exception& error) {
-    now->failure = error.what();
+    now->failure = ServerPaths(campaign.file.parent_path()).hidden_in(error.what());
   }
   return now;
 }

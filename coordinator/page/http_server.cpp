@@ -5,6 +5,7 @@
 #include <pthread.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <boost/asio/io_context.hpp>
@@ -15,7 +16,11 @@
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
 #include <exception>
+#include <map>
+#include <ranges>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "core/error.hpp"
 
@@ -34,10 +39,13 @@ constexpr std::chrono::milliseconds farewell_max(1000);
 constexpr std::size_t farewell_size_max = 65'536;
 constexpr int backlog = 128;
 
+class Session;
+
 /// What the connections of a server share.
 struct Shared {
   HttpConfig config;
   HttpServer::Handler handler;
+  std::vector<Session*> sessions;  // In the order of accepting; only the server's thread uses it.
   std::atomic<std::uint64_t> num_connections = 0;
   std::atomic<std::uint64_t> num_requests = 0;
   std::atomic<std::uint64_t> num_refused = 0;
@@ -51,16 +59,51 @@ HttpAnswer plain_answer(unsigned status, std::string_view text) {
 
 HttpAnswer content_refusal() { return plain_answer(413, "a request must have no content"); }
 
+/// Whoever may have many addresses counts as one client: of IPv6, a network of 64 bits.
+std::string client_of(const tcp::socket& socket) {
+  ErrorCode error;
+  const asio::ip::address address = socket.remote_endpoint(error).address();
+  if (error || !address.is_v6() || address.to_v6().is_v4_mapped()) return address.to_string();
+  auto bytes = address.to_v6().to_bytes();
+  std::fill(bytes.begin() + 8, bytes.end(), std::uint8_t{0});
+  return asio::ip::address_v6(bytes).to_string();
+}
+
 /// A connection, from its first byte to its end. Its pending operation owns it.
 class Session : public std::enable_shared_from_this<Session> {
  public:
+  /// What can be lost when the connection is closed for another one; the first goes first.
+  enum class Worth : std::uint8_t {
+    silent,          ///< No request is being answered.
+    answering,       ///< A request is; it showed no token.
+    trusted_silent,  ///< Like `silent`, but an earlier request showed the token.
+    trusted,         ///< Is never closed for another one.
+  };
+
   Session(tcp::socket socket, Shared& shared)
-      : shared_(shared), stream_(std::move(socket)), timer_(stream_.get_executor()) {
+      : shared_(shared),
+        client_(client_of(socket)),
+        stream_(std::move(socket)),
+        timer_(stream_.get_executor()) {
+    shared_.sessions.push_back(this);
     ++shared_.num_connections;
   }
-  ~Session() { --shared_.num_connections; }
+  ~Session() { leave(); }
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
+
+  [[nodiscard]] const std::string& client() const { return client_; }
+  [[nodiscard]] Worth worth() const {
+    if (is_answering_) return is_trusted_ ? Worth::trusted : Worth::answering;
+    return is_trusted_ ? Worth::trusted_silent : Worth::silent;
+  }
+
+  /// Closes the connection at once.
+  void close() {
+    leave();
+    stream_.close();
+    timer_.cancel();
+  }
 
   /// Waits for the first byte of a request, then for the whole request.
   void begin(std::chrono::milliseconds first_byte_max) {
@@ -76,6 +119,10 @@ class Session : public std::enable_shared_from_this<Session> {
 
  private:
   using Parser = http::request_parser<http::empty_body>;
+
+  void leave() {
+    if (std::erase(shared_.sessions, this) > 0) --shared_.num_connections;
+  }
 
   void read() {
     parser_.emplace();
@@ -108,6 +155,7 @@ class Session : public std::enable_shared_from_this<Session> {
     if (!parser_->is_done()) return answer(content_refusal());
     is_last_ = !message.keep_alive();
     note_request();
+    is_answering_ = true;
     ask();
   }
 
@@ -133,6 +181,7 @@ class Session : public std::enable_shared_from_this<Session> {
     } catch (const std::exception&) {
       given = plain_answer(500, "the page could not be made");
     }
+    if (given) is_trusted_ = is_trusted_ || given->has_shown_token;
     if (given) return answer(std::move(*given));
     if (patience == Patience::over) return answer(plain_answer(503, "no answer in time"));
     stream_.expires_never();
@@ -162,6 +211,7 @@ class Session : public std::enable_shared_from_this<Session> {
   }
 
   void go_on() {
+    is_answering_ = false;
     if (!is_last_) return begin(shared_.config.idle_max);
     // A connection that is closed with bytes unread is reset, and the client may not see the
     // answer.
@@ -180,6 +230,7 @@ class Session : public std::enable_shared_from_this<Session> {
   }
 
   Shared& shared_;
+  std::string client_;
   beast::tcp_stream stream_;
   asio::steady_timer timer_;
   beast::flat_buffer buffer_{65'536};  // At most; of one request and the beginning of the next.
@@ -191,7 +242,29 @@ class Session : public std::enable_shared_from_this<Session> {
   std::array<char, 4096> discarded_{};
   bool is_head_ = false;
   bool is_last_ = false;  ///< The connection ends after this answer.
+  bool is_answering_ = false;
+  bool is_trusted_ = false;  ///< A request has shown the token.
 };
+
+/// Closes the connection that is missed least, so that those that ask nothing cannot keep others
+/// out: of the least worth, of the client that has most of them, the oldest. False if none may be.
+bool make_room(const Shared& shared) {
+  using Worth = Session::Worth;
+  for (const Worth worth : {Worth::silent, Worth::answering, Worth::trusted_silent}) {
+    std::map<std::string, std::size_t> counts;
+    for (const Session* one : shared.sessions) {
+      if (one->worth() == worth) ++counts[one->client()];
+    }
+    if (counts.empty()) continue;
+    const std::size_t most = std::ranges::max(counts | std::views::values);
+    const auto oldest = std::ranges::find_if(shared.sessions, [&](const Session* one) {
+      return one->worth() == worth && counts.at(one->client()) == most;
+    });
+    (*oldest)->close();
+    return true;
+  }
+  return false;
+}
 
 [[noreturn]] void refuse_address(const HttpConfig& config, const std::string& reason) {
   throw Error(fmt::format("page = {}:{} ({})", config.host, config.port, reason));
@@ -279,12 +352,13 @@ class HttpServer::Impl {
 
   void serve(tcp::socket socket) {
     keep_from_children(socket.native_handle());
-    if (shared_.num_connections < shared_.config.num_connections_max) {
+    const bool is_full = shared_.sessions.size() >= shared_.config.num_connections_max;
+    if (is_full) ++shared_.num_refused;
+    if (!is_full || make_room(shared_)) {
       std::make_shared<Session>(std::move(socket), shared_)
           ->begin(shared_.config.request_duration_max);
       return;
     }
-    ++shared_.num_refused;
     constexpr std::string_view refusal =
         "HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nRetry-After: 5\r\n"
         "Connection: close\r\n\r\n";

@@ -25,6 +25,7 @@ struct HttpAnswer {
   std::string content_type = "text/html; charset=utf-8";
   std::string body = {};
   std::vector<std::pair<std::string, std::string>> headers = {};  ///< Beside those of HttpConfig.
+  bool has_shown_token = false;  ///< The client has, and its connection is kept before others.
 };
 
 /// Bounds of a server.
@@ -45,12 +46,14 @@ struct HttpConfig {
 struct HttpCounts {
   std::uint64_t num_connections = 0;  ///< Open now.
   std::uint64_t num_requests = 0;
-  std::uint64_t num_refused = 0;  ///< Connections that were one too many.
+  std::uint64_t num_refused = 0;  ///< Connections that were one too many: refused, or another one
+                                  ///< was closed for them.
 };
 
 /// An HTTP/1.1 server for pages that people look at, in a thread of its own. One thread serves all
 /// connections without ever waiting for one of them. Every step of a connection has a deadline for
-/// the whole of it, so that a client that sends a byte a second gains nothing.
+/// the whole of it, so that a client that sends a byte a second gains nothing. A connection that is
+/// one too many takes the place of one that asks nothing; see README.md.
 ///
 /// It knows GET and HEAD; other methods get the status 405, and a request with content 413.
 class HttpServer {

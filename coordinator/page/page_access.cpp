@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <netinet/in.h>
 #include <sodium.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -74,9 +75,15 @@ std::string_view cookie_in(std::string_view header) {
   return {};
 }
 
+/// The token in `Bearer TOKEN`. Letters of the scheme have no case, and several blanks may follow
+/// it: RFC 7235, section 2.1.
 std::string_view bearer_in(std::string_view header) {
   constexpr std::string_view scheme = "Bearer ";
-  return header.starts_with(scheme) ? header.substr(scheme.size()) : std::string_view();
+  const bool is_bearer = header.size() >= scheme.size() &&
+                         strncasecmp(header.data(), scheme.data(), scheme.size()) == 0;
+  if (!is_bearer) return {};
+  header.remove_prefix(scheme.size());
+  return header.substr(std::min(header.find_first_not_of(' '), header.size()));
 }
 
 }  // namespace
@@ -148,7 +155,7 @@ std::optional<HttpAnswer> PageAccess::welcome(std::string_view given_token) cons
 bool is_loopback_host(std::string_view host) {
   if (host.starts_with('[')) return host == "[::1]" || host.starts_with("[::1]:");
   const std::string name(host.substr(0, host.find(':')));
-  if (name == "localhost") return true;
+  if (strcasecmp(name.c_str(), "localhost") == 0) return true;
   in_addr ipv4{};
   constexpr std::uint32_t loopback_network = 127;
   return inet_pton(AF_INET, name.c_str(), &ipv4) == 1 &&

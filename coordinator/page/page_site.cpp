@@ -49,18 +49,26 @@ std::optional<HttpAnswer> PageSite::answer(const HttpRequest& http,
     if (auto welcome = sources_.access.welcome(request->text("token"))) return welcome;
   }
   if (auto refusal = sources_.access.refusal_of(http)) return refusal;
+  std::optional<HttpAnswer> given = answer_to_visitor(*request, patience);
+  if (given) given->has_shown_token = sources_.access.has_token();
+  return given;
+}
+
+std::optional<HttpAnswer> PageSite::answer_to_visitor(const PageRequest& request,
+                                                      Patience patience) const {
+  const std::vector<std::string>& path = request.path;
   if (path.size() == 1) {
     if (auto file = file_answer(path[0])) return file;
   }
-  const SnapshotDepth depth = !path.empty() && is_about_workers(*request)
+  const SnapshotDepth depth = !path.empty() && is_about_workers(request)
                                   ? SnapshotDepth::with_workers
                                   : SnapshotDepth::without_workers;
   std::shared_ptr<const PageSnapshot> snapshot = sources_.board->want(depth, sources_.now());
   if (snapshot == nullptr && patience == HttpServer::Patience::left) return std::nullopt;
   if (snapshot == nullptr) snapshot = sources_.board->newest();
   if (snapshot == nullptr) return text_answer(503, "the coordinator has not said anything yet");
-  if (auto found = about_service(*request, *snapshot)) return found;
-  return about_campaign(*request, *snapshot);
+  if (auto found = about_service(request, *snapshot)) return found;
+  return about_campaign(request, *snapshot);
 }
 
 HttpAnswer PageSite::health() const {

@@ -34,6 +34,9 @@ class PageSite {
 
  private:
   [[nodiscard]] HttpAnswer health() const;
+  /// To somebody who may see the page.
+  [[nodiscard]] std::optional<HttpAnswer> answer_to_visitor(const PageRequest& request,
+                                                            Patience patience) const;
   [[nodiscard]] std::optional<HttpAnswer> about_service(const PageRequest& request,
                                                         const PageSnapshot& snapshot) const;
   [[nodiscard]] HttpAnswer about_campaign(const PageRequest& request,

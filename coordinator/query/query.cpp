@@ -116,6 +116,9 @@ void Reader::restrict_connection() {
   for (const auto& [setting, value] : settings) {
     check(sqlite3_db_config(connection(), setting, value, nullptr));
   }
+  if (limits_.temporary_data == TemporaryData::in_memory) {
+    database_->execute("PRAGMA temp_store = MEMORY");
+  }
   database_->execute("PRAGMA query_only = ON");
   rule_.apply_to(connection());
   sqlite3_progress_handler(connection(), steps_between_looks, &Reader::on_progress, this);
@@ -154,6 +157,10 @@ void Reader::fail(int code, const std::string& sql) const {
       throw TimeLimitError(time_limit_text(limits_));
     case SQLITE_NOMEM:
       throw Error(memory_limit_text(limits_));
+    case SQLITE_FULL:  // Nothing else is written.
+      throw Error(
+          "temporary files = no space left (set SQLITE_TMPDIR to a directory with more, or ask for "
+          "less)");
     case SQLITE_ERROR:
     case SQLITE_AUTH:
     case SQLITE_TOOBIG:
@@ -260,7 +267,11 @@ std::string time_limit_text(const QueryLimits& limits) {
 }
 
 std::string memory_limit_text(const QueryLimits& limits) {
-  return fmt::format("memory = {} MiB (the query needs more)", limits.memory_size_max >> 20);
+  const bool has_all_in_it = limits.temporary_data == TemporaryData::in_memory;
+  return fmt::format("memory = {} MiB (the query{} more; ask for less{})",
+                     limits.memory_size_max >> 20,
+                     has_all_in_it ? " and what it sorts need" : " needs",
+                     has_all_in_it ? ", or query a copy of the database elsewhere" : "");
 }
 
 QueryEnd run_query(const QueryFiles& files, const std::string& sql, const QueryLimits& limits,

@@ -49,17 +49,24 @@ struct QueryFiles {
   std::vector<AttachedFile> attached;  ///< With different names.
 };
 
+/// Where a query keeps what it sorts and collects.
+enum class TemporaryData : std::uint8_t {
+  in_files,   ///< From some size on; in the directory that SQLITE_TMPDIR or TMPDIR names.
+  in_memory,  ///< Within the memory that the query may have.
+};
+
 struct QueryLimits {
   std::chrono::duration<double> time_limit{60.0};  ///< With the opening of the file.
   /// Bytes; held by run_query_in_process().
   std::uint64_t memory_size_max = std::uint64_t{8} << 30;
+  TemporaryData temporary_data = TemporaryData::in_files;
   /// Asked every few microseconds; the query ends when it says so.
   std::function<bool()> is_interrupted = [] { return false; };
 };
 
 /// What a TimeLimitError says.
 [[nodiscard]] std::string time_limit_text(const QueryLimits& limits);
-/// What is said of a query that needs more memory: `memory = 8192 MiB (the query needs more)`.
+/// What is said of a query that needs more memory: `memory = 8192 MiB (the query needs more; ...)`.
 [[nodiscard]] std::string memory_limit_text(const QueryLimits& limits);
 
 enum class QueryEnd : std::uint8_t { complete, interrupted };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -29,6 +30,16 @@ constexpr std::chrono::milliseconds grace(500);
 // So often the parent looks whether it is interrupted; a signal wakes it sooner.
 constexpr std::chrono::milliseconds look_interval(100);
 constexpr std::size_t read_size = std::size_t{64} << 10;
+
+// A process whose address space is limited is to take nothing beside it: temporary files, of which
+// a statement may make many, have no limit of their own.
+QueryLimits within_limits_of_process(QueryLimits limits) {
+  rlimit memory{};
+  if (getrlimit(RLIMIT_AS, &memory) != 0 || memory.rlim_cur == RLIM_INFINITY) return limits;
+  limits.memory_size_max = std::min<std::uint64_t>(limits.memory_size_max, memory.rlim_cur);
+  limits.temporary_data = TemporaryData::in_memory;
+  return limits;
+}
 
 ChildLimits child_limits(const QueryLimits& limits) {
   // The kernel keeps the limit if the parent is stopped and cannot.
@@ -161,7 +172,8 @@ class Follower {
 }  // namespace
 
 QueryEnd run_query_in_process(const QueryFiles& files, const std::string& sql,
-                              const QueryLimits& limits, const QueryOutput& output) {
+                              const QueryLimits& wanted, const QueryOutput& output) {
+  const QueryLimits limits = within_limits_of_process(wanted);
   const Clock::time_point late_at =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(limits.time_limit);
   ChildProcess child(child_limits(limits),

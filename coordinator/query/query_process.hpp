@@ -20,7 +20,8 @@ struct QueryOutput {
 /// As run_query(), but the file is opened and the query runs in a child process: whatever the file
 /// and the query make SQLite do, that process is killed half a second after the time limit, or
 /// after is_interrupted() has said so for half a second. Rows that it had written by then have
-/// reached the sink.
+/// reached the sink. If the address space of this process is limited, that holds for the query and
+/// its temporary data, which is kept in memory.
 ///
 /// @pre This process has one thread.
 /// @throws QueryError, TimeLimitError, StoreError, InvalidArgument; Error if the query needs more

@@ -366,6 +366,7 @@ std::optional<FileReturn> Store::return_to_place() {
     case detail::Placement::log_removed:
       impl_->renew_log();
       return FileReturn::log_made_anew;
+    case detail::Placement::truncated:
     case detail::Placement::without_directory:
       impl_->check_place();
       return std::nullopt;

@@ -6,22 +6,11 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/campaign/name.hpp"
 #include "core/error.hpp"
 
 namespace proofmass {
 namespace {
-
-constexpr std::size_t name_length_max = 64;
-
-void check_name(const std::string& name) {
-  const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-           c == '-' || c == '.';
-  };
-  if (!name.empty() && name.size() <= name_length_max && std::ranges::all_of(name, allowed)) return;
-  throw ConfigError("campaign.name", fmt::format("\"{:.100}\"", name),
-                    fmt::format("must be 1 to {} letters, digits, _, - or .", name_length_max));
-}
 
 void check_table_column(const std::vector<double>& column, const TableSource& source,
                         std::uint64_t num_runs) {
@@ -45,7 +34,7 @@ std::string_view name_of(Interpretation interpretation) {
 }
 
 void check_identity(const Campaign& campaign) {
-  check_name(campaign.name);
+  check_campaign_name(campaign.name, NameOrigin::stored);
   if (campaign.seed > seed_max) {
     throw ConfigError("campaign.seed", fmt::format("{}", campaign.seed),
                       fmt::format("must be in [0, {}]", seed_max));

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/wire/names.hpp"
 
@@ -87,8 +88,7 @@ void require_count(int count, std::uint64_t minimum, std::uint64_t maximum,
 
 std::string checked_name(const std::string& name, std::string_view field) {
   // The name itself is not repeated: it may hold anything.
-  require(is_name(name), field, fmt::format("{} bytes", name.size()),
-          "must be 1 to 128 of [A-Za-z0-9._-]");
+  require(is_name(name), field, fmt::format("{} bytes", name.size()), is_name_rule);
   return name;
 }
 

@@ -8,12 +8,12 @@
 
 namespace proofmass::wire {
 
-/// True for 1 to 128 characters of [A-Za-z0-9._-]: names of workers, hosts and models, which go
-/// into logs and the database as they are.
+/// True for 1 to 128 characters of which has_name_form() holds: names of workers, hosts and models,
+/// which go into logs and the database as they are; see core/campaign/name.hpp.
 [[nodiscard]] bool is_name(std::string_view text);
 
-/// The text with every character that a name may not have replaced by `-`, cut to 128; `unnamed` if
-/// nothing is left.
+/// The text with every character that a name may not have replaced by `-`, or `x` in the first
+/// place, cut to 128; `unnamed` if nothing is left.
 [[nodiscard]] std::string name_from(std::string_view text);
 
 /// True if most runs of the campaign were given up: then it is no success that it is finished.

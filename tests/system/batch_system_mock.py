@@ -189,6 +189,13 @@ def words_of_arguments(text):
     return [word for word in words + [word] if word is not None]
 
 
+def expanded(argument, number):
+    """What becomes of macros: all that is unknown is empty."""
+    known = {"ClusterId": str(number), "ProcId": "0", "DOLLAR": "$"}
+    argument = re.sub(r"(?<!\$)\$\((\w+)[^)]*\)", lambda m: known.get(m[1], ""), argument)
+    return argument.replace("$$(DOLLARDOLLAR)", "$$")
+
+
 def condor_submit(directory, arguments):
     assert arguments == ["-terse", "-"], arguments
     lines = sys.stdin.read().splitlines()
@@ -317,8 +324,7 @@ class Queue:
     def start_by_condor(self, allocation):
         description = json.loads(allocation.read("description"))
         arguments = words_of_arguments(description["arguments"])
-        for macro, value in (("$(ClusterId)", str(allocation.number)), ("$(ProcId)", "0")):
-            arguments = [argument.replace(macro, value) for argument in arguments]
+        arguments = [expanded(argument, allocation.number) for argument in arguments]
         return self.popen(
             allocation,
             [description["executable"], *arguments],

@@ -69,7 +69,7 @@ TEST_F(ServedDirectory, HasAFileThatIsLockedForAMoment) {
   wait_for_log("coordinator", "campaign_not_served");
   const Process worker = null_worker("worker", {"--run-time", "0"});
   ASSERT_EQ(unserved().size(), 1U);
-  EXPECT_EQ(unserved()[0].at("file"), "served/null.db");
+  EXPECT_EQ(unserved()[0].at("file"), "null.db");
   EXPECT_TRUE(contains(unserved()[0].at("reason"), "null.db"));
   holder.reset();
   wait_for_log("coordinator", "campaign_file_served file=served/null.db");
@@ -116,7 +116,7 @@ TEST_F(ServedDirectory, HasAFileWithABadRow) {
   const Process worker = null_worker("worker", {"--run-time", "0"});
   expect_finished_here();
   ASSERT_EQ(unserved().size(), 1U);
-  EXPECT_EQ(unserved()[0].at("file"), "served/bad.db");
+  EXPECT_EQ(unserved()[0].at("file"), "bad.db");
 }
 
 /// The directory is a small file system of its own.

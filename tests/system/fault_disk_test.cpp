@@ -88,10 +88,9 @@ TEST_F(FaultyDisk, HasNoRoomForACampaign) {
   Process submit = start_behind({}, "submit", "proofmass",
                                 {"submit", "null.toml", "--connect", clients_endpoint});
   EXPECT_EQ(submit.wait(), 1);
-  EXPECT_EQ(
-      errors_of("submit"),
-      "proofmass: error: campaign database = served/null.db.unfinished (the disk is full; what was "
-      "committed before is safe, free space and try again)\n");
+  EXPECT_EQ(errors_of("submit"),
+            "proofmass: error: campaign database = null.db.unfinished (the disk is full; what was "
+            "committed before is safe, free space and try again)\n");
   EXPECT_FALSE(fs::exists(file_of("null")));
   fs::remove(path("served/ballast"));
   enlarge();

@@ -184,6 +184,18 @@ TEST_F(CampaignFileThatLosesItsName, IsNoneThatIsCopiedAloneFromALiveCoordinator
   }
 }
 
+// What it held is lost; whoever looks after the coordinator learns it at once, not at the end.
+TEST_F(CampaignFileThatLosesItsName, ByBeingTruncatedIsAFailureAtOnce) {
+  const Process coordinator = this->coordinator("coordinator", {"null.toml"});
+  const Process worker = null_worker("worker", {"--run-time", "0.05"});
+  wait_for_done("null", 100);
+  fs::resize_file(file_of("null"), 0);
+  const std::string reason = "was truncated or written over while it was served";
+  wait_for_log("coordinator", reason);
+  EXPECT_TRUE(contains(status_of("null")["storage_failure"], reason));
+  EXPECT_LT(status_of("null")["num_done"], 2000);
+}
+
 /// `served` is a directory of another machine, as far as the kernel knows.
 class NetworkFileSystem : public FaultTest {
  protected:

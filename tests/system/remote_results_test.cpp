@@ -139,8 +139,7 @@ TEST_F(RemoteResults, SayThatACopyHasNoPlace) {
 TEST_F(RemoteResults, AreNotServedOnceArchivedAndReturnWithTheFile) {
   const auto runs = stored_runs(path("served/hardy2013.db"));
   EXPECT_EQ(remote_command({"archive", "hardy2013"}), 0) << errors_of("remote");
-  EXPECT_EQ(output_of("remote"),
-            "campaign hardy2013: its database is served/archived/hardy2013.db now\n");
+  EXPECT_EQ(output_of("remote"), "campaign hardy2013: its database is archived/hardy2013.db now\n");
   EXPECT_EQ(remote_command({"status"}), 0);
   EXPECT_TRUE(contains(output_of("remote"), "no campaigns")) << output_of("remote");
   EXPECT_EQ(stored_runs(path("served/archived/hardy2013.db")), runs);
@@ -155,7 +154,7 @@ TEST_F(RemoteResults, StayInTheListIfTheArchiveHasSuchAFile) {
   std::ofstream(path("served/archived/hardy2013.db")) << "an older one";
   EXPECT_EQ(remote_command({"archive", "hardy2013"}), 1);
   EXPECT_EQ(errors_of("remote"),
-            "proofmass: error: archived file = served/archived/hardy2013.db (File exists)\n");
+            "proofmass: error: archived file = archived/hardy2013.db (File exists)\n");
   EXPECT_EQ(read_file(path("served/archived/hardy2013.db")), "an older one");
   EXPECT_EQ(remote_command({"report", "hardy2013"}), 0) << errors_of("remote");
 }

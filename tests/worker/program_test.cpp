@@ -74,7 +74,8 @@ TEST(WorkerProgram, NeedsAName) {
     const Outcome outcome = run({"--connect", "ipc:///tmp/none", "--name", "a b", supervision});
     EXPECT_EQ(outcome.exit_code, 2);
     EXPECT_EQ(outcome.text,
-              "test-worker: error: name = a b (must be 1 to 128 of [A-Za-z0-9._-])\n");
+              "test-worker: error: name = a b (must be 1 to 128 of [A-Za-z0-9._-], a letter or "
+              "digit first)\n");
   }
 }
 

@@ -6,6 +6,7 @@
 #include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/standard_output.hpp"
+#include "core/campaign/name.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/names.hpp"
@@ -56,8 +57,7 @@ struct ReleaseOptions {
 
 int release_host(const ReleaseOptions& options) {
   if (!wire::is_name(options.host)) {
-    throw UsageError(
-        fmt::format("host = \"{}\" (must be 1 to 128 of [A-Za-z0-9._-])", options.host));
+    throw UsageError(fmt::format("host = \"{}\" ({})", options.host, is_name_rule));
   }
   return with_connection(options.client, [&](const Ask& ask) {
     const auto done =

@@ -21,6 +21,7 @@
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/factory/batch_system.hpp"
 #include "coordinator/factory/carry_out.hpp"
+#include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/log.hpp"
@@ -99,8 +100,8 @@ FactoryConfig checked(const FactoryOptions& options) {
   // A worker's name is this one with an identifier of 64 characters at most.
   constexpr std::size_t name_size_max = 60;
   if (!wire::is_name(config.name) || config.name.size() > name_size_max) {
-    throw UsageError(fmt::format("--name = \"{}\" (must be 1 to {} of [A-Za-z0-9._-])", config.name,
-                                 name_size_max));
+    throw UsageError(fmt::format("--name = \"{}\" (must be 1 to {} of {})", config.name,
+                                 name_size_max, name_rule));
   }
   if (config.workers_min > config.workers_max) {
     throw UsageError(fmt::format("--workers-min = {} (must be at most --workers-max, {})",

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -31,6 +32,10 @@ struct FetchOptions {
   ClientOptions client;
   std::string campaign;
   std::optional<std::filesystem::path> file;  ///< By default NAME.db.
+};
+
+struct FullDisk : Error {
+  using Error::Error;
 };
 
 /// What has arrived of a database, in a file that outlives this process: a later one goes on. There
@@ -127,7 +132,10 @@ class ArrivedPart {
   }
 
   [[noreturn]] void fail() const {
-    throw Error(fmt::format("file = {} ({})", path_.string(), std::strerror(errno)));
+    const int error = errno;
+    const std::string text = fmt::format("file = {} ({})", path_.string(), std::strerror(error));
+    if (error == ENOSPC || error == EDQUOT) throw FullDisk(text);
+    throw Error(text);
   }
 
   std::filesystem::path path_;
@@ -136,13 +144,29 @@ class ArrivedPart {
   std::string sha256_;  ///< As it was last read.
 };
 
-/// Completes the part. @throws Error if it is not what the coordinator announced; then it is gone.
+/// Whoever answers may announce what they like.
+void require_space(const std::filesystem::path& file, std::uint64_t size) {
+  std::error_code error;
+  const std::filesystem::space_info space = std::filesystem::space(directory_of(file), error);
+  if (error || size <= space.available) return;
+  throw Error(fmt::format("file = {} (the database has {} bytes more, the disk has room for {})",
+                          file.string(), size, space.available));
+}
+
+/// Completes the part. @throws Error if it is not what the coordinator announced; then it is gone,
+/// as it is if the disk is full: nobody else shall lack the space.
 void complete(ArrivedPart& part, const Ask& ask, const wire::AnswerReply& answer) {
   if (answer.offset != part.size()) part.clear();
-  read_answer(ask, answer, [&](std::string_view bytes) { part.append(bytes); });
+  require_space(part.path(), answer.size - std::min(answer.size, part.size()));
+  std::error_code ignored;
+  try {
+    read_answer(ask, answer, [&](std::string_view bytes) { part.append(bytes); });
+  } catch (const FullDisk&) {
+    std::filesystem::remove(part.path(), ignored);
+    throw;
+  }
   part.read_again();
   if (part.sha256() == answer.sha256) return;
-  std::error_code ignored;
   std::filesystem::remove(part.path(), ignored);
   throw Error("database = another one than was announced (fetch it again)");
 }

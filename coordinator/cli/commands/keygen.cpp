@@ -13,6 +13,7 @@
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/net/authentication/allow_list.hpp"
+#include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/link/keys.hpp"
@@ -101,8 +102,7 @@ std::string read_list(const std::filesystem::path& file) {
 
 void add_pair(const std::filesystem::path& directory, KeyRole role, const std::string& name) {
   if (!wire::is_name(name)) {
-    throw UsageError(
-        fmt::format("--{} = {} (must be 1 to 128 of [A-Za-z0-9._-])", to_text(role), name));
+    throw UsageError(fmt::format("--{} = {} ({})", to_text(role), name, is_name_rule));
   }
   const std::filesystem::path list = directory / list_name(role);
   std::string text = read_list(list);

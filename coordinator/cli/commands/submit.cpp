@@ -10,6 +10,7 @@
 #include "coordinator/cli/commands/watch.hpp"
 #include "coordinator/cli/override_options.hpp"
 #include "coordinator/cli/standard_output.hpp"
+#include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/wire/client_codec.hpp"
@@ -35,7 +36,7 @@ std::unique_ptr<Campaign> campaign_to_submit(const SubmitOptions& options) {
   if (options.name) {
     campaign->name = *options.name;
     try {
-      campaign->validate();
+      check_campaign_name(campaign->name, NameOrigin::given);
     } catch (const ConfigError& error) {
       throw UsageError(error.what());
     }

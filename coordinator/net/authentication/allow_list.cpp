@@ -42,7 +42,8 @@ std::string_view read_line(std::string_view line, wire::Domain domain, AllowedKe
   if (key.empty() || key.front() == '#') return {};
   const std::string_view name = take_word(line);
   if (!wire::PublicKey::parse(key)) return "must begin with a public key of 40 characters";
-  if (!wire::is_name(name)) return "must have a name of [A-Za-z0-9._-] after the key";
+  if (!wire::is_name(name))
+    return "must have a name of [A-Za-z0-9._-], a letter or digit first, after the key";
   const std::string_view rights_text = take_word(line);
   std::optional<Rights> rights;
   if (domain == wire::Domain::clients) {

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
@@ -192,7 +193,13 @@ void FilePlace::remember_log() {
   index_ = identity_at(index_of(path_));
 }
 
-Placement FilePlace::look() const {
+Placement FilePlace::look() {
+  struct stat status {};
+  if (::fstat(descriptor_, &status) == 0) {
+    is_truncated_ = is_truncated_ || status.st_size < size_max_;
+    size_max_ = std::max(size_max_, status.st_size);
+  }
+  if (is_truncated_) return Placement::truncated;
   const Identity present = identity_at(path_);
   if (present == file_) {
     return identity_at(log_of(path_)) == log_ ? Placement::in_place : Placement::log_removed;

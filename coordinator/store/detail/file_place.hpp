@@ -37,6 +37,7 @@ enum class Placement : std::uint8_t {
   removed,            ///< Nothing has its name any more: it was removed or renamed.
   replaced,           ///< Another file has its name.
   log_removed,        ///< It has its name, but its write-ahead log has not.
+  truncated,          ///< It is shorter than it was: somebody has emptied it or written over it.
   without_directory,  ///< Its directory was removed or renamed.
 };
 
@@ -57,7 +58,8 @@ class FilePlace {
   /// To be called once the connection has opened the write-ahead log.
   void remember_log();
 
-  [[nodiscard]] Placement look() const;
+  /// A file that was truncated once stays so: what was cut off does not come back.
+  [[nodiscard]] Placement look();
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }  ///< Canonical.
 
   /// Whether the log that lies beside the name belongs to this file.
@@ -88,6 +90,8 @@ class FilePlace {
   Identity file_;
   Identity log_;
   Identity index_;
+  off_t size_max_ = 0;  ///< The largest that was seen: SQLite only adds pages to a campaign.
+  bool is_truncated_ = false;
 };
 
 /// Removes the write-ahead log and its index that lie beside this canonical name, whosever they

@@ -132,9 +132,10 @@ Store::Impl::~Impl() {
   if (!place) return;
   try {
     rows.reset();
-    if (place->look() != detail::Placement::in_place) {
+    if (const auto placement = place->look(); placement != detail::Placement::in_place) {
       database.leave_files_alone();
-      (void)fold_own_log();
+      // What is left of a truncated file is of no use with pages of its log in it.
+      if (placement != detail::Placement::truncated) (void)fold_own_log();
       return;
     }
     if (!rest()) {
@@ -164,6 +165,10 @@ void Store::Impl::check_place() const {
       database.refuse("was replaced by another file while it was served");
     case detail::Placement::log_removed:
       database.refuse("lost its write-ahead log, which was removed while it was served");
+    case detail::Placement::truncated:
+      database.refuse(
+          "was truncated or written over while it was served: what it held is lost; stop the "
+          "coordinator, put a copy back, and what the copy lacks is computed again");
     case detail::Placement::without_directory:
       database.refuse("lost its directory, which was removed or renamed while it was served");
   }

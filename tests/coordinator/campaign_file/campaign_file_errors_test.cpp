@@ -86,9 +86,9 @@ TEST(CampaignFileErrors, NameAValueOutOfRange) {
   EXPECT_EQ(refusal_of("campaign.seed = -1"), "campaign.toml:1: campaign.seed = -1 (must be >= 0)");
   EXPECT_EQ(refusal_of("campaign.runs = 0"),
             "campaign.toml:1: campaign.runs = 0 (must be in [1, 1000000000])");
-  EXPECT_EQ(
-      refusal_of("campaign.name = \"a b\""),
-      "campaign.toml:1: campaign.name = \"a b\" (must be 1 to 64 letters, digits, _, - or .)");
+  EXPECT_EQ(refusal_of("campaign.name = \"a b\""),
+            "campaign.toml:1: campaign.name = \"a b\" (must be 1 to 64 of [A-Za-z0-9._-], a letter "
+            "or digit first)");
 }
 
 TEST(CampaignFileErrors, NameBrokenTomlByLine) {

@@ -1,8 +1,13 @@
 #include "coordinator/campaign_file/data_file.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <string>
 
@@ -112,15 +117,40 @@ TEST(ParseColumn, RefusesAMalformedRowByLine) {
 TEST(ReadTextFile, TakesAFileOfExactlyTheLargestSizeAndNoLarger) {
   const test::ScratchFolder folder;
   const auto file = folder.write("f", "12345");
-  EXPECT_EQ(read_text_file(file, 5), "12345");
-  EXPECT_EQ(refusal_of([&] { (void)read_text_file(file, 4); }), "is larger than 4 bytes");
+  EXPECT_EQ(read_text_file(file, 5, Pipes::refused), "12345");
+  EXPECT_EQ(refusal_of([&] { (void)read_text_file(file, 4, Pipes::refused); }),
+            "is larger than 4 bytes");
 }
 
 TEST(ReadTextFile, SaysWhyAFileCannotBeRead) {
   const test::ScratchFolder folder;
-  EXPECT_EQ(refusal_of([&] { (void)read_text_file(folder.path() / "absent", 5); }),
+  EXPECT_EQ(refusal_of([&] { (void)read_text_file(folder.path() / "absent", 5, Pipes::accepted); }),
             "cannot be read: No such file or directory");
-  EXPECT_EQ(refusal_of([&] { (void)read_text_file(folder.path(), 5); }), "is a directory");
+  EXPECT_EQ(refusal_of([&] { (void)read_text_file(folder.path(), 5, Pipes::accepted); }),
+            "is a directory");
+}
+
+// Reading it waits for a message of the kernel; its size is 0.
+TEST(ReadTextFile, ReadsNothingThatTheKernelMakesUp) {
+  EXPECT_EQ(read_text_file("/proc/kmsg", 5, Pipes::accepted), "");
+  EXPECT_EQ(read_text_file("/proc/uptime", 5, Pipes::refused), "");
+}
+
+TEST(ReadTextFile, TakesAPipeOnlyWhereAUserMayNameOne) {
+  const test::ScratchFolder folder;
+  const std::filesystem::path pipe = folder.path() / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(read_text_file(pipe, 5, Pipes::accepted), "");  // Nobody writes to it.
+  const int keeper = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  std::ofstream(pipe) << "12345";
+  EXPECT_EQ(read_text_file(pipe, 5, Pipes::accepted), "12345");
+  ::close(keeper);
+  for (const std::filesystem::path& file : {pipe, std::filesystem::path("/dev/zero")}) {
+    EXPECT_EQ(refusal_of([&] { (void)read_text_file(file, 5, Pipes::refused); }),
+              "is a pipe, a socket or a device");
+  }
+  EXPECT_EQ(refusal_of([&] { (void)read_text_file("/dev/zero", 5, Pipes::accepted); }),
+            "is larger than 5 bytes");
 }
 
 }  // namespace

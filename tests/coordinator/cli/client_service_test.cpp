@@ -124,10 +124,13 @@ TEST_F(ClientCommands, CheckNamesBeforeAnythingIsSent) {
     EXPECT_EQ(answer.exit_code, exit_wrong_usage);
     return answer.error;
   };
-  EXPECT_EQ(refusal({"submit", directory / "mine.toml", "--name", "../other"}),
-            "campaign.name = \"../other\" (must be 1 to 64 letters, digits, _, - or .)");
-  EXPECT_EQ(refusal({"pause", "a b"}), "campaign = \"a b\" (must be 1 to 128 of [A-Za-z0-9._-])");
-  EXPECT_EQ(refusal({"release", "a b"}), "host = \"a b\" (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(
+      refusal({"submit", directory / "mine.toml", "--name", "../other"}),
+      "campaign.name = \"../other\" (must be 1 to 64 of [A-Za-z0-9._-], a letter or digit first)");
+  EXPECT_EQ(refusal({"pause", "a b"}),
+            "campaign = \"a b\" (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
+  EXPECT_EQ(refusal({"release", "a b"}),
+            "host = \"a b\" (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
 }
 
 TEST_F(ClientCommands, FailInTheCoordinatorsWords) {

@@ -58,9 +58,10 @@ TEST(FactoryCommand, RefusesWhatCannotBe) {
   EXPECT_EQ(refusal_of_factory({"--dry-run", "--workers-min", "5", "--workers-max", "3"}),
             "--workers-min = 5 (must be at most --workers-max, 3)");
   EXPECT_EQ(refusal_of_factory({"--dry-run", "--name", "a b"}),
-            "--name = \"a b\" (must be 1 to 60 of [A-Za-z0-9._-])");
+            "--name = \"a b\" (must be 1 to 60 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_factory({"--dry-run", "--name", std::string(61, 'a')}),
-            "--name = \"" + std::string(61, 'a') + "\" (must be 1 to 60 of [A-Za-z0-9._-])");
+            "--name = \"" + std::string(61, 'a') +
+                "\" (must be 1 to 60 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_factory({"--dry-run", "--worker-start-cmd", "a\nb"}),
             "--worker-start-cmd (must be one line)");
 }

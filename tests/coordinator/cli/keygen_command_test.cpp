@@ -138,7 +138,8 @@ TEST_F(Keygen, RefusesAPairThatMakesNoSense) {
             "--worker = w2 (is in " + (directory_ / "authorized_workers").string() + " already)");
   EXPECT_EQ(refusal({"--client", "w2"}), "key file = " + (directory_ / "w2.key").string() +
                                              " (exists; keys are never replaced)");
-  EXPECT_EQ(refusal({"--worker", "../x"}), "--worker = ../x (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(refusal({"--worker", "../x"}),
+            "--worker = ../x (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
 }
 
 TEST_F(Keygen, RefusesADirectoryThatCannotBeMade) {

@@ -143,13 +143,21 @@ TEST(BatchSystem, ListsWhatCondorHasNotEnded) {
 }
 
 // What HTCondor does with `arguments` in its new syntax: the outer double quotes go, two double
-// quotes are one, single quotes keep a word together, and two of them within are one.
+// quotes are one, single quotes keep a word together, and two of them within are one. Before that,
+// it expands macros, among them those for a dollar sign and for two.
 TEST(BatchSystem, QuotesForCondor) {
   const BatchCommand command = system_of("condor").submission(example());
-  EXPECT_THAT(
-      command.input,
-      HasSubstr("arguments = \"-c 'echo \"\"it''s $1\"\"' bash $(ClusterId).$(ProcId)\"\n"));
+  EXPECT_THAT(command.input, HasSubstr("arguments = \"-c 'echo \"\"it''s $(DOLLAR)1\"\"' bash "
+                                       "$(ClusterId).$(ProcId)\"\n"));
   EXPECT_THAT(command.input, EndsWith("queue\n"));
+}
+
+TEST(BatchSystem, LetsCondorExpandNothingOfTheWorkersCommand) {
+  AllocationConfig config = example();
+  config.worker_command = "cd $(mktemp -d); x=$ENV(HOME) y=$$(Memory) z=$$$";
+  EXPECT_THAT(system_of("condor").submission(config).input,
+              HasSubstr("'cd $(DOLLAR)(mktemp -d); x=$(DOLLAR)ENV(HOME) "
+                        "y=$$(DOLLARDOLLAR)(Memory) z=$$(DOLLARDOLLAR)$(DOLLAR)'"));
 }
 
 TEST(BatchSystem, ReadsWhatCondorAnswers) {
@@ -183,10 +191,12 @@ TEST(BatchSystem, StartsLocalWorkersWithTheirProcessAsIdentifier) {
 
 TEST(BatchSystem, RefusesAnswersThatItDoesNotUnderstand) {
   const BatchSystem& slurm = system_of("slurm");
-  EXPECT_EQ(test::message_of<Error>([&] { (void)slurm.id_of(""); }),
-            "sbatch: identifier = \"\" (must be 1 to 64 of [A-Za-z0-9._-])");
+  EXPECT_EQ(
+      test::message_of<Error>([&] { (void)slurm.id_of(""); }),
+      "sbatch: identifier = \"\" (must be 1 to 64 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(test::message_of<Error>([&] { (void)slurm.id_of("$(rm)"); }),
-            "sbatch: identifier = \"$(rm)\" (must be 1 to 64 of [A-Za-z0-9._-])");
+            "sbatch: identifier = \"$(rm)\" (must be 1 to 64 of [A-Za-z0-9._-], a letter or digit "
+            "first)");
   EXPECT_EQ(test::message_of<Error>([&] { (void)slurm.allocations_of(example(), "17\n"); }),
             "squeue: line = \"17\" (must be an identifier and a state)");
 }

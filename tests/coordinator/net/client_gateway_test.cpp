@@ -51,7 +51,8 @@ class ClientGatewayTest : public testing::Test {
                   before_carrying_out();
                   carried_out.push_back(std::move(respond));
                 },
-            .now = [] { return TimePoint(); }};
+            .now = [] { return TimePoint(); },
+            .paths = ServerPaths("")};
   }
 
   void note(const std::string& routing_id, const std::string& bytes) {
@@ -146,7 +147,8 @@ TEST(RequestOf, RefusesADefinitionThatIsNone) {
   EXPECT_EQ(refusal([](Definition& d) { d.text.insert(0, "x = 1\n"); }),
             "definition:1: x = 1 (unknown key)");
   EXPECT_EQ(refusal([](Definition& d) { d.text.replace(d.text.find("tables"), 6, "../a"); }),
-            "definition:2: campaign.name = \"../a\" (must be 1 to 64 letters, digits, _, - or .)");
+            "definition:2: campaign.name = \"../a\" (must be 1 to 64 of [A-Za-z0-9._-], a letter "
+            "or digit first)");
   EXPECT_NE(refusal([](Definition& d) { d.table_columns.clear(); }), "");
   EXPECT_NE(refusal([](Definition& d) { d.table_columns[0].pop_back(); }), "");
 }

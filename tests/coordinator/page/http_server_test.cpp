@@ -185,19 +185,88 @@ TEST_F(HttpServerTest, ClosesConnectionsThatDoNotTakeTheirAnswer) {
   while (server->counts().num_connections > 0) std::this_thread::yield();
 }
 
-TEST_F(HttpServerTest, RefusesConnectionsThatAreTooMany) {
-  config.num_connections_max = 2;
+/// A client that has asked and does not take its answer.
+class Stuck : public RawClient {
+ public:
+  explicit Stuck(std::uint16_t port, const std::string& target = "/large",
+                 const std::string& address = "127.0.0.1")
+      : RawClient(port, address) {
+    send("GET " + target + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  }
+};
+
+/// Two connections at a time; the answer to /large is larger than any buffer, and that to a target
+/// with `token` is given to somebody who has shown it.
+class CrowdedHttpServer : public HttpServerTest {
+ protected:
+  CrowdedHttpServer() {
+    config.num_connections_max = 2;
+    handler = [](const HttpRequest& request, HttpServer::Patience) {
+      const bool is_large = request.target.starts_with("/large");
+      return HttpAnswer{.body = is_large ? std::string(std::size_t{16} << 20, 'x') : "small",
+                        .has_shown_token = request.target.ends_with("token")};
+    };
+    start();
+  }
+  void wait_for_requests(std::uint64_t count) const {
+    while (server->counts().num_requests < count) std::this_thread::yield();
+  }
+  void wait_for_connections(std::uint64_t count) const {
+    while (server->counts().num_connections != count) std::this_thread::yield();
+  }
+  std::string answer_to_next() { return RawClient(server->port()).ask("/a"); }
+};
+
+TEST_F(CrowdedHttpServer, ClosesTheOldestThatAsksNothing) {
+  const Stuck asking(server->port());
+  wait_for_requests(1);
+  RawClient silent(server->port());
+  EXPECT_THAT(answer_to_next(), HasSubstr("small"));
+  EXPECT_EQ(silent.rest(), "");
+  wait_for_connections(1);
+  RawClient half(server->port());
+  half.send("GET /half HTTP/1.1\r\nHost");
+  RawClient idle(server->port());
+  (void)idle.ask("/a");  // It took the place of `half`.
+  EXPECT_EQ(half.rest(), "");
+  EXPECT_THAT(answer_to_next(), HasSubstr("small"));
+  EXPECT_EQ(idle.rest(), "");
+  EXPECT_EQ(server->counts().num_refused, 3U);
+  wait_for_connections(1);  // That of `asking`.
+}
+
+TEST_F(CrowdedHttpServer, ClosesThatOfTheAddressWithMost) {
+  server.reset();
+  config.num_connections_max = 3;
   start();
-  RawClient first(server->port());
-  auto second = std::make_unique<RawClient>(server->port());
-  (void)first.ask("/a");
-  (void)second->ask("/a");
+  const Stuck other(server->port(), "/large", "127.0.0.9");
+  wait_for_requests(1);
+  Stuck first(server->port());
+  wait_for_requests(2);
+  const Stuck second(server->port());
+  wait_for_requests(3);
+  RawClient next(server->port(), "127.0.0.9");  // Nobody is silent: `first` goes.
+  EXPECT_THAT(next.ask("/a"), HasSubstr("small"));
+  RawClient after(server->port(), "127.0.0.9");  // `next` is silent now.
+  EXPECT_EQ(next.rest(), "");
+}
+
+TEST_F(CrowdedHttpServer, KeepsThoseThatShowedTheToken) {
+  RawClient trusted(server->port());
+  (void)trusted.ask("/a?token");
+  const Stuck stuck(server->port());
+  wait_for_requests(2);
+  EXPECT_THAT(answer_to_next(), HasSubstr("small"));  // In the place of `stuck`.
+  EXPECT_THAT(answer_to_next(), HasSubstr("small"));
+  EXPECT_THAT(trusted.ask("/a"), HasSubstr("small"));
+}
+
+TEST_F(CrowdedHttpServer, RefusesWhatIsTooManyIfAllAreAnsweringAToken) {
+  const Stuck first(server->port(), "/large?token");
+  const Stuck second(server->port(), "/large?token");
+  wait_for_requests(2);
   EXPECT_THAT(RawClient(server->port()).rest(), StartsWith("HTTP/1.1 503 Service Unavailable\r\n"));
   EXPECT_EQ(server->counts().num_refused, 1U);
-  second.reset();
-  while (server->counts().num_connections > 1) std::this_thread::yield();
-  EXPECT_THAT(RawClient(server->port()).ask("/a"), StartsWith("HTTP/1.1 200"));
-  EXPECT_THAT(first.ask("/a"), StartsWith("HTTP/1.1 200"));
 }
 
 TEST_F(HttpServerTest, AsksAgainForAnAnswerThatIsNotThereYet) {

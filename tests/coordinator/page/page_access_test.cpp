@@ -27,7 +27,7 @@ std::string header_of(const HttpAnswer& answer, const std::string& name) {
 
 TEST(LoopbackHost, IsThisMachineByNameOrAddress) {
   for (const std::string host :
-       {"localhost", "localhost:5557", "127.0.0.1", "127.1.2.3:80", "[::1]", "[::1]:5557"}) {
+       {"localhost", "LocalHost:5557", "127.0.0.1", "127.1.2.3:80", "[::1]", "[::1]:5557"}) {
     EXPECT_TRUE(is_loopback_host(host)) << host;
   }
   for (const std::string host :
@@ -54,6 +54,10 @@ TEST(PageWithToken, AsksForIt) {
   };
   EXPECT_EQ(status({.host = "localhost"}), 401U);
   EXPECT_EQ(status({.authorization = "Bearer " + page_secret}), 200U);
+  EXPECT_EQ(status({.authorization = "bearer " + page_secret}), 200U);
+  EXPECT_EQ(status({.authorization = "BEARER   " + page_secret}), 200U);
+  EXPECT_EQ(status({.authorization = "Bearer" + page_secret}), 401U);
+  EXPECT_EQ(status({.authorization = "Basic " + page_secret}), 401U);
   EXPECT_EQ(status({.authorization = "Bearer " + page_secret + "x"}), 401U);
   EXPECT_EQ(status({.authorization = "Bearer "}), 401U);
   EXPECT_EQ(status({.authorization = page_secret}), 401U);

@@ -50,7 +50,7 @@ std::string columns(const std::string& begin, int count) {
   return text;
 }
 
-constexpr const char* refusal = "memory = 256 MiB (the query needs more)";
+constexpr const char* refusal = "memory = 256 MiB (the query needs more; ask for less)";
 
 // A row of 20 texts of 60 MB, which SQLite has to hold all at once.
 TEST_F(QueryMemory, EndsAQueryWhoseValuesNeedMore) {

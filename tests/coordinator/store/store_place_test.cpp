@@ -307,6 +307,23 @@ TEST_F(StorePlace, AnIdleFileIsLookedAt) {
   EXPECT_EQ(num_readable(), 10u);
 }
 
+// What was cut off cannot be had back; nothing more is stored, or named as stored.
+TEST_F(StorePlace, AFileThatIsTruncatedIsNamedAtOnceAndLeftAlone) {
+  StoreWriter& writer = start();
+  writer.open(id, create());
+  deliver(writer, 0, 10);
+  (void)take_completions();
+  std::filesystem::resize_file(file(), 4096);
+  writer.flush();
+  EXPECT_THAT(take_completions(), ElementsAre(HasSubstr("was truncated or written over")));
+  std::filesystem::resize_file(file(), 1 << 20);  // The hole does not bring it back.
+  deliver(writer, 10, 20);
+  EXPECT_THAT(take_completions(), testing::IsEmpty());
+  std::filesystem::resize_file(file(), 4096);
+  end();
+  EXPECT_EQ(std::filesystem::file_size(file()), 4096U);
+}
+
 TEST_F(StorePlace, AFileThatIsClosedWithoutItsNameGetsItBack) {
   {
     Store store = Store::create(file(), campaign_of(100), "");

@@ -119,7 +119,7 @@ std::string refusal_of_question(const std::function<void(proto::AnswerRequest&)>
 
 TEST(MalformedQuestion, HasLimits) {
   EXPECT_EQ(refusal_of_question([](auto& question) { question.set_campaign("../a"); }),
-            "campaign = 4 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "campaign = 4 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_question(
                 [](auto& question) { question.set_question(static_cast<proto::Question>(5)); }),
             "question = 5 (must be in [1, 4])");
@@ -170,7 +170,7 @@ TEST(MalformedPart, MustNotBeLargerThanAMessage) {
 TEST(MalformedRelease, MustNameAHost) {
   EXPECT_EQ(refusal(ReleaseHostRequest{.host = "n7"},
                     [](auto& envelope) { envelope.mutable_release_host()->set_host("a b"); }),
-            "host = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "host = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
 }
 
 std::string refusal_of_report(const std::function<void(proto::FactoryReport&)>& change) {
@@ -180,9 +180,9 @@ std::string refusal_of_report(const std::function<void(proto::FactoryReport&)>& 
 
 TEST(MalformedFactoryReport, HasNamesAPhaseTimesAndAText) {
   EXPECT_EQ(refusal_of_report([](auto& report) { report.set_name("a b"); }),
-            "name = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "name = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_report([](auto& report) { report.clear_batch_system(); }),
-            "batch_system = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "batch_system = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_report([](auto& report) { report.clear_phase(); }),
             "phase = 0 (must be in [1, 3])");
   EXPECT_EQ(refusal_of_report(
@@ -213,7 +213,7 @@ TEST(MalformedFactoryStatus, HasAReportAnOwnerAndATime) {
   EXPECT_EQ(refusal_of_factory([](auto& factory) { factory.clear_report(); }),
             "interval_s = 0 (must be in [1, 3600])");
   EXPECT_EQ(refusal_of_factory([](auto& factory) { factory.set_owner("a b"); }),
-            "owner = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "owner = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_factory([](auto& factory) { factory.set_silent_s(-1.0); }),
             "silent_s = -1 (must be >= 0)");
 }
@@ -231,8 +231,9 @@ TEST(MalformedStatus, MustNameFilesAndHostsInPrintableCharacters) {
               file.set_file("a\x1b");
             }),
             "file = 2 bytes (must be printable ASCII and line ends)");
-  EXPECT_EQ(refusal_of_status([](auto& status) { status.add_quarantined_hosts("a b"); }),
-            "quarantined_hosts = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+  EXPECT_EQ(
+      refusal_of_status([](auto& status) { status.add_quarantined_hosts("a b"); }),
+      "quarantined_hosts = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_status([](auto& status) {
               for (std::size_t i = 0; i <= unserved_files_per_reply_max; ++i) {
                 status.add_unserved_files();
@@ -353,16 +354,17 @@ TEST(MalformedControlRequest, HasAnActionAndACampaign) {
   EXPECT_EQ(refusal_of_control([](auto& control) { control.set_priority(101); }),
             "priority = 101 (must be in [-100, 100])");
   EXPECT_EQ(refusal_of_control([](auto& control) { control.set_campaign("a b"); }),
-            "campaign = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "campaign = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
 }
 
 // Replies.
 
 TEST(MalformedStatusReply, HasVersionsAndATime) {
   EXPECT_EQ(refusal_of_status([](auto& status) { status.set_version(""); }),
-            "version = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
-  EXPECT_EQ(refusal_of_status([](auto& status) { status.set_model_version("\n"); }),
-            "model_version = 1 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "version = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
+  EXPECT_EQ(
+      refusal_of_status([](auto& status) { status.set_model_version("\n"); }),
+      "model_version = 1 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_status([](auto& status) { status.set_uptime_s(-1.0); }),
             "uptime_s = -1 (must be >= 0)");
 }
@@ -376,7 +378,7 @@ TEST(MalformedStatusReply, NamesABoundedNumberOfCampaigns) {
 
 TEST(MalformedCampaignStatus, HasANameAPhaseAndAPriority) {
   EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.set_name(""); }),
-            "name = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "name = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.clear_phase(); }),
             "phase = 0 (must be in [1, 4])");
   EXPECT_EQ(refusal_of_campaign([](auto& campaign) { campaign.set_priority(101); }),
@@ -426,9 +428,9 @@ TEST(MalformedWorkerStatus, HasANumberNamesAndATime) {
   EXPECT_EQ(refusal_of_worker([](auto& worker) { worker.clear_worker_id(); }),
             "worker_id = 0 (must not be 0)");
   EXPECT_EQ(refusal_of_worker([](auto& worker) { worker.set_name(""); }),
-            "name = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "name = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_worker([](auto& worker) { worker.set_host("a\n"); }),
-            "host = 2 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "host = 2 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_worker([](auto& worker) { worker.set_silent_s(nan); }),
             "silent_s = nan (must be >= 0)");
 }

@@ -83,7 +83,7 @@ TEST(MalformedDefinition, HasTablesWithNamesThatMayBeLogged) {
     EXPECT_EQ(refusal_of_definition(
                   [&](auto& definition) { definition.mutable_tables(0)->set_key(key); }),
               "definition.tables.key = " + std::to_string(key.size()) +
-                  " bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+                  " bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   }
 }
 

@@ -114,13 +114,14 @@ TEST(MalformedEnvelope, HasASession) {
 
 TEST(MalformedHello, HasNamesThatMayBeLogged) {
   EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_worker_name("a b"); }),
-            "worker_name = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "worker_name = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_host(""); }),
-            "host = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
-  EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_model_version("\n"); }),
-            "model_version = 1 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "host = 0 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
+  EXPECT_EQ(
+      refusal_of_hello([](auto& hello) { hello.set_model_version("\n"); }),
+      "model_version = 1 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
   EXPECT_EQ(refusal_of_hello([](auto& hello) { hello.set_build("1 2"); }),
-            "build = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-])");
+            "build = 3 bytes (must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first)");
 }
 
 TEST(MalformedHello, SaysOnlyOfACrashHowTheFormerProcessEnded) {

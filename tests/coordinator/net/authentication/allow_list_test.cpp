@@ -50,7 +50,8 @@ TEST(AllowListText, SaysWhichLineIsWrongAndNotWhatItSays) {
             "keys line = 1 (must begin with a public key of 40 characters)");
   for (const std::string name : {"", "a/b", "ü", "a\"b"}) {
     EXPECT_EQ(parsing(key + " " + name + "\n"),
-              "keys line = 1 (must have a name of [A-Za-z0-9._-] after the key)");
+              "keys line = 1 (must have a name of [A-Za-z0-9._-], a letter or digit first, after "
+              "the key)");
   }
   EXPECT_EQ(parsing(key + " a b\n"), "keys line = 1 (must be KEY NAME)");
   EXPECT_EQ(parsing(fine + key + " b\n"), "keys line = 2 (names a key a second time)");

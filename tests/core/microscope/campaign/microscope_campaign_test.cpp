@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 
+#include "core/campaign/name.hpp"
 #include "core/error.hpp"
 
 namespace proofmass {
@@ -58,13 +59,22 @@ TEST(MicroscopeCampaign, IsInterpretedByWhatDiffersFromRunToRun) {
 }
 
 TEST(MicroscopeCampaign, RefusesABadName) {
-  const std::string rule = " (must be 1 to 64 letters, digits, _, - or .)";
+  const std::string rule = " (must be 1 to 64 of [A-Za-z0-9._-], a letter or digit first)";
   EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.name = ""; }),
             "campaign.name = \"\"" + rule);
   EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.name = "a/b"; }),
             "campaign.name = \"a/b\"" + rule);
   EXPECT_EQ(refusal_after([](MicroscopeCampaign& c) { c.name = std::string(65, 'a'); }),
             "campaign.name = \"" + std::string(65, 'a') + "\"" + rule);
+}
+
+// As it is in files of before; a new campaign may not have it.
+TEST(MicroscopeCampaign, MayHaveANameWithAnotherCharacterFirst) {
+  for (const std::string name : {"_a", "-rf", ".."}) {
+    EXPECT_EQ(refusal_after([&](MicroscopeCampaign& c) { c.name = name; }), "");
+    EXPECT_NO_THROW(check_campaign_name(name, NameOrigin::stored));
+    EXPECT_THROW(check_campaign_name(name, NameOrigin::given), ConfigError);
+  }
 }
 
 TEST(MicroscopeCampaign, RefusesASeedThatNoFileCanHold) {

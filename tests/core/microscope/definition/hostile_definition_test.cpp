@@ -111,7 +111,8 @@ TEST(HostileDefinition, BreaksARule) {
   EXPECT_NE(refusal_after("maximum = 0.01", "maximum = inf").find("maximum = inf (must be finite)"),
             std::string::npos);
   EXPECT_NE(refusal_after("name = \"hardy2013\"", "name = \"../a\"")
-                .find("campaign.name = \"../a\" (must be 1 to 64 letters, digits, _, - or .)"),
+                .find("campaign.name = \"../a\" (must be 1 to 64 of [A-Za-z0-9._-], a letter or "
+                      "digit first)"),
             std::string::npos);
   EXPECT_NE(refusal_after("runs = 100", "runs = 1000000001").find("campaign.runs = 1000000001"),
             std::string::npos);

@@ -1,0 +1,75 @@
+#include "coordinator/net/server_paths.hpp"
+
+#include <algorithm>
+#include <system_error>
+#include <variant>
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::string_view before_a_path = " \t\n\"'`(=[,;";
+constexpr std::string_view after_a_path = " \t\n\"'`),;]";
+
+bool may_begin_path(std::string_view text, std::size_t position) {
+  return position == 0 || before_a_path.find(text[position - 1]) != std::string_view::npos;
+}
+
+bool begins_path(std::string_view text) {
+  return text.starts_with('/') || text.starts_with("./") || text.starts_with("../");
+}
+
+}  // namespace
+
+ServerPaths::ServerPaths(const std::filesystem::path& directory) {
+  if (directory.empty()) return;
+  std::error_code ignored;
+  for (const std::filesystem::path& spelling :
+       {directory, std::filesystem::absolute(directory, ignored),
+        std::filesystem::weakly_canonical(directory, ignored)}) {
+    if (!spelling.empty()) prefixes_.push_back((spelling / "").string());
+  }
+  std::ranges::sort(prefixes_, std::ranges::greater(), &std::string::size);
+}
+
+std::string ServerPaths::hidden_in(std::string_view text) const {
+  std::string result;
+  for (std::size_t i = 0; i < text.size();) {
+    const std::string_view rest = text.substr(i);
+    const auto within = std::ranges::find_if(
+        prefixes_, [&](const std::string& prefix) { return rest.starts_with(prefix); });
+    if (may_begin_path(text, i) && within != prefixes_.end()) {
+      i += within->size();
+    } else if (may_begin_path(text, i) && begins_path(rest)) {
+      const std::string_view path = rest.substr(0, rest.find_first_of(after_a_path));
+      const std::string_view name = path.substr(path.rfind('/') + 1);
+      result += name.empty() ? path : name;
+      i += path.size();
+    } else {
+      result += text[i++];
+    }
+  }
+  return result;
+}
+
+void ServerPaths::hide_in(wire::StatusReply& reply) const {
+  for (wire::CampaignStatus& campaign : reply.campaigns) {
+    campaign.storage_failure = hidden_in(campaign.storage_failure);
+  }
+  for (wire::UnservedFile& unserved : reply.unserved_files) {
+    unserved.file = hidden_in(unserved.file);
+    unserved.reason = hidden_in(unserved.reason);
+  }
+}
+
+void ServerPaths::hide_in(wire::ClientReply& reply) const {
+  if (auto* const status = std::get_if<wire::StatusReply>(&reply)) hide_in(*status);
+  if (auto* const done = std::get_if<wire::DoneReply>(&reply)) done->text = hidden_in(done->text);
+  if (auto* const error = std::get_if<wire::ErrorReply>(&reply)) {
+    error->text = hidden_in(error->text);
+  }
+  if (auto* const answer = std::get_if<wire::AnswerReply>(&reply)) {
+    answer->error_text = hidden_in(answer->error_text);
+  }
+}
+
+}  // namespace proofmass::coordinator

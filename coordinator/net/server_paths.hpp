@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/wire/client_messages.hpp"
+
+namespace proofmass::coordinator {
+
+/// Where a coordinator keeps its files, which concerns nobody on another machine: what is said to
+/// clients and on the page names files as they are called within the directory of campaigns. The
+/// log has whole paths.
+class ServerPaths {
+ public:
+  /// @param directory  Of campaigns; may be empty.
+  explicit ServerPaths(const std::filesystem::path& directory);
+
+  /// The text with files of the directory named within it, and without the directories of other
+  /// paths: `campaign database = a.db (is no file)`.
+  [[nodiscard]] std::string hidden_in(std::string_view text) const;
+  /// The same for all that the reply says of files and failures.
+  void hide_in(wire::ClientReply& reply) const;
+  void hide_in(wire::StatusReply& reply) const;
+
+ private:
+  std::vector<std::string> prefixes_;  ///< Spellings of the directory, with a slash at the end.
+};
+
+}  // namespace proofmass::coordinator
