@@ -8,7 +8,6 @@
 #include <fstream>
 #include <iterator>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "coordinator/bench/bench_campaigns.hpp"
@@ -21,6 +20,7 @@
 #include "core/model.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -53,7 +53,7 @@ Machine this_machine() {
   std::ifstream file("/proc/cpuinfo");
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   return {.processor = processor_name(text),
-          .num_processors = std::max(1U, std::thread::hardware_concurrency()),
+          .num_processors = wire::num_processors(),
           .compiler = "GCC " __VERSION__,
           .build_type = PROOFMASS_BUILD_TYPE};
 }
