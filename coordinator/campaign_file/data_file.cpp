@@ -6,6 +6,8 @@
 #include <fstream>
 #include <system_error>
 
+#include "proto/text/byte_order_mark.hpp"
+
 namespace proofmass::coordinator::detail {
 
 void require_regular_file(const std::filesystem::path& file) {
@@ -30,6 +32,10 @@ std::string read_text_file(const std::filesystem::path& file, std::uintmax_t siz
   if (text.size() > size_max) {
     throw UnreadableFile(fmt::format("is larger than {} bytes", size_max));
   }
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
+    throw UnreadableFile("is UTF-16; save it as UTF-8");
+  }
+  text.erase(0, text.size() - wire::without_byte_order_mark(text).size());
   text.shrink_to_fit();
   return text;
 }
