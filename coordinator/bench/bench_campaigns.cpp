@@ -90,8 +90,8 @@ CampaignCost measure_campaign(std::uint64_t num_runs) {
   const ScratchDirectory directory;
   const std::filesystem::path file = directory.path() / "bench.toml";
   const std::filesystem::path database = directory.path() / "bench.db";
-  constexpr mode_t mode = 0600;
-  wire::write_whole_file("campaign file", file, model().example(), mode, wire::IfExists::refuse);
+  wire::write_whole_file("campaign file", file, model().example(), wire::private_mode,
+                         wire::IfThere::keep);
   const auto start = std::chrono::steady_clock::now();
   const bool is_done =
       run_to_end({wire::program_beside_this("proofmass").string(), "run", file.string(), "--db",

@@ -1,7 +1,6 @@
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -20,9 +19,9 @@
 #include "coordinator/cli/remote_answer.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/report/digest.hpp"
-#include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -42,12 +41,11 @@ class ArrivedPart {
   /// @throws Error if the file is there and cannot be read or is another process's, or is not and
   ///         cannot be made.
   explicit ArrivedPart(std::filesystem::path path) : path_(std::move(path)) {
-    descriptor_ = open(path_.c_str(), O_RDWR | O_CLOEXEC);
-    if (descriptor_ < 0 && errno == ENOENT) {
+    descriptor_ = wire::open_own_file("file", path_, wire::IfAbsent::leave);
+    if (descriptor_ < 0) {
       check_directory();
       return;
     }
-    if (descriptor_ < 0) fail();
     try {
       lock();
       read_again();
@@ -104,17 +102,14 @@ class ArrivedPart {
   }
 
   void make() {
-    descriptor_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-    if (descriptor_ < 0) fail();
+    descriptor_ = wire::open_own_file("file", path_, wire::IfAbsent::make);
     lock();
     if (ftruncate(descriptor_, 0) != 0) fail();
   }
 
   // Its last owner may have renamed or removed it between our opening and locking it.
   void lock() const {
-    const bool is_locked = flock(descriptor_, LOCK_EX | LOCK_NB) == 0;
-    if (!is_locked && errno != EWOULDBLOCK) fail();
-    if (is_locked && has_its_name()) return;
+    if (wire::lock_file(descriptor_) != wire::Locked::by_another && has_its_name()) return;
     throw Error(fmt::format("file = {} (is being written by another `fetch`; try again later)",
                             path_.string()));
   }
@@ -136,8 +131,20 @@ class ArrivedPart {
   std::string sha256_;  ///< As it was last read.
 };
 
+/// A size that a coordinator announces may be any number.
+void check_room(const ArrivedPart& part, std::uint64_t size) {
+  struct statvfs disk {};
+  const std::filesystem::path directory = wire::directory_of(part.path());
+  if (statvfs(directory.c_str(), &disk) != 0) return;
+  const std::uint64_t num_free = std::uint64_t{disk.f_bavail} * disk.f_frsize;
+  if (size <= part.size() || size - part.size() <= num_free) return;
+  throw Error(fmt::format("database = {} bytes (must be at most the {} that {} has free)", size,
+                          num_free, directory.string()));
+}
+
 /// Completes the part. @throws Error if it is not what the coordinator announced; then it is gone.
 void complete(ArrivedPart& part, const Ask& ask, const wire::AnswerReply& answer) {
+  check_room(part, answer.size);
   if (answer.offset != part.size()) part.clear();
   read_answer(ask, answer, [&](std::string_view bytes) { part.append(bytes); });
   part.read_again();
@@ -177,7 +184,7 @@ int fetch_database(const FetchOptions& options) {
                                  .known_sha256 = part.size() > 0 ? part.sha256() : ""});
     complete(part, ask, answer);
     Store::check_absence(file);  // Again: completing it may have taken long.
-    if (const int error = publish_file(part.path(), file, IfThere::keep); error != 0) {
+    if (const int error = wire::publish_file(part.path(), file, wire::IfThere::keep); error != 0) {
       throw Error(fmt::format("file = {} ({})", file.string(), std::strerror(error)));
     }
     print_lines(summary_of(file, options.client.format));

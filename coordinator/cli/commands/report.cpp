@@ -38,7 +38,7 @@ struct ReportOptions {
   OutputFormat format = OutputFormat::text;
   std::filesystem::path html;  ///< `-`: standard output. Empty: not wanted; so is the next.
   std::filesystem::path markdown;
-  IfThere if_there = IfThere::keep;
+  wire::IfThere if_there = wire::IfThere::keep;
   ClientConnectionConfig connection;  ///< Of a coordinator, if it is to be asked.
 
   [[nodiscard]] bool has_document() const { return !html.empty() || !markdown.empty(); }
@@ -106,12 +106,13 @@ void check_standard_output(const ReportOptions& options) {
   take(options.markdown, "--markdown");
 }
 
-void check_document(const std::filesystem::path& file, IfThere if_there) {
+void check_document(const std::filesystem::path& file, wire::IfThere if_there) {
   if (file.empty() || file == "-") return;
   check_output_file(file, if_there, "- writes to standard output");
 }
 
-void write_document(const std::filesystem::path& file, IfThere if_there, const std::string& text) {
+void write_document(const std::filesystem::path& file, wire::IfThere if_there,
+                    const std::string& text) {
   if (file == "-") {
     write_standard_output(text);
   } else {
