@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
-#include <thread>
 
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/wire/messages.hpp"
 
 namespace proofmass::worker {
@@ -59,7 +59,7 @@ void add_connection(CLI::App& app, Options& options) {
 }
 
 void add_work(CLI::App& app, Options& options) {
-  options.num_threads = std::clamp(std::thread::hardware_concurrency(), 1U, threads_max());
+  options.num_threads = std::min(wire::num_processors(), threads_max());
   app.add_option("--threads", options.num_threads,
                  "Threads that simulate, one a processor by default")
       ->envname("PROOFMASS_THREADS")

@@ -19,7 +19,7 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
-#include "proto/link/signals.hpp"
+#include "proto/link/surroundings.hpp"
 #include "proto/wire/endpoint.hpp"
 #include "proto/wire/names.hpp"
 #include "worker/net/serve.hpp"
@@ -153,6 +153,8 @@ int work(const Options& options, const Program& program, ServeConfig config,
   if (options.faults && options.faults->kill) {
     wire::arm_kill_point(options.faults->kill->point, options.faults->kill->passage);
   }
+  constexpr int num_threads_beside = 4;  // ZeroMQ's, and one for heartbeats.
+  wire::require_threads(static_cast<int>(options.num_threads) + num_threads_beside);
   config.session = start.session;
   config.hello = hello_for(options, start);
   StopSignals signals(config.signals);
@@ -200,7 +202,6 @@ int run(const Options& options, const Program& program) {
 }  // namespace
 
 int run_worker(int argc, char** argv, const Program& program) {
-  wire::keep_ends_of_children();
   Options options;
   CLI::App app(
       "Simulates runs for a proofmass coordinator.\n"
@@ -217,6 +218,7 @@ int run_worker(int argc, char** argv, const Program& program) {
   app.set_version_flag("--version", program.name + " " PROOFMASS_VERSION);
   wire::add_manual_option(app, {"proofmass", "proofmass-coordinator"});
   return reporting_errors(program, [&] {
+    wire::settle_surroundings();
     try {
       app.parse(argc, argv);
     } catch (const CLI::Success& wish) {

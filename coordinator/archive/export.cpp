@@ -1,6 +1,5 @@
 #include "coordinator/archive/export.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -136,25 +135,9 @@ class RunLines {
 
 }  // namespace
 
-void fail_to_write(const std::filesystem::path& path, int error_number) {
-  throw ArchiveError(fmt::format("output = {} (cannot be written: {})", path.string(),
-                                 std::strerror(error_number)));
-}
-
-void publish(DraftFile& file) {
-  if (const int error_number = file.publish(IfThere::replace)) {
-    fail_to_write(file.path(), error_number);
-  }
-  (void)synchronise_directory_of(file.path());
-}
-
-std::string draft_ending() { return fmt::format(".{}.new", ::getpid()); }
-
 TextOutput::TextOutput(const std::filesystem::path& path) {
-  file_.emplace(path, draft_ending());
-  constexpr mode_t mode = 0666;  // Less what the user masks.
-  descriptor_ = ::open(file_->draft().c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
-  if (descriptor_ < 0) fail_to_write(path, errno);
+  file_.emplace("output", path);
+  descriptor_ = file_->open();
 }
 
 TextOutput::~TextOutput() {
@@ -168,28 +151,29 @@ void TextOutput::write(std::string_view text) {
 
 void TextOutput::finish() {
   write_rest();
-  if (file_) publish(*file_);
+  if (file_) file_->publish(wire::IfThere::replace);
 }
 
 void TextOutput::write_rest() {
   flush();
   if (!file_ || descriptor_ < 0) return;
   const int descriptor = std::exchange(descriptor_, -1);
-  if (::close(descriptor) != 0) fail_to_write(name(), errno);
+  if (::close(descriptor) != 0) file_->fail(errno);
 }
 
 void TextOutput::flush() {
   std::string_view rest = buffer_;
   while (!rest.empty()) {
     const ssize_t size = ::write(descriptor_, rest.data(), rest.size());
-    if (size < 0 && errno != EINTR) fail_to_write(name(), errno);
+    if (size < 0 && errno != EINTR) fail();
     if (size > 0) rest.remove_prefix(static_cast<std::size_t>(size));
   }
   buffer_.clear();
 }
 
-std::filesystem::path TextOutput::name() const {
-  return file_ ? file_->path() : std::filesystem::path("-");
+void TextOutput::fail() const {
+  if (file_) file_->fail(errno);
+  throw Error(fmt::format("output = - (cannot be written: {})", std::strerror(errno)));
 }
 
 WalkedResults walk_results(const Store& store, const IsStopped& is_stopped,
@@ -232,6 +216,15 @@ void export_json(const Store& store, TextOutput& output, const IsStopped& is_sto
                              walked.num_results, walked.digest));
   });
   output.finish();
+}
+
+void export_sqlite(const Store& store, const std::filesystem::path& file,
+                   const IsStopped& is_stopped) {
+  check_definition_digest(store);
+  (void)walk_results(store, is_stopped, [](const RunResult&) {});
+  wire::DraftFile draft("output", file);
+  store.write_plain(draft.draft());
+  draft.publish(wire::IfThere::replace);
 }
 
 }  // namespace proofmass::coordinator

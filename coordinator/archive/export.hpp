@@ -9,14 +9,11 @@
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/archive/result_columns.hpp"
 #include "coordinator/report/digest.hpp"
-#include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/run_result.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
-
-/// @throws ArchiveError `output = path (cannot be written: why)` for an errno.
-[[noreturn]] void fail_to_write(const std::filesystem::path& path, int error_number);
 
 /// Text that goes to standard output as it comes, or to a file that appears when it is complete.
 class TextOutput {
@@ -24,7 +21,7 @@ class TextOutput {
   /// To standard output. A reader that goes away is an error, if SIGPIPE is ignored.
   TextOutput() = default;
   /// To a file; one that has this name is replaced at the end.
-  /// @throws ArchiveError `output = path (cannot be written: why)`; so do all below.
+  /// @throws Error `output = path (cannot be written: why)`; so do all below.
   explicit TextOutput(const std::filesystem::path& path);
   ~TextOutput();
   TextOutput(const TextOutput&) = delete;
@@ -38,9 +35,9 @@ class TextOutput {
 
  private:
   void flush();
-  [[nodiscard]] std::filesystem::path name() const;
+  [[noreturn]] void fail() const;
 
-  std::optional<DraftFile> file_;  ///< Nothing: standard output.
+  std::optional<wire::DraftFile> file_;  ///< Nothing: standard output.
   int descriptor_ = 1;
   std::string buffer_;
 };
@@ -53,7 +50,7 @@ class TextOutput {
 // With DrawColumns::included a column for each drawn quantity follows, named and in the unit of
 // the table `draw` of `proofmass query`.
 //
-// All throw ArchiveError if the output cannot be written, StoreError if the file cannot be read or
+// All throw Error if the output cannot be written, StoreError if the file cannot be read or
 // if its results or its definition are not those that were stored, see check_digest(),
 // DefinitionError if draws are wanted of a definition that is no campaign, and Interrupted; then
 // no file appears. Standard output has the results by then.
@@ -72,12 +69,10 @@ void export_json(const Store& store, TextOutput& output, const IsStopped& is_sto
 void export_hdf5(const Store& store, const std::filesystem::path& file, const IsStopped& is_stopped,
                  DrawColumns draws = DrawColumns::left_out);
 
-/// Gives a complete draft its name.
-/// @throws ArchiveError `output = path (cannot be written: why)`.
-void publish(DraftFile& file);
-
-/// The ending of drafts of this process: `.PROCESS.new`.
-[[nodiscard]] std::string draft_ending();
+/// An SQLite file with the tables and views of the campaign, see Store::write_plain(). A file of
+/// this name is replaced.
+void export_sqlite(const Store& store, const std::filesystem::path& file,
+                   const IsStopped& is_stopped);
 
 /// walk_checked() with an end.
 /// @throws Interrupted soon after `is_stopped` says so.

@@ -171,7 +171,7 @@ void write_results(const Hdf5File& file, const Store& store, const IsStopped& is
 
 void export_hdf5(const Store& store, const std::filesystem::path& file, const IsStopped& is_stopped,
                  DrawColumns draws) {
-  DraftFile draft(file, draft_ending());
+  wire::DraftFile draft("output", file);
   Hdf5File output(draft);
   store.read_one_state([&] {
     check_definition_digest(store);
@@ -179,7 +179,7 @@ void export_hdf5(const Store& store, const std::filesystem::path& file, const Is
     write_results(output, store, is_stopped, draws);
   });
   output.close();
-  publish(draft);
+  draft.publish(wire::IfThere::replace);
 }
 
 }  // namespace proofmass::coordinator

@@ -107,7 +107,7 @@ class Hdf5Series final : public SeriesOutput {
  public:
   Hdf5Series(const std::filesystem::path& file, const SeriesOrigin& origin,
              const SignalSelection& selection)
-      : selection_(selection), draft_(file, draft_ending()), file_(draft_) {
+      : selection_(selection), draft_("output", file), file_(draft_) {
     describe_run(file_, origin, selection.recording());
   }
 
@@ -120,7 +120,7 @@ class Hdf5Series final : public SeriesOutput {
   void finish() override {
     end_session();
     file_.close();
-    publish(draft_);
+    draft_.publish(wire::IfThere::replace);
   }
 
  private:
@@ -143,7 +143,7 @@ class Hdf5Series final : public SeriesOutput {
   }
 
   const SignalSelection& selection_;
-  DraftFile draft_;
+  wire::DraftFile draft_;
   Hdf5File file_;
   std::optional<std::size_t> session_;
   std::vector<SignalTable> tables_;  ///< Of that session.

@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "proto/text/byte_order_mark.hpp"
+
 namespace proofmass::coordinator::detail {
 namespace {
 
@@ -78,6 +80,10 @@ std::string read_text_file(const std::filesystem::path& file, std::size_t size_m
   if (text.size() > size_max) {
     throw UnreadableFile(fmt::format("is larger than {} bytes", size_max));
   }
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
+    throw UnreadableFile("is UTF-16; save it as UTF-8");
+  }
+  text.erase(0, text.size() - wire::without_byte_order_mark(text).size());
   text.shrink_to_fit();
   return text;
 }

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -18,10 +17,10 @@
 
 #include "coordinator/cli/program.hpp"
 #include "coordinator/report/summarise.hpp"
-#include "coordinator/store/draft_file.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "proto/link/whole_file.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -134,11 +133,12 @@ void make_directory(const std::filesystem::path& directory) {
 /// Kept until the process ends, however it does; the file stays and means nothing by itself.
 int lock(const std::filesystem::path& directory) {
   const std::filesystem::path file = directory / "coordinator.lock";
-  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, S_IRUSR | S_IWUSR);
-  if (descriptor < 0) refuse(directory, std::strerror(errno));
-  if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) return descriptor;
+  const int descriptor = wire::open_own_file("lock", file, wire::IfAbsent::make);
+  const wire::Locked locked = wire::lock_file(descriptor);
+  if (locked == wire::Locked::yes) return descriptor;
   close(descriptor);
-  refuse(directory, "another coordinator serves it");
+  refuse(directory, locked == wire::Locked::by_another ? "another coordinator serves it"
+                                                       : wire::no_locks_remedy);
 }
 
 ServedCampaign load_file(const std::filesystem::path& file) {
@@ -192,7 +192,7 @@ std::filesystem::path CampaignFolder::archive(const std::filesystem::path& file)
     throw Error(fmt::format("archived file = {} ({})", place.string(), std::strerror(errno)));
   }
   for (const std::filesystem::path& changed : {place, file}) {
-    (void)synchronise_directory_of(changed);  // The file has a name, old or new, in any case.
+    (void)wire::synchronise_directory_of(changed);  // The file has a name, old or new, in any case.
   }
   return place;
 }

@@ -29,8 +29,8 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/init_system.hpp"
 #include "proto/link/log.hpp"
-#include "proto/link/signals.hpp"
 #include "proto/link/start_program.hpp"
+#include "proto/link/surroundings.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -167,6 +167,7 @@ bool has_given_up_runs(const Service& service) {
 /// @return An ExitCode.
 int serve_campaigns(const ServeOptions& options) {
   wire::ignore_broken_pipes();  // The service outlives what reads its log.
+  require_room_for_service();
   const std::optional<PageConfig> page_config = page_config_of(options.page);
   const Log log = wire::make_log("proofmass-coordinator", options.log_format, wire::LogLevel::info);
   const SignalThread signals;
@@ -269,7 +270,6 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
 }  // namespace
 
 int run_proofmass_coordinator(int argc, char** argv) {
-  wire::keep_ends_of_children();
   CLI::App app(
       "Lends the runs of campaigns to workers and stores their results.\n"
       "On SIGTERM it first lets workers deliver their results; on SIGINT or a second\n"

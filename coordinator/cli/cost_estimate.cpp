@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <ctime>
-#include <thread>
 #include <vector>
 
 #include "coordinator/cli/progress_display.hpp"
 #include "core/math/instruction_set.hpp"
 #include "core/model.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -69,14 +69,12 @@ CostEstimate& CostEstimate::operator+=(const CostEstimate& other) {
   return *this;
 }
 
-std::uint64_t num_cores_here() { return std::max(1U, std::thread::hardware_concurrency()); }
-
 CostEstimate estimated_cost(std::uint64_t num_runs, double batch_s) {
   const auto time_s = [&](std::uint64_t num_at_a_time) {
     return static_cast<double>((num_runs + num_at_a_time - 1) / num_at_a_time) * batch_s;
   };
   return {.one_core_s = time_s(model().batch_size()),
-          .all_cores_s = time_s(model().batch_size() * num_cores_here()),
+          .all_cores_s = time_s(model().batch_size() * wire::num_processors()),
           .disk_mb = database_mb(num_runs)};
 }
 
@@ -84,7 +82,7 @@ std::string cost_text(const CostEstimate& cost) {
   return fmt::format(
       "Time      about {} of one core; {} on the {} cores here\n"
       "Disk      about {:.1f} MB\n",
-      duration_text(cost.one_core_s), duration_text(cost.all_cores_s), num_cores_here(),
+      duration_text(cost.one_core_s), duration_text(cost.all_cores_s), wire::num_processors(),
       cost.disk_mb);
 }
 

@@ -22,9 +22,6 @@ struct CostEstimate {
   CostEstimate& operator+=(const CostEstimate& other);
 };
 
-/// Cores of this machine, at least one.
-[[nodiscard]] std::uint64_t num_cores_here();
-
 /// Of a campaign with so many runs, whose batches take so long. `run` gives each core one batch of
 /// runs at a time. The last batch counts as a whole one, which it costs at most.
 [[nodiscard]] CostEstimate estimated_cost(std::uint64_t num_runs, double batch_s);

@@ -1,7 +1,6 @@
 #include "coordinator/cli/output_file.hpp"
 
 #include <fmt/format.h>
-#include <sys/types.h>
 
 #include <system_error>
 
@@ -17,11 +16,14 @@ void refuse_output(const std::filesystem::path& output, std::string_view why) {
   throw UsageError(fmt::format("output = {} ({})", output.string(), why));
 }
 
-void check_output_file(const std::filesystem::path& output, IfThere if_there,
+void check_output_file(const std::filesystem::path& output, wire::IfThere if_there,
                        std::string_view remedy) {
   std::error_code ignored;
+  if (std::filesystem::is_symlink(output, ignored)) {
+    refuse_output(output, "is a symbolic link; name the file that it leads to");
+  }
   if (!std::filesystem::exists(output, ignored)) return;
-  if (if_there == IfThere::keep) {
+  if (if_there == wire::IfThere::keep) {
     refuse_output(output, "exists already; replace it with --force");
   }
   if (!std::filesystem::is_regular_file(output)) {
@@ -32,12 +34,9 @@ void check_output_file(const std::filesystem::path& output, IfThere if_there,
   }
 }
 
-void write_output_file(const std::filesystem::path& output, IfThere if_there,
+void write_output_file(const std::filesystem::path& output, wire::IfThere if_there,
                        std::string_view text) {
-  constexpr mode_t mode = 0644;
-  wire::write_whole_file(
-      "output", output, text, mode,
-      if_there == IfThere::replace ? wire::IfExists::replace : wire::IfExists::refuse);
+  wire::write_whole_file("output", output, text, wire::public_mode, if_there);
 }
 
 void check_document(const std::filesystem::path& file, IfThere if_there) {
@@ -58,7 +57,7 @@ void check_new_file(std::string_view argument, const std::filesystem::path& file
   if (std::filesystem::exists(file, error)) {
     throw UsageError(fmt::format("{} = {} (exists already)", argument, file.string()));
   }
-  const bool has_directory = std::filesystem::is_directory(directory_of(file), error);
+  const bool has_directory = std::filesystem::is_directory(wire::directory_of(file), error);
   if (has_directory || error == std::errc::permission_denied) return;  // Making it says more.
   throw Error(fmt::format("{} = {} (its directory does not exist)", argument, file.string()));
 }

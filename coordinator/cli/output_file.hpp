@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string_view>
 
-#include "coordinator/store/draft_file.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 
@@ -14,12 +14,12 @@ namespace proofmass::coordinator {
 /// campaign would be lost.
 /// @param remedy  What to tell people whose output is no file.
 /// @throws UsageError `output = path (rule)`.
-void check_output_file(const std::filesystem::path& output, IfThere if_there,
+void check_output_file(const std::filesystem::path& output, wire::IfThere if_there,
                        std::string_view remedy);
 
 /// Writes a file that is whole or not there at any time.
 /// @throws Error `output = path (reason)`.
-void write_output_file(const std::filesystem::path& output, IfThere if_there,
+void write_output_file(const std::filesystem::path& output, wire::IfThere if_there,
                        std::string_view text);
 
 /// Both for a text whose file may be `-`, standard output.

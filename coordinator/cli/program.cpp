@@ -20,7 +20,7 @@
 #include "proto/command_line/manual_option.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
-#include "proto/link/signals.hpp"
+#include "proto/link/surroundings.hpp"
 
 namespace proofmass::coordinator {
 
@@ -44,6 +44,7 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
     return exit_code;
   };
   try {
+    wire::settle_surroundings();
     app.parse(argc, argv);
     const int exit_code = work();
     flush_standard_output();
@@ -66,7 +67,6 @@ int run_program(CLI::App& app, int argc, char** argv, const Command& work) {
 }
 
 int run_proofmass(int argc, char** argv) {
-  wire::keep_ends_of_children();
   CLI::App app(std::string(model().purpose()), "proofmass");
   app.footer(exit_codes_text({}));  // Of the commands, unless they say otherwise.
   app.set_version_flag("--version", "proofmass " PROOFMASS_VERSION);

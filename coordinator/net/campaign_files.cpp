@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <system_error>
 
-#include "coordinator/store/draft_file.hpp"
 #include "core/statistics/stop_rule.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 
@@ -18,7 +18,7 @@ std::uint64_t horizon_of(const StopPlan& plan, std::uint64_t num_runs_wanted,
 void remove_made(const std::filesystem::path& file) {
   std::error_code ignored;
   std::filesystem::remove(file, ignored);
-  (void)synchronise_directory_of(file);
+  (void)wire::synchronise_directory_of(file);
 }
 
 }  // namespace proofmass::coordinator

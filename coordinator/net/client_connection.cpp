@@ -14,6 +14,7 @@
 #include "core/error.hpp"
 #include "proto/link/connection_monitor.hpp"
 #include "proto/link/socket.hpp"
+#include "proto/link/surroundings.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/endpoint.hpp"
 
@@ -166,8 +167,11 @@ class ClientConnection::Impl {
   Clock::time_point deadline_;
 };
 
-ClientConnection::ClientConnection(const ClientConnectionConfig& config)
-    : impl_(std::make_unique<Impl>(config)) {}
+ClientConnection::ClientConnection(const ClientConnectionConfig& config) {
+  constexpr int num_threads = 2;  // Both are ZeroMQ's.
+  wire::require_threads(num_threads);
+  impl_ = std::make_unique<Impl>(config);
+}
 
 ClientConnection::~ClientConnection() = default;
 

@@ -91,6 +91,10 @@ struct ServiceConfig {
   std::optional<wire::FaultPlan> faults;  ///< Of workers' messages; for tests of this program.
 };
 
+/// To be called before a service and its threads are made.
+/// @throws Error if there are too few threads for one.
+void require_room_for_service();
+
 /// A coordinator: lends the runs of its campaigns to the workers that connect, stores their results
 /// and answers clients. One thread serves all sockets; another writes to the campaign databases.
 class Service {

@@ -73,7 +73,7 @@ std::unique_ptr<detail::Database> open_files(const QueryFiles& files) {
     if (other.is_private_copy()) {
       database->attach_copy_of(other, name);
     } else {
-      database->attach_read_only(file, name);
+      database->attach_read_only(other, name);
     }
   }
   // A private copy has it on: the caller has tables of its own to add before it is turned on again.

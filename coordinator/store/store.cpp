@@ -107,7 +107,7 @@ Store Store::create_filled(const std::filesystem::path& path, const Campaign& ca
   detail::check_directory_of(path);
   auto lock = std::make_unique<detail::StoreLock>(path);
   detail::check_absence(path);
-  detail::appear_complete(path, IfThere::keep, [&](const std::filesystem::path& draft) {
+  detail::appear_complete(path, wire::IfThere::keep, [&](const std::filesystem::path& draft) {
     write_draft(draft, campaign, definition, fill);
   });
   return Store(std::make_unique<Impl>(path, std::move(lock)));
@@ -421,21 +421,43 @@ void Store::check_integrity() const {
   read_one_state([&] { detail::check_integrity(impl_->database); });
 }
 
+void Store::write_plain(const std::filesystem::path& draft) const {
+  Database plain(draft, Access::create);
+  if (impl_->database.is_private_copy()) {
+    plain.attach_copy_of(impl_->database, "source");
+  } else {
+    plain.attach_read_only(impl_->database, "source");
+  }
+  plain.execute("PRAGMA synchronous = OFF");  // It is made durable before it gets its name.
+  Transaction transaction(plain);
+  detail::Statement object = impl_->database.prepare(
+      "SELECT type = 'table', name, sql FROM sqlite_schema WHERE sql IS NOT NULL "
+      "ORDER BY type = 'table' DESC, rowid");
+  while (object.step()) {
+    plain.execute(detail::plain_definition(object.text(2)));
+    if (object.integer(0) == 0) continue;
+    plain.execute(
+        fmt::format("INSERT INTO main.\"{0}\" SELECT * FROM source.\"{0}\"", object.text(1)));
+  }
+  transaction.commit();
+}
+
 void Store::back_up(const std::filesystem::path& destination) const {
   check_name(destination);
-  const detail::StoreLock lock(destination);
+  const detail::StoreLock lock(destination, detail::IfNoLocks::go_on);
   detail::check_absence(destination);
-  detail::appear_complete(destination, IfThere::keep, [&](const std::filesystem::path& draft) {
-    Database copy(draft, Access::create);
-    impl_->database.copy_to(copy);
-    copy.execute("PRAGMA cell_size_check = ON");
-    // Nobody shall rely on the copy of a damaged file, which is the one to be named.
-    copy.name_in_messages(impl_->path);
-    (void)detail::check_all_pages(copy);
-    copy.name_in_messages(draft);
-    // What is copied may say that there is a log.
-    copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
-  });
+  detail::appear_complete(
+      destination, wire::IfThere::keep, [&](const std::filesystem::path& draft) {
+        Database copy(draft, Access::create);
+        impl_->database.copy_to(copy);
+        copy.execute("PRAGMA cell_size_check = ON");
+        // Nobody shall rely on the copy of a damaged file, which is the one to be named.
+        copy.name_in_messages(impl_->path);
+        (void)detail::check_all_pages(copy);
+        copy.name_in_messages(draft);
+        // What is copied may say that there is a log.
+        copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
+      });
 }
 
 }  // namespace proofmass::coordinator

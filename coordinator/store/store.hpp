@@ -279,6 +279,12 @@ class Store {
   /// @throws StoreError if the destination exists or cannot be written.
   void back_up(const std::filesystem::path& destination) const;
 
+  /// Writes the same tables and views into an empty file, for SQLite from 3.25 on: no table is
+  /// STRICT, and columns that are computed when read hold their values. The programs themselves do
+  /// not take it for a campaign.
+  /// @throws StoreError if that cannot be done.
+  void write_plain(const std::filesystem::path& draft) const;
+
  private:
   struct Impl;
   explicit Store(std::unique_ptr<Impl> impl);

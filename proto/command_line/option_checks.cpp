@@ -7,13 +7,17 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <memory>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <string_view>
 #include <system_error>
 
 #include "core/definition/definition_text.hpp"
 #include "proto/command_line/described_program.hpp"
+#include "proto/text/byte_order_mark.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -112,6 +116,7 @@ std::string place_in(const std::string& file, const std::string& item) {
   std::ifstream stream(file);
   std::string line, section;
   for (int number = 1; std::getline(stream, line); ++number) {
+    line = without_byte_order_mark(line);
     CLI::detail::trim(line);
     std::string name = CLI::detail::trim_copy(line.substr(0, line.find_first_of("=#")));
     if (line.starts_with('[') && line.ends_with(']')) {
@@ -148,6 +153,16 @@ std::string refusal_of_file(const CLI::App& app, const std::string& text) {
   return fmt::format("config = {} ({})", place_in(file, item), rule_for_item(app, item));
 }
 
+/// As CLI11 reads option files, which knows no byte order mark.
+class OptionFile : public CLI::ConfigTOML {
+ public:
+  std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
+    const std::string text(std::istreambuf_iterator<char>(input), {});
+    std::istringstream rest(std::string(without_byte_order_mark(text)));
+    return CLI::ConfigTOML::from_config(rest);
+  }
+};
+
 }  // namespace
 
 CLI::Validator one_of(const std::vector<std::string>& words) {
@@ -166,6 +181,7 @@ void add_option_file(CLI::App& app, const std::string& description, const std::s
       ->envname(variable)
       ->type_name(file_type);
   app.allow_config_extras(CLI::config_extras_mode::error);
+  app.config_formatter(std::make_shared<OptionFile>());
 }
 
 std::string refusal_of(const CLI::App& app, const CLI::ParseError& error) {

@@ -13,6 +13,7 @@
 
 #include "core/error.hpp"
 #include "proto/link/whole_file.hpp"
+#include "proto/text/byte_order_mark.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -58,27 +59,19 @@ class OpenFile {
   int descriptor_;
 };
 
-void check_is_private(const std::filesystem::path& file, const struct stat& status) {
-  if (status.st_uid != ::geteuid()) {
-    refuse(file, fmt::format("owner = user {}; must be owned by user {}, who runs this program",
-                             status.st_uid, ::geteuid()));
-  }
-  const mode_t mode = status.st_mode & 07777;
-  if ((mode & 077) == 0) return;
-  refuse(file, fmt::format("mode {:04o}; must be readable by its owner alone: chmod 600", mode));
-}
-
 std::string read_text(const std::filesystem::path& file, Half half) {
   const OpenFile opened(file);
   struct stat status {};
   if (::fstat(opened.descriptor(), &status) != 0) refuse(file, std::strerror(errno));
   if (!S_ISREG(status.st_mode)) refuse(file, "must be a regular file");
-  if (half == Half::secret) check_is_private(file, status);
+  check_reach("key file", file, status,
+              half == Half::secret ? Reach::private_to_owner : Reach::written_by_owner);
   std::string text(key_file_size_max, '\0');
   const ssize_t size = ::read(opened.descriptor(), text.data(), text.size());
   if (size < 0) refuse(file, std::strerror(errno));
   text.resize(static_cast<std::size_t>(size));
-  return text;
+  std::erase(text, '\r');
+  return std::string(without_byte_order_mark(text));
 }
 
 std::vector<std::string_view> split(std::string_view text, char separator) {
@@ -180,10 +173,10 @@ void write_key_pair(const std::filesystem::path& directory, std::string_view nam
   write_whole_file("key file", secret_file,
                    fmt::format("{}\n{}secret {}\n", header_line(role, Half::secret), public_line,
                                pair.secret_key.reveal()),
-                   0600, IfExists::refuse);
+                   private_mode, IfThere::keep);
   write_whole_file("key file", public_file,
-                   fmt::format("{}\n{}", header_line(role, Half::public_alone), public_line), 0644,
-                   IfExists::refuse);
+                   fmt::format("{}\n{}", header_line(role, Half::public_alone), public_line),
+                   trusted_mode, IfThere::keep);
 }
 
 KeyPair read_key_pair(const std::filesystem::path& file, KeyRole role) {
@@ -215,12 +208,22 @@ Protection protection_by(const std::optional<std::filesystem::path>& keys, bool 
   return is_plain_waived ? Protection::waived : Protection::none;
 }
 
+void check_key_directory(const std::filesystem::path& directory) {
+  struct stat status {};
+  if (::stat(directory.c_str(), &status) != 0) {
+    throw Error(fmt::format("key directory = {} ({})", directory.string(), std::strerror(errno)));
+  }
+  check_reach("key directory", directory, status, Reach::written_by_owner);
+}
+
 ServerSecurity read_server_security(const std::filesystem::path& directory, Domain domain) {
+  check_key_directory(directory);
   const std::filesystem::path file = key_file(directory, KeyRole::coordinator, "key");
   return {.domain = domain, .keys = read_key_pair(file, KeyRole::coordinator)};
 }
 
 ClientSecurity read_client_security(const std::filesystem::path& directory, KeyRole role) {
+  check_key_directory(directory);
   const std::filesystem::path trusted = key_file(directory, KeyRole::coordinator, "pub");
   return {.identity = CurveIdentity{.role = role,
                                     .keys = read_key_pair(key_file(directory, role, "key"), role),

@@ -56,11 +56,12 @@ struct KeyPair {
 /// A new pair, from the system's random numbers.
 [[nodiscard]] KeyPair make_key_pair();
 
-/// Writes a pair to two new files: `NAME.key` with both halves, mode 0600, and `NAME.pub` with the
-/// public one, mode 0644. Either file is whole or not there, also after a crash.
+/// Writes a pair to two new files: `NAME.key` with both halves, for this user alone, and `NAME.pub`
+/// with the public one. Either file is whole or not there, also after a crash.
 ///
 /// @param directory  Exists.
-/// @throws Error reading `key file = PATH (rule)` if one of them exists or cannot be written.
+/// @throws Error reading `key file = PATH (rule)` if one of them exists or cannot be written, or if
+///         the file system would let others read the secret.
 void write_key_pair(const std::filesystem::path& directory, std::string_view name, KeyRole role,
                     const KeyPair& pair);
 
@@ -72,7 +73,7 @@ void write_key_pair(const std::filesystem::path& directory, std::string_view nam
 [[nodiscard]] KeyPair read_key_pair(const std::filesystem::path& file, KeyRole role);
 
 /// Reads `NAME.pub`.
-/// @throws Error as read_key_pair() does, but for the owner and the mode, which do not matter.
+/// @throws Error as read_key_pair() does; others may read it, and it may be root's.
 [[nodiscard]] PublicKey read_public_key(const std::filesystem::path& file, KeyRole role);
 
 // What stands in a directory of keys, as `proofmass keygen` makes it.
@@ -116,15 +117,19 @@ struct ClientSecurity {
 [[nodiscard]] Protection protection_by(const std::optional<std::filesystem::path>& keys,
                                        bool is_plain_waived);
 
+/// Whoever may write to a directory of keys decides who may do what.
+/// @throws Error reading `key directory = PATH (rule)` if others than this user and root can.
+void check_key_directory(const std::filesystem::path& directory);
+
 /// Reads DIRECTORY/coordinator.key.
-/// @throws Error as read_key_pair() does.
+/// @throws Error as check_key_directory() and read_key_pair() do.
 [[nodiscard]] ServerSecurity read_server_security(const std::filesystem::path& directory,
                                                   Domain domain);
 
 /// Reads DIRECTORY/worker.key or client.key, and coordinator.pub.
 ///
 /// @param role  Worker or client.
-/// @throws Error as read_key_pair() and read_public_key() do.
+/// @throws Error as check_key_directory(), read_key_pair() and read_public_key() do.
 [[nodiscard]] ClientSecurity read_client_security(const std::filesystem::path& directory,
                                                   KeyRole role);
 

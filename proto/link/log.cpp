@@ -38,7 +38,9 @@ Log make_log(const std::string& program, LogFormat format, LogLevel level) {
   const auto logger =
       std::make_shared<spdlog::logger>(program, std::make_shared<spdlog::sinks::stderr_sink_mt>());
   logger->set_level(level == LogLevel::info ? spdlog::level::info : spdlog::level::warn);
-  if (format == LogFormat::json) logger->set_pattern("%v");
+  // In UTC, as all times in databases and JSON: logs of several machines are laid side by side.
+  logger->set_pattern(format == LogFormat::json ? "%v" : "[%Y-%m-%d %T.%eZ] [%n] [%l] %v",
+                      spdlog::pattern_time_type::utc);
   // std::function shares the logger with its copies.
   return [logger, format](const Event& event) {
     logger->log(level_of(event.severity), format == LogFormat::text

@@ -1,16 +1,22 @@
 #include "proto/link/machine.hpp"
 
 #include <fmt/format.h>
+#include <sched.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
+#include <cmath>
 #include <csignal>
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <limits>
+#include <memory>
+#include <sstream>
 #include <string>
 
 #include "proto/wire/names.hpp"
@@ -20,7 +26,53 @@ namespace {
 
 constexpr int status_if_unknown = W_EXITCODE(1, 0);
 
+std::string text_of(const char* file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Version 2 has both numbers in one file, with `max` for no quota; version 1 has -1.
+double quota_of_group(const std::filesystem::path& group) {
+  double quota_us = -1.0, period_us = 0.0;
+  if (!(std::ifstream(group / "cpu.max") >> quota_us >> period_us)) {
+    std::ifstream(group / "cpu.cfs_quota_us") >> quota_us;
+    std::ifstream(group / "cpu.cfs_period_us") >> period_us;
+  }
+  const bool has_quota = quota_us > 0.0 && period_us > 0.0;
+  return has_quota ? quota_us / period_us : std::numeric_limits<double>::infinity();
+}
+
 }  // namespace
+
+unsigned num_processors() {
+  // More than any kernel has; a mask that is too small for the kernel's is an error.
+  constexpr int count_max = 1 << 16;
+  const std::unique_ptr<cpu_set_t, void (*)(cpu_set_t*)> mask(
+      CPU_ALLOC(count_max), [](cpu_set_t* set) { CPU_FREE(set); });
+  const std::size_t size = CPU_ALLOC_SIZE(count_max);
+  const bool is_known = sched_getaffinity(0, size, mask.get()) == 0;
+  const double count = is_known ? CPU_COUNT_S(size, mask.get()) : 1;
+  const double quota = processor_quota(text_of("/proc/self/cgroup"), "/sys/fs/cgroup");
+  return static_cast<unsigned>(std::max(1.0, std::min(count, std::ceil(quota))));
+}
+
+// A line is `0::/a/b` in version 2 and `4:cpu,cpuacct:/a/b` in version 1. In a container, where
+// the path may be that of the host, the uppermost group is the container's own.
+double processor_quota(std::string_view memberships, const std::filesystem::path& root) {
+  double quota = std::numeric_limits<double>::infinity();
+  std::istringstream lines{std::string(memberships)};
+  for (std::string number, controllers, path; std::getline(lines, number, ':');) {
+    if (!std::getline(lines, controllers, ':') || !std::getline(lines, path)) break;
+    const bool has_processors = ("," + controllers + ",").find(",cpu,") != std::string::npos;
+    if (!controllers.empty() && !has_processors) continue;
+    const std::filesystem::path top = controllers.empty() ? root : root / "cpu";
+    for (std::filesystem::path group = path;; group = group.parent_path()) {
+      quota = std::min(quota, quota_of_group(top / group.relative_path()));
+      if (!group.has_relative_path()) break;
+    }
+  }
+  return quota;
+}
 
 std::string host_name() {
   std::array<char, 256> name{};
@@ -28,10 +80,7 @@ std::string host_name() {
   return name_from(name.data());
 }
 
-std::uint64_t num_oom_kills() {
-  std::ifstream stream("/proc/vmstat");
-  return oom_kills_in(std::string(std::istreambuf_iterator<char>(stream), {}));
-}
+std::uint64_t num_oom_kills() { return oom_kills_in(text_of("/proc/vmstat")); }
 
 std::uint64_t oom_kills_in(std::string_view vmstat) {
   constexpr std::string_view label = "\noom_kill ";

@@ -3,6 +3,7 @@
 #include <sys/types.h>
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,6 +24,17 @@ inline constexpr bool has_address_space_limit = true;
 
 /// The name of this machine, with `-` for each character that is_name() does not allow.
 [[nodiscard]] std::string host_name();
+
+/// Processors that this process may use: those of its affinity mask, and no more than the quota of
+/// its control groups, rounded up. At least 1.
+[[nodiscard]] unsigned num_processors();
+
+/// The quota of a process in processors, the smallest of its control groups and those above them;
+/// infinite if there is none. Both versions of control groups.
+/// @param memberships  As in /proc/self/cgroup.
+/// @param root         Where control groups are mounted: /sys/fs/cgroup.
+[[nodiscard]] double processor_quota(std::string_view memberships,
+                                     const std::filesystem::path& root);
 
 /// Number of processes that the kernel has ended for lack of memory since the machine started.
 [[nodiscard]] std::uint64_t num_oom_kills();

@@ -1,8 +1,6 @@
 #include "worker/spool/spool.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <array>
@@ -14,6 +12,7 @@
 
 #include "core/error.hpp"
 #include "core/math/hash.hpp"
+#include "proto/link/whole_file.hpp"
 #include "proto/wire/codec.hpp"
 
 namespace proofmass::worker {
@@ -84,8 +83,7 @@ Spool::Spool(std::filesystem::path path, std::string_view model, std::uint64_t s
     : path_(std::move(path)),
       header_(fmt::format("proofmass-spool 1 {}\n", model)),
       size_max_(size_max),
-      file_(open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600)) {
-  if (file_ < 0) throw Error(message(std::strerror(errno)));
+      file_(wire::open_own_file("spool", path_, wire::IfAbsent::make)) {
   try {
     lock();
     read();
@@ -105,8 +103,10 @@ std::string Spool::message(std::string_view reason) const {
 }
 
 void Spool::lock() const {
-  if (flock(file_, LOCK_EX | LOCK_NB) == 0) return;
-  throw Error(message(errno == EWOULDBLOCK ? "used by another worker" : std::strerror(errno)));
+  const wire::Locked locked = wire::lock_file(file_);
+  if (locked == wire::Locked::yes) return;
+  throw Error(message(locked == wire::Locked::by_another ? "used by another worker"
+                                                         : wire::no_locks_remedy));
 }
 
 void Spool::read() {

@@ -39,14 +39,16 @@ Hdf5Handle::Hdf5Handle(hid_t id, Close close, const std::filesystem::path& file)
   if (id_ < 0) fail(file);
 }
 
-Hdf5File::Hdf5File(const DraftFile& file) : name_(file.path()) {
+Hdf5File::Hdf5File(const wire::DraftFile& file) : name_(file.path()) {
   // After a file that could not be flushed, the library's own end would crash; nothing is left
   // for it to do, as all files are closed here.
   (void)H5dont_atexit();
   // Errors are thrown, not printed.
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  file_ =
-      handle(H5Fcreate(file.draft().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
+  // Nobody else knows the draft, and some file systems have no locks.
+  const Hdf5Handle access = handle(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  check(H5Pset_file_locking(access, 0, 1));
+  file_ = handle(H5Fcreate(file.draft().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose);
 }
 
 void Hdf5File::check(herr_t code) const {

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/store.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator::detail {
 
@@ -48,7 +48,7 @@ class Hdf5Handle {
 /// An HDF5 file that is written, by its draft.
 class Hdf5File {
  public:
-  explicit Hdf5File(const DraftFile& file);
+  explicit Hdf5File(const wire::DraftFile& file);
 
   [[nodiscard]] hid_t root() const { return file_; }
 

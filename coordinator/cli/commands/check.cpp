@@ -14,6 +14,7 @@
 #include "coordinator/cli/standard_output.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/model.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -45,7 +46,7 @@ CheckJson check_json(const CheckOptions& options, const Campaign& campaign, cons
                  {"seed", std::to_string(campaign.seed)}, {"num_runs", campaign.num_runs},
                  {"num_steps", plan.num_steps()},         {"step_name", model().step_name()},
                  {"one_core_s", cost.one_core_s},         {"all_cores_s", cost.all_cores_s},
-                 {"num_cores", num_cores_here()},         {"disk_bytes", cost.disk_mb * 1e6},
+                 {"num_cores", wire::num_processors()},   {"disk_bytes", cost.disk_mb * 1e6},
                  {"differences", CheckJson::array()}};
   for (const auto& [field, own, example] : campaign.differences_from(*example_campaign())) {
     json["differences"].push_back({{"field", field}, {"value", own}, {"example", example}});

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "coordinator/cli/program.hpp"
-#include "coordinator/store/draft_file.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 
@@ -41,9 +41,9 @@ inline void add_json_flag(CLI::App& command, OutputFormat& format) {
 
 /// Declares --force.
 /// @param if_there  Lives as long as the command.
-inline void add_force_flag(CLI::App& command, IfThere& if_there) {
+inline void add_force_flag(CLI::App& command, wire::IfThere& if_there) {
   command.add_flag_callback(
-      "--force", [&if_there] { if_there = IfThere::replace; }, "Replace an existing file");
+      "--force", [&if_there] { if_there = wire::IfThere::replace; }, "Replace an existing file");
 }
 
 /// Type names of campaign databases and campaign files, see described_program().

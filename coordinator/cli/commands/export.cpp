@@ -12,18 +12,18 @@
 #include "coordinator/store/store.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
-#include "proto/link/signals.hpp"
+#include "proto/link/surroundings.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-enum class ExportFormat : std::uint8_t { csv, json, hdf5 };
+enum class ExportFormat : std::uint8_t { csv, json, hdf5, sqlite };
 
 struct ExportOptions {
   std::filesystem::path database;
   ExportFormat format = ExportFormat::csv;
   std::filesystem::path output;  ///< Empty or `-` for standard output.
-  IfThere if_there = IfThere::keep;
+  wire::IfThere if_there = wire::IfThere::keep;
   DrawColumns draws = DrawColumns::left_out;
 };
 
@@ -32,11 +32,14 @@ bool is_standard_output(const std::filesystem::path& output) {
 }
 
 void check(const ExportOptions& options) {
+  if (options.format == ExportFormat::sqlite && options.draws == DrawColumns::included) {
+    throw UsageError("draws = (must not be given with --format sqlite)");
+  }
   if (!is_standard_output(options.output)) {
     check_output_file(options.output, options.if_there,
                       "leave --output out to write to a pipe or device");
-  } else if (options.format == ExportFormat::hdf5) {
-    refuse_output("-", "must be a file for hdf5: name it with --output");
+  } else if (options.format == ExportFormat::hdf5 || options.format == ExportFormat::sqlite) {
+    refuse_output("-", "must be a file for hdf5 and sqlite: name it with --output");
   }
 }
 
@@ -53,6 +56,8 @@ void write(const ExportOptions& options, const IsStopped& is_stopped) {
   const Store store = Store::open_read_only(options.database);
   if (options.format == ExportFormat::hdf5) {
     export_hdf5(store, options.output, is_stopped, options.draws);
+  } else if (options.format == ExportFormat::sqlite) {
+    export_sqlite(store, options.output, is_stopped);
   } else if (is_standard_output(options.output)) {
     TextOutput output;
     write_text(options, store, output, is_stopped);
@@ -74,8 +79,10 @@ int export_results(const ExportOptions& options) {
 }  // namespace
 
 void add_export(CLI::App& app, Command& chosen) {
-  static const std::map<std::string, ExportFormat> formats{
-      {"csv", ExportFormat::csv}, {"json", ExportFormat::json}, {"hdf5", ExportFormat::hdf5}};
+  static const std::map<std::string, ExportFormat> formats{{"csv", ExportFormat::csv},
+                                                           {"json", ExportFormat::json},
+                                                           {"hdf5", ExportFormat::hdf5},
+                                                           {"sqlite", ExportFormat::sqlite}};
   auto [command, options] = add_command<ExportOptions>(
       app, chosen, "export", "Write all results in a format of other programs", export_results);
   command.footer(exit_codes_text({exit_interrupted}));

@@ -25,7 +25,7 @@
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/log.hpp"
-#include "proto/link/signals.hpp"
+#include "proto/link/surroundings.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/names.hpp"
 

@@ -1,6 +1,4 @@
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -21,9 +19,9 @@
 #include "coordinator/cli/remote_answer.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/report/digest.hpp"
-#include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -47,12 +45,11 @@ class ArrivedPart {
   /// @throws Error if the file is there and cannot be read or is another process's, or is not and
   ///         cannot be made.
   explicit ArrivedPart(std::filesystem::path path) : path_(std::move(path)) {
-    descriptor_ = open(path_.c_str(), O_RDWR | O_CLOEXEC);
-    if (descriptor_ < 0 && errno == ENOENT) {
+    descriptor_ = wire::open_own_file("file", path_, wire::IfAbsent::leave);
+    if (descriptor_ < 0) {
       check_directory();
       return;
     }
-    if (descriptor_ < 0) fail();
     try {
       lock();
       read_again();
@@ -109,17 +106,14 @@ class ArrivedPart {
   }
 
   void make() {
-    descriptor_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-    if (descriptor_ < 0) fail();
+    descriptor_ = wire::open_own_file("file", path_, wire::IfAbsent::make);
     lock();
     if (ftruncate(descriptor_, 0) != 0) fail();
   }
 
   // Its last owner may have renamed or removed it between our opening and locking it.
   void lock() const {
-    const bool is_locked = flock(descriptor_, LOCK_EX | LOCK_NB) == 0;
-    if (!is_locked && errno != EWOULDBLOCK) fail();
-    if (is_locked && has_its_name()) return;
+    if (wire::lock_file(descriptor_) != wire::Locked::by_another && has_its_name()) return;
     throw Error(fmt::format("file = {} (is being written by another `fetch`; try again later)",
                             path_.string()));
   }
@@ -147,7 +141,7 @@ class ArrivedPart {
 /// Whoever answers may announce what they like.
 void require_space(const std::filesystem::path& file, std::uint64_t size) {
   std::error_code error;
-  const std::filesystem::space_info space = std::filesystem::space(directory_of(file), error);
+  const std::filesystem::space_info space = std::filesystem::space(wire::directory_of(file), error);
   if (error || size <= space.available) return;
   throw Error(fmt::format("file = {} (the database has {} bytes more, the disk has room for {})",
                           file.string(), size, space.available));
@@ -201,7 +195,7 @@ int fetch_database(const FetchOptions& options) {
                                  .known_sha256 = part.size() > 0 ? part.sha256() : ""});
     complete(part, ask, answer);
     Store::check_absence(file);  // Again: completing it may have taken long.
-    if (const int error = publish_file(part.path(), file, IfThere::keep); error != 0) {
+    if (const int error = wire::publish_file(part.path(), file, wire::IfThere::keep); error != 0) {
       throw Error(fmt::format("file = {} ({})", file.string(), std::strerror(error)));
     }
     print_lines(summary_of(file, options.client.format));

@@ -11,7 +11,7 @@ namespace {
 
 struct InitOptions {
   std::filesystem::path file = model().example_file();
-  IfThere if_there = IfThere::keep;
+  wire::IfThere if_there = wire::IfThere::keep;
 };
 
 int write_example(const InitOptions& options) {

@@ -25,8 +25,6 @@ namespace {
 
 using wire::KeyRole;
 
-constexpr mode_t list_mode = 0644;
-
 struct KeygenOptions {
   std::filesystem::path directory;
   std::optional<std::string> worker;  ///< Adds a pair of this name for another worker.
@@ -80,6 +78,7 @@ void make_whole_set(const std::filesystem::path& directory) {
     refuse_to_replace(directory / name);
   }
   make_directory(directory);
+  wire::check_key_directory(directory);
   wire::write_key_pair(directory, to_text(KeyRole::coordinator), KeyRole::coordinator,
                        wire::make_key_pair());
   for (const KeyRole role : {KeyRole::worker, KeyRole::client}) {
@@ -87,7 +86,7 @@ void make_whole_set(const std::filesystem::path& directory) {
     wire::write_key_pair(directory, to_text(role), role, pair);
     wire::write_whole_file("allow-list", directory / list_name(role),
                            list_head(role) + list_line(pair, to_text(role), first_rights(role)),
-                           list_mode, wire::IfExists::refuse);
+                           wire::trusted_mode, wire::IfThere::keep);
   }
 }
 
@@ -104,6 +103,7 @@ void add_pair(const std::filesystem::path& directory, KeyRole role, const std::s
   if (!wire::is_name(name)) {
     throw UsageError(fmt::format("--{} = {} ({})", to_text(role), name, is_name_rule));
   }
+  wire::check_key_directory(directory);
   const std::filesystem::path list = directory / list_name(role);
   std::string text = read_list(list);
   for (const auto& [key, owner] : parse_allow_list(text, domain_of(role), list)) {
@@ -117,8 +117,8 @@ void add_pair(const std::filesystem::path& directory, KeyRole role, const std::s
   const wire::KeyPair pair = wire::make_key_pair();
   wire::write_key_pair(directory, name, role, pair);
   if (!text.empty() && text.back() != '\n') text += '\n';
-  wire::write_whole_file("allow-list", list, text + list_line(pair, name), list_mode,
-                         wire::IfExists::replace);
+  wire::write_whole_file("allow-list", list, text + list_line(pair, name), wire::trusted_mode,
+                         wire::IfThere::replace);
 }
 
 void say_where_to_copy(const std::filesystem::path& directory, KeyRole role,

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -23,6 +22,7 @@
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -65,8 +65,7 @@ void require_part(const std::filesystem::path& part, const LargestPart& largest)
 /// @throws ArchiveError with the checks that fail.
 void require_sound(const std::filesystem::path& part, const MergeOptions& options,
                    const IsStopped& is_stopped) {
-  const VerifyOptions how{.fraction = options.fraction,
-                          .num_threads = std::max(1U, std::thread::hardware_concurrency())};
+  const VerifyOptions how{.fraction = options.fraction, .num_threads = wire::num_processors()};
   std::string failing;
   const auto collect = [&](const Check& check) {
     if (check.verdict == Verdict::fails) failing += "\n" + check_text(check);

@@ -16,7 +16,6 @@
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/report/review_charts.hpp"
-#include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/model.hpp"
 #include "proto/command_line/described_program.hpp"
@@ -29,14 +28,12 @@
 namespace proofmass::coordinator {
 namespace {
 
-constexpr mode_t picture_mode = 0644;
-
 struct PlotOptions {
   std::filesystem::path database;
   std::string chart;
   std::filesystem::path output;
   bool is_list = false;
-  IfThere if_there = IfThere::keep;
+  wire::IfThere if_there = wire::IfThere::keep;
 };
 
 bool is_png(const std::filesystem::path& output) { return output.extension() == ".png"; }
@@ -74,19 +71,14 @@ pid_t start_converter(const std::filesystem::path& svg, const std::filesystem::p
 
 /// Writes a bitmap of the picture. The file appears when it is whole.
 void write_png(const Picture& picture, const PlotOptions& options) {
-  const DraftFile svg(options.output, ".svg-draft");
-  DraftFile png(options.output, ".png-draft");
-  wire::write_whole_file("output", svg.draft(), svg_of(picture, SvgUse::plain), picture_mode,
-                         wire::IfExists::replace);
+  const wire::DraftFile svg("output", options.output, wire::private_mode, ".svg-draft");
+  wire::DraftFile png("output", options.output);
+  svg.write(svg_of(picture, SvgUse::plain));
   const int status = wire::wait_for_end(start_converter(svg.draft(), png.draft(), options.output));
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
     throw Error(fmt::format("output = {} (rsvg-convert failed)", options.output.string()));
   }
-  if (const int failure = png.publish(options.if_there); failure != 0) {
-    throw Error(fmt::format("output = {} (cannot be written: {})", options.output.string(),
-                            std::generic_category().message(failure)));
-  }
-  (void)synchronise_directory_of(options.output);
+  png.publish(options.if_there);
 }
 
 void write_picture(const Picture& picture, const PlotOptions& options) {

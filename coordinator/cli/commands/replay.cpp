@@ -37,7 +37,7 @@ struct ReplayOptions {
   std::vector<std::string> groups;
   SeriesFormat format = SeriesFormat::hdf5;
   std::filesystem::path output;  ///< Empty: nothing is written.
-  IfThere if_there = IfThere::keep;
+  wire::IfThere if_there = wire::IfThere::keep;
   OutputFormat output_format = OutputFormat::text;  ///< Of what is printed.
 
   /// True if `output` names a directory that files are written to.

@@ -39,7 +39,7 @@ struct ReportOptions {
   OutputFormat format = OutputFormat::text;
   std::filesystem::path html;  ///< `-`: standard output. Empty: not wanted; so is the next.
   std::filesystem::path markdown;
-  IfThere if_there = IfThere::keep;
+  wire::IfThere if_there = wire::IfThere::keep;
   ClientConnectionConfig connection;  ///< Of a coordinator, if it is to be asked.
 
   [[nodiscard]] bool has_document() const { return !html.empty() || !markdown.empty(); }

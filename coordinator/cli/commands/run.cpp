@@ -15,7 +15,6 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -37,8 +36,9 @@
 #include "core/runs.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
-#include "proto/link/signals.hpp"
+#include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"
+#include "proto/link/surroundings.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -73,10 +73,10 @@ std::vector<RunRange> runs_beside(RunRange part, std::uint64_t num_runs) {
 
 /// No more than there are quarters of batches: the runs of one take no longer than one of them.
 std::uint64_t num_workers(const RunOptions& options, std::uint64_t num_runs_missing) {
-  const unsigned num_processors = std::max(1U, std::thread::hardware_concurrency());
   const std::uint64_t quarter = (model().batch_size() + 3) / 4;
   const std::uint64_t num_quarters = (num_runs_missing + quarter - 1) / quarter;
-  return std::min<std::uint64_t>(options.num_workers.value_or(num_processors), num_quarters);
+  return std::min<std::uint64_t>(options.num_workers.value_or(wire::num_processors()),
+                                 num_quarters);
 }
 
 /// The file of a campaign that asks for more runs until its stop rule is reached.
@@ -356,6 +356,7 @@ StopPlan stop_plan_of(const RunOptions& options, std::uint64_t num_runs) {
 
 int run_campaign(const RunOptions& options) {
   wire::ignore_broken_pipes();  // A campaign goes on when nobody reads its progress.
+  require_room_for_service();
   const std::unique_ptr<Campaign> campaign =
       read_campaign(options.campaign_file, options.overrides);
   check_part(options, *campaign);

@@ -26,7 +26,7 @@
 #include "core/runs.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/standard_error.hpp"
-#include "proto/link/signals.hpp"
+#include "proto/link/surroundings.hpp"
 
 namespace proofmass::coordinator {
 namespace {

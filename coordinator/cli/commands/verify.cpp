@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/commands/commands.hpp"
@@ -13,6 +12,7 @@
 #include "coordinator/cli/stop_signals.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
+#include "proto/link/machine.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -39,8 +39,7 @@ void print_checks(const std::filesystem::path& database, std::size_t num_failing
 
 int verify_database(const VerifyCommandOptions& options) {
   return run_until_stopped([&](const IsStopped& is_stopped) {
-    const VerifyOptions how{.fraction = options.fraction,
-                            .num_threads = std::max(1U, std::thread::hardware_concurrency())};
+    const VerifyOptions how{.fraction = options.fraction, .num_threads = wire::num_processors()};
     const bool is_json = options.format == OutputFormat::json;
     std::size_t num_failing = 0, num_checks = 0;
     Json checks = Json::array();

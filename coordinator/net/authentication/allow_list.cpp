@@ -11,6 +11,8 @@
 
 #include "core/error.hpp"
 #include "proto/link/keys.hpp"
+#include "proto/link/whole_file.hpp"
+#include "proto/text/byte_order_mark.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
@@ -63,10 +65,7 @@ std::string read_file(const std::filesystem::path& file) {
   struct stat status {};
   if (::stat(file.c_str(), &status) != 0) refuse(file, std::strerror(errno));
   if (!S_ISREG(status.st_mode)) refuse(file, "must be a regular file");
-  if ((status.st_mode & 022) != 0) {
-    refuse(file, fmt::format("mode {:04o}; must be writable by its owner alone: chmod go-w",
-                             status.st_mode & 07777));
-  }
+  wire::check_reach("allow-list", file, status, wire::Reach::written_by_owner);
   if (static_cast<std::size_t>(status.st_size) > file_size_max) refuse(file, "is too large");
   std::ifstream stream(file, std::ios::binary);
   if (!stream) refuse(file, std::strerror(errno));
@@ -85,6 +84,7 @@ AllowedKeys read_allow_list(const std::filesystem::path& file, wire::Domain doma
 AllowedKeys parse_allow_list(std::string_view text, wire::Domain domain,
                              const std::filesystem::path& file) {
   AllowedKeys keys;
+  text = wire::without_byte_order_mark(text);
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     const std::string_view rule = read_line(text.substr(0, end), domain, keys);

@@ -5,14 +5,16 @@
 #include <sqlite3.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <system_error>
 
+#include "coordinator/store/campaign_peek.hpp"
 #include "coordinator/store/detail/file_place.hpp"
-#include "coordinator/store/draft_file.hpp"
 #include "coordinator/store/store_error.hpp"
+#include "proto/link/whole_file.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -63,6 +65,19 @@ std::string name_of(const std::filesystem::path& path, Access access) {
   }
 }
 
+// Asked before the connection has a lock. SQLite takes a missing lock for one of somebody else.
+bool has_locks(sqlite3* connection) {
+  sqlite3_file* file = nullptr;
+  sqlite3_file_control(connection, "main", SQLITE_FCNTL_FILE_POINTER, &file);
+  if (file == nullptr || file->pMethods == nullptr) return true;
+  errno = 0;
+  if (file->pMethods->xLock(file, SQLITE_LOCK_SHARED) == SQLITE_OK) {
+    (void)file->pMethods->xUnlock(file, SQLITE_LOCK_NONE);
+    return true;
+  }
+  return errno != ENOLCK && errno != ENOSYS && errno != EOPNOTSUPP;
+}
+
 // SQLite applies a log to whatever file has the name, also to one that was put there since.
 std::string damage(const std::filesystem::path& file, std::string_view what) {
   if (has_log(file) && is_sound_without_log(file)) {
@@ -79,7 +94,7 @@ constexpr std::string_view log_out_of_reach =
 
 // SQLite keeps an index beside a log; where it cannot make one, it says that it cannot open a file.
 bool is_log_out_of_reach(const std::filesystem::path& file) {
-  const std::string directory = directory_of(log_path(file)).string();
+  const std::string directory = wire::directory_of(log_path(file)).string();
   return has_log(file) && ::faccessat(AT_FDCWD, file.c_str(), R_OK, AT_EACCESS) == 0 &&
          ::faccessat(AT_FDCWD, directory.c_str(), W_OK, AT_EACCESS) != 0;
 }
@@ -266,19 +281,34 @@ void Statement::refuse_as_damaged(std::string_view what) const {
 
 void Database::Close::operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }
 
-Database::Database(const std::filesystem::path& path, Access access) : path_(path) {
-  const std::string name = name_of(path, access);
-  sqlite3* connection = nullptr;
-  const int code = sqlite3_open_v2(name.c_str(), &connection, open_flags(access), nullptr);
-  connection_.reset(connection);
-  if (code != SQLITE_OK) fail(code);
-  sqlite3_extended_result_codes(connection, 1);
+Database::Database(const std::filesystem::path& path, Access access)
+    : path_(path), name_(name_of(path, access)) {
+  open(access);
+  const bool is_file = access != Access::memory && access != Access::immutable;
+  if (is_file && !has_locks(connection_.get())) {
+    if (access == Access::read_write) refuse(wire::no_locks_remedy);
+    if (access == Access::read_only && has_journal(path)) {
+      refuse("has a log or a journal, and no locks; copy all of its files to a local disk");
+    }
+    // Nobody can be writing to it, or knows the draft.
+    name_ = file_uri(path, access == Access::create ? "nolock=1" : "mode=ro&immutable=1");
+    open(access);
+  }
+  sqlite3* const connection = connection_.get();
   sqlite3_busy_timeout(connection, busy_timeout_ms);
   sqlite3_limit(connection, SQLITE_LIMIT_SQL_LENGTH, sql_size_max);
   const bool is_reader = access == Access::read_only || access == Access::immutable;
   if (!is_reader && sqlite3_db_readonly(connection, "main") != 0) {
     throw StoreError(fmt::format("campaign database = {} (is not writable)", path_.string()));
   }
+}
+
+void Database::open(Access access) {
+  sqlite3* connection = nullptr;
+  const int code = sqlite3_open_v2(name_.c_str(), &connection, open_flags(access), nullptr);
+  connection_.reset(connection);
+  if (code != SQLITE_OK) fail(code);
+  sqlite3_extended_result_codes(connection, 1);
 }
 
 void Database::distrust_content() {
@@ -366,8 +396,8 @@ void Database::attach(const std::string& database, const std::string& name,
   }
 }
 
-void Database::attach_read_only(const std::filesystem::path& file, const std::string& name) {
-  attach(file_uri(file, "mode=ro"), name, file);
+void Database::attach_read_only(const Database& other, const std::string& name) {
+  attach(other.name_, name, other.path_);
 }
 
 void Database::attach_copy_of(const Database& other, const std::string& name) {

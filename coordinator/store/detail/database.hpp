@@ -93,7 +93,8 @@ class Statement {
 /// One connection to one database file, for one thread.
 class Database {
  public:
-  /// Opens the file and waits up to 5 s, then and later, for locks of others.
+  /// Opens the file and waits up to 5 s, then and later, for locks of others. On a file system
+  /// without locks, a file without a log is read as it is.
   /// @throws StoreError if the file cannot be opened as asked.
   Database(const std::filesystem::path& path, Access access);
   Database(const Database&) = delete;
@@ -134,9 +135,10 @@ class Database {
 
   [[nodiscard]] bool is_private_copy() const { return is_private_copy_; }
 
-  /// Makes the tables of another file known under `name.`; the file can only be read.
+  /// Makes the tables of the file of another database known under `name.`; the file can only be
+  /// read. @pre The other was opened read-only.
   /// @throws StoreError naming that file.
-  void attach_read_only(const std::filesystem::path& file, const std::string& name);
+  void attach_read_only(const Database& other, const std::string& name);
   /// The same of a private copy of another database.
   void attach_copy_of(const Database& other, const std::string& name);
 
@@ -181,11 +183,13 @@ class Database {
     void operator()(sqlite3* connection) const;
   };
 
+  void open(Access access);
   void attach(const std::string& database, const std::string& name,
               const std::filesystem::path& file);
   [[noreturn]] void refuse_copy(int code) const;
 
   std::filesystem::path path_;
+  std::string name_;  ///< By which SQLite opened it.
   std::unique_ptr<sqlite3, Close> connection_;
   bool is_private_copy_ = false;
 };

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -25,6 +24,7 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "coordinator/store/store_error.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -67,12 +67,14 @@ int open_and_lock(const std::filesystem::path& path) {
                                      ? std::string("is not writable")
                                      : fmt::format("cannot be opened: {}", std::strerror(error))));
   }
-  if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) return descriptor;
+  const wire::Locked locked = wire::lock_file(descriptor);
+  if (locked == wire::Locked::yes) return descriptor;
   ::close(descriptor);
-  throw StoreError(fmt::format(
-      "campaign database = {} (another coordinator has it; a campaign has one coordinator "
-      "at a time)",
-      path.string()));
+  throw StoreError(
+      fmt::format("campaign database = {} ({})", path.string(),
+                  locked == wire::Locked::impossible
+                      ? wire::no_locks_remedy
+                      : "another coordinator has it; a campaign has one coordinator at a time"));
 }
 
 [[noreturn]] void refuse_to_make(const std::filesystem::path& file, std::string_view kind,
@@ -233,7 +235,7 @@ void restore_name(const std::filesystem::path& path, Database& open_file, const 
   if (own_log == OwnLog::folded_in || !place.has_own_log()) place.remove_own_log();
   const auto write = [&](const std::filesystem::path& draft) { copy_to_draft(open_file, draft); };
   if (placement == Placement::removed) {
-    appear_complete(path, IfThere::keep, [&](const std::filesystem::path& draft) {
+    appear_complete(path, wire::IfThere::keep, [&](const std::filesystem::path& draft) {
       write(draft);
       remove_log_of(path);  // Ours, all of which is in the copy, or of a file that is gone.
     });
@@ -243,7 +245,7 @@ void restore_name(const std::filesystem::path& path, Database& open_file, const 
   // While our log is there, the other file has none, and ours must not be applied to it.
   const Access access = place.has_own_log() ? Access::immutable : Access::read_only;
   check_that_it_is_an_older_copy(path, access, open_file);
-  appear_complete(path, IfThere::replace, [&](const std::filesystem::path& draft) {
+  appear_complete(path, wire::IfThere::replace, [&](const std::filesystem::path& draft) {
     write(draft);
     remove_log_of(path);  // Ours, or that of the older copy, whose results are all here.
   });

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statfs.h>
 #include <sys/sysmacros.h>
@@ -89,7 +88,7 @@ std::string network_fuse_name_of(const std::string& directory) {
 }  // namespace
 
 void check_directory_of(const std::filesystem::path& path) {
-  const std::string directory = directory_of(path).string();
+  const std::string directory = wire::directory_of(path).string();
   struct statfs status {};
   if (statfs(directory.c_str(), &status) != 0) {
     throw StoreError(fmt::format("directory = {} ({})", directory, std::strerror(errno)));
@@ -119,17 +118,16 @@ void check_presence(const std::filesystem::path& path) {
   refuse(std::filesystem::exists(status) ? "is no file" : "does not exist");
 }
 
-void appear_complete(const std::filesystem::path& path, IfThere if_there,
+void appear_complete(const std::filesystem::path& path, wire::IfThere if_there,
                      const std::function<void(const std::filesystem::path& draft)>& write) {
-  DraftFile file(path, ".unfinished");
-  write(file.draft());
-  if (const int error = file.publish(if_there)) {
-    throw StoreError(fmt::format("campaign database = {} (cannot be given its name: {})",
-                                 path.string(), std::strerror(error)));
-  }
-  if (const int error = synchronise_directory_of(path)) {
-    throw StoreError(
-        fmt::format("directory = {} ({})", directory_of(path).string(), std::strerror(error)));
+  try {
+    wire::DraftFile file("campaign database", path, wire::trusted_mode, ".unfinished");
+    write(file.draft());
+    file.publish(if_there);
+  } catch (const StoreError&) {
+    throw;
+  } catch (const Error& error) {
+    throw StoreError(error.what());
   }
 }
 
@@ -146,13 +144,11 @@ std::string holder(const std::filesystem::path& path) {
 }
 
 int open_lock_file(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (descriptor >= 0) return descriptor;
-  const int error = errno;
-  throw StoreError(
-      fmt::format("lock = {} (cannot be created: {}; the directory of a campaign database "
-                  "must be writable)",
-                  path.string(), std::strerror(error)));
+  try {
+    return wire::open_own_file("lock", path, wire::IfAbsent::make, wire::trusted_mode);
+  } catch (const Error& error) {
+    throw StoreError(error.what());
+  }
 }
 
 // False if the last holder removed the file between our opening and locking it.
@@ -170,21 +166,28 @@ std::filesystem::path lock_path(const std::filesystem::path& campaign_file) {
   return path.concat(".lock");
 }
 
-int acquire(const std::filesystem::path& path) {
+int acquire(const std::filesystem::path& path, IfNoLocks if_no_locks) {
   const int descriptor = open_lock_file(path);
-  if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0 && is_file_at(descriptor, path))
-    return descriptor;
+  const wire::Locked locked = wire::lock_file(descriptor);
+  const bool is_enough = locked == wire::Locked::yes ||
+                         (locked == wire::Locked::impossible && if_no_locks == IfNoLocks::go_on);
+  if (is_enough && is_file_at(descriptor, path)) return descriptor;
   ::close(descriptor);
+  if (locked == wire::Locked::impossible) {
+    throw StoreError(fmt::format("lock = {} ({})", path.string(), wire::no_locks_remedy));
+  }
   throw StoreError(fmt::format("lock = {} (held by {}; a campaign has one coordinator at a time)",
                                path.string(), holder(path)));
 }
 
 }  // namespace
 
-StoreLock::StoreLock(const std::filesystem::path& campaign_file)
-    : path_(lock_path(campaign_file)), descriptor_(acquire(path_)) {
+StoreLock::StoreLock(const std::filesystem::path& campaign_file, IfNoLocks if_no_locks)
+    : path_(lock_path(campaign_file)), descriptor_(acquire(path_, if_no_locks)) {
   // For people only: the lock holds even if this cannot be written.
-  std::ofstream(path_) << this_process() << '\n';
+  if (::ftruncate(descriptor_, 0) != 0) return;
+  const std::string text = this_process() + '\n';
+  [[maybe_unused]] const ssize_t written = ::write(descriptor_, text.data(), text.size());
 }
 
 // Somebody may have removed the file, and another process may have made one.

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "coordinator/store/draft_file.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator::detail {
 
@@ -30,8 +30,11 @@ void check_presence(const std::filesystem::path& path);
 /// Lets `write` make a file beside `path`, which then takes that name: complete or not at all, and
 /// durable.
 /// @throws StoreError if that cannot be done, or if the name is taken and is to be kept.
-void appear_complete(const std::filesystem::path& path, IfThere if_there,
+void appear_complete(const std::filesystem::path& path, wire::IfThere if_there,
                      const std::function<void(const std::filesystem::path& draft)>& write);
+
+/// What becomes of a lock on a file system without locks.
+enum class IfNoLocks : std::uint8_t { refuse, go_on };
 
 /// Exclusive right to write a campaign database, held through an advisory lock on `<file>.lock`.
 /// The kernel releases it when the process ends in whatever way; a file left behind holds nothing
@@ -40,7 +43,8 @@ class StoreLock {
  public:
   /// @throws StoreError naming the holder if the lock is taken, or if the directory is not
   /// writable.
-  explicit StoreLock(const std::filesystem::path& campaign_file);
+  explicit StoreLock(const std::filesystem::path& campaign_file,
+                     IfNoLocks if_no_locks = IfNoLocks::refuse);
   ~StoreLock();  ///< Removes the lock file.
   /// Whether the lock file still has its name, without which it keeps nobody away.
   [[nodiscard]] bool is_in_place() const;

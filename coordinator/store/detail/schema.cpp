@@ -199,6 +199,21 @@ void check_schema(const Database& database, std::int64_t version) {
   if (!expected.empty()) database.refuse("lacks " + expected.begin()->first);
 }
 
+std::string plain_definition(std::string sql) {
+  if (!sql.starts_with("CREATE TABLE")) return sql;
+  const auto cut = [&sql](std::size_t begin, std::size_t end) { sql.erase(begin, end - begin); };
+  constexpr std::string_view strict = " STRICT";
+  const std::size_t options = sql.rfind(')') + 1;
+  if (sql.find(strict, options) == options) cut(options, options + strict.size());
+  if (sql.find(',', options) == options) cut(options, options + 1);
+  // A column that is computed when read: `error_a REAL AS (estimate_a - truth_a)`.
+  constexpr std::string_view computed = " AS (";
+  for (std::size_t begin = 0; (begin = sql.find(computed, begin)) != std::string::npos;) {
+    cut(begin, sql.find(')', begin) + 1);
+  }
+  return sql;
+}
+
 void migrate(Database& database) {
   PROOFMASS_EXPECT(database.in_transaction());
   const std::int64_t before = database.integer("PRAGMA user_version");  // 0 of a new file.

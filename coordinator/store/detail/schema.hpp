@@ -67,6 +67,9 @@ void check_up_to_date(const Database& database, const std::filesystem::path& pat
 /// Whether a campaign database has an older version than this program writes.
 [[nodiscard]] bool is_older(const Database& database);
 
+/// The definition of a table, view or index of a campaign without what SQLite 3.25 does not know.
+[[nodiscard]] std::string plain_definition(std::string sql);
+
 /// Brings the schema up to date, step by step. @pre Inside a transaction.
 void migrate(Database& database);
 

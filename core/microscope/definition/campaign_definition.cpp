@@ -51,6 +51,20 @@ void read_columns(MicroscopeCampaign& campaign, DataFiles& files) {
   }
 }
 
+void check_environment_headings(CsvReader& reader) {
+  const bool has_line = reader.next_row();
+  const auto [own, expected] = std::ranges::mismatch(reader.cells(), environment_headings);
+  if (own == reader.cells().end() && expected == environment_headings.end()) return;
+  std::string text;
+  if (has_line) {
+    text = fmt::format(
+        "column {} is {}; ", expected - environment_headings.begin() + 1,
+        own == reader.cells().end() ? "missing" : fmt::format("\"{}\"", own->substr(0, 40)));
+  }
+  reader.refuse(
+      fmt::format("{}the first line must be {}", text, fmt::join(environment_headings, ",")));
+}
+
 /// Values that a drawn quantity may have in a file: far beyond any instrument, and wide enough for
 /// any experiment with the model. An offcentring of 5 m is a slip of the pen.
 class MagnitudeCheck {
@@ -126,9 +140,7 @@ void check_independence(const MicroscopeCampaign& campaign) {
 EnvironmentTable parse_environment(std::string_view text, const std::string& name,
                                    double orbit_period_s) {
   CsvReader reader(text, name);
-  if (!reader.next_row() || !std::ranges::equal(reader.cells(), environment_headings)) {
-    reader.refuse(fmt::format("the first line must be {}", fmt::join(environment_headings, ",")));
-  }
+  check_environment_headings(reader);
   EnvironmentTable table;
   while (reader.next_row()) {
     if (table.size() == environment_rows_max) {

@@ -10,12 +10,12 @@
 #include <fstream>
 #include <iterator>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "core/microscope/simulation/run.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
 #include "core/model.hpp"
+#include "proto/link/machine.hpp"
 #include "tests/benchmarks/bench/bench_campaigns.hpp"
 #include "tests/benchmarks/bench/bench_parts.hpp"
 #include "tests/benchmarks/bench/bench_report.hpp"
@@ -49,7 +49,7 @@ Machine this_machine() {
   std::ifstream file("/proc/cpuinfo");
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   return {.processor = processor_name(text),
-          .num_processors = std::max(1U, std::thread::hardware_concurrency()),
+          .num_processors = wire::num_processors(),
           .compiler = "GCC " __VERSION__,
           .build_type = PROOFMASS_BUILD_TYPE};
 }

@@ -268,7 +268,7 @@ TEST(DataFileErrors, NameTheLineOfAMalformedFile) {
   EXPECT_EQ(refusal_of(table_law, folder), "draws.csv:4: a = \"x\" (must be a number)");
   folder.write("env.csv", "time\n");
   EXPECT_TRUE(refusal_of("[environment]\nkind = \"file\"\nfile = \"env.csv\"", folder)
-                  .starts_with("env.csv:1: the first line must be time_s,"));
+                  .starts_with("env.csv:1: column 1 is \"time\"; the first line must be time_s,"));
 }
 
 TEST(DataFileErrors, NameATableWithFewerRowsThanRuns) {

@@ -189,7 +189,7 @@ TEST_F(ArchiveCommands, MakeVisibleWhatAFileSays) {
 
 TEST_F(ArchiveCommands, ExportHdf5ToAFileOnly) {
   EXPECT_EQ(misuse({"export", database_, "--format", "hdf5"}),
-            "output = - (must be a file for hdf5: name it with --output)");
+            "output = - (must be a file for hdf5 and sqlite: name it with --output)");
 }
 
 TEST_F(ArchiveCommands, ListAndCompare) {

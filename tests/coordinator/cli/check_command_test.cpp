@@ -15,6 +15,7 @@
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/microscope/results/results.hpp"
 #include "core/model.hpp"
+#include "proto/link/machine.hpp"
 #include "tests/coordinator/cli/program.hpp"
 #include "tests/coordinator/cli/temporary_directory.hpp"
 #include "tests/support/microscope_results.hpp"
@@ -119,7 +120,7 @@ TEST_F(Check, EstimatesTheTimeOfAllRuns) {
 }
 
 TEST(CostEstimate, CountsAnIncompleteBatchAsAWhole) {
-  const std::uint64_t num_at_once = batch_size() * num_cores_here();
+  const std::uint64_t num_at_once = batch_size() * wire::num_processors();
   EXPECT_EQ(estimated_cost(1, 2.5).one_core_s, 2.5);
   EXPECT_EQ(estimated_cost(batch_size(), 2.5).one_core_s, 2.5);
   EXPECT_EQ(estimated_cost(batch_size() + 1, 2.5).one_core_s, 5.0);

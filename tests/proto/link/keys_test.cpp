@@ -59,13 +59,13 @@ TEST(KeyFiles, HoldKeysOfCurve25519) {
 }
 
 TEST(KeyFiles, SecretOnesAreTheOwnersAloneWhateverTheUmask) {
-  for (const mode_t mask : {mode_t{0}, mode_t{0022}, mode_t{0777}}) {
+  for (const mode_t mask : {mode_t{0}, mode_t{0022}, mode_t{0077}}) {
     const ScratchDirectory directory;
     const mode_t before = ::umask(mask);
     write_key_pair(directory.path(), "client", KeyRole::client, make_key_pair());
     ::umask(before);
     EXPECT_EQ(mode_of(directory / "client.key"), 0600u);
-    EXPECT_EQ(mode_of(directory / "client.pub"), 0644u);
+    EXPECT_EQ(mode_of(directory / "client.pub"), 0644u & ~mask);
   }
 }
 
@@ -238,23 +238,22 @@ TEST(Security, IsReadFromADirectory) {
 TEST(WholeFile, ReplacesOnlyWhenAsked) {
   const ScratchDirectory directory;
   const auto file = directory / "list";
-  write_whole_file("list", file, "one", 0644, IfExists::refuse);
-  EXPECT_EQ(refusal_of([&] { write_whole_file("list", file, "two", 0644, IfExists::refuse); }),
-            "list = " + file.string() + " (File exists)");
+  write_whole_file("list", file, "one", 0644, IfThere::keep);
+  EXPECT_EQ(refusal_of([&] { write_whole_file("list", file, "two", 0644, IfThere::keep); }),
+            "list = " + file.string() + " (cannot be written: File exists)");
   EXPECT_EQ(text_of(file), "one");
-  write_whole_file("list", file, "two", 0640, IfExists::replace);
+  write_whole_file("list", file, "two", 0640, IfThere::replace);
   EXPECT_EQ(text_of(file), "two");
-  EXPECT_EQ(mode_of(file), 0640u);
+  EXPECT_EQ(mode_of(file), 0644u);  // That of the one before.
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory.path()),
                           std::filesystem::directory_iterator()),
             1);
 }
 
 TEST(WholeFile, CannotStandInADirectoryThatIsNotThere) {
-  EXPECT_EQ(refusal_of([] {
-              write_whole_file("list", "/nonexistent/list", "x", 0644, IfExists::replace);
-            }),
-            "list = /nonexistent/list (No such file or directory)");
+  EXPECT_EQ(refusal_of(
+                [] { write_whole_file("list", "/nonexistent/list", "x", 0644, IfThere::replace); }),
+            "list = /nonexistent/list (cannot be written: No such file or directory)");
 }
 
 }  // namespace

@@ -5,6 +5,12 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <string>
+
+#include "tests/proto/link/scratch_directory.hpp"
 
 namespace proofmass::wire {
 namespace {
@@ -24,6 +30,25 @@ int status_after(int signal) {
 TEST(OomKills, AreReadFromTheKernelsCounters) {
   EXPECT_EQ(oom_kills_in("nr_free_pages 1\noom_kill 17\nnuma_hit 2\n"), 17U);
   EXPECT_EQ(oom_kills_in("nr_free_pages 1\n"), 0U);
+}
+
+// Version 2 of control groups, then version 1; a container sees the path of the host.
+TEST(ProcessorQuota, IsTheSmallestOfAllControlGroupsAbove) {
+  const test::ScratchDirectory root;
+  const auto write = [&](const std::string& file, const std::string& text) {
+    std::filesystem::create_directories((root / file).parent_path());
+    std::ofstream(root / file) << text;
+  };
+  write("a/cpu.max", "150000 100000\n");
+  write("a/b/cpu.max", "max 100000\n");
+  EXPECT_EQ(processor_quota("0::/a/b\n", root.path()), 1.5);
+  EXPECT_EQ(processor_quota("0::/\n", root.path()), std::numeric_limits<double>::infinity());
+  write("cpu/cpu.cfs_quota_us", "50000\n");
+  write("cpu/cpu.cfs_period_us", "100000\n");
+  EXPECT_EQ(processor_quota("5:memory:/a\n4:cpu,cpuacct:/of/the/host\n", root.path()), 0.5);
+  write("cpu/cpu.cfs_quota_us", "-1\n");
+  EXPECT_GT(processor_quota("4:cpu:/\n", root.path()), 1e9);
+  EXPECT_GE(num_processors(), 1U);
 }
 
 pid_t child_that_exits(int exit_code) {

@@ -6,7 +6,7 @@
 #include <csignal>
 #include <string>
 
-#include "proto/link/signals.hpp"
+#include "proto/link/surroundings.hpp"
 
 namespace proofmass::wire {
 namespace {

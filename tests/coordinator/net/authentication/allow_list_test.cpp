@@ -88,7 +88,7 @@ TEST(AllowListText, HasALimit) {
 class AllowListFile : public ::testing::Test {
  protected:
   void write(const std::string& text) {
-    wire::write_whole_file("list", file_, text, 0644, wire::IfExists::replace);
+    wire::write_whole_file("list", file_, text, 0644, wire::IfThere::replace);
   }
 
   /// A look a second after the one before.

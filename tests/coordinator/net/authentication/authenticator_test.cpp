@@ -56,9 +56,9 @@ class AuthenticatorTest : public ::testing::Test {
 
   void write_lists(const std::string& workers, const std::string& clients) {
     wire::write_whole_file("list", directory_ / "authorized_workers", workers, 0644,
-                           wire::IfExists::replace);
+                           wire::IfThere::replace);
     wire::write_whole_file("list", directory_ / "authorized_clients", clients, 0644,
-                           wire::IfExists::replace);
+                           wire::IfThere::replace);
   }
 
   [[nodiscard]] std::string endpoint(Domain domain) const {

@@ -54,7 +54,7 @@ TEST(NetworkFuseName, IsReadFromTheMountTable) {
 
 TEST_F(FileSystemTest, CheckPassesALocalDirectory) {
   check_directory_of(file());
-  EXPECT_EQ(synchronise_directory_of(file()), 0);
+  EXPECT_EQ(wire::synchronise_directory_of(file()), 0);
 }
 
 TEST_F(FileSystemTest, ReportsAMissingDirectory) {
@@ -62,7 +62,7 @@ TEST_F(FileSystemTest, ReportsAMissingDirectory) {
       "directory = " + (directory() / "missing").string() + " (No such file or directory)";
   EXPECT_EQ(test::store_error_of([&] { check_directory_of(directory() / "missing" / "a.db"); }),
             expected);
-  EXPECT_EQ(synchronise_directory_of(directory() / "missing" / "a.db"), ENOENT);
+  EXPECT_EQ(wire::synchronise_directory_of(directory() / "missing" / "a.db"), ENOENT);
 }
 
 using StoreLockTest = test::StoreTest;
