@@ -39,8 +39,7 @@ bool is_about_workers(const PageRequest& request) { return request.path.back() =
 
 }  // namespace
 
-std::optional<HttpAnswer> PageSite::answer(const HttpRequest& http,
-                                           HttpServer::Patience patience) const {
+std::optional<HttpAnswer> PageSite::answer(const HttpRequest& http, Patience patience) const {
   const std::optional<PageRequest> request = parse_target(http.target);
   if (!request) return not_found();
   const std::vector<std::string>& path = request->path;
@@ -64,7 +63,7 @@ std::optional<HttpAnswer> PageSite::answer_to_visitor(const PageRequest& request
                                   ? SnapshotDepth::with_workers
                                   : SnapshotDepth::without_workers;
   std::shared_ptr<const PageSnapshot> snapshot = sources_.board->want(depth, sources_.now());
-  if (snapshot == nullptr && patience == HttpServer::Patience::left) return std::nullopt;
+  if (snapshot == nullptr && patience == Patience::left) return std::nullopt;
   if (snapshot == nullptr) snapshot = sources_.board->newest();
   if (snapshot == nullptr) return text_answer(503, "the coordinator has not said anything yet");
   if (auto found = about_service(request, *snapshot)) return found;

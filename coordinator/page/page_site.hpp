@@ -33,6 +33,8 @@ class PageSite {
                                                  HttpServer::Patience patience) const;
 
  private:
+  using Patience = HttpServer::Patience;
+
   [[nodiscard]] HttpAnswer health() const;
   /// To somebody who may see the page.
   [[nodiscard]] std::optional<HttpAnswer> answer_to_visitor(const PageRequest& request,
