@@ -39,12 +39,13 @@ void write_output_file(const std::filesystem::path& output, wire::IfThere if_the
   wire::write_whole_file("output", output, text, wire::public_mode, if_there);
 }
 
-void check_document(const std::filesystem::path& file, IfThere if_there) {
+void check_document(const std::filesystem::path& file, wire::IfThere if_there) {
   if (file.empty() || file == "-") return;
   check_output_file(file, if_there, "- writes to standard output");
 }
 
-void write_document(const std::filesystem::path& file, IfThere if_there, std::string_view text) {
+void write_document(const std::filesystem::path& file, wire::IfThere if_there,
+                    std::string_view text) {
   if (file == "-") return write_standard_output(text);
   write_output_file(file, if_there, text);
 }

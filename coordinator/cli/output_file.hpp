@@ -23,8 +23,9 @@ void write_output_file(const std::filesystem::path& output, wire::IfThere if_the
                        std::string_view text);
 
 /// Both for a text whose file may be `-`, standard output.
-void check_document(const std::filesystem::path& file, IfThere if_there);
-void write_document(const std::filesystem::path& file, IfThere if_there, std::string_view text);
+void check_document(const std::filesystem::path& file, wire::IfThere if_there);
+void write_document(const std::filesystem::path& file, wire::IfThere if_there,
+                    std::string_view text);
 
 /// Checks that a file can be made which replaces nothing.
 /// @param argument  What names the file, for the message.

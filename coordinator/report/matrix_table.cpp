@@ -33,8 +33,7 @@ Quantity quantity_of(const MatrixRow& row) {
 std::string subject_of(const MatrixRow& row) {
   if (is_joint_row(row)) return "all objectives";
   const std::string symbol(quantity_of(row).symbol);
-  const bool is_error =
-      row.answer.requirement.parameter < model().results().quantities.size();
+  const bool is_error = row.answer.requirement.parameter < model().results().quantities.size();
   return is_error ? "|error| of " + symbol : symbol;
 }
 
@@ -150,7 +149,7 @@ std::string shell_word(std::string_view text) {
 ReviewTable matrix_table(const Review& review) {
   ReviewTable table{.id = "matrix",
                     .caption = fmt::format("Verification matrix (statistical interpretation: {})",
-                                          name_of(review.interpretation)),
+                                           name_of(review.interpretation)),
                     .columns = {{.title = "id", .is_text = true},
                                 {.title = "requirement", .is_text = true},
                                 {.title = "limit"},

@@ -117,7 +117,8 @@ void insert_budget_coefficients(Database& database, const Campaign& campaign) {
   Statement insert = database.prepare("INSERT INTO budget_coefficient VALUES (?, ?, ?, ?)");
   const std::vector<Quantity>& quantities = model().results().quantities;
   for (const BudgetTerm& term : budget->terms) {
-    const auto level = term.follows_level ? std::optional(budget->assumed_level) : std::nullopt;
+    std::optional<double> level;
+    if (term.follows_level) level = budget->assumed_level;
     for (std::size_t j = 0; j < quantities.size(); ++j) {
       const double value = term.coefficients[j];
       if (value != 0.0) insert.run(term.info.name, quantities[j].name, value, level);

@@ -55,8 +55,7 @@ TEST(ParseEnvironment, RefusesOtherHeadings) {
       "angular_x_rad_s2,angular_y_rad_s2,angular_z_rad_s2";
   EXPECT_EQ(environment_refusal(""), "e.csv:1: " + rule);
   EXPECT_EQ(environment_refusal("0,1,2,3,4,5,6\n"), "e.csv:1: column 1 is \"0\"; " + rule);
-  EXPECT_EQ(environment_refusal("time_s,linear_x_m_s2\n"),
-            "e.csv:1: column 3 is missing; " + rule);
+  EXPECT_EQ(environment_refusal("time_s,linear_x_m_s2\n"), "e.csv:1: column 3 is missing; " + rule);
 }
 
 TEST(ParseEnvironment, RefusesAMalformedRowByLine) {

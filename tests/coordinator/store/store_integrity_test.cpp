@@ -217,8 +217,7 @@ TEST_F(StoreBackup, LeavesNothingIfTheDiskIsFull) {
 TEST_F(StoreBackup, NeedsADirectory) {
   const std::filesystem::path missing = directory() / "missing" / "copy.db";
   EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()).back_up(missing); }),
-            "lock = " + missing.string() +
-                ".lock (No such file or directory)");
+            "lock = " + missing.string() + ".lock (No such file or directory)");
 }
 
 }  // namespace

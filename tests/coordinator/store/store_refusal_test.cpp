@@ -374,8 +374,7 @@ TEST_F(StoreRefusal, OfADirectoryThatDoesNotExist) {
 TEST_F(StoreRefusal, OfADirectoryThatIsNotWritable) {
   create();
   EXPECT_EQ(error_with(std::filesystem::perms(0555), [&] { Store::open(file()); }),
-            "lock = " + file().string() +
-                ".lock (Permission denied)");
+            "lock = " + file().string() + ".lock (Permission denied)");
 }
 
 TEST_F(StoreRefusal, OfAFileWithALogInADirectoryThatIsNotWritable) {
