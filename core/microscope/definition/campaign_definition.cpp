@@ -126,8 +126,7 @@ void check_independence(const MicroscopeCampaign& campaign) {
     if (!is_serial && p_values.regular >= independence_p_value_min) continue;
     throw ConfigError(
         fmt::format("dispersion.{}.independent", drawn_names()[drawn[i]]), "true",
-        fmt::format("column \"{}\" {}, p = {:.1g}; leave the key out if it is a design, or shuffle "
-                    "or draw the rows at random",
+        fmt::format("column \"{}\" {}, p = {:.1g}; leave the key out, or draw each row anew",
                     law.column,
                     is_serial ? "depends on the order of its rows"
                               : "covers its range more evenly than independent draws do",

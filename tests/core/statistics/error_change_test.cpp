@@ -226,7 +226,7 @@ TEST(ErrorChange, IsFoundWithTheProbabilityThatGoesWithTheSmallestFactor) {
 }
 
 // The mean of an exponential law moves the distances from it: by their own scatter alone, a test of
-// 5 % found a change in 11 % of pairs of campaigns without one. Standard error 0.7 %.
+// 5 % found a change in 12 % of pairs of campaigns without one. Standard error 0.7 %.
 TEST(ErrorChange, OfScaleIsRarelyFoundInASkewLawWithoutOne) {
   int num_found = 0;
   for (std::uint64_t repetition = 0; repetition < 1000; ++repetition) {
