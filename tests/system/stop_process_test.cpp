@@ -86,17 +86,17 @@ TEST_F(StopRule, IsRefusedIfItCannotBeRead) {
 
 // A verdict of a fixed number of runs is that of a campaign that was never extended.
 TEST_F(StopRule, IsWhatDecidesAfterAnExtension) {
-  const auto report = [&](const std::string& name) {
-    Process(directory / "", name, programs + "/proofmass",
-            {"report", "grown.db", "--requirement", "k2c < 1e9 for 95% with 95%"})
-        .wait();
+  const auto report = [&](const std::string& name, int exit_code) {
+    Process process(directory / "", name, programs + "/proofmass",
+                    {"report", "grown.db", "--requirement", "k2c < 1e9 for 95% with 95%"});
+    EXPECT_EQ(process.wait(), exit_code);
     return read_file(path(name + ".out"));
   };
   ASSERT_EQ(start("grown", {"--runs", "64"}).wait(), 0) << errors_of("grown");
-  const std::string fixed = report("fixed");
+  const std::string fixed = report("fixed", 0);
   EXPECT_TRUE(contains(fixed, "Answer       met\nRule         64 draws, a number fixed")) << fixed;
   ASSERT_EQ(start("grown", {"--runs", "72"}).wait(), 0) << errors_of("grown");
-  const std::string extended = report("extended");
+  const std::string extended = report("extended", 3);
   EXPECT_TRUE(contains(extended, "Answer       undecided\nRule         sequential")) << extended;
 }
 
