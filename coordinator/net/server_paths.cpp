@@ -8,14 +8,9 @@ namespace proofmass::coordinator {
 namespace {
 
 constexpr std::string_view before_a_path = " \t\n\"'`(=[,;";
-constexpr std::string_view after_a_path = " \t\n\"'`),;]";
 
 bool may_begin_path(std::string_view text, std::size_t position) {
   return position == 0 || before_a_path.find(text[position - 1]) != std::string_view::npos;
-}
-
-bool begins_path(std::string_view text) {
-  return text.starts_with('/') || text.starts_with("./") || text.starts_with("../");
 }
 
 }  // namespace
@@ -39,11 +34,6 @@ std::string ServerPaths::hidden_in(std::string_view text) const {
         prefixes_, [&](const std::string& prefix) { return rest.starts_with(prefix); });
     if (may_begin_path(text, i) && within != prefixes_.end()) {
       i += within->size();
-    } else if (may_begin_path(text, i) && begins_path(rest)) {
-      const std::string_view path = rest.substr(0, rest.find_first_of(after_a_path));
-      const std::string_view name = path.substr(path.rfind('/') + 1);
-      result += name.empty() ? path : name;
-      i += path.size();
     } else {
       result += text[i++];
     }

@@ -17,8 +17,8 @@ class ServerPaths {
   /// @param directory  Of campaigns; may be empty.
   explicit ServerPaths(const std::filesystem::path& directory);
 
-  /// The text with files of the directory named within it, and without the directories of other
-  /// paths: `campaign database = a.db (is no file)`.
+  /// The text with files of the directory named within it: `campaign database = a.db (is no file)`.
+  /// Other paths stay: they are those that a client sent.
   [[nodiscard]] std::string hidden_in(std::string_view text) const;
   /// The same for all that the reply says of files and failures.
   void hide_in(wire::ClientReply& reply) const;

@@ -103,9 +103,9 @@ void add_pair(const std::filesystem::path& directory, KeyRole role, const std::s
   if (!wire::is_name(name)) {
     throw UsageError(fmt::format("--{} = {} ({})", to_text(role), name, is_name_rule));
   }
-  wire::check_key_directory(directory);
   const std::filesystem::path list = directory / list_name(role);
   std::string text = read_list(list);
+  wire::check_key_directory(directory);
   for (const auto& [key, owner] : parse_allow_list(text, domain_of(role), list)) {
     if (owner.name != name) continue;
     throw UsageError(

@@ -19,10 +19,21 @@ namespace {
 // 20 orbits, which the paper's test lasts at least, cannot tell closer lines apart.
 bool is_line(double multiple, double of_line) { return std::abs(multiple - of_line) < 0.05; }
 
-// The largest value of a law, but for one draw in 370 of a normal one.
+// The largest value of a law, but for one draw in 370 of a normal one; that of a table is in its
+// column.
 double size_of(const Dispersion& law) {
-  if (law.law == Law::normal) return std::abs(law.mean) + 3.0 * law.standard_deviation;
-  return std::max({std::abs(law.minimum), std::abs(law.maximum), std::abs(law.value)});
+  switch (law.law) {
+    case Law::uniform:
+    case Law::truncated_normal:
+      return std::max(std::abs(law.minimum), std::abs(law.maximum));
+    case Law::normal:
+      return std::abs(law.mean) + 3.0 * law.standard_deviation;
+    case Law::fixed:
+      return std::abs(law.value);
+    case Law::table:
+      break;
+  }
+  return 0.0;
 }
 
 /// Sizes of drawn quantities.

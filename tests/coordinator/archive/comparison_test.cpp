@@ -107,7 +107,7 @@ TEST(Comparison, OfPairsIsRunByRun) {
   EXPECT_EQ(same.p_values.scale, 1.0);
 }
 
-// Scale has a weight of 0.2, and those of all tests add up to 10.
+// Scale has a weight of 0.4, and those of all tests add up to 10.
 TEST(Comparison, FindsASmallChangeOfManyRunsAndCorrectsForThreeTestsOfTenParameters) {
   const Side first = side(40);
   Side second = side(40);
@@ -115,7 +115,7 @@ TEST(Comparison, FindsASmallChangeOfManyRunsAndCorrectsForThreeTestsOfTenParamet
   const CampaignComparison comparison = compare_campaigns(first, second);
   const ParameterComparison& changed = comparison.parameters[index(Parameter::a_c12)];
   EXPECT_LT(changed.p_values.scale, 1e-6);
-  EXPECT_NEAR(changed.adjusted_p_values.scale, 50.0 * changed.p_values.scale,
+  EXPECT_NEAR(changed.adjusted_p_values.scale, 25.0 * changed.p_values.scale,
               1e-12 * changed.p_values.scale);
 }
 

@@ -60,7 +60,8 @@ TEST(Init, SaysWhyAFileCannotBeWritten) {
   const auto file = directory / "none" / "a.toml";
   const test::Answer answer = test::answer_of({"init", file});
   EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
-  EXPECT_EQ(answer.error, "output = " + file.string() + " (No such file or directory)");
+  EXPECT_EQ(answer.error,
+            "output = " + file.string() + " (cannot be written: No such file or directory)");
 }
 
 // An empty file would be taken for a campaign file at the next attempt.
@@ -73,7 +74,7 @@ TEST(Init, LeavesNothingOnAFullDisk) {
     answer = test::answer_of({"init", file});
   }
   EXPECT_EQ(answer.exit_code, exit_cannot_be_done);
-  EXPECT_EQ(answer.error, "output = " + file.string() + " (File too large)");
+  EXPECT_EQ(answer.error, "output = " + file.string() + " (cannot be written: File too large)");
   EXPECT_TRUE(std::filesystem::is_empty(file.parent_path()));
 }
 

@@ -112,7 +112,7 @@ TEST_F(ServiceLimits, HoldForMoreRunsOfAFinishedCampaign) {
   start_with({test::campaign_of("a", 2)});
   EXPECT_THAT(submit("b"), StartsWith("campaign b: active"));
   EXPECT_EQ(submit("a", 3), too_many);
-  EXPECT_THAT(submit("a", 2), StartsWith("campaign a: finished"));  // Nothing begins again.
+  EXPECT_THAT(submit("a", 2), StartsWith("campaign a: failed"));  // Nothing begins again.
   EXPECT_THAT(control(ControlAction::cancel, "b"), StartsWith("campaign b: cancelled"));
   EXPECT_THAT(submit("a", 3), StartsWith("campaign a: active"));
 }

@@ -111,6 +111,8 @@ TEST_F(DefinitionTable, HasTheKeysAndValuesOfTheCampaignFile) {
   const MicroscopeCampaign campaign = varied_campaign();
   make_file(campaign);
   Pairs pairs = pairs_of(canonical_definition(campaign));
+  // The text leaves it out, as texts of older programs do.
+  pairs.emplace_back("budget.test_spin_rate_rad_s", "0");
   const auto rows = rows_of("SELECT key, value FROM definition_entry ORDER BY key");
   // Excitations stand behind the other keys of their session in the text, before them in the table.
   std::ranges::sort(pairs);

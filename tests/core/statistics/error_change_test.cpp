@@ -167,13 +167,14 @@ double k2c_error(double normal, double other) {
   return triangular(normal) * triangular(other);
 }
 
-// 20 % more scatter of K2c was found in 66 % with a weight of 0.2; see README.md.
+// 20 % more scatter of K2c is found in 69.4 % of 2,000 repetitions, and with a weight of 0.2 in 66
+// %; see README.md. Three standard errors of 300 repetitions are 8 %.
 TEST(ErrorChange, FindsALargerScatterOfK2c) {
   const Case one{1000, 1000, 300};
   const Found found = found_in(
       one, k2c_error, [](double normal, double other) { return 1.2 * k2c_error(normal, other); });
   print("K2c, scatter x 1.2", one, found);
-  EXPECT_GT(found.scale, 68.0);
+  EXPECT_NEAR(found.scale, 69.4, 8.0);
 }
 
 /// Both passes of the errors of a campaign.

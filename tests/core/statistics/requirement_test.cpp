@@ -72,7 +72,9 @@ TEST(ParseRequirement, RefusesAnUnknownParameter) {
   EXPECT_EQ(refusal("a_c14 < 1 for 9% with 9%"),
             "requirement = a_c14 < 1 for 9% with 9% (a_c14 is no parameter; they are "
             "a_c11_delta_x, a_c11_delta_z, a_c11_delta_y, a_c12, a_c13, a_d11_prime, a_d12, "
-            "a_d13, k2d, k2c)");
+            "a_d13, k2d, k2c, budget, t_xx_delta_x, t_xz_delta_z, t_xy_delta_y, t_yy_delta_y, "
+            "t_zz_delta_z, residual_x, residual_y, residual_z, common_quadratic, "
+            "differential_quadratic)");
 }
 
 TEST(ParseRequirement, RefusesNumbersOutsideTheirRange) {

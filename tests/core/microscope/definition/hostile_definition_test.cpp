@@ -156,7 +156,7 @@ TEST(HostileDefinition, HasOtherTables) {
   EXPECT_EQ(refusal([](Definition& d) { d.tables[0].values[8] = nan; }),
             "definition:5: environment.file row 2 = nan (must be finite)");
   EXPECT_EQ(refusal([](Definition& d) { d.table_columns.clear(); }),
-            "definition:240: dispersion = 0 columns (laws of kind table are 1)");
+            "definition:235: dispersion = 0 columns (laws of kind table are 1)");
   EXPECT_NE(refusal([](Definition& d) {
               d.table_columns[0].pop_back();
             }).find("has 1 rows, 2 runs need one each"),
