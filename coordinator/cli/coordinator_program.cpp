@@ -167,7 +167,7 @@ bool has_given_up_runs(const Service& service) {
 /// @return An ExitCode.
 int serve_campaigns(const ServeOptions& options) {
   wire::ignore_broken_pipes();  // The service outlives what reads its log.
-  require_room_for_service();
+  wire::require_threads(num_service_threads);
   const std::optional<PageConfig> page_config = page_config_of(options.page);
   const Log log = wire::make_log("proofmass-coordinator", options.log_format, wire::LogLevel::info);
   const SignalThread signals;

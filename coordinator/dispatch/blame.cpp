@@ -79,11 +79,12 @@ std::uint32_t num_credible(const State& state, const Suspicion& suspicion) {
   return count;
 }
 
-/// The smaller, the sooner the host may try the run. A crash says more than a trial without a
+/// The smaller, the sooner the host may try the run. A crash says more than a computation without a
 /// result, which any worker can make up.
-std::uint32_t share_of_trials(const Suspicion& suspicion, const HostId& id) {
+std::uint32_t share_of_run(const Suspicion& suspicion, const HostId& id) {
   const auto host = suspicion.hosts.find(id);
-  return host == suspicion.hosts.end() ? 0 : 4 * host->second.num_crashes + host->second.num_trials;
+  return host == suspicion.hosts.end() ? 0
+                                       : 4 * host->second.num_crashes + host->second.num_lent_alone;
 }
 
 /// A run that is stored cannot become a suspect. Its audit is given up instead.
@@ -221,13 +222,13 @@ bool may_try(const State& state, const Suspicion& suspicion, const Worker& worke
   if (own == suspicion.hosts.end()) return true;
   const std::uint32_t crashes_max = state.config.crashes_per_run_max;
   const bool has_spoken = own->second.num_alone > 0 ? is_proven(state, worker.host)
-                                                    : own->second.num_trials >= crashes_max;
+                                                    : own->second.num_lent_alone >= crashes_max;
   if (has_spoken && suspicion.num_crashes >= crashes_max) return false;
   if (state.ticked_at - suspicion.tried_at >= state.config.lease_duration_max) return true;
   return std::ranges::none_of(state.hosts, [&](const auto& item) {
     const auto& [host, content] = item;
     return content.num_workers > 0 && !state.quarantined.contains(host) &&
-           share_of_trials(suspicion, host) < share_of_trials(suspicion, worker.host);
+           share_of_run(suspicion, host) < share_of_run(suspicion, worker.host);
   });
 }
 

@@ -244,7 +244,7 @@ bool lend_suspect(const Borrower& borrower) {
   campaign.pending_suspects.erase(found);
   Suspicion& suspicion = campaign.suspects.at(run);
   suspicion.tried_at = borrower.now;
-  ++suspicion.hosts[worker.host].num_trials;
+  ++suspicion.hosts[worker.host].num_lent_alone;
   Lease lease = borrower.lease_of(RunSet(RunRange{run, 1}), attempt);
   lease.is_alone = true;
   lease.num_slots = 1;

@@ -182,7 +182,7 @@ struct Suspicion {
   struct OnHost {
     std::uint32_t num_crashes = 0;
     std::uint32_t num_alone = 0;
-    std::uint32_t num_trials = 0;
+    std::uint32_t num_lent_alone = 0;
   };
   std::uint32_t num_crashes = 0;
   std::map<HostId, OnHost> hosts;  ///< Of the present epoch.

@@ -25,7 +25,6 @@
 #include "coordinator/net/worker_history.hpp"
 #include "core/error.hpp"
 #include "proto/link/kill_point.hpp"
-#include "proto/link/surroundings.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -448,11 +447,6 @@ class Service::Impl final : public Outbox {
   bool has_storage_failed_ = false;
   Background background_;  ///< Ends before all that its work uses.
 };
-
-void require_room_for_service() {
-  constexpr int num_threads = 8;  // ZeroMQ's, and those that write, answer, guard and wait.
-  wire::require_threads(num_threads);
-}
 
 Service::Service(std::vector<ServedCampaign> campaigns, const ServiceConfig& config, Log log)
     : impl_(std::make_unique<Impl>(

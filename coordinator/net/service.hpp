@@ -91,9 +91,9 @@ struct ServiceConfig {
   std::optional<wire::FaultPlan> faults;  ///< Of workers' messages; for tests of this program.
 };
 
-/// To be called before a service and its threads are made.
-/// @throws Error if there are too few threads for one.
-void require_room_for_service();
+/// Threads of a service, to be required before it is made: ZeroMQ's, and those that write, answer,
+/// guard and wait.
+inline constexpr int num_service_threads = 8;
 
 /// A coordinator: lends the runs of its campaigns to the workers that connect, stores their results
 /// and answers clients. One thread serves all sockets; another writes to the campaign databases.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/statistics/detail/check.hpp"
+#include "core/statistics/detail/special.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/order.hpp"
 
@@ -36,8 +37,7 @@ double serial_p_value(std::span<const double> values) {
   return std::min(1.0, least * static_cast<double>(num_lags));
 }
 
-/// Of levels that each have as many values as the others: Pearson's χ², which is too small there,
-/// by the cube root of Wilson and Hilferty.
+/// Of levels that each have as many values as the others: Pearson's χ², which is too small there.
 double level_p_value(std::span<const double> ascending, std::size_t num_levels) {
   const auto expected = static_cast<double>(ascending.size()) / static_cast<double>(num_levels);
   double chi_square = 0.0;
@@ -48,8 +48,7 @@ double level_p_value(std::span<const double> ascending, std::size_t num_levels) 
     begin = end;
   }
   const double freedom = static_cast<double>(num_levels) - 1.0;
-  const double spread = 2.0 / (9.0 * freedom);
-  return normal_cumulative((std::cbrt(chi_square / freedom) - 1.0 + spread) / std::sqrt(spread));
+  return detail::regularised_gamma(0.5 * freedom, 0.5 * chi_square).lower;
 }
 
 /// Two neighbouring gaps a and b of ordered independent values are exponential with nearly the

@@ -267,8 +267,13 @@ def compare_many_errors(a, b):
     first, second = columns[a], columns[b]
     limit = 2 * math.sqrt(np.mean(np.concatenate([first, second]) ** 2))
     location = scipy.stats.ttest_ind(second, first, equal_var=False)
-    distances = [abs(side - float(exact_moments(side)[0])) for side in (first, second)]
-    scale = scipy.stats.ttest_ind(*distances, equal_var=False)
+    # The mean of |x - m| scatters as that of |x - m| - s (x - m), s being the mean sign of x - m.
+    deviations = [side - float(exact_moments(side)[0]) for side in (first, second)]
+    scatters = [abs(d) - np.mean(np.sign(d)) * d for d in deviations]
+    scale = scipy.stats.ttest_ind_from_stats(
+        *(figure for d, s in zip(deviations, scatters)
+          for figure in (float(exact_moments(abs(d))[0]), float(np.std(s, ddof=1)), len(d))),
+        equal_var=False)
     beyond = [int((abs(side) > limit).sum()) for side in (first, second)]
     within = [len(first) - beyond[0], len(second) - beyond[1]]
     return limit, location.pvalue, scale.pvalue, scipy.stats.fisher_exact([beyond, within])[1]

@@ -356,7 +356,7 @@ StopPlan stop_plan_of(const RunOptions& options, std::uint64_t num_runs) {
 
 int run_campaign(const RunOptions& options) {
   wire::ignore_broken_pipes();  // A campaign goes on when nobody reads its progress.
-  require_room_for_service();
+  wire::require_threads(num_service_threads);
   const std::unique_ptr<Campaign> campaign =
       read_campaign(options.campaign_file, options.overrides);
   check_part(options, *campaign);
