@@ -41,6 +41,9 @@ const std::map<std::string, std::string> unheld{
     {"run_failure.num_attempts", "told by the coordinator of the time alone"},
     {"run_failure.given_up_utc", "a time of the wall clock"},
     {"audit.compared_unix_s", "a time of the wall clock"},
+    {"run_warning.run_index", "for queries; reports compute it anew"},
+    {"run_warning.effect", "for queries; reports compute it anew"},
+    {"run_warning.part", "for queries; reports compute it anew"},
     {"coordinator_start.start_id", "a number in the order of the starts"},
     {"coordinator_start.epoch", "a random number"},
     {"coordinator_start.host", "told by the coordinator of the time alone"},
@@ -75,6 +78,7 @@ class ColumnChange : public test::VerificationTest {
     campaign_.dispersions[0].law = Law::table;
     campaign_.dispersions[0].file = "table.csv";
     campaign_.dispersions[0].column = "k";
+    campaign_.dispersions[0].is_independent = true;
     campaign_.table_columns = {std::vector<double>(18, 1e-3)};
     static const std::vector<RunResult> results = test::simulated(campaign_);
     results_ = results;

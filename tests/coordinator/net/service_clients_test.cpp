@@ -362,7 +362,8 @@ TEST_F(ServiceClients, AreToldThatAFileCannotBeServed) {
   };
   start_with({test::campaign_of("b", 2)});
   const wire::SubmitRequest request{.definition = definition_of(test::campaign_of("a", 2))};
-  const std::string expected = "campaign = a in a.db (is served already, from another file)";
+  const std::string expected = "campaign = a in " + (directory / "a.db").string() +
+                               " (is served already, from another file)";
   EXPECT_EQ(client->error(request), expected);
   EXPECT_EQ(client->error(request), expected);
   EXPECT_TRUE(std::filesystem::exists(directory / "a.db"));

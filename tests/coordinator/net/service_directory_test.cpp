@@ -224,7 +224,8 @@ TEST_F(ServiceWithADirectory, RemovesAFileThatItMadeForASubmissionInVain) {
   const wire::ReplyPacket packet = client->receive_final();
   EXPECT_EQ(packet.id, 100U);
   EXPECT_EQ(std::get<wire::ErrorReply>(packet.reply).text,
-            "campaign = a in a.db (is served already, from another file)");
+            "campaign = a in " + (directory / "a.db").string() +
+                " (is served already, from another file)");
   EXPECT_FALSE(fs::exists(directory / "a.db"));
   EXPECT_TRUE(fs::exists(directory / "small.db"));
   EXPECT_THAT(served(), ElementsAre("a"));
