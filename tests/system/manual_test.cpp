@@ -125,7 +125,8 @@ TEST(Completions, OfBashOfferWhatHelpShowsAndNothingElse) {
 }
 
 TEST(Completions, OfBashOfferValues) {
-  EXPECT_EQ(offered("proofmass", {"export", "a.db", "--format", "''"}), "csv\nhdf5\njson\n");
+  EXPECT_EQ(offered("proofmass", {"export", "a.db", "--format", "''"}),
+            "csv\nhdf5\njson\nsqlite\n");
   EXPECT_EQ(offered("proofmass", {"tag", "a.db", "r"}), "remove\n");
   EXPECT_EQ(offered("proofmass-worker", {"--log-format", "=", "j"}), "json\n");
   const TemporaryDirectory directory;

@@ -183,9 +183,9 @@ TEST_F(Stranger, LearnsNoPathOfTheServer) {
   ASSERT_EQ(remote({"status"}), 0);
   EXPECT_THAT(output(), HasSubstr("notes.db"));
   EXPECT_THAT(output(), Not(HasSubstr("/notes.db")));
-  const std::string status = page("/api/status");
-  EXPECT_THAT(status, HasSubstr("\"campaign database = notes.db (is not an SQLite database)\""));
-  EXPECT_THAT(status, Not(HasSubstr("served/")));
+  const std::string overview = page("/");
+  EXPECT_THAT(overview, HasSubstr("campaign database = notes.db (is not an SQLite database)"));
+  EXPECT_THAT(overview, Not(HasSubstr("served/")));
   std::filesystem::rename(path("served/hardy2013.db"), path("served/moved"));
   std::filesystem::create_directory(path("served/hardy2013.db"));
   for (const std::string command : {"report", "fetch"}) {
