@@ -217,6 +217,11 @@ void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox) {
              id);
 }
 
+void note_lent_alone(Suspicion& suspicion, const Worker& worker, TimePoint now) {
+  suspicion.tried_at = now;
+  ++suspicion.hosts[worker.host].num_lent_alone;
+}
+
 bool may_try(const State& state, const Suspicion& suspicion, const Worker& worker) {
   const auto own = suspicion.hosts.find(worker.host);
   if (own == suspicion.hosts.end()) return true;

@@ -29,10 +29,13 @@ void give_up_untried(State& state, Outbox& outbox);
 /// The run is not lent again. @pre It is a suspect, and has no place.
 void give_up(State& state, CampaignId id, RunIndex run, Outbox& outbox);
 
-/// True if the worker may be lent this suspect. A suspect is tried on the host that has tried it
-/// least, and on which it has crashed least, if a worker there takes it soon: otherwise a bad host
-/// could make a good run be given up, or keep it. A host whose word does not suffice any more, or
-/// that has often brought nothing, does not get it again.
+/// Counts that the run is lent to the worker alone, or found there and left to it.
+void note_lent_alone(Suspicion& suspicion, const Worker& worker, TimePoint now);
+
+/// True if the worker may be lent this suspect, or keep it if it holds it. A suspect is tried on
+/// the host that has tried it least, and on which it has crashed least, if a worker there takes it
+/// soon: otherwise a bad host could make a good run be given up, or keep it. A host whose word does
+/// not suffice any more, or that has often brought nothing, does not get it again.
 [[nodiscard]] bool may_try(const State& state, const Suspicion& suspicion, const Worker& worker);
 
 }  // namespace proofmass::coordinator::detail

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/dispatch/blame.hpp"
 #include "coordinator/dispatch/leases.hpp"
 #include "coordinator/dispatch/lending.hpp"
 
@@ -61,14 +62,19 @@ struct Adoption {
     }
   }
 
-  /// A suspect that is all that the worker has goes on there. Any other one must be tried alone.
+  /// A suspect that is all that the worker has goes on there if it might be lent to it, and counts
+  /// as lent. Any other one must be tried alone.
   /// @return True if the only run is a suspect, and lent to the worker from now on.
   [[nodiscard]] bool adopt_suspect(const HeldByAttempt& held, const RunSet& rest) const {
-    auto& suspects = state.campaigns.at(campaign_id).pending_suspects;
-    if (rest.size() != 1 || state.workers.at(id).num_lent > 0) return false;
-    if (claimable(rest).empty()) return false;
+    CampaignState& campaign = state.campaigns.at(campaign_id);
+    auto& suspects = campaign.pending_suspects;
+    const Worker& worker = state.workers.at(id);
+    if (rest.size() != 1 || worker.num_lent > 0 || claimable(rest).empty()) return false;
     const auto found = suspects.find(rest.first());
     if (found == suspects.end()) return false;
+    Suspicion& suspicion = campaign.suspects.at(found->first);
+    if (!may_try(state, suspicion, worker)) return false;
+    note_lent_alone(suspicion, worker, now);
     const auto held_as = std::find_if(held.begin(), held.end(), [&](const auto& item) {
       return item.second.contains(found->first);
     });

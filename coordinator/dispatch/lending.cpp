@@ -242,9 +242,7 @@ bool lend_suspect(const Borrower& borrower) {
   if (worker.num_lent > 0 || !is_clear) return true;
   const auto [run, attempt] = *found;
   campaign.pending_suspects.erase(found);
-  Suspicion& suspicion = campaign.suspects.at(run);
-  suspicion.tried_at = borrower.now;
-  ++suspicion.hosts[worker.host].num_lent_alone;
+  note_lent_alone(campaign.suspects.at(run), worker, borrower.now);
   Lease lease = borrower.lease_of(RunSet(RunRange{run, 1}), attempt);
   lease.is_alone = true;
   lease.num_slots = 1;

@@ -125,12 +125,18 @@ class World final : public coordinator::Outbox {
     return std::string(1, static_cast<char>('a' + step.number % num_connections));
   }
 
+  /// Half of the connections come from each of two hosts.
+  static std::string host(const Step& step) {
+    return step.number % num_connections < num_connections / 2 ? "h" : "g";
+  }
+
   void act(const Step& step) {
     switch (step.kind) {
       case StepKind::worker_message:
-        return gateway_.receive({.from = {.routing_id = routing_id(step), .key = "", .host = ""},
-                                 .frames = {step.content}},
-                                now_, *this);
+        return gateway_.receive(
+            {.from = {.routing_id = routing_id(step), .key = "", .host = host(step)},
+             .frames = {step.content}},
+            now_, *this);
       case StepKind::client_request:
         return carry_out_request(step.content);
       case StepKind::client_reply:

@@ -11,7 +11,7 @@
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/codec.hpp"
 #include "tests/fuzz/fuzz_input.hpp"
-#include "tests/support/microscope_results.hpp"
+#include "tests/support/drawn_result.hpp"
 
 namespace proofmass::test {
 namespace {
@@ -72,8 +72,7 @@ class Speaker {
     wire::ResultBatch batch{.campaign = campaign, .attempt = {attempt}, .results = {}};
     for (std::uint64_t run = first; run < first + count; ++run) {
       wire::ComputedRun computed;
-      computed.result = zero_result({.run = {run}});
-      computed.result.num_draws = 1;
+      computed.result = drawn_result({.run = {run}});
       computed.compute_s = 0.5;
       computed.elapsed_s = 8.0;
       batch.results.push_back(computed);
@@ -160,7 +159,8 @@ std::string workers_that_are_lost() {
   return to_bytes(steps);
 }
 
-/// The last run of a campaign crashes one worker after the other, each on another host.
+/// The last run of a campaign crashes one worker after the other: three on one host, and one on
+/// another.
 std::string run_that_crashes_workers() {
   std::vector<Step> steps;
   steps.push_back(control(wire::ControlAction::cancel, "table"));
@@ -171,7 +171,7 @@ std::string run_that_crashes_workers() {
   first.say(wire::Bye{.reason = wire::LossReason::drained});
   for (std::uint8_t i = 1; i <= 4; ++i) {
     Speaker worker(steps, i, 11U + i);
-    worker.say_hello(std::string(1, static_cast<char>('h' + i)));
+    worker.say_hello(i < 4 ? "h" : "g");
     worker.beat(fuzz_campaign, 0, 0);
     steps.push_back(happening(StepKind::gone, i));
   }
@@ -269,7 +269,7 @@ std::string hosts_that_lie() {
   for (std::uint8_t i = 0; i < 7; ++i) {
     Speaker worker(steps, i, 11U + i);
     const wire::SessionId former{10U + i};
-    worker.say_hello(i == 3 ? "g" : "h", wire::FormerSession{.session = former, .signal = 11});
+    worker.say_hello(i < 4 ? "h" : "g", wire::FormerSession{.session = former, .signal = 11});
     if (i != 2) worker.beat(fuzz_campaign, 0, 0);
   }
   steps.push_back(elapsed(16));  // Some make room for others.

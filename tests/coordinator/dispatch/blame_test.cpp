@@ -449,5 +449,27 @@ TEST_F(BlameTest, ASuspectThatIsAllAWorkerHoldsGoesOnThere) {
   EXPECT_EQ(state.workers.at(first).num_alone, 1U);
 }
 
+// A claim counts as a lease: one worker once kept a run from its end for ever.
+TEST_F(BlameTest, ASuspectIsClaimedAgainAndAgain) {
+  crash_three_times_on_one_host();
+  add_worker(second, 1, "liar");
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(runs_held_text(state, second), "0") << i;
+    on_bye(state, second, {.reason = LossReason::failed}, now, outbox);
+    say_hello(second, hello(1, "liar"));
+    heartbeat(second, {held(one, {{0}, 1}, 9)});
+  }
+  EXPECT_EQ(runs_held_text(state, second), "none") << "it has tried often enough";
+  const TimePoint claimed_at = now;
+  while (campaign(one).given_up.empty() && now - claimed_at < 1h) {
+    now += 5s;
+    heartbeat(first);
+    heartbeat(second, {held(one, {{0}, 1}, 9)});
+    on_tick(state, now, outbox);
+  }
+  EXPECT_EQ(now - claimed_at, 5min);
+  outbox.forget();
+}
+
 }  // namespace
 }  // namespace proofmass::test
