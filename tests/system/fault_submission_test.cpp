@@ -170,11 +170,11 @@ TEST_F(ClientRights, AreBoundedInNumberAndSize) {
 }
 
 TEST_F(ClientRights, AreBoundedInTheSizeOfDefinitions) {
-  const auto process = start_coordinator({"--bytes-per-key", "30000"});
+  const auto process = start_coordinator({"--bytes-per-key", "25000"});
   for (const std::string name : {"one", "two", "three"}) write_campaign(name, 16);
   EXPECT_TRUE(contains(told_to("anna", {"submit", "one.toml"}), "campaign one: active"));
   EXPECT_TRUE(contains(told_to("anna", {"submit", "two.toml"}), "campaign two: active"));
-  EXPECT_TRUE(contains(told_to("anna", {"submit", "three.toml"}), "(must be at most 30000 of"));
+  EXPECT_TRUE(contains(told_to("anna", {"submit", "three.toml"}), "(must be at most 25000 of"));
 }
 
 // Whoever can reach the socket of a coordinator without keys may do everything.
