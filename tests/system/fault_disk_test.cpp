@@ -105,7 +105,7 @@ TEST_F(FaultyDisk, IsReadOnly) {
   Process coordinator = this->coordinator("coordinator", {"null.toml"});
   EXPECT_EQ(coordinator.wait(), 1);
   EXPECT_EQ(errors_of("coordinator"),
-            "proofmass-coordinator: error: directory = served (Read-only file system)\n");
+            "proofmass-coordinator: error: lock = served/coordinator.lock (Read-only file system)\n");
 }
 
 }  // namespace
