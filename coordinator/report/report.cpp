@@ -312,14 +312,17 @@ std::string error_table(const CampaignStatistics& statistics, std::uint64_t num_
   return text + joint_text(statistics, num_given_up);
 }
 
-std::string level_text(const ErrorBudget& budget, const CampaignStatistics& statistics) {
+std::string level_text(const ErrorBudget& budget, const CampaignStatistics& statistics,
+                       std::string (*figure)(double)) {
   const std::string_view unit = model().results().health.at(budget.level).unit;
   if (statistics.health.empty() || statistics.health.at(budget.level).worst == 0.0) {
-    return fmt::format("{} is assumed: {:.3g} {}", budget.level_label, budget.assumed_level, unit);
+    return fmt::format("{} is assumed: {} {}", budget.level_label, figure(budget.assumed_level),
+                       unit);
   }
   const HealthStatistic& level = statistics.health.at(budget.level);
-  return fmt::format("{} is that of the runs: worst {:.2e}, mean {:.2e} {}; assumed was {:.3g}",
-                     budget.level_label, level.worst, level.mean, unit, budget.assumed_level);
+  return fmt::format("{} is that of the runs: worst {}, mean {} {}; assumed was {}",
+                     budget.level_label, figure(level.worst), figure(level.mean), unit,
+                     figure(budget.assumed_level));
 }
 
 std::string budget_table(const Campaign& campaign, const CampaignStatistics& statistics,
@@ -337,10 +340,12 @@ std::string budget_table(const Campaign& campaign, const CampaignStatistics& sta
     text +=
         budget_row(budget->terms[i].info, figures([&](const Budget& of) { return of.entries[i]; }));
   }
-  text += table_rule(budget_text_columns) +
-          budget_row(budget->total_info, figures([](const Budget& of) { return of.total; })) +
-          "before: bounds of construction; worst, mean: left by errors of the estimates\n" +
-          level_text(*budget, statistics) + "\n" + budget->note;
+  text +=
+      table_rule(budget_text_columns) +
+      budget_row(budget->total_info, figures([](const Budget& of) { return of.total; })) +
+      "before: bounds of construction; worst, mean: left by errors of the estimates\n" +
+      level_text(*budget, statistics, [](double value) { return fmt::format("{:.3g}", value); }) +
+      "\n" + budget->note;
   return totals ? text + totals_text(*totals) : text;
 }
 

@@ -54,8 +54,10 @@ namespace proofmass::coordinator {
                                       std::uint64_t num_given_up);
 
 /// What the level of a budget is, and that it is the one of the runs or an assumed one.
+/// @param figure  Spells a number.
 [[nodiscard]] std::string level_text(const ErrorBudget& budget,
-                                     const CampaignStatistics& statistics);
+                                     const CampaignStatistics& statistics,
+                                     std::string (*figure)(double));
 
 /// Budget before and after estimation beside the published one, and what single runs have.
 [[nodiscard]] std::string budget_table(const Campaign& campaign,

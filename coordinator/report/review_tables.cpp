@@ -223,7 +223,7 @@ ReviewTable review_budget_table(const Review& review) {
   table.notes.emplace_back(
       "Before: bounds of construction. After: what the errors of the estimates leave; the worst "
       "adds up the worst errors of different runs.");
-  table.notes.push_back(level_text(budget, review.results.statistics) + ".");
+  table.notes.push_back(level_text(budget, review.results.statistics, figure_text) + ".");
   if (!budget.note.empty()) table.notes.push_back(budget.note);
   if (const std::optional<RunTotals>& totals = review.results.totals) {
     table.notes.push_back(fmt::format(

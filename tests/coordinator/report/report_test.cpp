@@ -111,7 +111,7 @@ TEST(BudgetTable, IsOfTheResidueOfTheRuns) {
       test::lines_of(budget_table(MicroscopeCampaign{}, statistics, {}));
   EXPECT_THAT(lines, Contains("2·a_d11·Γ_res,x          2.0e-13  3.5e-16  3.2e-17 │"
                               "  2.0e-14  1.0e-17  3.2e-18"));
-  EXPECT_THAT(lines, Contains("Γ_res is that of the runs: worst 3.50e-11, mean 1.00e-11 m/s²; "
+  EXPECT_THAT(lines, Contains("Γ_res is that of the runs: worst 3.5e-11, mean 1e-11 m/s²; "
                               "assumed was 1e-12"));
   EXPECT_THAT(budget_table(MicroscopeCampaign{}, paper_statistics(100), {}),
               HasSubstr("Γ_res is assumed: 1e-12 m/s²\n"));
