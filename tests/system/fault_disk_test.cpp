@@ -104,8 +104,9 @@ TEST_F(FaultyDisk, IsReadOnly) {
   ASSERT_EQ(mount(nullptr, nullptr, MS_REMOUNT | MS_RDONLY, nullptr), 0);
   Process coordinator = this->coordinator("coordinator", {"null.toml"});
   EXPECT_EQ(coordinator.wait(), 1);
-  EXPECT_EQ(errors_of("coordinator"),
-            "proofmass-coordinator: error: lock = served/coordinator.lock (Read-only file system)\n");
+  EXPECT_EQ(
+      errors_of("coordinator"),
+      "proofmass-coordinator: error: lock = served/coordinator.lock (Read-only file system)\n");
 }
 
 }  // namespace
