@@ -28,6 +28,7 @@ ORDER BY largest_part DESC;
 
 -- Statistics are of completed runs from here on. Those of a file with runs that did not converge
 -- are computed anew from its results; the largest errors are kept with the results, and made here.
+-- The condition status <> 1 is that of the index of runs that are not completed.
 DELETE FROM statistic WHERE EXISTS (SELECT 1 FROM run_result WHERE status <> 1 AND status = 2);
 DELETE FROM budget_entry WHERE EXISTS (SELECT 1 FROM run_result WHERE status <> 1 AND status = 2);
 DELETE FROM summary WHERE EXISTS (SELECT 1 FROM run_result WHERE status <> 1 AND status = 2);
