@@ -90,7 +90,7 @@ TEST_F(ServiceWithADirectory, ServesAFileOnceItCanBeOpened) {
   EXPECT_THAT(status.campaigns, IsEmpty());
   ASSERT_EQ(status.unserved_files.size(), 1U);
   EXPECT_EQ(status.num_unserved_files, 1U);
-  EXPECT_EQ(status.unserved_files[0].file, "a.db");
+  EXPECT_EQ(status.unserved_files[0].file, (directory / "a.db").string());
   EXPECT_EQ(status.unserved_files[0].reason, "file = a.db (is locked)");
   while (folder.num_loads() < 4) std::this_thread::yield();
   folder.set_before_load([](const fs::path&) {});
