@@ -35,12 +35,16 @@ void PlayedCoordinator::check_sent(wire::WorkerId worker, const wire::Message& m
   }
 }
 
-/// A worker that does nothing wrong is never told that it must not come back.
+/// A worker that does nothing wrong is never told that it must not come back, and nobody is kept
+/// away for ever.
 void PlayedCoordinator::check_reject(const wire::Reject& reject, const Peer& peer) const {
   const bool may_come_again = reject.reason == wire::RejectReason::not_registered ||
                               reject.reason == wire::RejectReason::full ||
                               reject.reason == wire::RejectReason::quarantined;
   EXPECT_TRUE(may_come_again || !peer.is_honest) << reject.text;
+  for (const auto& [host, until] : life_->state.quarantined) {
+    EXPECT_GT(until, life_->state.ticked_at) << "a quarantine that does not end by itself";
+  }
 }
 
 /// Nobody gets what it was not given, unless which runs that were is forgotten.
