@@ -51,8 +51,10 @@ th,td,#matrix th,#matrix td{padding:.1rem .25rem}
 #matrix td:nth-child(2){min-width:13rem}
 h2,h3{break-after:avoid}
 figure,tr{break-inside:avoid}
-.flow{gap:.5rem}
-figure{zoom:.74}
+.flow{display:block}
+.flow>*{display:inline-block;vertical-align:top;margin-right:.2rem}
+table{break-inside:avoid}
+figure{zoom:.72}
 }
 )";
 
