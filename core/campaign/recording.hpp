@@ -69,7 +69,4 @@ struct RecordedSample {
   std::span<const double> values;  ///< Of all signals of all groups, in their order.
 };
 
-/// Takes the samples of a run, in the order of sessions and times. What it throws ends the replay.
-using SampleSink = std::function<void(const RecordedSample&)>;
-
 }  // namespace proofmass

@@ -5,9 +5,14 @@
 #include <benchmark/benchmark.h>
 
 #include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/microscope/control/control_loops.hpp"
+#include "core/microscope/environment/environment.hpp"
+#include "core/microscope/instrument/instrument.hpp"
+#include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/microscope/simulation/session_record.hpp"
 #include "core/random/normal.hpp"
+#include "core/signal/line_weights.hpp"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass {

@@ -8,7 +8,7 @@
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/dispersion.hpp"
 #include "core/microscope/campaign/scenario.hpp"
-#include "core/microscope/environment/environment.hpp"
+#include "core/microscope/environment/environment_table.hpp"
 #include "core/microscope/instrument/drawn_quantities.hpp"
 #include "core/microscope/instrument/instrument.hpp"
 

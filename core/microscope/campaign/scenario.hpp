@@ -6,13 +6,12 @@
 
 #include "core/campaign/field.hpp"
 #include "core/microscope/campaign/budget.hpp"
-#include "core/microscope/control/control_loops.hpp"
-#include "core/microscope/environment/environment.hpp"
+#include "core/microscope/control/control_config.hpp"
+#include "core/microscope/environment/environment_config.hpp"
 #include "core/microscope/estimation/estimation_config.hpp"
-#include "core/microscope/instrument/instrument.hpp"
+#include "core/microscope/instrument/instrument_config.hpp"
 #include "core/microscope/instrument/noise_config.hpp"
-#include "core/microscope/instrument/sensor_model.hpp"
-#include "core/microscope/orbit/kepler_orbit.hpp"
+#include "core/microscope/orbit/orbit_config.hpp"
 #include "core/microscope/results/results.hpp"
 #include "core/microscope/session/session.hpp"
 

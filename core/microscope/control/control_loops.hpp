@@ -2,22 +2,12 @@
 
 #include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
+#include "core/microscope/control/control_config.hpp"
 
 namespace proofmass {
 
 // The two control loops of the satellite, sampled. What a controller returns at sample k acts from
 // sample k + 1 on. README.md has the transfer functions.
-
-/// Settings of the drag-free loop L(s) = (ω_c/s)(1 + ω_i/s): `[drag_free]` of a campaign file.
-struct DragFreeConfig {
-  double bandwidth_hz = 0.05;  ///< f_c = ω_c/2π, at which |L| is about 1.
-  double integral_hz = 0.005;  ///< f_i = ω_i/2π, below which L grows with 1/f²; < bandwidth_hz.
-  /// Error of the read-out bias that the loop subtracts, on each axis of S: C_0 − b_0c of
-  /// [Hardy2013] section 4.2.
-  double bias_compensation_error_x_m_s2 = 0.0;
-  double bias_compensation_error_y_m_s2 = 0.0;
-  double bias_compensation_error_z_m_s2 = 0.0;
-};
 
 /// Gains of the drag-free loop at the sample rate, without unit.
 struct DragFreeGains {
@@ -48,15 +38,6 @@ struct DragFreeController {
     second_integral_S += T(gains.integral) * first_integral_S;
     return first_integral_S + second_integral_S;
   }
-};
-
-/// Settings of the attitude loop, proportional and derivative with a slow integral: `[attitude]` of
-/// a campaign file.
-struct AttitudeConfig {
-  double bandwidth_hz = 0.02;  ///< Natural frequency ω/2π.
-  double damping = 0.8;        ///< Damping ratio ζ.
-  double integral_hz = 1e-3;   ///< Corner below which the integral acts; < bandwidth_hz.
-  double blending_hz = 3e-3;   ///< Crossover ω_h/2π from star tracker to angular accelerometer.
 };
 
 /// Gains of the attitude estimator and controller at the sample rate.

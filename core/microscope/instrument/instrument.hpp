@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/microscope/instrument/drawn_quantities.hpp"
+#include "core/microscope/instrument/instrument_config.hpp"
 #include "core/microscope/results/results.hpp"
 
 namespace proofmass {
@@ -51,13 +52,6 @@ struct SensitivityMatrices {
 };
 
 [[nodiscard]] SensitivityMatrices sensitivity_matrices(const Instrument& instrument);
-
-/// A draw outside these bounds is drawn again.
-struct AcceptanceConfig {
-  double a_d11_max = 1e-2;
-  double a_d1j_max_rad = 1.6e-3;  ///< |a_d12| and |a_d13|.
-  double a_c1j_max_rad = 2.6e-3;  ///< |a_c12| and |a_c13|.
-};
 
 /// True if |a_d11|, |a_d12|, |a_d13|, |a_c12| and |a_c13| are at most their bounds, those behind
 /// [Hardy2013] tab:Budget.

@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "core/signal/noise_shape.hpp"
+#include "core/signal/sensor_noise.hpp"
 
 namespace proofmass {
 

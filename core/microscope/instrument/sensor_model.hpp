@@ -6,18 +6,13 @@
 #include "core/math/inline.hpp"
 #include "core/math/vector3.hpp"
 #include "core/microscope/instrument/instrument.hpp"
+#include "core/microscope/instrument/instrument_config.hpp"
 #include "core/microscope/orbit/gradient.hpp"
 
 namespace proofmass {
 
 // One sensor with its mass in the sample loop, over the number type of the kernel. k is the sensor,
 // 1 or 2, K its frame.
-
-/// Settings that are the same for all sensors: `[sensor]` of a campaign file.
-struct SensorConfig {
-  /// Largest acceleration that a sensor reports on an axis, m/s²; a larger one reads as this.
-  double range_m_s2 = 1e-5;
-};
 
 /// Satellite motion that both test masses feel at one sample.
 template <typename T>

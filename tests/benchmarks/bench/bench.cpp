@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "core/microscope/environment/environment.hpp"
+#include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/microscope/simulation/session_signals.hpp"
 #include "core/model.hpp"

@@ -10,9 +10,14 @@
 #include <vector>
 
 #include "core/microscope/campaign/microscope_campaign.hpp"
+#include "core/microscope/control/control_loops.hpp"
+#include "core/microscope/environment/environment.hpp"
+#include "core/microscope/instrument/instrument.hpp"
+#include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/microscope/simulation/batch_kernel.hpp"
 #include "core/microscope/simulation/session_record.hpp"
 #include "core/random/normal.hpp"
+#include "core/signal/line_weights.hpp"
 
 namespace proofmass::test {
 namespace {

@@ -6,6 +6,8 @@
 #include <complex>
 #include <numbers>
 
+#include "core/microscope/environment/environment.hpp"
+#include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/microscope/simulation/session_record.hpp"
 
 namespace proofmass {

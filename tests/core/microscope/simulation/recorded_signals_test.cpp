@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/campaign/recording.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/signal/noise_shape.hpp"
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/microscope/campaign/scenario.hpp"
+#include "core/microscope/environment/environment.hpp"
 
 namespace proofmass {
 namespace {
