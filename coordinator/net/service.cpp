@@ -40,19 +40,6 @@ constexpr int worker_messages_per_turn_max = 1000;
 // ... nor workers by clients that ask much.
 constexpr int client_messages_per_turn_max = 16;
 
-/// What is logged of a campaign database that lost its name and has it back.
-std::string_view kind_of(FileReturn file_return) {
-  switch (file_return) {
-    case FileReturn::restored:
-      return "campaign_file_restored";
-    case FileReturn::replaced:
-      return "campaign_file_replaced";
-    case FileReturn::log_made_anew:
-      return "write_ahead_log_restored";
-  }
-  return "campaign_file_restored";
-}
-
 }  // namespace
 
 class Service::Impl final : public Outbox {
@@ -353,6 +340,7 @@ class Service::Impl final : public Outbox {
   void complete(const StoreFailed& failed) {
     if (!campaign_service_.is_served(failed.campaign)) return;
     on_store_failed(state_, failed.campaign, failed.text, *this);
+    if (failed.is_abandoned) campaign_service_.abandon(failed.campaign);
   }
   void complete(const StoreRecovered& recovered) {
     if (!campaign_service_.is_served(recovered.campaign)) return;
@@ -365,13 +353,6 @@ class Service::Impl final : public Outbox {
          .fields = {{"size_bytes", grown.size},
                     Field::remark("(somebody reads an old state of the file)")}},
         grown.campaign);
-  }
-  void complete(const FileReturned& returned) {
-    if (!campaign_service_.is_served(returned.campaign)) return;
-    log({.severity = Severity::warning,
-         .kind = kind_of(returned.kind),
-         .fields = {{"runs", state_.campaigns.at(returned.campaign).committed.size()}}},
-        returned.campaign);
   }
   void complete(const LogKept& kept) {
     log({.severity = Severity::warning,
