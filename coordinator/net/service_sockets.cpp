@@ -47,11 +47,16 @@ ServiceSockets::ServiceSockets(const ServiceConfig& config, Log log)
       authenticator_->watch(wire::Domain::clients, [this] { return clients_->take_event(); });
     }
   }
+  descriptors_ = shared_out(raise_descriptor_limit(), config.num_descriptors_reserved,
+                            lowest_free_descriptor());
   if (!config.memory_size_max) return;
   guard_.emplace(*config.memory_size_max,
-                 MemoryGuard::Actions{.close = [this] { close(); },
-                                      .open = [this] { return open(); },
-                                      .note = [this](Event event) { note(std::move(event)); }});
+                 MemoryGuard::Actions{
+                     .close = [this] { close(); },
+                     .open = [this] { return open(); },
+                     .lacks_descriptors =
+                         [end = descriptors_.alarm] { return lowest_free_descriptor() >= end; },
+                     .note = [this](Event event) { note(std::move(event)); }});
 }
 
 ServiceSockets::~ServiceSockets() = default;
