@@ -23,7 +23,7 @@
 #include "coordinator/net/worker_gateway.hpp"
 #include "coordinator/net/worker_history.hpp"
 #include "core/error.hpp"
-#include "proto/link/kill_point.hpp"
+#include "proto/link/faults.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -74,7 +74,7 @@ class Service::Impl final : public Outbox {
 
   void run(const std::atomic<StopRequest>& stop, const std::function<void()>& on_turn) {
     while (!is_over(stop)) {
-      sockets_.wait(config_.faults ? tick_interval / 10 : tick_interval);
+      sockets_.wait(sockets_.has_faults() ? tick_interval / 10 : tick_interval);
       turn();
       on_turn();
     }

@@ -35,11 +35,11 @@ ServiceSockets::ServiceSockets(const ServiceConfig& config, Log log)
   if (config.keys) authenticator_ = std::make_unique<Authenticator>(*context_, *config.keys, log_);
   workers_ = std::make_unique<RouterSocket>(*context_, "bind", config.workers_endpoint,
                                             security_of(config, wire::Domain::workers),
-                                            config.faults, config.workers_listener);
+                                            config.workers_listener);
   if (config.clients_endpoint) {
     clients_ =
         std::make_unique<RouterSocket>(*context_, "bind-clients", *config.clients_endpoint,
-                                       security_of(config, wire::Domain::clients), std::nullopt);
+                                       security_of(config, wire::Domain::clients));
   }
   if (authenticator_ != nullptr) {
     authenticator_->watch(wire::Domain::workers, [this] { return workers_->take_event(); });

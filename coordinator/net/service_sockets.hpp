@@ -44,6 +44,9 @@ class ServiceSockets {
   [[nodiscard]] std::string workers_endpoint() const { return workers_->endpoint(); }
   [[nodiscard]] std::string clients_endpoint() const;  ///< Empty if there are no clients.
 
+  /// Whether messages come late on purpose.
+  [[nodiscard]] bool has_faults() const { return workers_->has_faults(); }
+
   /// Who may connect; null if there are no keys.
   [[nodiscard]] Authenticator* authenticator() { return authenticator_.get(); }
 

@@ -23,7 +23,7 @@
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "core/model.hpp"
-#include "proto/link/kill_point.hpp"
+#include "proto/link/faults.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {

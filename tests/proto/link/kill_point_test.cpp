@@ -1,4 +1,4 @@
-#include "proto/link/kill_point.hpp"
+#include "tests/support/faults/planned_faults.hpp"
 
 #include <gtest/gtest.h>
 #include <signal.h>
