@@ -33,8 +33,7 @@ class RouterSocket {
   /// @param listener  As for wire::make_router().
   /// @throws Error as wire::make_router() does.
   RouterSocket(zmq::context_t& context, std::string_view option, const std::string& endpoint,
-               const wire::ServerSecurity& security,
-               std::optional<int> listener = std::nullopt);
+               const wire::ServerSecurity& security, std::optional<int> listener = std::nullopt);
   ~RouterSocket();
   RouterSocket(const RouterSocket&) = delete;
   RouterSocket& operator=(const RouterSocket&) = delete;
@@ -79,9 +78,9 @@ class RouterSocket {
   std::string option_;
   wire::ServerSecurity security_;
   std::string endpoint_;
-  std::mutex mutex_;                            ///< For the socket and its events.
-  std::unique_ptr<zmq::socket_t> socket_;       ///< Null while it is closed.
-  std::unique_ptr<wire::SocketEvents> events_;  ///< Of the socket: gone before it.
+  std::mutex mutex_;                             ///< For the socket and its events.
+  std::unique_ptr<zmq::socket_t> socket_;        ///< Null while it is closed.
+  std::unique_ptr<wire::SocketEvents> events_;   ///< Of the socket: gone before it.
   std::unique_ptr<wire::LinkFaults> sending_;    ///< Null unless something shall go wrong.
   std::unique_ptr<wire::LinkFaults> receiving_;  ///< The same.
   std::map<std::string, Address> addresses_;     ///< Of those whose messages are delayed.

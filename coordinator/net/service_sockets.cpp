@@ -37,9 +37,8 @@ ServiceSockets::ServiceSockets(const ServiceConfig& config, Log log)
                                             security_of(config, wire::Domain::workers),
                                             config.workers_listener);
   if (config.clients_endpoint) {
-    clients_ =
-        std::make_unique<RouterSocket>(*context_, "bind-clients", *config.clients_endpoint,
-                                       security_of(config, wire::Domain::clients));
+    clients_ = std::make_unique<RouterSocket>(*context_, "bind-clients", *config.clients_endpoint,
+                                              security_of(config, wire::Domain::clients));
   }
   if (authenticator_ != nullptr) {
     authenticator_->watch(wire::Domain::workers, [this] { return workers_->take_event(); });

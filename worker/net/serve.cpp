@@ -8,8 +8,8 @@
 #include <utility>
 #include <variant>
 
-#include "proto/link/init_system.hpp"
 #include "proto/link/faults.hpp"
+#include "proto/link/init_system.hpp"
 #include "proto/wire/codec.hpp"
 #include "worker/net/coordinator_link.hpp"
 #include "worker/spool/spool.hpp"
