@@ -11,6 +11,7 @@
 #include "core/model.hpp"
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/link/faults.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/wire/messages.hpp"
 
@@ -94,10 +95,7 @@ void add_process(CLI::App& app, Options& options) {
       "--no-supervisor", [&options] { options.is_supervised = false; },
       "Do not watch the worker from a second process,\nwhich starts it again if it crashes");
   app.add_option("--parent", options.parent)->group("");  // For `proofmass run`.
-  app.add_option_function<std::string>(
-         "--faults",
-         [&options](const std::string& text) { options.faults = wire::FaultPlan::parse(text); })
-      ->group("");  // For tests of the program by itself.
+  wire::add_fault_option(app);
 }
 
 }  // namespace

@@ -8,7 +8,6 @@
 #include <string>
 #include <string_view>
 
-#include "proto/link/faults.hpp"
 #include "proto/link/log.hpp"
 #include "worker/execution/execution.hpp"
 
@@ -34,7 +33,6 @@ struct Options {
   wire::LogFormat log_format = wire::LogFormat::text;
   std::optional<pid_t> parent;  ///< Campaign that started this worker, for itself alone.
   bool is_supervised = true;
-  std::optional<wire::FaultPlan> faults;
 };
 
 /// Declares the options, which can also come from a file (--config) and from the environment.

@@ -110,7 +110,6 @@ ServeConfig serve_config(const Options& options, TimePoint program_start, const 
   config.security = security_for(options, log);
   config.signals = signal_source(options);
   config.spool = options.spool;
-  config.faults = options.faults;
   ConversationConfig& conversation = config.conversation;
   conversation.drain_time = options.drain_time;
   if (options.parent) conversation.give_up_after = give_up_with_parent;
@@ -150,9 +149,6 @@ int say_ended(const Ending& ending, const wire::Log& log) {
 /// The worker itself; 0, or it throws, or it ends the process because threads do not end.
 int work(const Options& options, const Program& program, ServeConfig config,
          const ChildStart& start) {
-  if (options.faults && options.faults->kill) {
-    wire::arm_kill_point(options.faults->kill->point, options.faults->kill->passage);
-  }
   constexpr int num_threads_beside = 4;  // ZeroMQ's, and one for heartbeats.
   wire::require_threads(static_cast<int>(options.num_threads) + num_threads_beside);
   config.session = start.session;

@@ -27,6 +27,7 @@
 #include "proto/command_line/described_program.hpp"
 #include "proto/command_line/manual_option.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/link/faults.hpp"
 #include "proto/link/init_system.hpp"
 #include "proto/link/log.hpp"
 #include "proto/link/start_program.hpp"
@@ -58,7 +59,6 @@ struct ServeOptions {
   PageOptions page;
   NoticeCommands::Config commands;
   wire::LogFormat log_format = wire::LogFormat::text;
-  std::string faults;       ///< As FaultPlan::parse() reads them.
   double time_scale = 1.0;  ///< > 0; of all that is waited for. Below 1 in tests of this program.
   std::vector<std::filesystem::path> campaign_files;  ///< To be served beside those that are there.
 };
@@ -122,7 +122,6 @@ ServiceConfig config_of(const ServeOptions& options, CampaignFolder& folder) {
   config.dispatch.hosts_per_key_max =
       std::max(config.dispatch.hosts_per_key_max, options.num_workers_max);
   config.dispatch.reference_digest = model().reference_digest(best_instruction_set());
-  if (!options.faults.empty()) config.faults = wire::FaultPlan::parse(options.faults);
   scale_times(config, options.time_scale);
   return config;
 }
@@ -176,9 +175,6 @@ int serve_campaigns(const ServeOptions& options) {
   ServiceConfig config = config_of(options, folder);
   NoticeCommands commands(options.commands, log);
   config.on_notice = [&](const CampaignNotice& notice) { commands.take(notice); };
-  if (config.faults && config.faults->kill) {
-    wire::arm_kill_point(config.faults->kill->point, config.faults->kill->passage);
-  }
   if (page_config) config.num_descriptors_reserved = page_descriptors_max();
   Service service(campaigns_of(options, folder), config, log);
   std::optional<Page> page;
@@ -263,7 +259,7 @@ void add_service(CLI::App& app, ServeOptions& options, bool& ends_when_done) {
                    "Format of the log; text by default")
       ->envname("PROOFMASS_LOG_FORMAT");
   // For tests of the program by itself.
-  app.add_option("--faults", options.faults)->group("");
+  wire::add_fault_option(app);
   app.add_option("--time-scale", options.time_scale)->group("")->check(CLI::PositiveNumber);
 }
 

@@ -289,18 +289,6 @@ const std::vector<BatchSystem>& batch_systems() {
   return systems;
 }
 
-std::string quoted_for_shell(std::string_view text) {
-  std::string quoted = "'";
-  for (const char c : text) {
-    if (c == '\'') {
-      quoted += "'\\''";
-    } else {
-      quoted += c;
-    }
-  }
-  return quoted + "'";
-}
-
 std::string output_of(const BatchCommand& command) {
   const std::string& program = command.arguments.front();
   const MemoryFile input("input");

@@ -45,9 +45,6 @@ struct BatchSystem {
 /// slurm, pbs, condor and local; `local` starts workers on this machine, for trials.
 [[nodiscard]] const std::vector<BatchSystem>& batch_systems();
 
-/// A word that `sh` reads as the text.
-[[nodiscard]] std::string quoted_for_shell(std::string_view text);
-
 /// Starts the program and waits for its end, at most a minute.
 /// @return What it wrote to standard output, at most 1 MiB of it.
 /// @throws Error with the program's name and its last words if it cannot be started, does not end

@@ -64,7 +64,7 @@ bool CampaignService::is_finished_and_settled(CampaignId id, const Served& serve
          is_finished(state_.campaigns.at(id));
 }
 
-// A file that is open can be restored if somebody removes it. So the last ones stay open.
+// A file that is open can be copied if somebody removes it. So the last ones stay open.
 void CampaignService::close_surplus(std::vector<CampaignId> ended, TimePoint now) {
   const std::size_t count_max = context_.config.finished_open_max;
   // Without a directory, a file that was closed could not be opened again.
@@ -217,7 +217,8 @@ void CampaignService::say_not_closed(std::string_view reason) {
 bool CampaignService::is_all_done() const {
   return std::all_of(state_.campaigns.begin(), state_.campaigns.end(), [&](const auto& item) {
     const auto& [id, campaign] = item;
-    return campaign.phase == Phase::cancelled || (is_finished(campaign) && !is_undecided(id));
+    return campaign.phase == Phase::cancelled || (is_finished(campaign) && !is_undecided(id)) ||
+           served_.at(id).is_abandoned;
   });
 }
 

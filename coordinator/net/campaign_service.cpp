@@ -321,7 +321,7 @@ void CampaignService::review_summary(CampaignId id, Served& served) {
     if (served.summary.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     take_summary(id, served);
   }
-  if (served.is_held || context_.now() < served.summary_after) return;
+  if (served.is_held || served.is_abandoned || context_.now() < served.summary_after) return;
   const bool is_due = std::exchange(served.is_summary_due, false);
   if (is_due || is_undecided(id)) begin_summary(id, served);
 }

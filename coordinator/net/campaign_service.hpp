@@ -77,6 +77,8 @@ class CampaignService {
   /// let_go().
   /// @throws Error if another request is changing it, or if nothing can be stored.
   void take_hold(CampaignId id);
+  /// Nothing can be stored any more in the file of this campaign: nothing of it is left to do.
+  void abandon(CampaignId id) { served_.at(id).is_abandoned = true; }
   [[nodiscard]] bool is_held(CampaignId id) const { return served_.at(id).is_held; }
   void let_go(CampaignId id) { served_.at(id).is_held = false; }
   void change(CampaignId id, const Change& change);
@@ -115,7 +117,7 @@ class CampaignService {
   /// True if nobody waits to be told of the end of a campaign, see ServiceConfig::on_notice.
   [[nodiscard]] bool is_all_told() const;
 
-  /// True if every campaign is finished or cancelled.
+  /// True if every campaign is finished, cancelled or abandoned.
   [[nodiscard]] bool is_all_done() const;
 
   /// Ends the service of all campaigns and gives the files that are open back, in the order in
@@ -147,6 +149,7 @@ class CampaignService {
     std::optional<TimePoint> ended_at = {};    ///< Nothing is left to do since then.
     std::optional<TimePoint> closing_at = {};  ///< When closing was tried last, in vain.
     bool is_held = false;                      ///< See take_hold().
+    bool is_abandoned = false;                 ///< See abandon().
     bool is_summary_due = false;
     std::uint64_t num_summarised = 0;    ///< Of the runs committed here.
     std::string summary_failure = {};    ///< Of the last statistics; empty if there was none.

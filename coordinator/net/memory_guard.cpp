@@ -24,6 +24,8 @@ constexpr std::chrono::milliseconds look_interval(25);
 // ZeroMQ frees what a closed socket held in threads of its own: it is done when nothing more comes.
 constexpr std::chrono::milliseconds settled_after(100);
 constexpr std::chrono::seconds settle_time_max(3);
+// Peers that do have keys get in again meanwhile, and others are cut off.
+constexpr std::chrono::seconds descriptors_pause(5);
 
 std::size_t mebibytes(std::size_t size) { return size >> 20; }
 
@@ -80,14 +82,18 @@ MemoryGuard::~MemoryGuard() {
 }
 
 void MemoryGuard::watch() {
+  Clock::time_point descriptors_at{};
   while (!is_stopping_after(look_interval)) {
     if (!is_open_) open();
     const std::size_t size = memory_.size();
-    if (bound_.is_exceeded(size)) reset(size);
+    if (bound_.is_exceeded(size)) reset(size, "(peers connect anew)");
+    if (Clock::now() < descriptors_at || !actions_.lacks_descriptors()) continue;
+    reset(size, "(descriptors were lacking; peers connect anew)");
+    descriptors_at = Clock::now() + descriptors_pause;
   }
 }
 
-void MemoryGuard::reset(std::size_t size_before) {
+void MemoryGuard::reset(std::size_t size_before, std::string_view reason) {
   actions_.close();
   const std::size_t size = settled_size();
   is_open_ = actions_.open();
@@ -95,7 +101,7 @@ void MemoryGuard::reset(std::size_t size_before) {
   note("sockets_reset", {{"resident_mib", mebibytes(size_before)},
                          {"left_mib", mebibytes(size)},
                          {"memory_max_mib", mebibytes(size_max_)},
-                         Field::remark("(peers connect anew)")});
+                         Field::remark(std::string(reason))});
   if (is_news) {
     note("memory_high", {{"resident_mib", mebibytes(size)},
                          {"memory_max_mib", mebibytes(size_max_)},

@@ -51,15 +51,17 @@ class ResidentMemory {
   int file_;
 };
 
-/// Watches the memory of this process 40 times a second, in a thread of its own, and therefore also
-/// while the service's thread is busy or waits for a disk.
+/// Watches the memory and the descriptors of this process 40 times a second, in a thread of its
+/// own, and therefore also while the service's thread is busy or waits for a disk.
 class MemoryGuard {
  public:
   /// What a guard does to sockets, in its own thread.
   struct Actions {
     std::function<void()> close;  ///< Frees all that the sockets hold; nothing is received then.
     std::function<bool()> open;   ///< False if the addresses are taken now: called again.
-    Log note;                     ///< `sockets_reset`, `memory_high`, `sockets_unbound`.
+    /// Whether the peers have taken so many descriptors that the sockets are to be closed.
+    std::function<bool()> lacks_descriptors;
+    Log note;  ///< `sockets_reset`, `memory_high`, `sockets_unbound`.
   };
 
   MemoryGuard(std::size_t size_max, Actions actions);
@@ -69,7 +71,7 @@ class MemoryGuard {
 
  private:
   void watch();
-  void reset(std::size_t size_before);
+  void reset(std::size_t size_before, std::string_view reason);
   void open();
   /// Size of the process once what the sockets held is free. Nothing comes in meanwhile.
   [[nodiscard]] std::size_t settled_size();

@@ -21,7 +21,7 @@
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/runs.hpp"
-#include "proto/link/kill_point.hpp"
+#include "proto/link/faults.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/names.hpp"

@@ -43,15 +43,13 @@ struct RouterSocket::Received {
 
 RouterSocket::RouterSocket(zmq::context_t& context, std::string_view option,
                            const std::string& endpoint, const wire::ServerSecurity& security,
-                           const std::optional<wire::FaultPlan>& faults,
                            std::optional<int> listener)
     : context_(context), option_(option), security_(security) {
   bind(endpoint, listener);
   endpoint_ = socket_->get(zmq::sockopt::last_endpoint);
-  if (!faults) return;
-  faults_.emplace(Faults{{*faults, wire::FaultyLink::Direction::sending},
-                         {*faults, wire::FaultyLink::Direction::receiving},
-                         {}});
+  if (security_.domain == wire::Domain::clients) return;
+  sending_ = wire::link_faults(wire::LinkFaults::Direction::sending);
+  receiving_ = wire::link_faults(wire::LinkFaults::Direction::receiving);
 }
 
 RouterSocket::~RouterSocket() = default;
@@ -69,20 +67,20 @@ int RouterSocket::receive(int count_max, TimePoint now,
   for (; count < count_max; ++count) {
     const std::optional<Received> received = next();
     if (!received) break;
-    if (!faults_ || received->frames.size() != 1) {
+    if (!receiving_ || received->frames.size() != 1) {
       handle(received->view());
       continue;
     }
-    faults_->addresses[received->from.routing_id] = received->from;
-    faults_->receiving.pass(received->from.routing_id, received->frames.front().to_string(), now);
+    addresses_[received->from.routing_id] = received->from;
+    receiving_->pass(received->from.routing_id, received->frames.front().to_string(), now);
   }
-  if (faults_) pass_due(now, handle);
+  if (receiving_) pass_due(now, handle);
   return count;
 }
 
 bool RouterSocket::send(const std::string& routing_id, const std::string& bytes, TimePoint now) {
-  if (!faults_) return send_now(routing_id, bytes);
-  faults_->sending.pass(routing_id, bytes, now);
+  if (!sending_) return send_now(routing_id, bytes);
+  sending_->pass(routing_id, bytes, now);
   return true;
 }
 
@@ -153,10 +151,10 @@ std::optional<RouterSocket::Received> RouterSocket::next() {
 }
 
 void RouterSocket::pass_due(TimePoint now, const std::function<void(const Incoming&)>& handle) {
-  for (const wire::Parcel& parcel : faults_->receiving.due(now)) {
-    handle({.from = faults_->addresses.at(parcel.routing), .frames = {parcel.bytes}});
+  for (const wire::Parcel& parcel : receiving_->due(now)) {
+    handle({.from = addresses_.at(parcel.routing), .frames = {parcel.bytes}});
   }
-  for (const wire::Parcel& parcel : faults_->sending.due(now)) {
+  for (const wire::Parcel& parcel : sending_->due(now)) {
     (void)send_now(parcel.routing, parcel.bytes);
   }
 }

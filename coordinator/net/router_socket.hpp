@@ -30,12 +30,10 @@ class RouterSocket {
   /// Binds the socket.
   ///
   /// @param option  Name of the option that the endpoint comes from, for messages.
-  /// @param faults  What shall go wrong with the messages, for tests of this program.
   /// @param listener  As for wire::make_router().
   /// @throws Error as wire::make_router() does.
   RouterSocket(zmq::context_t& context, std::string_view option, const std::string& endpoint,
-               const wire::ServerSecurity& security, const std::optional<wire::FaultPlan>& faults,
-               std::optional<int> listener = std::nullopt);
+               const wire::ServerSecurity& security, std::optional<int> listener = std::nullopt);
   ~RouterSocket();
   RouterSocket(const RouterSocket&) = delete;
   RouterSocket& operator=(const RouterSocket&) = delete;
@@ -47,6 +45,9 @@ class RouterSocket {
 
   /// The address to connect to, with the port that was chosen.
   [[nodiscard]] const std::string& endpoint() const { return endpoint_; }
+
+  /// Whether messages come late on purpose.
+  [[nodiscard]] bool has_faults() const { return sending_ != nullptr; }
 
   /// The next handshake that failed, if there are keys.
   [[nodiscard]] std::optional<wire::SocketEvent> take_event();
@@ -67,12 +68,6 @@ class RouterSocket {
  private:
   /// A message with the frames that hold its bytes.
   struct Received;
-  struct Faults {
-    wire::FaultyLink sending;
-    wire::FaultyLink receiving;
-    std::map<std::string, Address> addresses;  ///< Of those whose messages are delayed.
-  };
-
   void bind(const std::string& endpoint, std::optional<int> listener);
   void wait_for_unbound();
   [[nodiscard]] std::optional<Received> next();
@@ -83,10 +78,12 @@ class RouterSocket {
   std::string option_;
   wire::ServerSecurity security_;
   std::string endpoint_;
-  std::mutex mutex_;                            ///< For the socket and its events.
-  std::unique_ptr<zmq::socket_t> socket_;       ///< Null while it is closed.
-  std::unique_ptr<wire::SocketEvents> events_;  ///< Of the socket: gone before it.
-  std::optional<Faults> faults_;
+  std::mutex mutex_;                             ///< For the socket and its events.
+  std::unique_ptr<zmq::socket_t> socket_;        ///< Null while it is closed.
+  std::unique_ptr<wire::SocketEvents> events_;   ///< Of the socket: gone before it.
+  std::unique_ptr<wire::LinkFaults> sending_;    ///< Null unless something shall go wrong.
+  std::unique_ptr<wire::LinkFaults> receiving_;  ///< The same.
+  std::map<std::string, Address> addresses_;     ///< Of those whose messages are delayed.
 };
 
 }  // namespace proofmass::coordinator

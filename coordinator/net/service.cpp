@@ -13,7 +13,6 @@
 #include "coordinator/net/background.hpp"
 #include "coordinator/net/campaign_service.hpp"
 #include "coordinator/net/client_gateway.hpp"
-#include "coordinator/net/connection_limit.hpp"
 #include "coordinator/net/directory_service.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
 #include "coordinator/net/request_service.hpp"
@@ -24,7 +23,7 @@
 #include "coordinator/net/worker_gateway.hpp"
 #include "coordinator/net/worker_history.hpp"
 #include "core/error.hpp"
-#include "proto/link/kill_point.hpp"
+#include "proto/link/faults.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -39,19 +38,6 @@ constexpr std::chrono::milliseconds dismissal_interval(10);
 constexpr int worker_messages_per_turn_max = 1000;
 // ... nor workers by clients that ask much.
 constexpr int client_messages_per_turn_max = 16;
-
-/// What is logged of a campaign database that lost its name and has it back.
-std::string_view kind_of(FileReturn file_return) {
-  switch (file_return) {
-    case FileReturn::restored:
-      return "campaign_file_restored";
-    case FileReturn::replaced:
-      return "campaign_file_replaced";
-    case FileReturn::log_made_anew:
-      return "write_ahead_log_restored";
-  }
-  return "campaign_file_restored";
-}
 
 }  // namespace
 
@@ -72,7 +58,7 @@ class Service::Impl final : public Outbox {
         request_service_(context_, campaign_service_, directory_service_),
         client_gateway_(background_, client_callbacks()),
         background_([this] { sockets_.wake(); }) {
-    begin_to_limit_connections();
+    limit_workers();
     for (FileOutcome& outcome : beginning.campaigns) begin_with(std::move(outcome));
   }
 
@@ -88,7 +74,7 @@ class Service::Impl final : public Outbox {
 
   void run(const std::atomic<StopRequest>& stop, const std::function<void()>& on_turn) {
     while (!is_over(stop)) {
-      sockets_.wait(config_.faults ? tick_interval / 10 : tick_interval);
+      sockets_.wait(sockets_.has_faults() ? tick_interval / 10 : tick_interval);
       turn();
       on_turn();
     }
@@ -101,8 +87,7 @@ class Service::Impl final : public Outbox {
                              .workers = {},
                              .num_leases = state_.leases.size(),
                              .num_sockets_reset = sockets_.num_resets(),
-                             .num_messages_unsent = worker_gateway_.num_unsent(),
-                             .num_connections_refused = num_connections_refused()};
+                             .num_messages_unsent = worker_gateway_.num_unsent()};
     add_workers(state_, now(), depth, snapshot);
     paths_.hide_in(snapshot.status);
     for (CampaignSnapshot& campaign : snapshot.campaigns) {
@@ -170,30 +155,18 @@ class Service::Impl final : public Outbox {
   }
 
  private:
-  /// Warns if not all workers that could register will find room; `proofmass run` has few of them.
-  void begin_to_limit_connections() {
-    const std::uint64_t limit = raise_descriptor_limit();
-    const std::uint64_t descriptors_max = limit - std::min(config_.num_descriptors_reserved, limit);
-    connection_limit_ =
-        connection_limit(descriptors_max, lowest_free_descriptor(), sockets_.clients_endpoint());
-    limit_connections(connection_limit_);
-    const auto num_workers_max = static_cast<std::size_t>(connection_limit_.num_workers_max);
-    if (!config_.clients_endpoint || num_workers_max >= config_.dispatch.num_workers_max) return;
+  /// Registers no more workers than there are descriptors for; `proofmass run` has few of them.
+  void limit_workers() {
+    const Descriptors& descriptors = sockets_.descriptors();
+    std::size_t& num_workers_max = state_.config.num_workers_max;
+    if (!config_.clients_endpoint || descriptors.num_workers_max >= num_workers_max) return;
+    num_workers_max = descriptors.num_workers_max;
     log({.severity = Severity::warning,
          .kind = "few_descriptors",
-         .fields = {{"limit", limit},
+         .fields = {{"limit", descriptors.limit},
                     {"workers_max", num_workers_max},
                     Field::remark("(raise the limit of open files, ulimit -n or LimitNOFILE, to "
                                   "serve more)")}});
-  }
-
-  void note_refused_connections() {
-    const std::uint64_t num_refused = num_connections_refused();
-    if (!refused_connections_.is_news(num_refused, now())) return;
-    log({.severity = Severity::error,
-         .kind = "connections_refused",
-         .fields = {{"workers_max", static_cast<std::size_t>(connection_limit_.num_workers_max)},
-                    Field::remark("(no descriptors for more; the others try again)")}});
   }
 
   /// Campaigns that are handed over are served or end the start; those of the directory may wait.
@@ -290,7 +263,6 @@ class Service::Impl final : public Outbox {
   }
 
   void review() {
-    note_refused_connections();
     worker_gateway_.review(reviewed_at_, *this);
     const std::uint64_t num_unsent = worker_gateway_.num_unsent();
     if (num_unsent == num_unsent_logged_) return;
@@ -353,6 +325,7 @@ class Service::Impl final : public Outbox {
   void complete(const StoreFailed& failed) {
     if (!campaign_service_.is_served(failed.campaign)) return;
     on_store_failed(state_, failed.campaign, failed.text, *this);
+    if (failed.is_abandoned) campaign_service_.abandon(failed.campaign);
   }
   void complete(const StoreRecovered& recovered) {
     if (!campaign_service_.is_served(recovered.campaign)) return;
@@ -365,13 +338,6 @@ class Service::Impl final : public Outbox {
          .fields = {{"size_bytes", grown.size},
                     Field::remark("(somebody reads an old state of the file)")}},
         grown.campaign);
-  }
-  void complete(const FileReturned& returned) {
-    if (!campaign_service_.is_served(returned.campaign)) return;
-    log({.severity = Severity::warning,
-         .kind = kind_of(returned.kind),
-         .fields = {{"runs", state_.campaigns.at(returned.campaign).committed.size()}}},
-        returned.campaign);
   }
   void complete(const LogKept& kept) {
     log({.severity = Severity::warning,
@@ -428,8 +394,6 @@ class Service::Impl final : public Outbox {
   Log log_;
   CoordinatorStart start_;
   ServiceSockets sockets_;
-  ConnectionLimit connection_limit_;
-  RefusedConnections refused_connections_;
   State state_;
   StoreWriter writer_;
   WorkerHistory history_;

@@ -17,7 +17,6 @@
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/store/store_writer.hpp"
-#include "proto/link/faults.hpp"
 #include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
@@ -88,7 +87,6 @@ struct ServiceConfig {
   WriterConfig writer;
   /// Descriptors that the process needs for something else than workers, clients and files.
   std::uint64_t num_descriptors_reserved = 0;
-  std::optional<wire::FaultPlan> faults;  ///< Of workers' messages; for tests of this program.
 };
 
 /// Threads of a service, to be required before it is made: ZeroMQ's, and those that write, answer,

@@ -49,9 +49,8 @@ struct ServiceSnapshot {
   /// Of each of worker_activities, whether or not `workers` lists them.
   std::array<std::uint64_t, worker_activities.size()> num_workers_by_activity{};
   std::uint64_t num_leases = 0;
-  std::uint64_t num_sockets_reset = 0;        ///< How often a lack of memory closed the sockets.
-  std::uint64_t num_messages_unsent = 0;      ///< To workers; dropped because they found no room.
-  std::uint64_t num_connections_refused = 0;  ///< Because descriptors were lacking.
+  std::uint64_t num_sockets_reset = 0;    ///< How often a lack of memory closed the sockets.
+  std::uint64_t num_messages_unsent = 0;  ///< To workers; dropped because they found no room.
 };
 
 /// How much a snapshot holds. A copy of 10,000 workers takes some milliseconds.

@@ -35,11 +35,10 @@ ServiceSockets::ServiceSockets(const ServiceConfig& config, Log log)
   if (config.keys) authenticator_ = std::make_unique<Authenticator>(*context_, *config.keys, log_);
   workers_ = std::make_unique<RouterSocket>(*context_, "bind", config.workers_endpoint,
                                             security_of(config, wire::Domain::workers),
-                                            config.faults, config.workers_listener);
+                                            config.workers_listener);
   if (config.clients_endpoint) {
-    clients_ =
-        std::make_unique<RouterSocket>(*context_, "bind-clients", *config.clients_endpoint,
-                                       security_of(config, wire::Domain::clients), std::nullopt);
+    clients_ = std::make_unique<RouterSocket>(*context_, "bind-clients", *config.clients_endpoint,
+                                              security_of(config, wire::Domain::clients));
   }
   if (authenticator_ != nullptr) {
     authenticator_->watch(wire::Domain::workers, [this] { return workers_->take_event(); });
@@ -47,11 +46,16 @@ ServiceSockets::ServiceSockets(const ServiceConfig& config, Log log)
       authenticator_->watch(wire::Domain::clients, [this] { return clients_->take_event(); });
     }
   }
+  descriptors_ = shared_out(raise_descriptor_limit(), config.num_descriptors_reserved,
+                            lowest_free_descriptor());
   if (!config.memory_size_max) return;
   guard_.emplace(*config.memory_size_max,
-                 MemoryGuard::Actions{.close = [this] { close(); },
-                                      .open = [this] { return open(); },
-                                      .note = [this](Event event) { note(std::move(event)); }});
+                 MemoryGuard::Actions{
+                     .close = [this] { close(); },
+                     .open = [this] { return open(); },
+                     .lacks_descriptors =
+                         [end = descriptors_.alarm] { return lowest_free_descriptor() >= end; },
+                     .note = [this](Event event) { note(std::move(event)); }});
 }
 
 ServiceSockets::~ServiceSockets() = default;

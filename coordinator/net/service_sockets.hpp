@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "coordinator/net/authentication/authenticator.hpp"
+#include "coordinator/net/descriptors.hpp"
 #include "coordinator/net/memory_guard.hpp"
 #include "coordinator/net/router_socket.hpp"
 #include "coordinator/net/service.hpp"
@@ -22,8 +23,8 @@ namespace proofmass::coordinator {
 /// The sockets of a service: one for workers, perhaps one for clients, and one at which the library
 /// asks who may connect. For one thread.
 ///
-/// A MemoryGuard watches the memory of the process from a thread of its own. It closes the sockets
-/// and binds them again to free what they hold.
+/// A MemoryGuard watches the process from a thread of its own. It closes the sockets and binds them
+/// again to free what they hold.
 class ServiceSockets {
  public:
   using Handle = std::function<void(const Incoming&)>;
@@ -43,10 +44,15 @@ class ServiceSockets {
   [[nodiscard]] std::string workers_endpoint() const { return workers_->endpoint(); }
   [[nodiscard]] std::string clients_endpoint() const;  ///< Empty if there are no clients.
 
+  /// Whether messages come late on purpose.
+  [[nodiscard]] bool has_faults() const { return workers_->has_faults(); }
+
   /// Who may connect; null if there are no keys.
   [[nodiscard]] Authenticator* authenticator() { return authenticator_.get(); }
 
-  /// How often the sockets were closed and bound again to free memory.
+  [[nodiscard]] const Descriptors& descriptors() const { return descriptors_; }
+
+  /// How often the sockets were closed and bound again to free memory or descriptors.
   [[nodiscard]] std::uint64_t num_resets() const { return num_resets_; }
 
   /// Until a message, a handshake or a wake() is there, or the time is over.
@@ -85,6 +91,7 @@ class ServiceSockets {
   bool is_closing_ = false;
   std::vector<Event> notes_;
   std::atomic<std::uint64_t> num_resets_ = 0;
+  Descriptors descriptors_;
   std::optional<MemoryGuard> guard_;  ///< Uses all the others: the last one.
 };
 

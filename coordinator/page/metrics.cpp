@@ -151,12 +151,11 @@ void write_service(const ServiceSnapshot& service, MetricWriter& writer) {
   gauge("proofmass_unserved_files", "Files of the directory that cannot be served.",
         status.num_unserved_files);
   gauge("proofmass_factories", "Factories that report.", status.factories.size());
-  counter("proofmass_sockets_reset_total", "How often a lack of memory closed the sockets.",
+  counter("proofmass_sockets_reset_total",
+          "How often a lack of memory or descriptors closed the sockets.",
           service.num_sockets_reset);
   counter("proofmass_messages_unsent_total", "Messages to workers that found no room.",
           service.num_messages_unsent);
-  counter("proofmass_connections_refused_total", "Connections for which descriptors were lacking.",
-          service.num_connections_refused);
 }
 
 void write_page(const HttpCounts& page, double age_s, MetricWriter& writer) {

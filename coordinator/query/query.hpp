@@ -57,7 +57,7 @@ enum class TemporaryData : std::uint8_t {
 
 struct QueryLimits {
   std::chrono::duration<double> time_limit{60.0};  ///< With the opening of the file.
-  /// Bytes; held by run_query_in_process().
+  /// Bytes; held by run_bounded_query().
   std::uint64_t memory_size_max = std::uint64_t{8} << 30;
   TemporaryData temporary_data = TemporaryData::in_files;
   /// Asked every few microseconds; the query ends when it says so.
@@ -78,7 +78,7 @@ inline constexpr std::size_t sql_size_max = 1'000'000;
 /// may read, and nothing else; it sees each file as it was when it began.
 ///
 /// @param writer  Has got part of the rows if an exception comes after begin().
-/// The limits are looked at between steps of the query; see run_query_in_process() for calls that
+/// The limits are looked at between steps of the query; see run_bounded_query() for calls that
 /// do not end.
 /// @throws QueryError, TimeLimitError; StoreError if the file cannot be read; Error if memory is
 ///         lacking; and what the writer throws.

@@ -133,19 +133,6 @@ std::string requirement_name(const MatrixRow& row) {
                                                : row.stated.id;
 }
 
-std::string shell_word(std::string_view text) {
-  const auto is_plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '_' || c == '/' || c == '-' || c == '+';
-  };
-  if (!text.empty() && std::ranges::all_of(text, is_plain) && text[0] != '-') {
-    return std::string(text);
-  }
-  std::string word = "'";
-  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
-  return word + "'";
-}
-
 ReviewTable matrix_table(const Review& review) {
   ReviewTable table{.id = "matrix",
                     .caption = fmt::format("Verification matrix (statistical interpretation: {})",

@@ -9,6 +9,7 @@
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/requirements.hpp"
 #include "core/model.hpp"
+#include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -340,7 +341,7 @@ ReviewTable host_table(const Review& review) {
 }
 
 std::vector<std::pair<std::string, std::string>> reproducing_commands(const Review& review) {
-  const std::string database = shell_word(review.database);
+  const std::string database = wire::shell_word(review.database);
   std::vector<std::pair<std::string, std::string>> commands{
       {fmt::format("proofmass verify {} --fraction 0.1", database),
        "checks the database, simulates a tenth of the runs again and compares all bits"},

@@ -70,9 +70,6 @@ struct ReviewTable {
 [[nodiscard]] ReviewTable execution_table(const Review& review);
 [[nodiscard]] ReviewTable host_table(const Review& review);
 
-/// The name of the database as an argument of a POSIX shell.
-[[nodiscard]] std::string shell_word(std::string_view text);
-
 /// The commands that repeat or check what the report shows, each with what it does.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> reproducing_commands(
     const Review& review);

@@ -209,13 +209,6 @@ struct MergedPart {
   bool operator==(const MergedPart&) const = default;
 };
 
-/// How a campaign database got back the name that it had lost.
-enum class FileReturn : std::uint8_t {
-  restored,       ///< Nothing had the name.
-  replaced,       ///< An older copy of the campaign had it.
-  log_made_anew,  ///< The file had it, but its write-ahead log was removed.
-};
-
 /// What became of the deliveries of one commit.
 struct CommitSummary {
   std::uint64_t num_new = 0;

@@ -23,7 +23,7 @@
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/detail/store_impl.hpp"
 #include "core/model.hpp"
-#include "proto/link/kill_point.hpp"
+#include "proto/link/faults.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -88,15 +88,7 @@ void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
 
 Store::Store(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Store::~Store() {
-  if (impl_ == nullptr) return;
-  try {
-    (void)return_to_place();
-  } catch (const std::exception&) {
-    // A caller that must know calls rest() before.
-  }
-}
-
+Store::~Store() = default;
 Store::Store(Store&&) noexcept = default;
 Store& Store::operator=(Store&&) noexcept = default;
 
@@ -218,7 +210,7 @@ std::string Store::created_utc() const {
 std::string Store::owner() const { return impl_->database.text("SELECT owner FROM campaign"); }
 
 void Store::set_owner(std::string_view owner) {
-  impl_->change([&](Database& database) {
+  impl_->commit([&](Database& database) {
     database.prepare("UPDATE campaign SET owner = ?").run(owner);
     detail::write_table_digest(database);
   });
@@ -247,7 +239,7 @@ std::vector<std::vector<double>> Store::table_columns() const {
 
 void Store::extend(const Campaign& campaign, std::string_view definition) {
   detail::check_extension(impl_->database, campaign);
-  impl_->change(
+  impl_->commit(
       [&](Database& database) { detail::extend_campaign(database, campaign, definition); });
 }
 
@@ -256,12 +248,12 @@ CampaignControl Store::control() const { return detail::read_control(impl_->data
 StopPlan Store::stop_plan() const { return detail::read_stop_plan(impl_->database); }
 
 void Store::set_stop_plan(const StopPlan& plan) {
-  impl_->change([&](Database& database) { detail::write_stop_plan(database, plan); });
+  impl_->commit([&](Database& database) { detail::write_stop_plan(database, plan); });
 }
 
 void Store::record_stop_check(std::uint64_t num_runs, std::string_view statistic,
                               const StopCheck& check) {
-  impl_->change([&](Database& database) {
+  impl_->commit([&](Database& database) {
     detail::replace_stop_check(database, num_runs, statistic, check);
   });
 }
@@ -321,11 +313,11 @@ std::vector<wire::SessionId> Store::attached_sessions() const {
 }
 
 void Store::begin_coordinator(const CoordinatorStart& start) {
-  impl_->change([&](Database& database) { detail::insert_start(database, start); });
+  impl_->commit([&](Database& database) { detail::insert_start(database, start); });
 }
 
 void Store::end_coordinator(wire::Epoch epoch) {
-  impl_->change([&](Database& database) { detail::end_start(database, epoch); });
+  impl_->commit([&](Database& database) { detail::end_start(database, epoch); });
 }
 
 CommitSummary Store::write(std::span<const Entry> entries) {
@@ -353,37 +345,15 @@ bool Store::is_of_older_version() const { return impl_->database.is_private_copy
 bool Store::has_lost_its_log() const { return impl_->is_log_lost; }
 
 std::optional<std::string> Store::rest() {
-  (void)return_to_place();
+  impl_->check_place();
   return impl_->rest();
 }
 
-std::optional<FileReturn> Store::return_to_place() {
-  if (!impl_->place) return std::nullopt;
-  const detail::Placement placement = impl_->place->look();
-  switch (placement) {
-    case detail::Placement::in_place:
-      return std::nullopt;
-    case detail::Placement::log_removed:
-      impl_->renew_log();
-      return FileReturn::log_made_anew;
-    case detail::Placement::truncated:
-    case detail::Placement::without_directory:
-      impl_->check_place();
-      return std::nullopt;
-    case detail::Placement::removed:
-    case detail::Placement::replaced:
-      break;
-  }
-  const std::filesystem::path path = impl_->place->path();
-  if (!impl_->lock || !impl_->lock->is_in_place()) {
-    impl_->lock = std::make_unique<detail::StoreLock>(path);
-  }
-  // Whoever puts the file back finds all results in it, also if this process is killed.
-  const detail::OwnLog own_log = impl_->fold_own_log();
-  detail::restore_name(path, impl_->database, *impl_->place, placement, own_log);
-  auto fresh = std::make_unique<Impl>(path, std::move(impl_->lock));
-  impl_ = std::move(fresh);
-  return placement == detail::Placement::removed ? FileReturn::restored : FileReturn::replaced;
+void Store::check_place() { impl_->check_place(); }
+
+bool Store::is_abandoned() const {
+  const bool is_lost = impl_->place && impl_->place->is_lost();
+  return is_lost && (impl_->place->is_truncated() || !impl_->copy.empty());
 }
 
 CommitSummary Store::commit(std::span<const Delivery> deliveries) {
@@ -412,8 +382,6 @@ void Store::read_one_state(const std::function<void()>& read) const {
   const detail::ReadTransaction transaction(impl_->database);
   read();
 }
-
-bool Store::is_in_place() const { return impl_->database.is_in_place(); }
 
 std::uint64_t Store::log_size() const { return impl_->database.log_size(); }
 
@@ -446,18 +414,10 @@ void Store::back_up(const std::filesystem::path& destination) const {
   check_name(destination);
   const detail::StoreLock lock(destination, detail::IfNoLocks::go_on);
   detail::check_absence(destination);
-  detail::appear_complete(
-      destination, wire::IfThere::keep, [&](const std::filesystem::path& draft) {
-        Database copy(draft, Access::create);
-        impl_->database.copy_to(copy);
-        copy.execute("PRAGMA cell_size_check = ON");
-        // Nobody shall rely on the copy of a damaged file, which is the one to be named.
-        copy.name_in_messages(impl_->path);
-        (void)detail::check_all_pages(copy);
-        copy.name_in_messages(draft);
-        // What is copied may say that there is a log.
-        copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
-      });
+  detail::appear_complete(destination, wire::IfThere::keep,
+                          [&](const std::filesystem::path& draft) {
+                            detail::copy_whole(impl_->database, impl_->path, draft);
+                          });
 }
 
 }  // namespace proofmass::coordinator

@@ -105,9 +105,8 @@ class Store {
   ///         beside it: SQLite would apply that to whatever gets the name.
   static void check_absence(const std::filesystem::path& path);
 
-  /// Closes the file. One that has lost its name gets it back if that is possible, as
-  /// return_to_place() does. Of a coordinator's, no other file (log, lock) remains unless somebody
-  /// reads.
+  /// Closes the file, after check_place(). Of a coordinator's, no other file (log, lock) remains
+  /// unless somebody reads.
   ~Store();
   Store(Store&&) noexcept;
   Store& operator=(Store&&) noexcept;
@@ -195,22 +194,24 @@ class Store {
 
   /// To be called when nothing more is expected: folds the write-ahead log into the file, which is
   /// whole without it until the next change. Waits for nobody.
-  /// A file that has lost its name gets it back before.
   /// @return Why the log is still needed: somebody reads an old state of the file, or writes to it.
   ///         Or nothing.
-  /// @throws StoreError as return_to_place() does; if the disk does not take it. What was stored
+  /// @throws StoreError as check_place() does; if the disk does not take it. What was stored
   ///         is in the file and its log then.
   std::optional<std::string> rest();
 
-  /// Gives a file back its name that somebody removed, renamed or replaced while it was open: an
-  /// open file keeps all that was stored, but nobody finds it and it ends with the process.
+  /// Looks whether the file that is open still has its name, its log and its length: otherwise
+  /// nobody finds what is stored in it, and it ends with the process. Everything that stores
+  /// something looks before and afterwards. Costs some looks at the directory.
   ///
-  /// If nothing has the name, a copy of the open file gets it. So does it if the name is that of an
-  /// older copy of the campaign, all of whose results are in the open file. A removed write-ahead
-  /// log is made anew. Costs one look at the directory if all is well.
-  /// @return What was done, if anything.
-  /// @throws StoreError with the reason if it cannot be done now; to be tried again.
-  std::optional<FileReturn> return_to_place();
+  /// A file to which something happened is abandoned, also if somebody puts it back: nothing
+  /// more is stored in it. A copy of all that is stored is made beside its name,
+  /// `NAME.recovered-TIME.db`, unless it was truncated, when there is nothing to copy.
+  /// @throws StoreError if something happened: what, where the copy is, and how to go on from it;
+  ///         or why there is no copy yet, which the next call tries again to make.
+  void check_place();
+  /// Whether nothing can be stored any more, as check_place() said, and nothing is left to try.
+  [[nodiscard]] bool is_abandoned() const;
 
   /// Whether the file is older than this program, and a copy is read.
   [[nodiscard]] bool is_of_older_version() const;
@@ -260,10 +261,6 @@ class Store {
 
   /// Lets `read` see one state of the file, whatever a coordinator writes meanwhile.
   void read_one_state(const std::function<void()>& read) const;
-
-  /// False if the file that is open no longer has its name: it was removed, renamed or replaced,
-  /// and what is written to it is lost when it is closed.
-  [[nodiscard]] bool is_in_place() const;
 
   /// Bytes of the write-ahead log, which only grows while somebody reads one state of the file.
   [[nodiscard]] std::uint64_t log_size() const;

@@ -34,7 +34,7 @@ bool has_own_budget(const Database& database) {
 void Store::write_statistics(const CampaignStatistics& statistics,
                              const std::optional<ErrorBudget>& budget, const ResultDigests& digests,
                              std::span<const RunWarning> warnings) {
-  impl_->change([&](Database& database) {
+  impl_->commit([&](Database& database) {
     replace_all(database, statistics, budget);
     detail::replace_summary(database, statistics, digests);
     detail::replace_warnings(database, warnings);

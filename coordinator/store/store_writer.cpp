@@ -198,7 +198,7 @@ void StoreWriter::Impl::write_due(Lock& lock) {
   }
 }
 
-/// Gives files back the names that they lost while nothing was to be written.
+/// Finds files that lost their name while nothing was to be written.
 void StoreWriter::Impl::look_at_all(Lock& lock) {
   if (std::chrono::steady_clock::now() < look_at) return;
   for (const wire::CampaignId campaign : ids()) {
@@ -221,7 +221,7 @@ void StoreWriter::Impl::write_all(wire::CampaignId campaign, Lock& lock) {
 
 /// Brings a file of which nothing waits to rest.
 void StoreWriter::Impl::fold(wire::CampaignId campaign, Lock& lock) {
-  if (!write_some(campaign, 0, lock)) return;  // Gives the file its name back if need be.
+  if (!write_some(campaign, 0, lock)) return;
   OpenFile& open_file = file(campaign);
   open_file.rest_at.reset();  // What is added meanwhile sets it again.
   lock.unlock();
@@ -268,13 +268,13 @@ void StoreWriter::Impl::finish_write(wire::CampaignId campaign, OpenFile& open_f
   const bool has_failed_before = open_file.retry_at.has_value();
   if (attempted.failure) {
     open_file.retry_at = std::chrono::steady_clock::now() + config.retry_after;
-    if (has_failed_before) return;
-    completions.emplace_back(StoreFailed{.campaign = campaign, .text = *attempted.failure});
+    if (std::exchange(open_file.failure, *attempted.failure) == *attempted.failure) return;
+    completions.emplace_back(StoreFailed{.campaign = campaign,
+                                         .text = *attempted.failure,
+                                         .is_abandoned = open_file.store.is_abandoned()});
     return;
   }
-  if (attempted.file_return) {
-    completions.emplace_back(FileReturned{.campaign = campaign, .kind = *attempted.file_return});
-  }
+  open_file.failure.clear();
   open_file.retry_at.reset();
   std::vector<RunIndex> runs = detail::delivered_runs(open_file.writing);
   open_file.writing.clear();
@@ -334,8 +334,8 @@ void StoreWriter::open(wire::CampaignId campaign, Store store) {
     OpenFile file{.store = std::move(store),
                   .waiting = detail::WaitingEntries(impl_->config.num_records_max),
                   .writing = {},
-                  .unconfirmed = {},
                   .retry_at = {},
+                  .failure = {},
                   .known = {},
                   .rest_at = {}};
     for (const wire::SessionId session : attached) file.known.insert(session);

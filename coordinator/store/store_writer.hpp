@@ -45,10 +45,11 @@ struct Compared {
 };
 
 /// Nothing can be written to this file for now. All that was handed over is kept, and tried again
-/// each `retry_after`; said once until StoreRecovered.
+/// each `retry_after`; said once for each reason until StoreRecovered.
 struct StoreFailed {
   wire::CampaignId campaign;
-  std::string text;  ///< `campaign database = path (the disk is full; ...)`.
+  std::string text;           ///< `campaign database = path (the disk is full; ...)`.
+  bool is_abandoned = false;  ///< As Store::is_abandoned(): it will never be recovered.
 };
 
 /// All is well again, and what was waiting is written.
@@ -82,15 +83,8 @@ struct LogFolded {
   wire::CampaignId campaign;
 };
 
-/// A campaign database had been removed, renamed or replaced by an older copy, and has its name
-/// back, with all that was stored in it.
-struct FileReturned {
-  wire::CampaignId campaign;
-  FileReturn kind = FileReturn::restored;
-};
-
-using Completion = std::variant<FileReturned, Committed, Compared, StoreFailed, StoreRecovered,
-                                LogGrown, LogShrunk, LogKept, LogFolded>;
+using Completion = std::variant<Committed, Compared, StoreFailed, StoreRecovered, LogGrown,
+                                LogShrunk, LogKept, LogFolded>;
 
 /// Writes to campaign databases, in a thread of its own: a service never waits for a disk.
 ///

@@ -5,6 +5,7 @@
 #include <spawn.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <system_error>
 
 #include "core/error.hpp"
@@ -72,6 +73,19 @@ std::filesystem::path program_beside_this(std::string_view name) {
   if (!error && access(program.c_str(), X_OK) == 0) return program;
   throw Error(
       fmt::format("program = {} (must be beside {})", program.string(), self.filename().string()));
+}
+
+std::string shell_word(std::string_view text) {
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '/' || c == '-' || c == '+';
+  };
+  if (!text.empty() && std::ranges::all_of(text, is_plain) && text[0] != '-') {
+    return std::string(text);
+  }
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
+  return word + "'";
 }
 
 }  // namespace proofmass::wire

@@ -35,4 +35,7 @@ struct ProgramStart {
 /// @throws Error reading `program = PATH (rule)` if it is not there or cannot be executed.
 [[nodiscard]] std::filesystem::path program_beside_this(std::string_view name);
 
+/// The text as one word of a command line for a POSIX shell.
+[[nodiscard]] std::string shell_word(std::string_view text);
+
 }  // namespace proofmass::wire

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -27,7 +28,10 @@ class CoordinatorProcess : public CampaignProcess {
   [[nodiscard]] Process start_coordinator(const Arguments& further = {"short.toml"}) const {
     Arguments arguments{"--directory", "served", "--bind", endpoint(), "--exit-when-done"};
     arguments.insert(arguments.end(), further.begin(), further.end());
-    return Process(directory / "", "coordinator", programs + "/proofmass-coordinator", arguments);
+    const bool has_faults = std::ranges::find(further, "--faults") != further.end();
+    return Process(directory / "", "coordinator",
+                   programs + "/proofmass-coordinator" + (has_faults ? "-with-faults" : ""),
+                   arguments);
   }
   [[nodiscard]] Process start_worker(const std::string& name,
                                      const std::string& num_threads = "1") const {
@@ -222,6 +226,16 @@ TEST_F(CoordinatorProcess, KilledWhileItMakesAFileLeavesNoHalfFile) {
   Process coordinator = start_coordinator({"short.toml"});
   EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator");
   EXPECT_EQ(stored_runs(path("served/hardy2013.db")), reference());
+}
+
+// What tests can make go wrong nobody else can.
+TEST_F(CoordinatorProcess, HasNoFaultsWhereItIsInstalled) {
+  for (const std::string name : {"proofmass-coordinator", "proofmass-worker"}) {
+    Process program(directory / "", "program", programs + "/" + name,
+                    {"--connect", endpoint(), "--faults", "drop=0.5"});
+    EXPECT_EQ(program.wait(), 2);
+    EXPECT_TRUE(contains(errors_of("program"), "--faults")) << errors_of("program");
+  }
 }
 
 TEST_F(CoordinatorProcess, LosesNothingOnABadNetwork) {

@@ -277,7 +277,8 @@ class World(Setting):
         self.counts["coordinator starts"] += 1
         self.coordinator = Program(
             self, f"coordinator-{number}",
-            [self.programs / "proofmass-coordinator", "--directory", "served", "--bind",
+            [self.programs / ("proofmass-coordinator" + ("-with-faults" if plans else "")),
+             "--directory", "served", "--bind",
              self.endpoints[0], "--bind-clients", self.endpoints[1], "--time-scale", TIME_SCALE,
              "--drain-time", 3, *self.keys(), *(["--faults", ",".join(plans)] if plans else [])],
             {"LD_PRELOAD": str(self.options.faulty_calls),
@@ -294,6 +295,8 @@ class World(Setting):
         number = self.counts["worker starts"]
         self.counts["worker starts"] += 1
         program = "proofmass-null-worker" if self.is_null else "proofmass-worker"
+        if plans and not self.is_null:
+            program += "-with-faults"
         command = [self.programs / program, "--connect", self.endpoints[0], "--threads", 1,
                    "--name", f"w{number}", "--drain-time", 4, *self.keys()]
         command += ["--run-time", f"{self.run_time_s:.3f}"] if self.is_null else []
@@ -348,8 +351,10 @@ class World(Setting):
         return self.served / f"{campaign.name}.db"
 
     def rows(self, campaign):
+        return self.rows_in(self.file_of(campaign))
+
+    def rows_in(self, file):
         """Time of receipt of each stored run; nothing if the file cannot be read now."""
-        file = self.file_of(campaign)
         try:
             connection = sqlite3.connect(f"file:{file}?mode=ro", uri=True, timeout=0.2)
             try:

@@ -172,28 +172,8 @@ TEST_F(QueryProcess, EndsWith130InTheMidstOfAFunction) {
   }
 }
 
-TEST_F(QueryProcess, TakesItsChildWithIt) {
-  Process query(directory(), "query", program(),
-                {"query", file().string(), "SELECT " + endless_calls[0]});
-  wait_until("child", [&] { return !query.children().empty(); });
-  const pid_t child = query.children().front();
-  query.signal(SIGKILL);
-  EXPECT_EQ(query.wait(), -SIGKILL);
-  wait_until("end of the child", [&] { return !is_alive(child); });
-}
-
-TEST_F(QueryProcess, SaysWhatEndedItsChild) {
-  Process query(directory(), "query", program(),
-                {"query", file().string(), "SELECT " + endless_calls[0]});
-  wait_until("child", [&] { return !query.children().empty(); });
-  kill(query.children().front(), SIGSYS);  // Sanitizers have no handler for it.
-  EXPECT_EQ(query.wait(), 1);
-  EXPECT_EQ(errors(),
-            "proofmass: error: query: its process ended: killed by signal 31 (Bad system call)\n");
-}
-
-// The kernel holds it. What it does then is tested with less, in query_memory_test.cpp.
-TEST_F(QueryProcess, MayHave8GibibytesOfAddressSpace) {
+// What bounds a question to a coordinator bounds all that it needs.
+TEST_F(QueryProcess, IsOneProcessWith8GibibytesOfAddressSpace) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "sanitizers need more address space than any limit";
 #endif
@@ -201,10 +181,46 @@ TEST_F(QueryProcess, MayHave8GibibytesOfAddressSpace) {
                 {"query", file().string(), "--format", "csv",
                  "SELECT 1 UNION ALL SELECT " + endless_calls[0]});
   wait_until("a row", [&] { return output().ends_with("1\r\n"); });
-  EXPECT_THAT(read_file("/proc/" + std::to_string(query.children().front()) + "/limits"),
+  EXPECT_TRUE(query.children().empty());
+  EXPECT_THAT(read_file("/proc/" + std::to_string(query.id()) + "/limits"),
               testing::ContainsRegex("Max address space +8589934592 +8589934592 "));
   query.signal(SIGINT);
   EXPECT_EQ(query.wait(), 130);
+}
+
+/// Columns `<begin>1), <begin>2) ...`; SQLite computes equal ones only once.
+std::string columns(const std::string& begin, int count) {
+  std::string text;
+  for (int i = 1; i <= count; ++i) {
+    text += (i == 1 ? "" : ", ") + begin + std::to_string(i) + ")";
+  }
+  return text;
+}
+
+// The kernel holds the limit, whichever way a query takes memory.
+TEST_F(QueryProcess, EndsWith1WhenItNeedsMoreMemoryThanItMayHave) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers need more address space than any limit";
+#endif
+  const auto query_within_256_mib = [&](const std::string& sql) {
+    return Process(directory(), "query", "/usr/bin/prlimit",
+                   {"--as=268435456", program(), "query", file().string(), sql, "--format", "csv"})
+        .wait();
+  };
+  const std::vector<std::string> greedy{
+      // A row of 20 texts of 60 MB, which SQLite has to hold all at once.
+      "SELECT " + columns("hex(zeroblob(30000000) || ", 20),
+      // 40 lists of a million values, 8 bytes each.
+      "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 1000) SELECT " +
+          columns("percentile(a.i * b.i, ", 40) + " FROM n AS a, n AS b"};
+  for (const std::string& sql : greedy) {
+    EXPECT_EQ(query_within_256_mib(sql), 1);
+    EXPECT_EQ(errors(),
+              "proofmass: error: memory = 256 MiB (the query and what it sorts need more; ask for "
+              "less, or query a copy of the database elsewhere)\n");
+  }
+  EXPECT_EQ(query_within_256_mib("SELECT length(hex(zeroblob(30000000))) AS n"), 0) << errors();
+  EXPECT_EQ(output(), "n\r\n60000000\r\n");
 }
 
 }  // namespace

@@ -108,7 +108,7 @@ class Bench:
         folder = self.state("killed")
         endpoint = f"ipc://{self.folder}/killed"
         with subprocess.Popen(
-                [self.programs / SERVED, self.definition(NUM_RUNS), "--directory", folder, "--bind",
+                [self.programs / f"{SERVED}-with-faults", self.definition(NUM_RUNS), "--directory", folder, "--bind",
                  endpoint, "--faults", "kill=after_commit:2"], stderr=subprocess.DEVNULL) as served:
             with subprocess.Popen(
                     [self.programs / "proofmass-worker", "--connect", endpoint, "--threads", "1",

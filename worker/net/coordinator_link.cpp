@@ -11,12 +11,11 @@
 
 #include "core/error.hpp"
 #include "proto/link/connection_monitor.hpp"
+#include "proto/link/faults.hpp"
 #include "proto/link/socket.hpp"
 
 namespace proofmass::worker {
 namespace {
-
-using Direction = wire::FaultyLink::Direction;
 
 TimePoint steady_now() { return std::chrono::steady_clock::now(); }
 
@@ -28,15 +27,11 @@ std::chrono::milliseconds milliseconds_up(Duration time) {
 
 class CoordinatorLink::Impl {
  public:
-  Impl(const std::string& endpoint, const wire::ClientSecurity& security,
-       const std::optional<wire::FaultPlan>& faults)
+  Impl(const std::string& endpoint, const wire::ClientSecurity& security)
       : socket_(wire::make_dealer(context_, security)),
-        monitor_(context_, socket_, endpoint, security, steady_now()) {
-    if (faults) {
-      sending_.emplace(*faults, Direction::sending);
-      receiving_.emplace(*faults, Direction::receiving);
-    }
-  }
+        monitor_(context_, socket_, endpoint, security, steady_now()) {}
+
+  [[nodiscard]] bool has_faults() const { return sending_ != nullptr; }
 
   void wait(std::span<const int> descriptors, Duration time_max) {
     // A connection takes messages only some time after its handshake.
@@ -98,26 +93,30 @@ class CoordinatorLink::Impl {
   zmq::context_t context_;
   zmq::socket_t socket_;
   wire::ConnectionMonitor monitor_;
-  std::optional<wire::FaultyLink> sending_;
-  std::optional<wire::FaultyLink> receiving_;
+  // Null unless something shall go wrong.
+  std::unique_ptr<wire::LinkFaults> sending_ =
+      wire::link_faults(wire::LinkFaults::Direction::sending);
+  std::unique_ptr<wire::LinkFaults> receiving_ =
+      wire::link_faults(wire::LinkFaults::Direction::receiving);
   bool was_connected_ = false;
   bool is_newly_connected_ = false;  ///< And nobody has been told.
   bool can_send_ = false;            ///< At the last look; looked at only while nobody was told.
 };
 
-CoordinatorLink::CoordinatorLink(const std::string& endpoint, const wire::ClientSecurity& security,
-                                 const std::optional<wire::FaultPlan>& faults)
-    : endpoint_(endpoint), security_(security), faults_(faults), impl_(make_impl()) {}
+CoordinatorLink::CoordinatorLink(const std::string& endpoint, const wire::ClientSecurity& security)
+    : endpoint_(endpoint), security_(security), impl_(make_impl()) {}
 
 std::unique_ptr<CoordinatorLink::Impl> CoordinatorLink::make_impl() const {
   try {
-    return std::make_unique<Impl>(endpoint_, security_, faults_);
+    return std::make_unique<Impl>(endpoint_, security_);
   } catch (const zmq::error_t& error) {
     throw Error(fmt::format("connect = {} ({})", endpoint_, error.what()));
   }
 }
 
 CoordinatorLink::~CoordinatorLink() = default;
+
+bool CoordinatorLink::has_faults() const { return impl_->has_faults(); }
 
 void CoordinatorLink::reconnect() {
   impl_->drop_unsent();

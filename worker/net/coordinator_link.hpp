@@ -7,7 +7,6 @@
 #include <string>
 #include <string_view>
 
-#include "proto/link/faults.hpp"
 #include "proto/link/keys.hpp"
 #include "worker/execution/execution.hpp"
 
@@ -20,13 +19,14 @@ class CoordinatorLink {
   /// Begins to connect.
   ///
   /// @param endpoint  wire::check_endpoint() holds.
-  /// @param faults    What shall go wrong with the messages, for tests of this program.
   /// @throws Error if the socket cannot be made.
-  CoordinatorLink(const std::string& endpoint, const wire::ClientSecurity& security,
-                  const std::optional<wire::FaultPlan>& faults);
+  CoordinatorLink(const std::string& endpoint, const wire::ClientSecurity& security);
   ~CoordinatorLink();  ///< Waits some seconds at most until what was sent has left.
   CoordinatorLink(const CoordinatorLink&) = delete;
   CoordinatorLink& operator=(const CoordinatorLink&) = delete;
+
+  /// Whether messages come late on purpose.
+  [[nodiscard]] bool has_faults() const;
 
   /// Leaves the connection, with what has not been sent, and makes another one.
   void reconnect();
@@ -50,7 +50,6 @@ class CoordinatorLink {
 
   std::string endpoint_;
   wire::ClientSecurity security_;
-  std::optional<wire::FaultPlan> faults_;
   std::unique_ptr<Impl> impl_;
 };
 

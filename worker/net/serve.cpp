@@ -8,8 +8,8 @@
 #include <utility>
 #include <variant>
 
+#include "proto/link/faults.hpp"
 #include "proto/link/init_system.hpp"
-#include "proto/link/kill_point.hpp"
 #include "proto/wire/codec.hpp"
 #include "worker/net/coordinator_link.hpp"
 #include "worker/spool/spool.hpp"
@@ -100,8 +100,8 @@ class Service {
       : log_(config.log),
         progress_(progress),
         signals_(signals),
-        wait_max_(config.faults ? fault_interval : tick_interval),
-        link_(config.endpoint, config.security, config.faults),
+        link_(config.endpoint, config.security),
+        wait_max_(link_.has_faults() ? fault_interval : tick_interval),
         conversation_(
             config.session, config.hello, execution,
             [this](const wire::Packet& packet) { send(packet); }, time_now(), config.conversation),
@@ -196,8 +196,8 @@ class Service {
   const wire::Wake& progress_;
   StopSignals& signals_;
   StopRequest former_request_ = StopRequest::none;
-  Duration wait_max_;
   CoordinatorLink link_;
+  Duration wait_max_;
   Conversation conversation_;
   Keeping keeping_;
   wire::ServiceNotices notices_;

@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 
-#include "proto/link/faults.hpp"
 #include "proto/link/keys.hpp"
 #include "proto/link/socket.hpp"
 #include "proto/text/event.hpp"
@@ -24,7 +23,6 @@ struct ServeConfig {
   SignalSource signals = SignalSource::anyone;
   std::optional<std::filesystem::path> spool;  ///< Where results survive this process.
   wire::Log log = [](const wire::Event&) {};   ///< Told of all that happens.
-  std::optional<wire::FaultPlan> faults;       ///< On all messages; for tests of this program.
 };
 
 /// Computes runs for the coordinator at the endpoint until told to stop. To be called by the thread

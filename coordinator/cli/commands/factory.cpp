@@ -25,6 +25,7 @@
 #include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/log.hpp"
+#include "proto/link/start_program.hpp"
 #include "proto/link/surroundings.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/names.hpp"
@@ -72,11 +73,11 @@ std::string worker_command(const FactoryOptions& options) {
   }
   const auto walltime = std::chrono::minutes(options.walltime_min) - start_margin;
   command += fmt::format("proofmass-worker --connect {} --name {}-\"$1\" --max-walltime {}s",
-                         quoted_for_shell(checked_line("worker-connect", options.worker_endpoint)),
+                         wire::shell_word(checked_line("worker-connect", options.worker_endpoint)),
                          options.factory.name, walltime.count());
   command += fmt::format(" --idle-timeout {}s", options.idle_timeout_s);
   if (!options.worker_keys.empty()) {
-    command += " --keys " + quoted_for_shell(checked_line("worker-keys", options.worker_keys));
+    command += " --keys " + wire::shell_word(checked_line("worker-keys", options.worker_keys));
   }
   if (options.num_processors) command += fmt::format(" --threads {}", *options.num_processors);
   return command;
@@ -113,7 +114,7 @@ FactoryConfig checked(const FactoryOptions& options) {
 int show_submission(const BatchSystem& system, const AllocationConfig& config) {
   const BatchCommand command = system.submission(config);
   std::string text;
-  for (const std::string& argument : command.arguments) text += quoted_for_shell(argument) + " ";
+  for (const std::string& argument : command.arguments) text += wire::shell_word(argument) + " ";
   text.back() = '\n';
   print_lines(text + command.input);
   return exit_done;

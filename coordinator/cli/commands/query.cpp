@@ -24,9 +24,11 @@
 #include "coordinator/cli/remote_answer.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
-#include "coordinator/query/query_process.hpp"
+#include "coordinator/query/bounded_query.hpp"
 #include "coordinator/query/row_writer.hpp"
 #include "proto/command_line/option_checks.hpp"
+#include "proto/command_line/standard_error.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -135,6 +137,12 @@ int query_remotely(const QueryOptions& options) {
                       is_for_people ? AnswerText::lines : AnswerText::bytes);
 }
 
+[[noreturn]] void end_process(const std::string& error) {
+  if (error.empty()) _exit(exit_interrupted);
+  wire::say(fmt::format("proofmass: error: {}\n", wire::visible_text(error)));
+  _exit(exit_cannot_be_done);
+}
+
 // SIGINT and SIGTERM end it in order.
 int query_database(const QueryOptions& options) {
   if (is_remote(options.connection)) return query_remotely(options);
@@ -149,9 +157,13 @@ int query_database(const QueryOptions& options) {
                           .num_columns = table_columns(options)};
   const QueryOutput output{.format = options.format,
                            .table = table,
-                           .sink = write_standard_output,
-                           .flush = flush_standard_output};
-  const QueryEnd end = run_query_in_process(files, sql, limits, output);
+                           .sink =
+                               [](std::string_view rows) {
+                                 write_standard_output(rows);
+                                 flush_standard_output();
+                               },
+                           .end_process = end_process};
+  const QueryEnd end = run_bounded_query(files, sql, limits, output);
   flush_standard_output();
   return end == QueryEnd::complete ? exit_done : exit_interrupted;
 }

@@ -226,7 +226,7 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
   StorageNotes storage(display, config.writer.retry_after);
   const auto show = [&] {
     const wire::CampaignStatus status = service.campaigns().front();
-    storage.update(status);
+    if (!service.is_done()) storage.update(status);  // Otherwise run_campaign() tells why.
     display.update(options.part ? of_part(status, part.count, num_finished_beside)
                                 : out_of(status, num_runs));
   };
@@ -240,15 +240,6 @@ Outcome compute(ServedCampaign campaign, std::uint64_t num_runs, const RunOption
   page.reset();  // What it reads would keep the log from being folded in.
   const bool is_done = service.is_done();
   return {.store = std::move(service.close().front().store), .is_done = is_done};
-}
-
-/// What is written to a file that has lost its name is lost with it.
-void require_in_place(const Store& store, const std::filesystem::path& database) {
-  if (store.is_in_place()) return;
-  throw StoreError(fmt::format(
-      "campaign database = {} (was removed or replaced while the campaign ran; results that "
-      "are not in what is there now are lost, and the same command computes them again)",
-      database.string()));
 }
 
 int say_interrupted(const Store& store, const RunOptions& options) {
@@ -274,14 +265,13 @@ void bring_to_rest(Store& store, const std::filesystem::path& database) {
 
 /// Statistics of a file that cannot be written stay as they are; what is stored is said.
 int end_interrupted(Store& store, const Campaign& campaign, const RunOptions& options) {
-  const std::filesystem::path database = database_of(options);
+  store.check_place();
   try {
     update_statistics(store, campaign);
-    bring_to_rest(store, database);
+    bring_to_rest(store, database_of(options));
   } catch (const StoreError& error) {
     wire::say(fmt::format("proofmass: error: {}\n", wire::visible_text(error.what())));
   }
-  require_in_place(store, database);
   return say_interrupted(store, options);
 }
 
@@ -371,7 +361,6 @@ int run_campaign(const RunOptions& options) {
                             num_runs, options, std::move(start));
   if (!outcome.is_done) return end_interrupted(outcome.store, *campaign, options);
   update_statistics(outcome.store, *campaign);
-  require_in_place(outcome.store, database);
   bring_to_rest(outcome.store, database);
   print_outcome(outcome.store, *campaign, options.output);
   if (outcome.store.control().phase == wire::CampaignPhase::cancelled) {

@@ -290,13 +290,6 @@ void Database::attach_copy_of(const Database& other, const std::string& name) {
   if (code != SQLITE_OK) other.refuse_copy(code);
 }
 
-bool Database::is_in_place() const {
-  int has_moved = 0;
-  const int code =
-      sqlite3_file_control(connection_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &has_moved);
-  return code == SQLITE_OK && has_moved == 0;
-}
-
 std::uint64_t Database::log_size() const {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(log_path(path_), error);

@@ -145,9 +145,6 @@ class Database {
   /// The connection, for what SQLite can do and this class cannot.
   [[nodiscard]] sqlite3* handle() const { return connection_.get(); }
 
-  /// False if the file has been removed, renamed or replaced since it was opened.
-  [[nodiscard]] bool is_in_place() const;
-
   /// Bytes of the write-ahead log; 0 if there is none.
   [[nodiscard]] std::uint64_t log_size() const;
 

@@ -6,7 +6,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
@@ -14,15 +13,11 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
 
-#include "coordinator/store/detail/file_system.hpp"
-#include "coordinator/store/detail/result_rows.hpp"
-#include "coordinator/store/detail/schema.hpp"
-#include "coordinator/store/detail/store_impl.hpp"
+#include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "proto/link/whole_file.hpp"
 
@@ -52,12 +47,6 @@ std::filesystem::path index_of(const std::filesystem::path& canonical) {
   return std::filesystem::path(canonical).concat("-shm");
 }
 
-void remove_file(const std::filesystem::path& path) {
-  if (::unlink(path.c_str()) == 0 || errno == ENOENT) return;
-  throw StoreError(
-      fmt::format("file = {} (cannot be removed: {})", path.string(), std::strerror(errno)));
-}
-
 int open_and_lock(const std::filesystem::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
   if (descriptor < 0) {
@@ -80,57 +69,27 @@ int open_and_lock(const std::filesystem::path& path) {
 [[noreturn]] void refuse_to_make(const std::filesystem::path& file, std::string_view kind,
                                  const std::filesystem::path& beside) {
   throw StoreError(
-      fmt::format("campaign database = {0} (is gone, but its {1} {2} is there: put the file back, "
-                  "or move {2} away and begin anew)",
-                  file.string(), kind, beside.filename().string()));
+      fmt::format("campaign database = {0} (is gone, but its {1} {2} is there: {3}, or move {2} "
+                  "away and begin anew)",
+                  file.string(), kind, beside.filename().string(),
+                  kind == "copy" ? "give it the name" : "put the file back"));
 }
 
-[[noreturn]] void refuse(const Database& other, const std::string& what) {
-  other.refuse(fmt::format(
-      "took the place of the file that is being served, and {}; move it away, and the campaign is "
-      "written to its place again",
-      what));
-}
-
-std::optional<RunResult> next_result(Statement& row) {
-  if (!row.step()) return std::nullopt;
-  return read_result(row);
-}
-
-// Nothing that a worker was told to be safe may depend on the other file alone.
-void check_that_results_are_here(const Database& other, const Database& open_file) {
-  Statement theirs = select_results(other);
-  Statement ours = select_results(open_file);
-  std::optional<RunResult> own = next_result(ours);
-  while (const std::optional<RunResult> result = next_result(theirs)) {
-    while (own && own->run < result->run) own = next_result(ours);
-    if (!own || own->run != result->run || !are_equal(*own, *result)) {
-      refuse(other, fmt::format("has another result of run {}", result->run.value));
-    }
+// That of Store::check_place(); empty if there is none.
+std::filesystem::path recovered_copy_of(const std::filesystem::path& file) {
+  const std::string beginning = file.stem().string() + ".recovered-";
+  std::error_code error;
+  std::filesystem::directory_iterator item(wire::directory_of(file), error);
+  for (; !error && item != std::filesystem::directory_iterator(); item.increment(error)) {
+    const bool is_copy = item->path().filename().string().starts_with(beginning);
+    if (is_copy && item->path().extension() == file.extension()) return item->path();
   }
+  return {};
 }
 
-void check_that_it_is_an_older_copy(const std::filesystem::path& path, Access access,
-                                    const Database& open_file) {
-  Database other(path, access);
-  check_campaign_file(other, path);
-  constexpr std::int64_t first_version_with_uid = 4;
-  if (other.integer("PRAGMA user_version") < first_version_with_uid) {
-    refuse(other, "is of a version of which that cannot be told to be the same campaign");
-  }
-  const std::string uid = "SELECT campaign_uid FROM campaign";
-  if (other.integer(uid) != open_file.integer(uid)) refuse(other, "is of another campaign");
-  const std::string num_runs = "SELECT num_runs FROM campaign";
-  if (other.count(num_runs) > open_file.count(num_runs)) refuse(other, "has more runs");
-  check_that_results_are_here(other, open_file);
-}
-
-void copy_to_draft(const Database& open_file, const std::filesystem::path& draft) {
-  Database copy(draft, Access::create);
-  open_file.copy_to(copy);
-  // What is copied may say that there is a log.
-  copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
-}
+constexpr std::string_view truncated =
+    "was truncated or written over while it was served: what it held is lost; stop the "
+    "coordinator, put a copy back, and what the copy lacks is computed again";
 
 }  // namespace
 
@@ -177,6 +136,8 @@ void check_absence(const std::filesystem::path& file) {
   if (has_log(file)) refuse_to_make(file, "log", log_path(file));
   const std::uintmax_t journal_size = std::filesystem::file_size(journal_path(file), ignored);
   if (!ignored && journal_size > 0) refuse_to_make(file, "journal", journal_path(file));
+  const std::filesystem::path copy = recovered_copy_of(file);
+  if (!copy.empty()) refuse_to_make(file, "copy", copy);
 }
 
 FilePlace::FilePlace(const std::filesystem::path& file)
@@ -186,8 +147,10 @@ FilePlace::~FilePlace() { ::close(descriptor_); }
 
 FilePlace::Identity FilePlace::identity_at(const std::filesystem::path& path) {
   struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) return {};
-  return {.device = status.st_dev, .number = status.st_ino};
+  if (::stat(path.c_str(), &status) == 0) return {status.st_dev, status.st_ino};
+  if (errno == ENOENT || errno == ENOTDIR) return {};
+  throw StoreError(fmt::format("campaign database = {} (cannot be reached: {})", path.string(),
+                               std::strerror(errno)));
 }
 
 void FilePlace::remember_log() {
@@ -195,60 +158,32 @@ void FilePlace::remember_log() {
   index_ = identity_at(index_of(path_));
 }
 
-Placement FilePlace::look() {
+std::string_view FilePlace::look() {
+  if (is_lost()) return loss_;
   struct stat status {};
   if (::fstat(descriptor_, &status) == 0) {
-    is_truncated_ = is_truncated_ || status.st_size < size_max_;
-    size_max_ = std::max(size_max_, status.st_size);
+    if (status.st_size < size_max_) return loss_ = truncated;
+    size_max_ = status.st_size;
   }
-  if (is_truncated_) return Placement::truncated;
   const Identity present = identity_at(path_);
-  if (present == file_) {
-    return identity_at(log_of(path_)) == log_ ? Placement::in_place : Placement::log_removed;
+  if (present == Identity{}) {
+    loss_ = "was removed or renamed while it was served";
+  } else if (present != file_) {
+    loss_ = "was replaced by another file while it was served";
+  } else if (identity_at(log_of(path_)) != log_) {
+    loss_ = "lost its write-ahead log, which was removed while it was served";
   }
-  if (present != Identity{}) return Placement::replaced;
-  std::error_code ignored;
-  return std::filesystem::is_directory(path_.parent_path(), ignored) ? Placement::removed
-                                                                     : Placement::without_directory;
+  return loss_;
 }
 
-bool FilePlace::has_own_log() const {
-  return log_ != Identity{} && identity_at(log_of(path_)) == log_;
-}
+bool FilePlace::is_truncated() const { return loss_ == truncated; }
 
 void FilePlace::remove_own_log() const {
-  if (has_own_log()) remove_file(log_of(path_));
-  if (index_ != Identity{} && identity_at(index_of(path_)) == index_) {
-    remove_file(index_of(path_));
-  }
-}
-
-void remove_log_of(const std::filesystem::path& file) {
-  remove_file(log_of(file));
-  remove_file(index_of(file));
-}
-
-void restore_name(const std::filesystem::path& path, Database& open_file, const FilePlace& place,
-                  Placement placement, OwnLog own_log) {
-  check_directory_of(path);
-  // While results are in the log only, it stays until a complete copy is there.
-  if (own_log == OwnLog::folded_in || !place.has_own_log()) place.remove_own_log();
-  const auto write = [&](const std::filesystem::path& draft) { copy_to_draft(open_file, draft); };
-  if (placement == Placement::removed) {
-    appear_complete(path, wire::IfThere::keep, [&](const std::filesystem::path& draft) {
-      write(draft);
-      remove_log_of(path);  // Ours, all of which is in the copy, or of a file that is gone.
-    });
-    return;
-  }
-  const FilePlace other(path);  // No other coordinator has it.
-  // While our log is there, the other file has none, and ours must not be applied to it.
-  const Access access = place.has_own_log() ? Access::immutable : Access::read_only;
-  check_that_it_is_an_older_copy(path, access, open_file);
-  appear_complete(path, wire::IfThere::replace, [&](const std::filesystem::path& draft) {
-    write(draft);
-    remove_log_of(path);  // Ours, or that of the older copy, whose results are all here.
-  });
+  const auto remove = [](const std::filesystem::path& path, const Identity& own) {
+    if (own != Identity{} && identity_at(path) == own) ::unlink(path.c_str());
+  };
+  remove(log_of(path_), log_);
+  remove(index_of(path_), index_);
 }
 
 }  // namespace proofmass::coordinator::detail

@@ -2,11 +2,8 @@
 
 #include <sys/types.h>
 
-#include <cstdint>
 #include <filesystem>
-#include <string>
-
-#include "coordinator/store/detail/database.hpp"
+#include <string_view>
 
 namespace proofmass::coordinator::detail {
 
@@ -27,19 +24,9 @@ namespace proofmass::coordinator::detail {
 
 /// For a file that is about to be made.
 /// @throws StoreError
-///         if it is there, or the log or the rollback journal of one that is gone: SQLite would
-///         apply that to the new file.
+///         if it is there, or the log or the rollback journal of one that is gone, which SQLite
+///         would apply to the new file, or a copy that Store::check_place() has made of it.
 void check_absence(const std::filesystem::path& file);
-
-/// Where the open file of a coordinator is now.
-enum class Placement : std::uint8_t {
-  in_place,
-  removed,            ///< Nothing has its name any more: it was removed or renamed.
-  replaced,           ///< Another file has its name.
-  log_removed,        ///< It has its name, but its write-ahead log has not.
-  truncated,          ///< It is shorter than it was: somebody has emptied it or written over it.
-  without_directory,  ///< Its directory was removed or renamed.
-};
 
 /// Holds an open campaign database by the file itself, whatever becomes of its name: no two
 /// coordinators have one file, also where both lock files were removed. The advisory lock ends with
@@ -58,19 +45,18 @@ class FilePlace {
   /// To be called once the connection has opened the write-ahead log.
   void remember_log();
 
-  /// A file that was truncated once stays so: what was cut off does not come back.
-  [[nodiscard]] Placement look();
+  /// Looks whether the file has its name and its log, and all that was in it.
+  /// @return What happened to it while it was open, in words; empty if nothing did. What happened
+  ///         once stays so, whoever puts the file back.
+  /// @throws StoreError if that cannot be found out now.
+  std::string_view look();
+  [[nodiscard]] bool is_lost() const { return !loss_.empty(); }  ///< As look() said last.
+  /// Whether the file has become shorter, so that what it held is gone.
+  [[nodiscard]] bool is_truncated() const;
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }  ///< Canonical.
 
-  /// Whether the log that lies beside the name belongs to this file.
-  [[nodiscard]] bool has_own_log() const;
-
-  /// Removes the log, and its index, that lie beside the name and belong to this file. A log that
-  /// came with another file stays.
-  ///
-  /// Whatever opens a file of this name with its log must come afterwards: it would share the
-  /// index, and empty it, since SQLite takes no lock of its own process for that of another user.
-  /// @throws StoreError if one of them cannot be removed.
+  /// Removes the log, and its index, that lie beside the name and belong to this file: they would
+  /// be applied to whatever gets the name next. A log that came with another file stays.
   void remove_own_log() const;
 
  private:
@@ -82,7 +68,7 @@ class FilePlace {
     bool operator==(const Identity&) const = default;
   };
 
-  /// Of the file with this name; zeros if there is none.
+  /// Of the file with this name; zeros if there is none. @throws StoreError if that is unknown.
   [[nodiscard]] static Identity identity_at(const std::filesystem::path& path);
 
   std::filesystem::path path_;
@@ -91,29 +77,7 @@ class FilePlace {
   Identity log_;
   Identity index_;
   off_t size_max_ = 0;  ///< The largest that was seen: SQLite only adds pages to a campaign.
-  bool is_truncated_ = false;
+  std::string_view loss_;
 };
-
-/// Removes the write-ahead log and its index that lie beside this canonical name, whosever they
-/// are.
-/// @throws StoreError if one of them cannot be removed.
-void remove_log_of(const std::filesystem::path& file);
-
-/// Whether an open file needs its write-ahead log.
-enum class OwnLog : std::uint8_t {
-  folded_in,  ///< The file itself has all that is stored.
-  needed,     ///< Results may be in the log only.
-};
-
-/// Writes the open file to the name that it has lost, complete or not at all.
-///
-/// The write-ahead log of the open file would be applied to whatever has the name next. If it is
-/// folded in, it is removed first, and else when the copy that gets the name is complete.
-/// @param placement  `removed`: the name must still be free. `replaced`: what has the name now must
-///                   be an older copy of the same campaign, none of whose results differ; the
-///                   open file has all that is in it, and takes its place.
-/// @throws StoreError with the reason if that cannot be done; the open file is as it was.
-void restore_name(const std::filesystem::path& path, Database& open_file, const FilePlace& place,
-                  Placement placement, OwnLog own_log);
 
 }  // namespace proofmass::coordinator::detail

@@ -66,17 +66,14 @@ std::optional<TimePoint> due_time(const OpenFile& file, const CommitTimes& times
   return std::min(due, *urgent_since + times.commit_after);
 }
 
-// What is committed while the file loses its name is in the open file, and so in the copy that gets
-// the name: it is durable once the file has its name, and must not be written twice.
 Attempted try_to_write(OpenFile& file) {
   Attempted attempted;
   try {
-    attempted.file_return = file.store.return_to_place();
-    if (!file.unconfirmed && !file.writing.empty()) {
-      file.unconfirmed = file.store.write(file.writing);
+    if (file.writing.empty()) {
+      file.store.check_place();
+    } else {
+      attempted.summary = file.store.write(file.writing);
     }
-    if (const auto file_return = file.store.return_to_place()) attempted.file_return = file_return;
-    attempted.summary = std::exchange(file.unconfirmed, std::nullopt).value_or(CommitSummary{});
   } catch (const std::exception& error) {
     attempted.failure = error.what();
   }

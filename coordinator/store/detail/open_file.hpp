@@ -58,14 +58,14 @@ class WaitingEntries {
 struct OpenFile {
   Store store;
   WaitingEntries waiting;
-  std::vector<Entry> writing;  ///< Taken from `waiting`; kept if the last attempt failed.
-  std::optional<CommitSummary> unconfirmed;  ///< Of `writing`, if only the name is in doubt.
-  std::optional<TimePoint> retry_at;         ///< If the last attempt failed.
-  bool has_large_log = false;                ///< As was said last.
-  std::set<wire::SessionId> known;           ///< Workers of which the file has no end yet.
-  bool is_rest_wanted = false;               ///< Nothing more is expected.
-  std::optional<TimePoint> rest_at;          ///< When to fold the log in, once nothing waits.
-  bool is_log_kept = false;                  ///< As was said last: a reader keeps it from that.
+  std::vector<Entry> writing;         ///< Taken from `waiting`; kept if the last attempt failed.
+  std::optional<TimePoint> retry_at;  ///< If the last attempt failed.
+  std::string failure;                ///< Why it failed, as was said last.
+  bool has_large_log = false;         ///< As was said last.
+  std::set<wire::SessionId> known;    ///< Workers of which the file has no end yet.
+  bool is_rest_wanted = false;        ///< Nothing more is expected.
+  std::optional<TimePoint> rest_at;   ///< When to fold the log in, once nothing waits.
+  bool is_log_kept = false;           ///< As was said last: a reader keeps it from that.
 };
 
 /// Times as in WriterConfig.
@@ -83,7 +83,6 @@ struct Attempted {
   CommitSummary summary;
   std::optional<std::string> failure;
   std::uint64_t log_size = 0;  ///< Afterwards.
-  std::optional<FileReturn> file_return;
 };
 
 /// Tries to write what `writing` holds, to a file that has its name before and afterwards.

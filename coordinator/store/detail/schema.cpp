@@ -11,7 +11,7 @@
 #include "coordinator/store/detail/result_sql.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/model.hpp"
-#include "proto/link/kill_point.hpp"
+#include "proto/link/faults.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {

@@ -1,12 +1,15 @@
 #include "coordinator/store/detail/store_impl.hpp"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <cstdint>
+#include <ctime>
 #include <utility>
 
 #include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/detail/schema.hpp"
+#include "proto/link/start_program.hpp"
 
 namespace proofmass::coordinator {
 
@@ -80,6 +83,19 @@ std::optional<std::string> bring_to_rest(Database& database) {
   return std::nullopt;
 }
 
+void copy_whole(const Database& database, const std::filesystem::path& file,
+                const std::filesystem::path& draft) {
+  Database copy(draft, Access::create);
+  database.copy_to(copy);
+  copy.execute("PRAGMA cell_size_check = ON");
+  // Nobody shall rely on the copy of a damaged file, which is the one to be named.
+  copy.name_in_messages(file);
+  (void)check_all_pages(copy);
+  copy.name_in_messages(draft);
+  // What is copied may say that there is a log.
+  copy.execute("PRAGMA journal_mode = DELETE; UPDATE campaign SET is_log_needed = 0");
+}
+
 void prepare_reader(Database& database, const std::filesystem::path& file) {
   configure(database);
   check_campaign_file(database, file);
@@ -131,64 +147,75 @@ Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::Sto
 Store::Impl::~Impl() {
   if (!place) return;
   try {
+    check_place();
     rows.reset();
-    if (const auto placement = place->look(); placement != detail::Placement::in_place) {
-      database.leave_files_alone();
-      // What is left of a truncated file is of no use with pages of its log in it.
-      if (placement != detail::Placement::truncated) (void)fold_own_log();
-      return;
-    }
     if (!rest()) {
       database.execute("PRAGMA busy_timeout = 0");
       database.execute(without_log);
       return;
     }
   } catch (const StoreError&) {
-    // The next coordinator finds the log and goes on from there.
+    // The next coordinator finds the log, or the copy, and goes on from there.
   }
-  // The file says that it needs its log, of which SQLite may think that all is in the file.
-  if (is_perhaps_marked_) database.leave_files_alone();
+  // The file says that it needs its log, of which SQLite may think that all is in the file. Or what
+  // has the name now, and the log beside it, are not ours.
+  if (is_perhaps_marked_ || place->is_lost()) database.leave_files_alone();
 }
 
-void Store::Impl::change(const std::function<void(Database&)>& action) {
-  commit(action);
-  check_place();
-}
-
-void Store::Impl::check_place() const {
-  switch (place ? place->look() : detail::Placement::in_place) {
-    case detail::Placement::in_place:
-      return;
-    case detail::Placement::removed:
-      database.refuse("was removed or renamed while it was served");
-    case detail::Placement::replaced:
-      database.refuse("was replaced by another file while it was served");
-    case detail::Placement::log_removed:
-      database.refuse("lost its write-ahead log, which was removed while it was served");
-    case detail::Placement::truncated:
-      database.refuse(
-          "was truncated or written over while it was served: what it held is lost; stop the "
-          "coordinator, put a copy back, and what the copy lacks is computed again");
-    case detail::Placement::without_directory:
-      database.refuse("lost its directory, which was removed or renamed while it was served");
+void Store::Impl::check_place() {
+  const std::string_view loss = place ? place->look() : std::string_view();
+  if (loss.empty()) return;
+  // What is left of a truncated file is of no use with pages of its log in it.
+  if (place->is_truncated()) database.refuse(loss);
+  try {
+    if (copy.empty()) write_copy();
+  } catch (const StoreError& error) {
+    database.refuse(
+        fmt::format("{}, and a copy cannot be written beside it: {}; do not stop this "
+                    "program before that is mended",
+                    loss, error.what()));
   }
+  // A log of what has the name now would be applied to the copy.
+  const std::filesystem::path& name = place->path();
+  const std::string removal =
+      detail::has_log(name)
+          ? fmt::format("rm {} && ", wire::shell_word(detail::log_path(name).string()))
+          : std::string();
+  database.refuse(fmt::format(
+      "{}; {} has all that was acknowledged: stop this program, run `{}mv --backup {} {}`, and "
+      "start it again",
+      loss, copy.string(), removal, wire::shell_word(copy.string()),
+      wire::shell_word(name.string())));
 }
 
-// Leaving the mode folds the log in, which is still open, and entering it makes another one.
-void Store::Impl::renew_log() {
+// The log is first folded in, if nobody is in the way: whoever has the file under another name then
+// finds all results in it, too.
+void Store::Impl::write_copy() {
   rows.reset();
-  if (const std::optional<std::string> reason = rest()) database.refuse(*reason);
-  database.execute(without_log);
-  database.execute(with_log);
-  (void)says_that_log_is_needed(database);  // Reading opens the new log.
-  place->remember_log();
+  try {
+    (void)rest();
+  } catch (const StoreError&) {
+    // The copy has what the log has.
+  }
+  const std::filesystem::path& name = place->path();
+  const std::filesystem::path wanted =
+      name.parent_path() / fmt::format("{}.recovered-{:%Y%m%dT%H%M%SZ}{}", name.stem().string(),
+                                       fmt::gmtime(std::time(nullptr)), name.extension().string());
+  detail::check_directory_of(wanted);
+  detail::appear_complete(wanted, wire::IfThere::keep, [&](const std::filesystem::path& draft) {
+    detail::copy_whole(database, path, draft);
+  });
+  copy = wanted;
+  place->remove_own_log();
 }
 
 void Store::Impl::commit(const std::function<void(Database&)>& action) {
+  check_place();
   mark_log_as_needed();
   Transaction transaction(database);
   action(database);
   transaction.commit();
+  check_place();
 }
 
 // The mark reaches the file itself before anything that a copy of the file alone would lack. A
@@ -208,14 +235,6 @@ std::optional<std::string> Store::Impl::rest() {
   const std::optional<std::string> reason = detail::bring_to_rest(database);
   is_perhaps_marked_ = reason.has_value();
   return reason;
-}
-
-detail::OwnLog Store::Impl::fold_own_log() {
-  try {
-    return rest() ? detail::OwnLog::needed : detail::OwnLog::folded_in;
-  } catch (const StoreError&) {
-    return detail::OwnLog::needed;  // The disk does not take it.
-  }
 }
 
 }  // namespace proofmass::coordinator

@@ -26,6 +26,11 @@ void check_that_log_is_there(const Database& database, const std::filesystem::pa
 /// but the caller.
 [[nodiscard]] std::optional<std::string> bring_to_rest(Database& database);
 
+/// Writes all that the database of a file holds to an empty file, which is whole without a log.
+/// @throws StoreError naming the file if a page of it is damaged, and else the draft.
+void copy_whole(const Database& database, const std::filesystem::path& file,
+                const std::filesystem::path& draft);
+
 /// Prepares a connection to a campaign database for reading: checks the file, and if it is of an
 /// older version goes on with a private copy, see Database::go_on_with_private_copy().
 /// @throws StoreError as Store::open_read_only() does.
@@ -43,21 +48,15 @@ struct Store::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  /// Stores what `action` changes, durable in the open file when it returns, or nothing.
+  /// Stores what `action` changes, durable in a file that has its name when it returns. If it
+  /// throws, nothing is stored, or only in a file that has lost its name.
   void commit(const std::function<void(detail::Database&)>& action);
-  /// The same, and the file must have its name afterwards.
-  void change(const std::function<void(detail::Database&)>& action);
-  /// @throws StoreError if the file has lost its name, or its log has.
-  void check_place() const;
-  /// Gives the open file a log where its log was removed.
-  void renew_log();
+  /// As Store::check_place().
+  void check_place();
 
   /// Folds the log into the file, which is whole without it afterwards. Does not wait for readers:
   /// returns why it could not. @throws StoreError if the disk does not take it.
   [[nodiscard]] std::optional<std::string> rest();
-  /// The same for a file that has lost its name, and with it its log: all that is stored is to be
-  /// in the file itself, by whatever name it has now.
-  [[nodiscard]] detail::OwnLog fold_own_log();
 
   std::filesystem::path path;
   std::unique_ptr<detail::StoreLock> lock;   ///< Of a coordinator; a reader has none.
@@ -66,8 +65,11 @@ struct Store::Impl {
   std::optional<detail::EntryRows> rows;  ///< Prepared when they are first needed.
   bool is_log_lost = false;  ///< The file needed a log when it was opened; none was there.
 
+  std::filesystem::path copy;  ///< Of a file that lost its name; see Store::check_place().
+
  private:
   void mark_log_as_needed();
+  void write_copy();
 
   bool is_marked_ = false;          ///< The file itself, not only its log, says that it needs one.
   bool is_perhaps_marked_ = false;  ///< What the file says is not known to be that it needs none.

@@ -49,9 +49,12 @@ std::vector<std::string> ids_and_states(const std::vector<Allocation>& allocatio
 }
 
 TEST(BatchSystem, QuotesForTheShell) {
-  for (const std::string text : {"", "a b", "it's", "$HOME `id` \"x\" \\", "'"}) {
-    EXPECT_EQ(read_by_shell(quoted_for_shell(text)), text);
+  for (const std::string text :
+       {"", "a b", "it's", "$HOME `id` \"x\" \\", "'", "-rf", "~", "a/b.db"}) {
+    EXPECT_EQ(read_by_shell(wire::shell_word(text)), text);
   }
+  EXPECT_EQ(wire::shell_word("campaigns/a-b_1.db"), "campaigns/a-b_1.db");
+  EXPECT_EQ(wire::shell_word("it's"), "'it'\\''s'");
 }
 
 // The script of Slurm and PBS, with the variable that they set.
@@ -180,8 +183,8 @@ TEST(BatchSystem, FindsLocalWorkersByNameAndProcess) {
 TEST(BatchSystem, StartsLocalWorkersWithTheirProcessAsIdentifier) {
   AllocationConfig config = example();
   const std::string file = testing::TempDir() + "/started-by-factory";
-  config.worker_command = "echo \"$1\" $$ > " + quoted_for_shell(file + ".new") + " && mv " +
-                          quoted_for_shell(file + ".new") + " " + quoted_for_shell(file);
+  config.worker_command = "echo \"$1\" $$ > " + wire::shell_word(file + ".new") + " && mv " +
+                          wire::shell_word(file + ".new") + " " + wire::shell_word(file);
   const BatchSystem& local = system_of("local");
   const std::string id = local.id_of(output_of(local.submission(config)));
   const std::string seen = output_of(

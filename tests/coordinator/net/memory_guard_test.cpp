@@ -72,6 +72,7 @@ class MemoryGuardTest : public testing::Test {
                   ++num_opened;
                   return num_opened > num_failures;
                 },
+            .lacks_descriptors = [this] { return lacks_descriptors.exchange(false); },
             .note =
                 [this](const Event& event) {
                   const std::lock_guard lock(mutex);
@@ -90,6 +91,7 @@ class MemoryGuardTest : public testing::Test {
   std::condition_variable changed;
   std::vector<char> held;
   std::vector<std::string> events;
+  std::atomic<bool> lacks_descriptors = false;
   int num_opened = 0;
   int num_failures = 0;
   std::size_t size_at_start = ResidentMemory().size();
@@ -103,6 +105,17 @@ TEST_F(MemoryGuardTest, FreesWhatSocketsHold) {
   }
   EXPECT_EQ(wait_for_events(1), std::vector<std::string>{"sockets_reset"});
   EXPECT_LT(ResidentMemory().size(), size_at_start + 20 * mebibyte);
+}
+
+// Looked for again after a pause, in which peers get in again.
+TEST_F(MemoryGuardTest, ClosesSocketsThatHoldTooManyDescriptors) {
+  lacks_descriptors = true;
+  const MemoryGuard guard(std::size_t{1} << 40, actions());
+  EXPECT_EQ(wait_for_events(1), std::vector<std::string>{"sockets_reset"});
+  const auto begin = std::chrono::steady_clock::now();
+  lacks_descriptors = true;
+  EXPECT_EQ(wait_for_events(2), (std::vector<std::string>{"sockets_reset", "sockets_reset"}));
+  EXPECT_GT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(4));
 }
 
 TEST_F(MemoryGuardTest, TellsOnceOfWhatItCannotFree) {

@@ -46,7 +46,7 @@ class RouterSocketTest : public testing::Test {
 TEST_F(RouterSocketTest, IsBoundToTheSameAddressAgainAndPeersComeBack) {
   for (const std::string& where :
        {std::string("tcp://127.0.0.1:*"), "ipc://" + (directory / "socket").string()}) {
-    RouterSocket router(context, "bind", where, {}, {});
+    RouterSocket router(context, "bind", where, {});
     const std::string endpoint = router.endpoint();
     zmq::socket_t dealer = wire::make_dealer(peers_context, {});
     dealer.connect(endpoint);
@@ -77,7 +77,7 @@ TEST_F(RouterSocketTest, TakesOverASocketThatListensAlready) {
   dealer.connect(private_endpoint.address());
   const auto deadline = Clock::now() + std::chrono::seconds(20);
   while (!events.take() && Clock::now() < deadline) std::this_thread::yield();
-  RouterSocket router(context, "bind", private_endpoint.address(), {}, {}, listener);
+  RouterSocket router(context, "bind", private_endpoint.address(), {}, listener);
   EXPECT_EQ(router.endpoint(), private_endpoint.address());
   const auto say = [&dealer] { dealer.send(zmq::str_buffer("text"), zmq::send_flags::dontwait); };
   EXPECT_EQ(received(router, say), "text");
@@ -87,7 +87,7 @@ TEST_F(RouterSocketTest, TakesOverASocketThatListensAlready) {
 }
 
 TEST_F(RouterSocketTest, SaysThatItsAddressCannotBeHadNow) {
-  RouterSocket router(context, "bind", "tcp://127.0.0.1:*", {}, {});
+  RouterSocket router(context, "bind", "tcp://127.0.0.1:*", {});
   router.close();
   {
     const zmq::socket_t other = wire::make_router(context, "bind", router.endpoint(), {});
@@ -102,7 +102,7 @@ TEST_F(RouterSocketTest, SaysThatItsAddressCannotBeHadNow) {
 
 TEST_F(RouterSocketTest, TellsOfFailedHandshakesAlsoWhenItWasBoundAgain) {
   RouterSocket router(context, "bind", "tcp://127.0.0.1:*",
-                      {.domain = wire::Domain::workers, .keys = wire::make_key_pair()}, {});
+                      {.domain = wire::Domain::workers, .keys = wire::make_key_pair()});
   router.close();
   ASSERT_TRUE(router.open());
   zmq::socket_t plain = wire::make_dealer(peers_context, {});

@@ -232,7 +232,7 @@ TEST_F(ServiceWithADirectory, RemovesAFileThatItMadeForASubmissionInVain) {
   end(StopRequest::now);
 }
 
-// A file that is open can be restored if it is removed.
+// A file that is open can be copied if it is removed.
 TEST_F(ServiceWithADirectory, KeepsTheFilesOpenThatFinishedLast) {
   config.finished_open_max = 1;
   for (const std::string name : {"a", "b", "c"}) make_file(name);

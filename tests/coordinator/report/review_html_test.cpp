@@ -137,14 +137,6 @@ TEST_F(ReviewHtml, DrawsTheOperatingCharacteristic) {
   }
 }
 
-TEST(ShellWord, IsOneArgument) {
-  EXPECT_EQ(shell_word("campaigns/a-b_1.db"), "campaigns/a-b_1.db");
-  EXPECT_EQ(shell_word("a b.db"), "'a b.db'");
-  EXPECT_EQ(shell_word("it's"), "'it'\\''s'");
-  EXPECT_EQ(shell_word("-rf"), "'-rf'");
-  EXPECT_EQ(shell_word(""), "''");
-}
-
 /// Spectra of a session with a line of amplitude 3e-9 m/s².
 RunSpectra some_spectra() {
   SessionSpectrum spectrum{.session = "a_c13",

@@ -34,7 +34,7 @@ inline std::string committed(const std::vector<std::uint64_t>& runs) {
 }
 
 /// A writer, and all its completions in order as text: `committed 3 4 5`, `compared 3 equal`,
-/// `failed why`, `recovered`.
+/// `failed why`, `abandoned why`, `recovered`.
 class WriterTest : public StoreTest {
  protected:
   static constexpr wire::CampaignId id{1};
@@ -95,20 +95,9 @@ class WriterTest : public StoreTest {
            (compared.comparison.is_equal ? " equal" : " different");
   }
   static std::string text_of(const coordinator::StoreFailed& failed) {
-    return "failed " + failed.text;
+    return (failed.is_abandoned ? "abandoned " : "failed ") + failed.text;
   }
   static std::string text_of(const coordinator::StoreRecovered&) { return "recovered"; }
-  static std::string text_of(const coordinator::FileReturned& returned) {
-    switch (returned.kind) {
-      case coordinator::FileReturn::restored:
-        return "restored";
-      case coordinator::FileReturn::replaced:
-        return "replaced";
-      case coordinator::FileReturn::log_made_anew:
-        return "log made anew";
-    }
-    return "returned";
-  }
   static std::string text_of(const coordinator::LogGrown&) { return "log grown"; }
   static std::string text_of(const coordinator::LogShrunk&) { return "log shrunk"; }
   static std::string text_of(const coordinator::LogKept&) { return "log kept"; }

@@ -1,5 +1,3 @@
-#include "proto/link/faults.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 
 #include "core/error.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
+#include "tests/support/faults/planned_faults.hpp"
 
 namespace proofmass::wire {
 namespace {

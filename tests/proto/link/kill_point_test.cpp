@@ -1,5 +1,3 @@
-#include "proto/link/kill_point.hpp"
-
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -8,6 +6,8 @@
 #include <functional>
 #include <set>
 #include <string>
+
+#include "tests/support/faults/planned_faults.hpp"
 
 namespace proofmass::wire {
 namespace {

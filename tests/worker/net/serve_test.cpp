@@ -13,6 +13,7 @@
 #include "proto/wire/codec.hpp"
 #include "proto/wire/definition_codec.hpp"
 #include "tests/proto/link/scratch_directory.hpp"
+#include "tests/support/faults/planned_faults.hpp"
 #include "tests/support/microscope_results.hpp"
 #include "worker/execution/executor.hpp"
 #include "worker/spool/spool.hpp"
@@ -236,7 +237,7 @@ TEST_F(ServeTest, SaysWhyTheSpoolCannotBeUsed) {
 
 // Every other message is lost, both ways.
 TEST_F(ServeTest, DeliversAlthoughMessagesAreLost) {
-  config.faults = wire::FaultPlan::parse("seed=1,drop=0.5");
+  wire::plan_faults(wire::FaultPlan::parse("seed=1,drop=0.5"));
   config.conversation.resend_after = std::chrono::milliseconds(50);
   Coordinator coordinator(config.endpoint);
   std::future<Ending> ending = start_worker();
@@ -257,6 +258,7 @@ TEST_F(ServeTest, DeliversAlthoughMessagesAreLost) {
   EXPECT_EQ(coordinator.receive<wire::ResultBatch>().results.size(), 1U);
   for (int i = 0; i < 20; ++i) coordinator.send(wire::Stop{});
   EXPECT_EQ(ending.get().reason, "told to stop");
+  wire::plan_faults({});
 }
 
 }  // namespace

@@ -1,7 +1,8 @@
-#include "proto/link/faults.hpp"
+#include "tests/support/faults/planned_faults.hpp"
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 #include <set>
@@ -191,6 +192,32 @@ void FaultyLink::let_held_follow(const std::string& routing, LinkTime arrival) {
     under_way_.insert(std::move(entry));  // Behind all others of that time.
   }
   held_.erase(held);
+}
+
+namespace {
+
+// Of the process, as is the point at which it dies.
+std::optional<FaultPlan>& plan_of_process() {
+  static std::optional<FaultPlan> plan;
+  return plan;
+}
+
+}  // namespace
+
+void plan_faults(const std::optional<FaultPlan>& plan) {
+  plan_of_process() = plan;
+  if (plan && plan->kill) arm_kill_point(plan->kill->point, plan->kill->passage);
+}
+
+std::unique_ptr<LinkFaults> link_faults(LinkFaults::Direction direction) {
+  const std::optional<FaultPlan>& plan = plan_of_process();
+  return plan ? std::make_unique<FaultyLink>(*plan, direction) : nullptr;
+}
+
+void add_fault_option(CLI::App& app) {
+  app.add_option_function<std::string>(
+         "--faults", [](const std::string& text) { plan_faults(FaultPlan::parse(text)); })
+      ->group("");
 }
 
 }  // namespace proofmass::wire

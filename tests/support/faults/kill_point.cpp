@@ -1,5 +1,3 @@
-#include "proto/link/kill_point.hpp"
-
 #include <signal.h>
 #include <unistd.h>
 
@@ -8,6 +6,7 @@
 #include <cstddef>
 
 #include "core/error.hpp"
+#include "tests/support/faults/planned_faults.hpp"
 
 namespace proofmass::wire {
 namespace {
