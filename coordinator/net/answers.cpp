@@ -359,7 +359,9 @@ void Answers::make_room() {
 void Answers::ask(const wire::AnswerRequest& request, const std::filesystem::path& database,
                   const Asker& asker, Respond respond) {
   if (context_.config.answer_program.empty()) {
-    throw Error("question = one about results (this coordinator answers none)");
+    throw Error(
+        "this coordinator cannot answer questions about results, as the program proofmass is not "
+        "beside proofmass-coordinator; install it there");
   }
   require_room(asker.name);
   const std::uint64_t id = std::max<std::uint64_t>(1, context_.start.epoch.value + num_answers_++);

@@ -143,8 +143,10 @@ TEST_F(Answering, IsRefusedWhereThereIsNoProgram) {
   config.answer_program.clear();
   start({test::campaign_of("a", 5)});
   client.emplace(service->clients_endpoint());
-  EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
-            "question = one about results (this coordinator answers none)");
+  EXPECT_EQ(
+      client->error(AnswerRequest{.campaign = "a"}),
+      "this coordinator cannot answer questions about results, as the program proofmass is not "
+      "beside proofmass-coordinator; install it there");
 }
 
 TEST_F(Answering, SaysWhyAProgramCannotBeStarted) {
