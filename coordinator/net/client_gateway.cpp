@@ -207,9 +207,10 @@ std::optional<std::uint64_t> ClientGateway::begin(const Address& from, std::uint
     if (pending.waiters.size() < waiters_max) {
       pending.waiters.push_back(waiter);
     } else {
-      send(waiter, refusal(fmt::format("request = the same {} times (is being carried out; try "
-                                       "again later)",
-                                       waiters_max)));
+      send(waiter,
+           refusal(fmt::format("{} clients wait for the answer to this request already; try again "
+                               "later",
+                               waiters_max)));
     }
     return std::nullopt;
   }

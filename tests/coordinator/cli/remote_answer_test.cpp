@@ -166,14 +166,14 @@ TEST_F(Answering, SaysThatItsOutputHasNoPlace) {
 TEST_F(Answering, EndsAnOutputThatIsTooLarge) {
   start_with("exec head -c 70000000 /dev/zero");
   EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
-            "answer = more than 67108864 bytes (ask for less, or fetch the database)");
+            "the answer has more than 67108864 bytes; ask for less, or fetch the database");
 }
 
 TEST_F(Answering, EndsAProgramThatTakesTooLong) {
   config.answer_duration_max = std::chrono::milliseconds(300);
   start_with("exec sleep 1000");
   EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
-            "answer = not there after 0.3 s (ask for less)");
+            "there was no answer within 0.3 s; ask for less");
 }
 
 TEST_F(Answering, SaysThatAProgramCrashed) {
@@ -194,7 +194,7 @@ TEST_F(Answering, AnswersSoManyQuestionsAtATime) {
   const wire::ReplyPacket reply = client->receive_final();
   EXPECT_EQ(reply.id, 200U);
   EXPECT_EQ(std::get<wire::ErrorReply>(reply.reply).text,
-            "questions = 4 (are being answered, as many as may be; try again later)");
+            "4 questions are being answered, which is the limit; try again later");
 }
 
 // Others do not wait for one that takes long.
@@ -237,7 +237,7 @@ TEST_F(Answering, GivesOneAnswerToAllWhoAskTheSameAtTheSameTime) {
 TEST_F(Answering, KnowsNoAnswerThatItDidNotGive) {
   start_with("echo never");
   EXPECT_EQ(client->error(AnswerPartRequest{.answer_id = 1}),
-            "answer = 0000000000000001 (is not kept any more; ask again)");
+            "this answer is not kept any more; ask again");
 }
 
 TEST_F(Answering, LeavesNoFileOfAFetchThatIsRefused) {
