@@ -355,7 +355,7 @@ TEST_F(MadeUpAnswer, IsAskedForNothingBeyondItsSize) {
 
 TEST_F(MadeUpAnswer, IsNoLongerThanItsSize) {
   EXPECT_EQ(test::message_of<Error>([&] { (void)read(std::vector<std::string>(100, "ab"), 5); }),
-            "answer = longer than it was (ask again)");
+            "the answer became shorter while it was read; ask again");
 }
 
 }  // namespace
