@@ -181,9 +181,9 @@ void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::
       });
   if (is_posted) return;
   parts_.release(size);
-  respond(ticket, refusal(fmt::format("requests = {} (are under way, as many as may be; try again "
-                                      "later)",
-                                      Background::num_pending_max)));
+  respond(ticket,
+          refusal(fmt::format("{} requests are under way, which is the limit; try again later",
+                              Background::num_pending_max)));
 }
 
 void ClientGateway::carry_out(std::uint64_t ticket, const std::string& key, Request request) {
