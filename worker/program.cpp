@@ -40,7 +40,7 @@ constexpr std::chrono::seconds thread_end_max(5);
 /// A worker that a campaign started must not outlive it, however that ends.
 void die_with(pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != parent) throw Error("parent = gone (the campaign that started this worker)");
+  if (getppid() != parent) throw Error("the program that started this worker has ended");
 }
 
 wire::Hello hello_for(const Options& options, const ChildStart& start) {

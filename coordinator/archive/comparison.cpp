@@ -93,7 +93,7 @@ void visit_compared(const RunResult* a, const RunResult* b, bool is_paired, cons
   visit(of_first, of_second);
 }
 
-/// The same of all runs.
+/// visit_compared() for all runs of both campaigns, in run order.
 template <typename Visit>
 void walk_compared(const ComparedCampaign& first, const ComparedCampaign& second, bool is_paired,
                    const Visit& visit) {

@@ -60,7 +60,7 @@ struct ParameterComparison {
   /// See smallest_scale_factor(); empty below num_welch_min runs unless runs are paired.
   std::optional<double> smallest_scale_factor;
   ChangePValues p_values;           ///< That chance alone makes such a change.
-  ChangePValues adjusted_p_values;  ///< The same, in any test of all parameters.
+  ChangePValues adjusted_p_values;  ///< That chance alone makes one in any test of all parameters.
 };
 
 /// What two campaigns differ in, and what that does to the accuracy.
@@ -70,7 +70,7 @@ struct CampaignComparison {
   /// Why the draws are not the same, run by run; empty if they are, and pairs are compared.
   std::string why_unpaired;
   std::size_t num_first = 0;   ///< Runs of the first campaign that are compared.
-  std::size_t num_second = 0;  ///< The same as num_first if paired.
+  std::size_t num_second = 0;  ///< Runs of the second campaign; num_first if paired.
   /// Finished and given-up runs of each whole campaign that have no estimate: they may be its
   /// worst.
   MissingEstimates missing_in_first;

@@ -123,11 +123,12 @@ struct TestNames {
 
 TestNames tests_of(const CampaignComparison& comparison) {
   if (comparison.is_paired()) {
-    return {"Wilcoxon's signed ranks", "the same", "sign test"};
+    return {"Wilcoxon's signed ranks", "Wilcoxon's signed ranks", "sign test"};
   }
   return std::min(comparison.num_first, comparison.num_second) < num_welch_min
-             ? TestNames{"larger of Welch's and Smirnov's test", "the same", "Fisher's exact test"}
-             : TestNames{"Welch's t", "the same", "Fisher's exact test"};
+             ? TestNames{"larger of Welch's and Smirnov's test",
+                         "larger of Welch's and Smirnov's test", "Fisher's exact test"}
+             : TestNames{"Welch's t", "Welch's t", "Fisher's exact test"};
 }
 
 std::string bias_table(const CampaignComparison& comparison) {

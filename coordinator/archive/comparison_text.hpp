@@ -13,7 +13,7 @@ namespace proofmass::coordinator {
 [[nodiscard]] std::string comparison_text(const CampaignComparison& comparison,
                                           std::string_view first, std::string_view second);
 
-/// The same as JSON, complete and in SI units.
+/// A comparison of two campaigns as JSON, complete and in SI units.
 [[nodiscard]] std::string comparison_json(const CampaignComparison& comparison,
                                           std::string_view first, std::string_view second);
 

@@ -37,7 +37,7 @@ struct ListedCampaign {
 [[nodiscard]] std::string listing_text(std::span<const ListedCampaign> campaigns,
                                        std::size_t line_width_max);
 
-/// The same as JSON, complete.
+/// A listing as JSON, complete.
 [[nodiscard]] std::string listing_json(std::span<const ListedCampaign> campaigns);
 
 }  // namespace proofmass::coordinator

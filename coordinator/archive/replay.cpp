@@ -65,7 +65,7 @@ RunResult Replay::stored_result(RunIndex run) const {
 std::vector<RunResult> Replay::worst_results(std::size_t count, const IsStopped& is_stopped) const {
   const std::vector<double> objectives = campaign_->objectives();
   if (std::ranges::none_of(objectives, [](double limit) { return std::isfinite(limit); })) {
-    throw ArchiveError("objectives = none (the worst runs are those beside their objectives)");
+    throw ArchiveError("no run is the worst: the errors of this campaign have no objectives");
   }
   std::vector<std::pair<double, RunResult>> worst;  // Largest ratio first, then by run.
   (void)walk_results(store_, is_stopped, [&](const RunResult& result) {

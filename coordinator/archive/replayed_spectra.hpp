@@ -25,8 +25,8 @@ inline constexpr std::size_t num_spectrum_samples_max = std::size_t{1} << 23;
 [[nodiscard]] RunSpectra replayed_spectra(const Replay& replay, RunIndex run,
                                           const IsStopped& is_stopped);
 
-/// Those of the run that is the farthest off. None, and the reason, where there is no such run or
-/// this program cannot replay it.
+/// The spectra of the run that is the farthest off. None, and the reason, where there is no such
+/// run or this program cannot replay it.
 /// @param store  That of the review.
 /// @throws StoreError; Interrupted.
 [[nodiscard]] RunSpectra worst_run_spectra(const Store& store, const Review& review,

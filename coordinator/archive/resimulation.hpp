@@ -37,7 +37,7 @@ struct ResultDifference {
   RunIndex run;
   std::string column;    ///< Of the table `run_result`.
   std::string stored;    ///< Shortest text that reads back to the same bits.
-  std::string computed;  ///< The same.
+  std::string computed;  ///< As `stored`, of the run simulated again.
 };
 
 /// Every column that differs in a bit that means something; if the status does, that one alone.

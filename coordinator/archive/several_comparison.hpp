@@ -63,7 +63,7 @@ struct MemberNames {
 /// A text of a key, for JSON.
 using KeyText = std::pair<std::string, std::string>;
 
-/// The same as JSON, complete and in SI units.
+/// A comparison of several campaigns as JSON, complete and in SI units.
 /// @param varied  Keys with their values for each campaign; empty if none was varied.
 [[nodiscard]] std::string several_json(std::span<const ComparedMember> members,
                                        std::span<const std::vector<KeyText>> varied = {});

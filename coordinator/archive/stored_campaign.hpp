@@ -20,7 +20,7 @@ namespace proofmass::coordinator {
 /// be read or is not the one that was stored, see check_definition_digest().
 [[nodiscard]] std::shared_ptr<const Campaign> stored_campaign(const Store& store);
 
-/// The same of a definition that may have been changed, for who looks for changes.
+/// The campaign of a definition that may have been changed, for callers that look for changes.
 [[nodiscard]] std::shared_ptr<const Campaign> stored_campaign_unchecked(const Store& store);
 
 }  // namespace proofmass::coordinator

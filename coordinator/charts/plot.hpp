@@ -59,7 +59,7 @@ double draw_legend(std::span<const LegendEntry> entries, Point corner, double wi
 
 /// Grid lines and labels of ticks below the box, and the axis' label.
 void draw_x_axis(const AxisMap& x, const Axis& axis, const Box& box, SvgWriter& writer);
-/// The same on its left; the label is not drawn.
+/// Grid lines and labels of ticks on the left of the box; the label is not drawn.
 void draw_y_axis(const AxisMap& y, const Box& box, SvgWriter& writer);
 
 inline constexpr double x_axis_height = 42.0;  ///< Of the ticks and label below a plot.

@@ -52,7 +52,7 @@ template <typename Reply>
 /// @throws Error if the coordinator refuses.
 [[nodiscard]] wire::StatusReply whole_status(const Ask& ask);
 
-/// All workers, likewise.
+/// All workers, asked for page by page.
 /// @throws Error if the coordinator refuses.
 [[nodiscard]] wire::WorkersReply all_workers(const Ask& ask);
 

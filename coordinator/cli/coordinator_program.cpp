@@ -70,7 +70,7 @@ std::string status_of(const Service& service) {
   return fmt::format("{} campaigns to compute", num_active);
 }
 
-/// Those of campaign files, new ones or such that have more runs than before.
+/// The campaigns of campaign files: new ones, or such that have more runs than before.
 std::vector<ServedCampaign> campaigns_of(const ServeOptions& options, CampaignFolder& folder) {
   std::vector<ServedCampaign> campaigns;
   for (const std::filesystem::path& file : options.campaign_files) {

@@ -34,7 +34,7 @@ enum class DisplayMode : std::uint8_t {
 /// can be stored. Before the first run is done, how many the workers have.
 [[nodiscard]] std::string progress_bar(const wire::CampaignStatus& status, std::size_t columns_max);
 
-/// The same without a bar.
+/// The text of progress_bar() without the bar.
 [[nodiscard]] std::string progress_line(const wire::CampaignStatus& status);
 
 /// Shows a campaign's progress and notes beside it.

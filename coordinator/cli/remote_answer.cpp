@@ -26,7 +26,8 @@ void read_answer(const Ask& ask, const wire::AnswerReply& answer,
     take(part.content);
     request.offset += part.content.size();
   }
-  if (request.offset > answer.size) throw Error("answer = longer than it was (ask again)");
+  if (request.offset > answer.size)
+    throw Error("the answer became shorter while it was read; ask again");
 }
 
 int print_answer(const ClientConnectionConfig& connection, const wire::AnswerRequest& question,
@@ -41,7 +42,8 @@ int print_answer(const ClientConnectionConfig& connection, const wire::AnswerReq
     read_answer(ask, answer, [&](std::string_view part) { bytes += part; });
     Sha256 hash;
     hash.add_bytes(bytes);
-    if (hash.finish() != answer.sha256) throw Error("answer = another one than was announced");
+    if (hash.finish() != answer.sha256)
+      throw Error("the answer is not the one that was announced; ask again");
     if (text == AnswerText::lines) print_lines(bytes);
     if (text == AnswerText::tables) print_tables(bytes);
     if (text == AnswerText::bytes) write_standard_output(bytes);

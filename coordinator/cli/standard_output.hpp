@@ -22,7 +22,7 @@ struct ScreenSize {
 /// @throws Error `standard output: No space left on device`.
 void print_lines(std::string_view text);
 
-/// The same of tables and notes for people, painted if standard output is a terminal, see
+/// Prints tables and notes for people, painted if standard output is a terminal, see
 /// takes_paint(). To a file or a pipe it writes what print_lines() does.
 /// @throws Error as print_lines().
 void print_tables(std::string_view text);

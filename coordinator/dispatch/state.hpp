@@ -53,7 +53,8 @@ struct DispatchConfig {
   Duration heartbeat_interval = std::chrono::seconds(5);  ///< Asked of every worker.
   Duration suspect_after = std::chrono::seconds(15);  ///< Of silence; then nothing more is lent.
   Duration lost_after = std::chrono::seconds(60);     ///< Of silence; then runs are lent again.
-  /// The same while the coordinator is behind with reading: what seems silent may wait to be heard.
+  /// `lost_after` while the coordinator is behind with reading: what seems silent may wait to be
+  /// heard.
   Duration lost_after_if_behind = std::chrono::minutes(10);
   /// Runs that a heartbeat does not list, this long after they were lent, did not arrive. Longer
   /// than a message and its answer ever take while the worker is not suspect.

@@ -228,8 +228,9 @@ class AnswerProcess {
   void take_output(std::string_view bytes) {
     num_written_ += bytes.size();
     if (num_written_ > Answers::size_max) {
-      throw Error(fmt::format("answer = more than {} bytes (ask for less, or fetch the database)",
-                              Answers::size_max));
+      throw Error(
+          fmt::format("the answer has more than {} bytes; ask for less, or fetch the database",
+                      Answers::size_max));
     }
     answer_.append(bytes);
   }
@@ -254,7 +255,8 @@ class AnswerProcess {
 int exit_code_of(const std::optional<int>& status, const Order& order) {
   const bool is_out_of_time = !status || (WIFSIGNALED(*status) && WTERMSIG(*status) == SIGXCPU);
   if (is_out_of_time) {
-    throw Error(fmt::format("answer = not there after {:.3g} s (ask for less)", seconds_of(order)));
+    throw Error(
+        fmt::format("there was no answer within {:.3g} s; ask for less", seconds_of(order)));
   }
   if (!WIFEXITED(*status)) {
     throw Error(fmt::format("answer: the process was {}", wire::end_text(*status)));
@@ -342,7 +344,7 @@ void Answers::require_room(const std::string& owner) const {
                        num_unread + computing_.size() >= num_kept_max ||
                        (!owner.empty() && num_own >= num_computing_per_key);
   if (!is_full) return;
-  throw Error(fmt::format("questions = {} (are being answered, as many as may be; try again later)",
+  throw Error(fmt::format("{} questions are being answered, which is the limit; try again later",
                           computing_.size() + num_unread));
 }
 
@@ -359,7 +361,9 @@ void Answers::make_room() {
 void Answers::ask(const wire::AnswerRequest& request, const std::filesystem::path& database,
                   const Asker& asker, Respond respond) {
   if (context_.config.answer_program.empty()) {
-    throw Error("question = one about results (this coordinator answers none)");
+    throw Error(
+        "this coordinator cannot answer questions about results, as the program proofmass is not "
+        "beside proofmass-coordinator; install it there");
   }
   require_room(asker.name);
   const std::uint64_t id = std::max<std::uint64_t>(1, context_.start.epoch.value + num_answers_++);
@@ -398,8 +402,7 @@ void Answers::ask(const wire::AnswerRequest& request, const std::filesystem::pat
 wire::AnswerPartReply Answers::part(const wire::AnswerPartRequest& request, const Asker& asker) {
   const auto found = kept_.find(request.answer_id);
   if (found == kept_.end() || found->second.owner != asker.name) {
-    throw Error(
-        fmt::format("answer = {:016x} (is not kept any more; ask again)", request.answer_id));
+    throw Error("this answer is not kept any more; ask again");
   }
   Kept& kept = found->second;
   kept.read_at = context_.now();

@@ -46,7 +46,7 @@ class Answers {
   static constexpr std::size_t num_computing_per_key = 2;  ///< Of those.
   static constexpr std::size_t num_kept_max = 16;          ///< Answers that are being read.
   static constexpr std::chrono::seconds kept_for{60};      ///< After it was last read.
-  /// The same for an answer that was read to its end: another client may still be reading it. It
+  /// How long an answer stays that was read to its end: another client may still be reading it. It
   /// does not count against num_kept_max, and makes room when that many are held.
   static constexpr std::chrono::seconds kept_after_end{10};
   /// Of an answer, bytes, unless it is a copy of the database.

@@ -157,7 +157,9 @@ void CampaignService::close_ended(CampaignId id) {
 void CampaignService::archive(CampaignId id,
                               const std::function<void(wire::ClientReply)>& respond) {
   if (context_.config.directory == nullptr) {
-    throw Error("archive = a campaign (this coordinator has no directory)");
+    throw Error(
+        "this coordinator has no directory, which archived campaigns need; start it with "
+        "--directory");
   }
   const auto found = served_.find(id);
   if (found == served_.end()) return move_to_archive(id, respond);

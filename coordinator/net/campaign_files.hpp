@@ -40,7 +40,8 @@ enum class GivenUpRuns : std::uint8_t {
   retry,  ///< They are lent like all others.
 };
 
-/// What a service wants done with campaign databases. Its caller knows how.
+/// What a service has to have done with campaign databases. The program that runs the service
+/// implements it: `proofmass run` for one file, a coordinator for its directory.
 class CampaignFiles {
  public:
   virtual ~CampaignFiles() = default;
@@ -54,8 +55,8 @@ class CampaignFiles {
   ///         asker may not control.
   virtual ServedCampaign open(const Campaign& wanted, const StopPlan& plan, const Asker& asker) = 0;
 
-  /// The same for a campaign that was served before from this file, whatever the file is called.
-  /// @throws Error likewise; StoreError if there is no such file any more.
+  /// Opens a campaign that was served before from this file, whatever the file is called.
+  /// @throws Error as open() does; StoreError if there is no such file any more.
   virtual ServedCampaign open_again(const std::filesystem::path& file, const Campaign& wanted,
                                     const StopPlan& plan, const Asker& asker) = 0;
 

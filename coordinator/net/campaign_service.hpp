@@ -153,7 +153,7 @@ class CampaignService {
     bool is_summary_due = false;
     std::uint64_t num_summarised = 0;    ///< Of the runs committed here.
     std::string summary_failure = {};    ///< Of the last statistics; empty if there was none.
-    std::string extension_failure = {};  ///< The same of the last extension by the stop rule.
+    std::string extension_failure = {};  ///< Of the last extension by the stop rule.
     TimePoint summary_after = {};        ///< When statistics may be computed next.
     std::future<Summarised> summary;
   };

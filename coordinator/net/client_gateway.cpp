@@ -181,9 +181,9 @@ void ClientGateway::take_whole(const Address& from, std::uint64_t request, std::
       });
   if (is_posted) return;
   parts_.release(size);
-  respond(ticket, refusal(fmt::format("requests = {} (are under way, as many as may be; try again "
-                                      "later)",
-                                      Background::num_pending_max)));
+  respond(ticket,
+          refusal(fmt::format("{} requests are under way, which is the limit; try again later",
+                              Background::num_pending_max)));
 }
 
 void ClientGateway::carry_out(std::uint64_t ticket, const std::string& key, Request request) {
@@ -207,9 +207,10 @@ std::optional<std::uint64_t> ClientGateway::begin(const Address& from, std::uint
     if (pending.waiters.size() < waiters_max) {
       pending.waiters.push_back(waiter);
     } else {
-      send(waiter, refusal(fmt::format("request = the same {} times (is being carried out; try "
-                                       "again later)",
-                                       waiters_max)));
+      send(waiter,
+           refusal(fmt::format("{} clients wait for the answer to this request already; try again "
+                               "later",
+                               waiters_max)));
     }
     return std::nullopt;
   }

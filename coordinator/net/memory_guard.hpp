@@ -12,16 +12,17 @@
 
 namespace proofmass::coordinator {
 
-/// Decides when the sockets of a process are closed to free the memory that they hold. Sizes are
-/// those of its resident memory.
+/// Decides when the sockets of a process are closed to free the memory that they hold. A size is
+/// that of the process's resident memory.
 class MemoryBound {
  public:
   /// @param size_max  Of the process, bytes. The sockets are closed from three quarters of it on,
   ///                  so that what arrives meanwhile finds room.
   explicit MemoryBound(std::size_t size_max) : alarm_size_(size_max / 4 * 3), limit_(alarm_size_) {}
 
-  /// True if the sockets are to be closed at this size. Of a process that needs more for something
-  /// else they are closed again only when it has grown by a further quarter.
+  /// True if the sockets are to be closed at this size. If closing them did not bring the process
+  /// below its alarm, something else needs the memory: then they are closed again only when the
+  /// process has grown by a further quarter.
   [[nodiscard]] bool is_exceeded(std::size_t size);
 
   /// @param size  After the sockets were closed and memory was given back.

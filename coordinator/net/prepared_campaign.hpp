@@ -47,7 +47,7 @@ struct EndedCampaign {
   CampaignId id;
   std::filesystem::path file;
   wire::CampaignStatus status;
-  std::string created_utc = {};    ///< Likewise; empty if it was closed by this service.
+  std::string created_utc = {};    ///< When its file was made; empty if this service closed it.
   std::optional<FileStamp> stamp;  ///< Of the file when it was last looked at; empty until it was.
 };
 

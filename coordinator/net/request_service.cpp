@@ -78,7 +78,7 @@ void require_own_file(const CampaignService::Entry& campaign) {
 }
 
 [[noreturn]] void refuse_as_too_many() {
-  throw Error(fmt::format("requests = {} (are under way, as many as may be; try again later)",
+  throw Error(fmt::format("{} requests are under way, which is the limit; try again later",
                           Background::num_pending_max));
 }
 
@@ -220,8 +220,11 @@ void RequestService::carry_out(Request request, const Asker& asker, Respond resp
 void RequestService::submit(const Submitted& request, const Asker& asker, Respond respond) {
   const std::string& name = request->campaign->name;
   if (context_.config.files == nullptr) {
-    throw Error(fmt::format(
-        "submit = {} (this coordinator serves the campaigns that it began with)", name));
+    throw Error(
+        fmt::format("campaign {} cannot be submitted: this coordinator serves only the campaigns "
+                    "that it began with; "
+                    "start one with --directory",
+                    name));
   }
   const std::optional<CampaignService::Entry> entry = campaigns_.find(name);
   if (entry) {

@@ -76,7 +76,7 @@ class RequestService {
   /// @throws Error if its owner would have more than SubmissionLimits allow.
   void check_limits(const std::string& campaign, const std::string& owner,
                     const Holdings& added) const;
-  /// The same for an action on a campaign whose file is open.
+  /// check_limits() for an action on a campaign whose file is open.
   void check_limits(const std::string& campaign, const CampaignService::Entry& entry,
                     wire::ControlAction action) const;
   /// @param closed  The campaign if it has been served; otherwise its file may have to be made.

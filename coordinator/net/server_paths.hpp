@@ -20,7 +20,7 @@ class ServerPaths {
   /// The text with files of the directory named within it: `campaign database = a.db (is no file)`.
   /// Other paths stay: they are those that a client sent.
   [[nodiscard]] std::string hidden_in(std::string_view text) const;
-  /// The same for all that the reply says of files and failures.
+  /// Hides paths in all that the reply says of files and failures.
   void hide_in(wire::ClientReply& reply) const;
   void hide_in(wire::StatusReply& reply) const;
 

@@ -17,7 +17,7 @@ enum class WorkerActivity : std::uint8_t {
   computing,    ///< It holds runs.
   idle,         ///< It holds none.
   silent,       ///< It has said nothing for DispatchConfig::suspect_after: is lent nothing more.
-  quarantined,  ///< Too many workers crashed on its host: likewise.
+  quarantined,  ///< Too many workers crashed on its host: is lent nothing more.
 };
 
 inline constexpr std::array worker_activities{WorkerActivity::computing, WorkerActivity::idle,

@@ -16,8 +16,8 @@ namespace proofmass::coordinator {
 struct HttpRequest {
   std::string target = {};         ///< As it came: `/campaigns/a?events=2`.
   std::string host = {};           ///< The header Host; empty if there is none.
-  std::string authorization = {};  ///< Likewise.
-  std::string cookie = {};         ///< Likewise.
+  std::string authorization = {};  ///< The header Authorization; empty if there is none.
+  std::string cookie = {};         ///< The header Cookie; empty if there is none.
 };
 
 struct HttpAnswer {

@@ -19,14 +19,15 @@ struct ProcessFigures {
   double start_unix_s = 0.0;
 };
 
-/// Those of now. What cannot be read is 0.
+/// The figures of this moment. What cannot be read is 0.
 [[nodiscard]] ProcessFigures process_figures();
 
 /// Campaigns that have metrics of their own, so that the number of series is bounded; how many are
 /// left out is one of the metrics.
 inline constexpr std::size_t campaigns_with_metrics_max = 200;
 
-/// All metrics in Prometheus' text format 0.0.4. README.md documents each.
+/// All metrics in Prometheus' text format 0.0.4. README.md names those that deserve an
+/// alert.
 [[nodiscard]] std::string metrics_text(const PageSnapshot& snapshot, TimePoint now,
                                        const ProcessFigures& process, const HttpCounts& page);
 

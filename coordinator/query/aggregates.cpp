@@ -106,7 +106,8 @@ std::optional<double> rank(const AggregateColumns& columns) {
   return coefficient(rank_correlation(columns.x, columns.y, any_confidence));
 }
 
-// A run without a number is one of which nothing is known to its advantage.
+// A NULL stands for a run without an estimate, which is no evidence for a bound: it counts as
+// larger than any value.
 std::optional<double> tolerance_bound(const AggregateColumns& columns) {
   const Tolerance tolerance{.coverage = fraction_of("coverage", columns.parameters[0]),
                             .confidence = fraction_of("confidence", columns.parameters[1])};

@@ -159,8 +159,9 @@ void Reader::fail(int code, const std::string& sql) const {
       throw Error(memory_limit_text(limits_));
     case SQLITE_FULL:  // Nothing else is written.
       throw Error(
-          "temporary files = no space left (set SQLITE_TMPDIR to a directory with more, or ask for "
-          "less)");
+          "there is no space left for temporary files; set SQLITE_TMPDIR to a directory with more, "
+          "or "
+          "ask for less");
     case SQLITE_ERROR:
     case SQLITE_AUTH:
     case SQLITE_TOOBIG:

@@ -203,7 +203,7 @@ std::string markdown_text(std::string_view text) {
   return escaped;
 }
 
-// The other formats have all digits.
+// Six significant digits, for people; formats for programs have all digits.
 std::string figure_text(const Cell& cell) {
   const auto* real = std::get_if<double>(&cell);
   return real == nullptr ? cell_text(cell) : fmt::format("{:.6g}", *real);

@@ -89,7 +89,7 @@ std::string exceedance_lines(const RequirementAnswer& answer) {
          missing_lines(answer);
 }
 
-/// The same of the runs in which all objectives hold.
+/// The lines about the runs in which all objectives hold.
 std::string holding_lines(const RequirementAnswer& answer) {
   const RequirementCheck& check = answer.check;
   const double required = answer.requirement.tolerance.coverage;

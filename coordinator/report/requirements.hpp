@@ -34,7 +34,7 @@ namespace proofmass::coordinator {
 /// @param limit   The probability that is allowed.
 [[nodiscard]] std::string bounds_text(const Interval& bounds, double limit, Verdict verdict);
 
-/// The same of the probability that a requirement holds, and of what is required.
+/// bounds_text() of the probability that a requirement holds, beside what is required.
 [[nodiscard]] std::string success_text(const Interval& bounds, double required, Verdict verdict);
 
 /// What a requirement of the subject at a position compares with its limit, see

@@ -65,7 +65,7 @@ enum class WideCell : std::uint8_t { shorten, keep };
 /// and below a thousandth `1.2e+06`, which is at most seven characters below 1e99.
 [[nodiscard]] std::string measured_figure(double value);
 
-/// The same of any number, with a minus sign if it is below 0.
+/// measured_figure() of any number, with a minus sign if it is below 0.
 [[nodiscard]] std::string signed_figure(double value);
 
 /// A number ≥ 0 given by somebody: the same without zeros that say nothing, `7.3`, `2000`.

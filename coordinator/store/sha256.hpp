@@ -19,7 +19,7 @@ class Sha256 {
   void add(std::span<const unsigned char> bytes);
   void add_bytes(std::string_view bytes);  ///< Without their number.
   void add(std::uint64_t value);           ///< 8 bytes, lowest first.
-  void add(double value);                  ///< Its bits likewise; a zero has no sign.
+  void add(double value);                  ///< Its bits, lowest byte first; a zero has no sign.
   void add(std::string_view text);         ///< Its size as 64 bits, then its bytes.
 
   /// 64 hexadecimal digits. @pre Called once, at the end.

@@ -121,7 +121,7 @@ class Store {
   [[nodiscard]] std::optional<std::uint64_t> num_runs_fixed() const;
   [[nodiscard]] std::string definition() const;
   [[nodiscard]] std::string model_version() const;  ///< That of the program that made the file.
-  [[nodiscard]] std::string build() const;          ///< The same.
+  [[nodiscard]] std::string build() const;          ///< Of the program that made the file.
   [[nodiscard]] std::string created_utc() const;    ///< As in `2024-02-29T12:00:10Z`.
   /// Name of the key that submitted the campaign; empty without keys, or if it was not submitted.
   [[nodiscard]] std::string owner() const;
@@ -129,7 +129,7 @@ class Store {
   /// SHA-256 (64 hexadecimal digits) of data tables and table values, as it was stored with
   /// them.
   [[nodiscard]] std::string table_digest() const;
-  /// The same of what the tables hold now: another one if a number in them has changed.
+  /// The digest of what the tables hold now; it differs if a number in them has changed.
   [[nodiscard]] std::string computed_table_digest() const;
   /// The data that all runs share.
   [[nodiscard]] std::vector<DataTable> data_tables() const;
@@ -165,7 +165,7 @@ class Store {
 
   /// Ascending; neighbours are one range.
   [[nodiscard]] std::vector<RunRange> finished_runs() const;
-  [[nodiscard]] std::vector<RunRange> given_up_runs() const;  ///< The same; none is finished.
+  [[nodiscard]] std::vector<RunRange> given_up_runs() const;  ///< Ascending; none is finished.
   /// Finished runs of which a second result was compared with the stored one, ascending.
   [[nodiscard]] std::vector<RunRange> compared_runs() const;
   /// Runs that are neither finished nor given up, ascending.
@@ -175,7 +175,7 @@ class Store {
   [[nodiscard]] std::uint64_t num_before_blame() const;
   /// Second results that were compared with the stored ones.
   [[nodiscard]] std::uint64_t num_compared() const;
-  /// Those of them that differ, in run order.
+  /// Second results that differ from the stored ones, in run order.
   [[nodiscard]] std::vector<Contradiction> contradictions() const;
 
   /// Workers that joined and have not ended, as far as the file knows: those that may come back
@@ -226,7 +226,7 @@ class Store {
   /// Calls visit(result) for each finished run, in strictly ascending order. Zeros have no sign.
   /// @throws StoreError as ResultReader::next() does.
   void for_each_result(const std::function<void(const RunResult&)>& visit) const;
-  /// The same one by one.
+  /// Reads the finished runs one by one.
   [[nodiscard]] ResultReader results() const;
   [[nodiscard]] ResultReader results(RunRange runs) const;  ///< Of some of the runs.
 
@@ -238,14 +238,15 @@ class Store {
                         const std::optional<ErrorBudget>& budget, const ResultDigests& digests,
                         std::span<const RunWarning> warnings = {});
 
-  /// That of the last write_statistics(); empty before the first.
+  /// The summary of the last write_statistics(); empty before the first.
   [[nodiscard]] std::optional<Summary> summary() const;
 
   /// What `parameter` and `budget_coefficient` have other than a new file of a campaign of this
   /// definition, a line each: `parameter.unit of gain = m (must be 1)`. Numbers are equal if
   /// their bits are.
   [[nodiscard]] std::vector<std::string> parameter_differences(const Campaign& campaign) const;
-  /// What `statistic` and `budget_entry` have other than write_statistics() would store, likewise.
+  /// What `statistic` and `budget_entry` have other than write_statistics() would store, a line
+  /// each.
   [[nodiscard]] std::vector<std::string> statistic_differences(
       const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget) const;
   /// What rows of `stop_check` have other than these; there may be more of them.

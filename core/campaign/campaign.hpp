@@ -123,7 +123,7 @@ struct RunDraw {
   std::uint32_t num_draws = 0;  ///< As in RunResult.
   /// Of each of Model::drawn(); empty if no draw was accepted.
   std::vector<double> values{};
-  std::vector<double> truth{};  ///< Of each quantity of the results, SI; likewise.
+  std::vector<double> truth{};  ///< Of each quantity of the results, SI; empty without a draw.
 };
 
 /// What probabilities are over, in the terms of ECSS-E-ST-60-10C.
@@ -203,7 +203,7 @@ struct TableSource {
 
 /// Checks that `table_columns` has a column for each of these quantities, with a finite value for
 /// each run.
-/// @throws ConfigError likewise.
+/// @throws ConfigError naming the quantity and the rule.
 void check_table_columns(const Campaign& campaign, std::span<const TableSource> sources);
 
 }  // namespace proofmass

@@ -63,7 +63,7 @@ struct DefinitionItem {
 struct DefinitionDifference {
   std::string field;   ///< `noise.scale`.
   std::string first;   ///< As in a campaign file, or what is to be said about a file's rows.
-  std::string second;  ///< The same.
+  std::string second;  ///< As in `first`, of the other campaign.
 };
 
 }  // namespace proofmass

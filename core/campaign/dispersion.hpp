@@ -13,7 +13,7 @@ namespace proofmass {
 enum class Law : std::uint8_t {
   uniform = 1,           ///< On [minimum, maximum].
   normal = 2,            ///< mean, standard_deviation.
-  truncated_normal = 3,  ///< The same, inside [minimum, maximum].
+  truncated_normal = 3,  ///< mean, standard_deviation, on [minimum, maximum].
   fixed = 4,             ///< value.
   table = 5,             ///< One value a run, from a column of a file.
 };

@@ -8,7 +8,7 @@ namespace proofmass {
 
 /// What has_name_form() wants, for messages: `must be 1 to 64 of ` and this.
 inline constexpr std::string_view name_rule = "[A-Za-z0-9._-], a letter or digit first";
-/// The same of other names, see wire::is_name().
+/// The rule of the names that messages may hold, see wire::is_name().
 inline constexpr std::string_view is_name_rule =
     "must be 1 to 128 of [A-Za-z0-9._-], a letter or digit first";
 

@@ -125,8 +125,8 @@ struct RunResult {
   std::uint32_t num_draws = 0;     ///< Draws taken until one lay inside the acceptance bounds.
   std::uint32_t num_rounds = 0;    ///< Estimation rounds until no estimate moved any more.
   std::vector<double> truth{};     ///< Of each quantity, SI; if has_truth().
-  std::vector<double> estimate{};  ///< The same, if has_estimate().
-  std::vector<double> standard_error{};  ///< The same, of those quantities that have one.
+  std::vector<double> estimate{};  ///< Of each quantity, SI; if has_estimate().
+  std::vector<double> standard_error{};  ///< SI, of those quantities that have one.
   std::vector<double> health{};          ///< Of each health quantity; may be empty if has_truth().
   Loss loss{};                           ///< Says more if the status is `lost`.
 

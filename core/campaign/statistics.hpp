@@ -99,7 +99,7 @@ struct BudgetColumns {
                                            const CampaignStatistics& statistics);
 
 /// Leaves what was seen of a campaign whose draws are not independent: no interval is true of it.
-/// That of the share beyond an objective, which is always there, becomes 0 to 1.
+/// The interval of the share beyond an objective, which is always there, becomes 0 to 1.
 void leave_out_intervals(CampaignStatistics& statistics);
 
 /// The largest |error| of a quantity, and the runs beyond its objective.

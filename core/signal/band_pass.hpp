@@ -53,7 +53,7 @@ struct BiquadStateOf {
   }
 };
 
-/// Memory of a BandPass, likewise.
+/// Memory of a BandPass.
 template <typename T>
 struct BandPassStateOf {
   BiquadStateOf<T> high_pass;

@@ -216,7 +216,7 @@ void filter_backwards(const FilteredBlock& block, const RotatingLines& lines, Ba
 }
 
 #if defined(__x86_64__)
-// The same code in longer vectors, which halve its time; contraction is off, and the bits are
+// filter_block() in longer vectors, which halve its time; contraction is off, and the bits are
 // equal.
 template <std::size_t num_outputs>
 [[gnu::target("avx2")]] void filter_backwards_avx2(const FilteredBlock& block,

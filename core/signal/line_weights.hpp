@@ -21,7 +21,7 @@ struct LineFit {
   std::vector<double> known_hz;  ///< Further lines; at most LineWeights::num_lines_max in all.
 };
 
-/// The same estimate as one weighted sum over the raw record.
+/// The estimate of a LineFit as one weighted sum over the raw record.
 ///
 /// Every step of the estimate is linear, so the amplitudes of a line's cosine and sine are Σ wₖ xₖ
 /// with weights that depend on the record's length and the lines alone, not on the signal. They are

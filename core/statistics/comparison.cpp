@@ -204,8 +204,8 @@ double sign_test_p_value(std::size_t num_larger, std::size_t num_smaller) {
   return std::min(2.0 * binomial_at_most(fewer, count, 0.5), 1.0);
 }
 
-// Holm's with weights: the smallest p/w is held against the sum of all weights, the next against
-// that of the rest.
+// Holm's method with weights: the smallest p/w is held against the sum of all weights, the next one
+// against the sum of the rest.
 std::vector<double> holm_adjusted(std::span<const double> p_values,
                                   std::span<const double> weights) {
   if (!weights.empty()) detail::check_same_size("weights", weights, p_values);

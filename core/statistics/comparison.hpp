@@ -28,7 +28,8 @@ struct PairedComparison {
 [[nodiscard]] PairedComparison compare_paired(std::span<const double> first,
                                               std::span<const double> second, double confidence);
 
-/// The same of the differences second − first. Ranks need all of them; nothing else is kept.
+/// compare_paired() from the differences second − first. Ranks need all of them; nothing else is
+/// kept.
 [[nodiscard]] PairedComparison compare_differences(std::vector<double> differences,
                                                    double confidence);
 
@@ -56,8 +57,8 @@ inline constexpr std::size_t num_welch_min = 100;
                                                   std::span<const double> second,
                                                   double confidence);
 
-/// The same by the means alone, of num_welch_min values at least on either side: `distance` is 0
-/// and `law_p_value` 1.
+/// compare_unpaired() by the means alone, of num_welch_min values at least on either side:
+/// `distance` is 0 and `law_p_value` 1.
 [[nodiscard]] UnpairedComparison compare_means(const Moments& first, const Moments& second,
                                                double confidence);
 

@@ -113,7 +113,7 @@ std::optional<RegressionLine> fit_line(std::span<const double> x, std::span<cons
   const double xx = sum_xx.value() - n * x_rest * x_rest;
   const double slope = (sum_xy.value() - n * x_rest * y_rest) / xx;
 
-  // The same slope of the residuals is what the rounded one lacks.
+  // The slope of the residuals is what the rounded slope lacks.
   CompensatedSum sum_rest;
   for (std::size_t i = 0; i < x.size(); ++i) {
     const double dx = x[i] - x_centre - x_rest;

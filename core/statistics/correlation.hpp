@@ -29,7 +29,7 @@ struct Correlation {
                                                           std::span<const double> y,
                                                           double confidence);
 
-/// The same from average_ranks() of both columns, for a column that meets many others.
+/// rank_correlation() from average_ranks() of both columns, for a column that meets many others.
 [[nodiscard]] std::optional<Correlation> correlation_of_ranks(std::span<const double> x_ranks,
                                                               std::span<const double> y_ranks,
                                                               double confidence);

@@ -25,7 +25,8 @@ class ErrorPasses {
 
   [[nodiscard]] std::size_t count() const { return count_; }
   [[nodiscard]] double mean() const;  ///< After the first pass.
-  [[nodiscard]] double square_sum() const { return square_sum_.value(); }  ///< Σx², likewise.
+  /// Σx², after the first pass.
+  [[nodiscard]] double square_sum() const { return square_sum_.value(); }
   [[nodiscard]] Moments errors() const { return errors_.moments(); }
   [[nodiscard]] Moments deviations() const { return deviations_.moments(); }  ///< Of |x − mean|.
   /// Of |x − mean| − s (x − mean), s being the mean sign of x − mean: the same mean, and the
@@ -65,8 +66,9 @@ struct ChangePValues {
 [[nodiscard]] ChangePValues compare_many_errors(const ErrorPasses& first,
                                                 const ErrorPasses& second);
 
-/// The same of fewer values, at least two on either side: compare_unpaired() of the errors and of
-/// |error − mean of both campaigns|. A large change of the bias then shows as one of the scale too.
+/// Tests fewer values than num_welch_min, at least two on either side: compare_unpaired() of the
+/// errors and of |error − mean of both campaigns|. A large change of the bias then shows as one of
+/// the scale too.
 [[nodiscard]] ChangePValues compare_few_errors(std::span<const double> first,
                                                std::span<const double> second);
 
@@ -98,7 +100,8 @@ inline constexpr double finding_probability = 0.9;
 [[nodiscard]] std::optional<double> smallest_scale_factor(const ErrorPasses& first,
                                                           const ErrorPasses& second,
                                                           std::size_t num_parameters);
-/// The same of compare_paired_errors(). @param first  The errors of the first campaign.
+/// The factor that compare_paired_errors() would have found. @param first  The errors of the first
+/// campaign.
 [[nodiscard]] std::optional<double> smallest_scale_factor(const ErrorPasses& first,
                                                           const PairedErrors& pairs,
                                                           std::size_t num_parameters);
@@ -109,7 +112,7 @@ inline constexpr double finding_probability = 0.9;
 
 /// P-value of Fisher's exact test: of two groups of `num_first` and `num_second`, of which
 /// `tail_first` and `tail_second` are in the tail. Two-sided, by the probabilities that are at most
-/// that of what is seen.
+/// the one of the counts that are seen.
 struct TailCounts {
   std::uint64_t num_first = 0;
   std::uint64_t tail_first = 0;

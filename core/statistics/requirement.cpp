@@ -131,7 +131,7 @@ class VerdictRule {
   double allowed_rate_;
   std::optional<std::uint64_t> num_fixed_;
   double met_confidence_ = 0.0;      ///< Of sequential looks; 1 if nothing is left for them.
-  double not_met_confidence_ = 0.0;  ///< The same of the other verdict.
+  double not_met_confidence_ = 0.0;  ///< Of sequential looks; 1 if nothing is left for them.
 };
 
 /// The runs that it takes for so many exceedances if they come as often as in those of `check`.

@@ -20,7 +20,7 @@ struct Requirement {
   };
 
   std::size_t parameter = 0;  ///< For Subject::parameter: its position among the names.
-  double limit = 0.0;         ///< The same: SI, > 0; an error on it exceeds it.
+  double limit = 0.0;         ///< For Subject::parameter: SI, > 0; an error on it exceeds it.
   Tolerance tolerance;
   Subject subject = Subject::parameter;
 };
@@ -85,7 +85,7 @@ struct RequirementCheck {
                                                  std::uint64_t num_without_estimate,
                                                  std::optional<std::uint64_t> num_fixed);
 
-/// The same of a count, and without a bound.
+/// Checks a requirement by a count of exceedances; there is no bound then.
 [[nodiscard]] RequirementCheck check_requirement(const Requirement& requirement,
                                                  const ExceedanceCount& count,
                                                  std::optional<std::uint64_t> num_fixed);
@@ -100,7 +100,7 @@ struct Decision {
 
 /// A verdict that may be asked for after any number of runs and again after more: if the
 /// requirement does not hold, "met" is ever answered with probability 1 − confidence at most (the
-/// consumer's risk), and likewise "not met" if it holds.
+/// consumer's risk), and if it holds, "not met" is ever answered with that probability at most.
 ///
 /// With q = 1 − coverage and k of n exceeding, at n = num_fixed the verdict is "met" if
 /// P(Bin(n, q) ≤ k) ≤ 1 − confidence and "not met" if P(Bin(n, q) ≥ k) ≤ 1 − confidence. At any

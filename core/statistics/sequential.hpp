@@ -21,7 +21,7 @@ namespace proofmass {
 /// @pre 0 ≤ num_hits ≤ num_runs.
 [[nodiscard]] double evidence_of_less(double num_hits, double num_runs, double probability);
 
-/// The same against "the probability is p or less", with the weight of the larger ones
+/// Evidence against "the probability is p or less", with the weight of the larger ones
 /// w(p′) = p′^(−3/2)/(2 (p^(−1/2) − 1)). Without a hit there is none: 1 at most; it is then 0 here.
 [[nodiscard]] double evidence_of_more(double num_hits, double num_runs, double probability);
 

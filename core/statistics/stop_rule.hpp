@@ -71,12 +71,12 @@ struct StopCheck {
 /// @throws InvalidArgument if an error is not finite.
 [[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, std::span<const double> errors);
 
-/// The same of errors that were seen in passes.
+/// Checks a stop rule by errors that were seen in passes.
 /// @param errors  Made for wanted_by(rule); no further pass is needed.
 [[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, const ValuePasses& errors);
 [[nodiscard]] ValuePasses::Wanted wanted_by(const StopRule& rule);
 
-/// The same for a rule about exceedances. The estimate of `success` is the fraction of the runs
+/// Checks a stop rule about exceedances. The estimate of `success` is the fraction of the runs
 /// that meet all objectives, with its Clopper-Pearson interval. That of `verdict` is the fraction
 /// that exceed, with the bounds of decide(), each one-sided and with the requirement's confidence;
 /// it has no relative_half_width and is reached if there is a verdict.

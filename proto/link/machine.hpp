@@ -39,7 +39,7 @@ inline constexpr bool has_address_space_limit = true;
 /// Number of processes that the kernel has ended for lack of memory since the machine started.
 [[nodiscard]] std::uint64_t num_oom_kills();
 
-/// The same number, from the text of /proc/vmstat; 0 if the text does not have it.
+/// Reads num_oom_kills() from the text of /proc/vmstat; 0 if the text does not have it.
 [[nodiscard]] std::uint64_t oom_kills_in(std::string_view vmstat);
 
 /// Waits until a child process ends.
@@ -47,7 +47,8 @@ inline constexpr bool has_address_space_limit = true;
 ///         that exited with 1, so that it is not taken for a success.
 [[nodiscard]] int wait_for_end(pid_t child);
 
-/// The same of a child process that has ended; nothing if it has not. Does not wait.
+/// The exit code that wait_for_end() returns, of a child process that has ended; nothing if it has
+/// not. Does not wait.
 [[nodiscard]] std::optional<int> status_if_ended(pid_t child);
 
 /// How a process ended, for people: `exit code 1`, `killed by signal 9 (Killed)`.

@@ -60,7 +60,7 @@ void settle(const Limit& limit) {
                           limit.least, limit.remedy));
 }
 
-// Those of other threads are as large as the limit was when the program began.
+// Stacks of other threads are as large as the limit was when the program began.
 void settle_stacks() {
   settle(stack_size);
   pthread_attr_t attributes;

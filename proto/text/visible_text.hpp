@@ -21,7 +21,7 @@ struct Character {
 /// of a file or a peer passes through it, or visible_lines(), on its way to a person.
 [[nodiscard]] std::string visible_text(std::string_view text);
 
-/// The same for text of several lines, whose ends stay.
+/// visible_text() of several lines, whose ends stay.
 [[nodiscard]] std::string visible_lines(std::string_view text);
 
 /// Visible text that is safe in HTML and SVG, between tags and in an attribute's double quotes:

@@ -18,7 +18,7 @@ struct SubmitRequest {
   Definition definition;  ///< With its columns; what it says has not been looked at.
   /// -100 to 100; runs of a higher one are lent first. Unset: as it is, 0 for a new campaign.
   std::optional<int> priority = {};
-  std::optional<double> audit_fraction = {};  ///< 0 to 1. Likewise.
+  std::optional<double> audit_fraction = {};  ///< 0 to 1. Unset: as it is.
   /// See parse_stop_rule(): the campaign's runs are as many as it may take. Empty: all of them.
   std::string stop_rule = {};
   /// Runs without an estimate and given up; with more, the campaign is cancelled.

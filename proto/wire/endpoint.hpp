@@ -19,7 +19,7 @@ enum class Protection : std::uint8_t {
 ///
 ///     ipc://PATH  tcp://127.0.0.1:PORT  tcp://[::1]:PORT           anyhow
 ///     tcp://HOST:PORT  tcp://[IPV6]:PORT                           with keys, or waived
-///     tcp://*:PORT  tcp://INTERFACE:PORT                           likewise, to bind
+///     tcp://*:PORT  tcp://INTERFACE:PORT                           to bind; with keys, or waived
 ///
 /// A port to bind may be `*`: the system chooses one.
 ///

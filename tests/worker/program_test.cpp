@@ -108,8 +108,7 @@ TEST(WorkerProgram, GoesOnIfNobodyReadsItsLog) {
 TEST(WorkerProgram, DoesNotOutliveItsCampaign) {
   const Outcome outcome = run({"--connect", "ipc:///tmp/none", "--parent", "1"});
   EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_EQ(outcome.text,
-            "test-worker: error: parent = gone (the campaign that started this worker)\n");
+  EXPECT_EQ(outcome.text, "test-worker: error: the program that started this worker has ended\n");
 }
 
 }  // namespace

@@ -35,9 +35,9 @@ struct ConversationConfig {
   /// which a thousand workers of a coordinator that restarts come one after the other.
   Duration hello_delay = std::chrono::milliseconds(250);
   Duration hello_delay_max = std::chrono::seconds(32);
-  /// Between a refusal that is not final and the next Hello; doubles and varies likewise. Refusals
-  /// that are so much apart begin anew. A worker whose key is revoked for as long, so that it has
-  /// asked four times at least, ends.
+  /// Between a refusal that is not final and the next Hello; doubles and varies as hello_delay
+  /// does. Refusals that are so much apart begin anew. A worker whose key is revoked for as long,
+  /// so that it has asked four times at least, ends.
   Duration refusal_delay = std::chrono::seconds(15);
   Duration refusal_delay_max = std::chrono::seconds(60);
   Duration refusal_memory = std::chrono::minutes(5);

@@ -21,7 +21,7 @@ struct HeldRun {
   auto operator<=>(const HeldRun&) const = default;
 };
 
-/// The same runs by campaign and attempt, with the first `num_ranges_max` of their ranges.
+/// Runs by campaign and attempt, with the first `num_ranges_max` of their ranges.
 /// @param runs  In any order, each once.
 [[nodiscard]] std::vector<wire::HeldRuns> grouped(std::vector<HeldRun> runs,
                                                   std::size_t num_ranges_max);

@@ -84,7 +84,8 @@ class Spooler {
   /// not be written, if so; they stay in memory, and the next call tries again.
   [[nodiscard]] std::optional<std::string> look(
       const std::vector<wire::LeasedResult>& unacknowledged);
-  /// Likewise at the end, when they will not stay in memory.
+  /// Writes all results at the end, when they will not stay in memory; returns why some could not
+  /// be written, if so.
   [[nodiscard]] std::optional<std::string> finish(
       const std::vector<wire::LeasedResult>& unacknowledged);
 

@@ -162,7 +162,7 @@ void complete(ArrivedPart& part, const Ask& ask, const wire::AnswerReply& answer
   part.read_again();
   if (part.sha256() == answer.sha256) return;
   std::filesystem::remove(part.path(), ignored);
-  throw Error("database = another one than was announced (fetch it again)");
+  throw Error("the database is not the one that was announced; fetch it again");
 }
 
 /// What was fetched, after its results were held against the digest that came with them.

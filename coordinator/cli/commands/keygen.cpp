@@ -28,7 +28,7 @@ using wire::KeyRole;
 struct KeygenOptions {
   std::filesystem::path directory;
   std::optional<std::string> worker;  ///< Adds a pair of this name for another worker.
-  std::optional<std::string> client;  ///< Likewise for a client.
+  std::optional<std::string> client;  ///< Adds a pair of this name for another client.
 };
 
 std::string_view list_name(KeyRole role) {

@@ -88,7 +88,7 @@ RunSet runs_missing_in(const Store& store) {
   return missing;
 }
 
-/// The same for people, and how to get them.
+/// The missing runs for people, and how to get them.
 std::string missing_text(const Store& store, const MergeOptions& options) {
   const RunSet missing = runs_missing_in(store);
   if (missing.empty()) return {};

@@ -52,7 +52,7 @@ void check_plot_arguments(const PlotOptions& options) {
 const Picture& chosen_picture(const std::vector<NamedPicture>& pictures, const std::string& name) {
   const auto found = std::ranges::find(pictures, name, &NamedPicture::name);
   if (found != pictures.end()) return found->picture;
-  throw UsageError(fmt::format("chart = {} (is none of this campaign; --list names all)",
+  throw UsageError(fmt::format("this campaign has no chart {}; --list names those that it has",
                                wire::visible_text(name)));
 }
 
@@ -99,7 +99,7 @@ void print_names(const Review& review, const Campaign& campaign) {
   print_lines(names);
 }
 
-/// Those of the worst run, which is simulated for them.
+/// The spectra of the worst run, which is simulated for them.
 /// @throws ArchiveError if it has no spectrum of that name.
 void add_spectra(const Store& store, const std::string& chart, Review& review,
                  const IsStopped& is_stopped) {

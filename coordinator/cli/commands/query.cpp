@@ -120,7 +120,7 @@ std::optional<std::size_t> table_columns(const QueryOptions& options) {
 
 int query_remotely(const QueryOptions& options) {
   if (!options.attached.empty()) {
-    throw UsageError("--attach = a file (is not possible with --connect)");
+    throw UsageError("--attach is not possible with --connect; fetch the databases first");
   }
   const auto format = std::ranges::find(formats(), options.format,
                                         &std::map<std::string, RowFormat>::value_type::second);

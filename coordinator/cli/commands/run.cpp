@@ -84,7 +84,8 @@ class GrowingFile final : public CampaignFiles {
  public:
   [[nodiscard]] ServedCampaign open(const Campaign& wanted, const StopPlan&,
                                     const Asker&) override {
-    throw UsageError(fmt::format("submit = {} (nobody is there to submit)", wanted.name));
+    throw UsageError(fmt::format(
+        "campaign {} cannot be submitted: proofmass run serves its own alone", wanted.name));
   }
   [[nodiscard]] ServedCampaign open_again(const std::filesystem::path&, const Campaign& wanted,
                                           const StopPlan& plan, const Asker& asker) override {

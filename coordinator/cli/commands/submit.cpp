@@ -25,7 +25,7 @@ struct SubmitOptions {
   Overrides overrides;
   std::optional<std::string> name;       ///< By default the one in the file.
   std::optional<int> priority;           ///< -100 to 100; as it is without one.
-  std::optional<double> audit_fraction;  ///< 0 to 1; likewise.
+  std::optional<double> audit_fraction;  ///< 0 to 1; as it is without one.
   StopOptions stop;
   bool waits = false;
 };

@@ -62,7 +62,7 @@ class WatchDisplay {
 [[nodiscard]] int watch_until_over(const Ask& ask, const std::optional<std::string>& campaign,
                                    WatchDisplay& display, const std::function<void()>& pause);
 
-/// The same with a WatchDisplay on standard output, each second.
+/// watch_until_over() with a WatchDisplay on standard output, each second.
 [[nodiscard]] int watch_on_standard_output(const Ask& ask,
                                            const std::optional<std::string>& campaign,
                                            OutputFormat format);

@@ -107,7 +107,7 @@ class Database {
 
   /// Runs statements that yield nothing of interest.
   void execute(const std::string& sql);
-  /// The same; false if another connection is in the way.
+  /// execute(); false if another connection is in the way.
   [[nodiscard]] bool execute_unless_busy(const std::string& sql);
   [[nodiscard]] Statement prepare(std::string_view sql) const;
 
@@ -139,7 +139,7 @@ class Database {
   /// read. @pre The other was opened read-only.
   /// @throws StoreError naming that file.
   void attach_read_only(const Database& other, const std::string& name);
-  /// The same of a private copy of another database.
+  /// Attaches a private copy of another database.
   void attach_copy_of(const Database& other, const std::string& name);
 
   /// The connection, for what SQLite can do and this class cannot.

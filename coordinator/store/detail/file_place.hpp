@@ -11,7 +11,7 @@ namespace proofmass::coordinator::detail {
 /// `file` is a symbolic link that leads to it.
 [[nodiscard]] std::filesystem::path log_path(const std::filesystem::path& file);
 
-/// The same of the rollback journal.
+/// Where SQLite puts the rollback journal of a database.
 [[nodiscard]] std::filesystem::path journal_path(const std::filesystem::path& file);
 
 /// Whether a write-ahead log with something in it lies beside the file: one that is longer than its

@@ -14,7 +14,7 @@ namespace proofmass::coordinator::detail {
 /// A write-ahead log needs memory shared by all readers and writers, so one host.
 [[nodiscard]] std::string_view network_file_system_name(std::uint64_t type);
 
-/// The same for file systems in user space, of which the type tells nothing: `fuse.sshfs`.
+/// Name of a network file system in user space, of which statfs(2) tells nothing: `fuse.sshfs`.
 ///
 /// @param mount_table  As in /proc/self/mountinfo.
 /// @param device       `major:minor` of the directory.

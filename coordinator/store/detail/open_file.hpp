@@ -38,7 +38,7 @@ class WaitingEntries {
   [[nodiscard]] bool is_hurried() const { return is_hurried_; }
   /// Since when the oldest one waits, roughly; nothing if none does.
   [[nodiscard]] std::optional<TimePoint> waiting_since() const { return waiting_since_; }
-  /// The same of those that are urgent: results, and how the campaign is to be served.
+  /// Since when the oldest urgent entry waits: a result, or how the campaign is to be served.
   [[nodiscard]] std::optional<TimePoint> urgent_since() const { return urgent_since_; }
 
  private:

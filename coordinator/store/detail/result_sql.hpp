@@ -14,7 +14,7 @@ namespace proofmass::coordinator::detail {
 ///                           {health_columns}
 ///     {status_name}         status of r, a row of run_result, as text; also {loss_cause_name},
 ///                           {loss_session_name}
-///     {health_values}       columns of r that begin with health_, without that, likewise
+///     {health_values}       columns of r that begin with health_, without that
 ///     {truth_of_parameter}  truth in r of the parameter p; also {estimate_of_parameter},
 ///                           {error_of_parameter}
 ///     {budget_total}        budget total that the errors of a row of run_result leave, m/s²;

@@ -22,7 +22,7 @@ inline constexpr std::int64_t oldest_schema_version = 8;
 /// oldest_schema_version, each further one leads to the next version.
 [[nodiscard]] std::span<const std::string_view> schema_files();
 
-/// The same as SQL, see with_quantities().
+/// The schema files as SQL, see with_quantities().
 [[nodiscard]] const std::vector<std::string>& migrations();
 
 /// The version that this program reads and writes.

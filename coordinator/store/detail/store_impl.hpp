@@ -60,7 +60,7 @@ struct Store::Impl {
 
   std::filesystem::path path;
   std::unique_ptr<detail::StoreLock> lock;   ///< Of a coordinator; a reader has none.
-  std::unique_ptr<detail::FilePlace> place;  ///< The same. Closed after the database.
+  std::unique_ptr<detail::FilePlace> place;  ///< Of a coordinator. Closed after the database.
   detail::Database database;
   std::optional<detail::EntryRows> rows;  ///< Prepared when they are first needed.
   bool is_log_lost = false;  ///< The file needed a log when it was opened; none was there.

@@ -27,7 +27,7 @@ class MicroscopeCampaign final : public Campaign {
   EnvironmentTable environment_table;  ///< Rows of that file; empty if harmonic.
 
   void validate() const override;
-  /// The same but for `table_columns`, which may be absent.
+  /// validate() of a campaign whose `table_columns` may be absent.
   /// @throws ConfigError naming the field, its value and the rule.
   void validate_without_columns() const;
 

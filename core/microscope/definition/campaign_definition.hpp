@@ -59,11 +59,11 @@ class Document;
 /// to the same bits. Rows of data files are not in it.
 [[nodiscard]] std::string canonical_definition(const MicroscopeCampaign& campaign);
 
-/// The same for people: each field with its meaning and rule, dispersions by group.
+/// A campaign as TOML for people: each field with its meaning and rule, dispersions by group.
 [[nodiscard]] std::string commented_campaign(const MicroscopeCampaign& campaign);
 
-/// Every key of a campaign with its value, in the order of canonical_definition(), which says the
-/// same as one text. The rows of data files are not in it.
+/// Every key of a campaign with its value, in the order of canonical_definition(). The rows of data
+/// files are not in it.
 [[nodiscard]] std::vector<DefinitionItem> definition_items(const MicroscopeCampaign& campaign);
 
 /// Everything but the number of runs that two campaigns do not share, in the order of a campaign

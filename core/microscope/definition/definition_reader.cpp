@@ -205,7 +205,7 @@ double replaced_centre(Document& document, const std::string& path, Dispersion l
 }
 
 // Keys that belong to other laws: a mean beside a uniform law would be silently without effect.
-// Those of a law in the file that an assignment replaces are gone with it.
+// Keys of a law in the file that an assignment replaces are gone with it.
 void refuse_other_keys(Document& document, const std::string& path, Law law, bool is_assigned) {
   const std::span<const std::string_view> keys = keys_of(law);
   for (const std::string_view key : all_keys) {

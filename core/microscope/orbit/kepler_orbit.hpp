@@ -33,7 +33,7 @@ class KeplerOrbit {
   /// A pure function of time, by Newton's method to rounding; `time_s` may be negative.
   [[nodiscard]] OrbitPoint at(double time_s) const;
 
-  /// The same for a batch of times, one a lane; nothing if one of them needs more than the first
+  /// at() for a batch of times, one a lane; nothing if one of them needs more than the first
   /// step of Newton's method, which none does up to an eccentricity of 0.008.
   template <typename T>
   [[nodiscard]] PROOFMASS_INLINE std::optional<OrbitPointOf<T>> at_lanes(const T& time_s) const {

@@ -16,7 +16,7 @@ namespace proofmass {
 struct BatchSession {
   SessionSignals* signals = nullptr;      ///< Not yet asked for any sample.
   SessionSetup setup;                     ///< What the runs share.
-  const NoiseModel* noise = nullptr;      ///< The same for all runs.
+  const NoiseModel* noise = nullptr;      ///< That all runs share.
   const NoiseStreams* streams = nullptr;  ///< Of the session.
   std::uint64_t seed = 0;                 ///< Of the campaign.
   std::size_t num_runs = batch_lanes;     ///< At least 1; in the first lanes.
@@ -36,8 +36,8 @@ using SessionOutcomes = std::array<SessionOutcome, batch_lanes>;  ///< Of each l
 using BatchKernel = void (*)(const BatchSession& session,
                              std::span<SessionOutcome, batch_lanes> outcomes);
 
-/// The same for several sessions of the same runs, which are computed side by side as far as there
-/// are lanes, into the outcomes of each session. Signals are summed whether or not the session
+/// Records several sessions of the same runs, which are computed side by side as far as there are
+/// lanes, into the outcomes of each session. Signals are summed whether or not the session
 /// records them.
 ///
 /// @param sessions  Of the same runs, noise, gains and settling. They begin in this order: the

@@ -24,7 +24,7 @@ struct LoopConstants {
   Matrix3<T> thrust_matrix;            ///< [M_DF]: acceleration in S for a command in S.
   Vector3<T> angular_bias_S_rad_s2;    ///< Of the measured angular acceleration.
   Vector3<T> star_tracker_bias_S_rad;  ///< Of the fused angles.
-  double sensor_range_m_s2 = 0.0;      ///< The same for every lane.
+  double sensor_range_m_s2 = 0.0;      ///< One number for all lanes.
 };
 
 /// What the instrument and the on-board estimator report at one sample.

@@ -25,7 +25,7 @@ template <typename T>
 struct SharedSampleOf {
   T gradient_s2{};            ///< μ/r³.
   Vector3<T> radial_I;        ///< û: unit vector from the Earth's centre to the satellite.
-  Vector3<T> radial_R;        ///< The same vector.
+  Vector3<T> radial_R;        ///< û in the reference frame.
   Quaternion<T> attitude_IR;  ///< Of the reference.
   Vector3<T> omega_IR_R;      ///< Of the reference, rad/s; constant.
   /// Of a harmonic environment the components in R: what tilts S against R leaves them unchanged.

@@ -143,8 +143,10 @@ TEST_F(Answering, IsRefusedWhereThereIsNoProgram) {
   config.answer_program.clear();
   start({test::campaign_of("a", 5)});
   client.emplace(service->clients_endpoint());
-  EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
-            "question = one about results (this coordinator answers none)");
+  EXPECT_EQ(
+      client->error(AnswerRequest{.campaign = "a"}),
+      "this coordinator cannot answer questions about results, as the program proofmass is not "
+      "beside proofmass-coordinator; install it there");
 }
 
 TEST_F(Answering, SaysWhyAProgramCannotBeStarted) {
@@ -164,14 +166,14 @@ TEST_F(Answering, SaysThatItsOutputHasNoPlace) {
 TEST_F(Answering, EndsAnOutputThatIsTooLarge) {
   start_with("exec head -c 70000000 /dev/zero");
   EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
-            "answer = more than 67108864 bytes (ask for less, or fetch the database)");
+            "the answer has more than 67108864 bytes; ask for less, or fetch the database");
 }
 
 TEST_F(Answering, EndsAProgramThatTakesTooLong) {
   config.answer_duration_max = std::chrono::milliseconds(300);
   start_with("exec sleep 1000");
   EXPECT_EQ(client->error(AnswerRequest{.campaign = "a"}),
-            "answer = not there after 0.3 s (ask for less)");
+            "there was no answer within 0.3 s; ask for less");
 }
 
 TEST_F(Answering, SaysThatAProgramCrashed) {
@@ -192,7 +194,7 @@ TEST_F(Answering, AnswersSoManyQuestionsAtATime) {
   const wire::ReplyPacket reply = client->receive_final();
   EXPECT_EQ(reply.id, 200U);
   EXPECT_EQ(std::get<wire::ErrorReply>(reply.reply).text,
-            "questions = 4 (are being answered, as many as may be; try again later)");
+            "4 questions are being answered, which is the limit; try again later");
 }
 
 // Others do not wait for one that takes long.
@@ -235,7 +237,7 @@ TEST_F(Answering, GivesOneAnswerToAllWhoAskTheSameAtTheSameTime) {
 TEST_F(Answering, KnowsNoAnswerThatItDidNotGive) {
   start_with("echo never");
   EXPECT_EQ(client->error(AnswerPartRequest{.answer_id = 1}),
-            "answer = 0000000000000001 (is not kept any more; ask again)");
+            "this answer is not kept any more; ask again");
 }
 
 TEST_F(Answering, LeavesNoFileOfAFetchThatIsRefused) {
@@ -353,7 +355,7 @@ TEST_F(MadeUpAnswer, IsAskedForNothingBeyondItsSize) {
 
 TEST_F(MadeUpAnswer, IsNoLongerThanItsSize) {
   EXPECT_EQ(test::message_of<Error>([&] { (void)read(std::vector<std::string>(100, "ab"), 5); }),
-            "answer = longer than it was (ask again)");
+            "the answer became shorter while it was read; ask again");
 }
 
 }  // namespace

@@ -168,14 +168,14 @@ TEST_F(ReviewCommands, SayWhyTheWorstRunHasNoSpectra) {
   EXPECT_EQ(refused.error, "chart = spectrum:a_c13 (" + reason + ")");
   EXPECT_EQ(
       test::answer_of({"plot", database_, "--chart", "spectrum:a_c99", "--output", "-"}).error,
-      "chart = spectrum:a_c99 (is none of this campaign; --list names all)");
+      "this campaign has no chart spectrum:a_c99; --list names those that it has");
 }
 
 TEST_F(ReviewCommands, RefuseAChartThatIsNone) {
   const test::Answer refused =
       test::answer_of({"plot", database_, "--chart", "pie\x1b", "--output", "-"});
   EXPECT_EQ(refused.exit_code, exit_wrong_usage);
-  EXPECT_EQ(refused.error, "chart = pie\\u001b (is none of this campaign; --list names all)");
+  EXPECT_EQ(refused.error, "this campaign has no chart pie\\u001b; --list names those that it has");
   EXPECT_EQ(test::answer_of({"plot", database_, "--output", "-"}).error,
             "chart = (must be given; --list names all)");
   EXPECT_EQ(test::answer_of({"plot", database_, "--chart", "errors"}).error,

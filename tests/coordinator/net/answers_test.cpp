@@ -69,7 +69,7 @@ class AnswersTest : public testing::Test {
 
   bool is_dropped(std::size_t question = 0) {
     const std::string refusal = test::message_of<Error>([&] { (void)part("anna", 0, question); });
-    return refusal.ends_with("(is not kept any more; ask again)");
+    return refusal.ends_with("is not kept any more; ask again");
   }
 
   test::TemporaryDirectory directory_;
@@ -184,7 +184,7 @@ TEST_F(AnswersTest, AreCountedWhileTheyComeAndNothingElseIs) {
   ask("anna");
   wait_for(2);
   EXPECT_EQ(std::get<wire::ErrorReply>(replies_.back()).text,
-            "answer = more than 67108864 bytes (ask for less, or fetch the database)");
+            "the answer has more than 67108864 bytes; ask for less, or fetch the database");
 }
 
 // The file has no blocks: only its size says how long a copy of it is.

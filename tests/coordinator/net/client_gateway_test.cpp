@@ -86,7 +86,7 @@ TEST_F(ClientGatewayTest, LimitsHowManyWaitForTheSame) {
   ask("late", 5);
   ASSERT_EQ(replies_to("late").size(), 1U);
   EXPECT_EQ(replies_to("late")[0].second,
-            "request = the same 16 times (is being carried out; try again later)");
+            "16 clients wait for the answer to this request already; try again later");
   ASSERT_EQ(carried_out.size(), 1U);
   carried_out[0](wire::DoneReply{"done"});
   EXPECT_EQ(replies_to("late").size(), 1U);

@@ -154,7 +154,9 @@ TEST_F(ServiceClients, CannotSubmitWhereOneCampaignIsServed) {
   start_with({});
   EXPECT_EQ(
       client->error(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 2))}),
-      "submit = a (this coordinator serves the campaigns that it began with)");
+      "campaign a cannot be submitted: this coordinator serves only the campaigns that it began "
+      "with; "
+      "start one with --directory");
 }
 
 TEST_F(ServiceClients, PauseAndResumeACampaign) {

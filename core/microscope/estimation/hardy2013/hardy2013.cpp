@@ -178,7 +178,8 @@ class Round {
     return fitted + known_[Parameter::a_d11_prime] * known_[Parameter::k2c];
   }
 
-  /// The slope s_1 is (1 − a) K21/K11² with K11 = K1c (1 + a), a = a_d11; s_2 likewise with −a.
+  /// The slope s_1 is (1 − a) K21/K11² with K11 = K1c (1 + a), a = a_d11; s_2 is (1 + a) K22/K12²
+  /// with K12 = K1c (1 − a).
   [[nodiscard]] double common_quadratic(const std::array<double, 2>& s) const {
     if (correction_ != Correction::second_order) return 0.5 * (s[0] + s[1]);
     const double a = known_[Parameter::a_d11_prime];
