@@ -11,6 +11,7 @@
 
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
+#include "core/campaign/recording.hpp"
 #include "core/model.hpp"
 
 namespace proofmass::coordinator {

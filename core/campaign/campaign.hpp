@@ -11,12 +11,17 @@
 #include <vector>
 
 #include "core/campaign/definition.hpp"
-#include "core/campaign/recording.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/math/instruction_set.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass {
+
+struct RecordedSample;  // core/campaign/recording.hpp, which says what the numbers of a replay are.
+struct Recording;
+
+/// Takes the samples of a run, in the order of sessions and times. What it throws ends the replay.
+using SampleSink = std::function<void(const RecordedSample&)>;
 
 /// A term of an error budget, with its published figures.
 struct BudgetEntryInfo {

@@ -12,7 +12,7 @@
 namespace proofmass {
 
 // The time series of a run. No simulation keeps them: Plan::replay() computes a run again and
-// passes each sample on, and a Recording says what its numbers are.
+// passes each sample on to a SampleSink, and a Recording says what its numbers are.
 
 /// A signal of a simulation: a number in each sample.
 struct RecordedSignal {
@@ -68,8 +68,5 @@ struct RecordedSample {
   double time_s = 0.0;             ///< From the session's start; the first is 0.
   std::span<const double> values;  ///< Of all signals of all groups, in their order.
 };
-
-/// Takes the samples of a run, in the order of sessions and times. What it throws ends the replay.
-using SampleSink = std::function<void(const RecordedSample&)>;
 
 }  // namespace proofmass

@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "core/campaign/dispersion.hpp"
+#include "core/campaign/recording.hpp"
 #include "core/definition/definition_text.hpp"
 #include "core/definition/document.hpp"
 #include "core/math/elementary.hpp"
