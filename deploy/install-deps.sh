@@ -11,7 +11,7 @@ packages=(
   libzmq3-dev cppzmq-dev libsodium-dev libprotobuf-dev protobuf-compiler
   libsqlite3-dev sqlite3 libhdf5-dev
   libspdlog-dev libfmt-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev
-  libutfcpp-dev libboost-dev
+  libutfcpp-dev libboost-dev help2man
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev qemu-user g++-aarch64-linux-gnu clang-format

@@ -29,6 +29,8 @@ if [[ ! -d $build ]]; then
 fi
 for program in proofmass proofmass-coordinator proofmass-worker; do
   [[ -x $build/bin/$program ]] || fail "--build = $build (lacks bin/$program)"
+  [[ -s $build/share/man/man1/$program.1 ]] ||
+    fail "--build = $build (lacks the man page of $program: install help2man and build it again)"
 done
 
 stage=$(mktemp --directory)

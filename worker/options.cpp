@@ -9,7 +9,6 @@
 
 #include "core/error.hpp"
 #include "core/model.hpp"
-#include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/machine.hpp"

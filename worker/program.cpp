@@ -15,7 +15,6 @@
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
-#include "proto/command_line/manual_option.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/machine.hpp"
@@ -212,7 +211,6 @@ int run_worker(int argc, char** argv, const Program& program) {
   add_options(app, options);
   program.add_options(app);
   app.set_version_flag("--version", program.name + " " PROOFMASS_VERSION);
-  wire::add_manual_option(app, {"proofmass", "proofmass-coordinator"});
   return reporting_errors(program, [&] {
     wire::settle_surroundings();
     try {

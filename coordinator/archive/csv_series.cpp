@@ -1,14 +1,17 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cstddef>
 #include <iterator>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include "coordinator/archive/export.hpp"
 #include "coordinator/archive/series_output.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -35,6 +38,48 @@ std::string series_heading(const SignalSelection& selection) {
   return line + "\r\n";
 }
 
+/// Text that goes to a file, which appears when it is complete.
+class SeriesFile {
+ public:
+  /// @throws Error `output = path (cannot be written: why)`; so do all below.
+  explicit SeriesFile(const std::filesystem::path& path) : file_("output", path) {
+    descriptor_ = file_.open();
+  }
+  ~SeriesFile() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  SeriesFile(const SeriesFile&) = delete;
+  SeriesFile& operator=(const SeriesFile&) = delete;
+
+  void write(std::string_view text) {
+    constexpr std::size_t buffer_size = 1 << 18;
+    buffer_ += text;
+    if (buffer_.size() >= buffer_size) flush();
+  }
+  /// Writes what is left and closes the file.
+  void write_rest() {
+    flush();
+    if (descriptor_ >= 0 && ::close(std::exchange(descriptor_, -1)) != 0) file_.fail(errno);
+  }
+  /// Gives the file its name, replacing one that has it.
+  void publish() { file_.publish(wire::IfThere::replace); }
+
+ private:
+  void flush() {
+    std::string_view rest = buffer_;
+    while (!rest.empty()) {
+      const ssize_t size = ::write(descriptor_, rest.data(), rest.size());
+      if (size < 0 && errno != EINTR) file_.fail(errno);
+      if (size > 0) rest.remove_prefix(static_cast<std::size_t>(size));
+    }
+    buffer_.clear();
+  }
+
+  wire::DraftFile file_;
+  int descriptor_ = -1;
+  std::string buffer_;
+};
+
 class CsvSeries final : public SeriesOutput {
  public:
   CsvSeries(std::filesystem::path directory, RunIndex run, const SignalSelection& selection)
@@ -59,7 +104,7 @@ class CsvSeries final : public SeriesOutput {
   void finish() override {
     // A full disk is found before any file appears.
     for (const auto& file : files_) file->write_rest();
-    for (const auto& file : files_) file->finish();
+    for (const auto& file : files_) file->publish();
   }
 
  private:
@@ -67,7 +112,7 @@ class CsvSeries final : public SeriesOutput {
     if (!files_.empty()) files_.back()->write_rest();
     session_ = index;
     const RecordedSession& session = selection_.recording().sessions[index];
-    files_.push_back(std::make_unique<TextOutput>(csv_series_file(directory_, run_, session)));
+    files_.push_back(std::make_unique<SeriesFile>(csv_series_file(directory_, run_, session)));
     files_.back()->write(series_heading(selection_));
   }
 
@@ -75,7 +120,7 @@ class CsvSeries final : public SeriesOutput {
   RunIndex run_;
   const SignalSelection& selection_;
   std::size_t session_ = 0;                         ///< That of the last file.
-  std::vector<std::unique_ptr<TextOutput>> files_;  ///< One a session; at most one is open.
+  std::vector<std::unique_ptr<SeriesFile>> files_;  ///< One a session; at most one is open.
   fmt::memory_buffer line_;
 };
 

@@ -29,8 +29,7 @@ ListedCampaign listed(const std::filesystem::path& file) {
             .num_runs = store.num_runs(),
             .num_finished = num_runs_in(store.finished_runs()),
             .phase = store.control().phase,
-            .created_utc = store.created_utc(),
-            .tags = store.tags()};
+            .created_utc = store.created_utc()};
   } catch (const StoreError& error) {
     return {.file = file, .problem = error.what()};
   }
@@ -66,21 +65,6 @@ constexpr std::array<TextColumn, 7> columns{{{"file", 18, true},
                                              {"seed", 9},
                                              {"created", 11}}};
 
-std::string tag_lines(std::span<const std::string> tags) {
-  if (tags.empty()) return "";
-  constexpr std::size_t columns_max = 80;
-  std::string text, line = "  tags:";
-  const std::string indent(line.size(), ' ');
-  for (const std::string& tag : tags) {
-    if (line.size() + 1 + tag.size() > columns_max) {
-      text += line + "\n";
-      line = indent;
-    }
-    line += fmt::format(" {}", wire::visible_text(tag));
-  }
-  return text + line + "\n";
-}
-
 std::vector<std::string> cells_of(const ListedCampaign& campaign) {
   constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10Z.
   return {wire::visible_text(campaign.file.filename().string()),
@@ -102,8 +86,7 @@ Json json_of(const ListedCampaign& campaign) {
           {"phase", wire::name_of(campaign.phase)},
           {"num_runs", campaign.num_runs},
           {"num_finished", campaign.num_finished},
-          {"created_utc", campaign.created_utc},
-          {"tags", campaign.tags}};
+          {"created_utc", campaign.created_utc}};
 }
 
 }  // namespace
@@ -132,7 +115,7 @@ std::string listing_text(std::span<const ListedCampaign> campaigns, std::size_t 
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const ListedCampaign& campaign = campaigns[i];
     if (campaign.problem.empty()) {
-      text += table_row(wide, rows[i]) + tag_lines(campaign.tags);
+      text += table_row(wide, rows[i]);
     } else {
       text += rows[i].front() + "\n  " + campaign.problem + "\n";
     }

@@ -21,7 +21,6 @@ struct ListedCampaign {
   std::uint64_t num_finished = 0;  ///< Of them.
   wire::CampaignPhase phase = wire::CampaignPhase::active;
   std::string created_utc = {};
-  std::vector<std::string> tags = {};  ///< Ascending.
 };
 
 /// The campaigns of some files, and of the files *.db of some directories (not of those below), by
@@ -32,7 +31,7 @@ struct ListedCampaign {
 [[nodiscard]] std::vector<ListedCampaign> list_campaigns(
     std::span<const std::filesystem::path> places);
 
-/// A line a campaign, and below it tags or what is wrong. The table is 80 columns wide, or wider if
+/// A line a campaign, and below it what is wrong. The table is 80 columns wide, or wider if
 /// names are long and `line_width_max` has room for them.
 [[nodiscard]] std::string listing_text(std::span<const ListedCampaign> campaigns,
                                        std::size_t line_width_max);

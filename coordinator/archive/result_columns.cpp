@@ -87,10 +87,6 @@ const std::vector<ValueColumn>& value_columns() {
   return columns;
 }
 
-std::string draw_column_name(std::size_t quantity) {
-  return fmt::format("draw_{}", model().drawn()[quantity].name);
-}
-
 DrawnColumns::DrawnColumns(const Store& store, DrawColumns columns) {
   if (columns == DrawColumns::included) campaign_ = stored_campaign_unchecked(store);
 }

@@ -45,10 +45,6 @@ struct ValueColumn {
 /// Whether an export has the drawn values of each run.
 enum class DrawColumns : std::uint8_t { left_out, included };
 
-/// `draw_offcentring_m.x`.
-/// @param quantity  Index into Model::drawn().
-[[nodiscard]] std::string draw_column_name(std::size_t quantity);
-
 /// The columns of drawn values of an export, none or one for each drawn quantity. They are computed
 /// anew, as the table `draw` of `proofmass query` is.
 class DrawnColumns {

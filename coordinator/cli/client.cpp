@@ -9,7 +9,6 @@
 
 #include "coordinator/cli/program.hpp"
 #include "core/campaign/name.hpp"
-#include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/wire/endpoint.hpp"

@@ -24,8 +24,6 @@
 #include "coordinator/page/page.hpp"
 #include "coordinator/report/report.hpp"
 #include "core/model.hpp"
-#include "proto/command_line/described_program.hpp"
-#include "proto/command_line/manual_option.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/faults.hpp"
 #include "proto/link/init_system.hpp"
@@ -280,7 +278,6 @@ int run_proofmass_coordinator(int argc, char** argv) {
   add_service(app, options, ends_when_done);
   add_addresses(app, options);
   add_page_options(app, options.page);
-  wire::add_manual_option(app, {"proofmass", "proofmass-worker"});
   return run_program(app, argc, argv, [&] {
     if (ends_when_done) options.end = ServiceEnd::when_done;
     return serve_campaigns(options);

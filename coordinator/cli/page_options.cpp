@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "coordinator/cli/program.hpp"
-#include "proto/command_line/described_program.hpp"
+#include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {
 

@@ -18,9 +18,7 @@ CampaignIdentity identity_of(const Store& store) {
           .model_version = store.model_version(),
           .build = store.build(),
           .created_utc = store.created_utc(),
-          .definition_digest = store.table_digest(),
-          .tags = store.tags(),
-          .notes = store.notes()};
+          .definition_digest = store.table_digest()};
 }
 
 MissingEstimates missing_of(const CampaignStatistics& statistics, std::uint64_t num_given_up) {

@@ -27,8 +27,6 @@ struct CampaignIdentity {
   std::string build;
   std::string created_utc;
   std::string definition_digest;
-  std::vector<std::string> tags;
-  std::vector<Note> notes;
 };
 
 /// Everything that a review report and its charts are made of.

@@ -281,10 +281,6 @@ ReviewTable identity_table(const Review& review) {
                pair_of("SHA-256 of the results", digest_words(review)),
                pair_of("SHA-256 of the definition", identity.definition_digest)},
       .notes = {}};
-  for (const std::string& tag : identity.tags) table.rows.push_back(pair_of("tag", tag));
-  for (const Note& note : identity.notes) {
-    table.rows.push_back(pair_of("note of " + note.time_utc, note.text));
-  }
   if (!review.stop.empty()) table.rows.push_back(pair_of("stop rule", review.stop));
   return table;
 }

@@ -73,9 +73,15 @@ std::string p_value_cell(double p_value) {
   return p_value < p_value_min ? fmt::format("<{:.0e}", p_value_min) : measured_figure(p_value);
 }
 
+/// Heading of the quantities that drive an output.
+std::string driver_heading(std::span<const Sensitivity> rows, std::string_view output) {
+  return rows.empty() ? fmt::format("{}: no input found", output)
+                      : fmt::format("drives {}", output);
+}
+
 std::string sensitivity_rows(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
                              std::string_view output) {
-  const std::string title = fmt::format("drives {}", output);
+  const std::string title = driver_heading(rows, output);
   const std::array<TextColumn, 4> columns{
       {{title, 39, true}, {"% of variance (95 %)", 21}, {"rank", 9}, {"p", 11}}};
   std::string text = table_heading(columns);
@@ -142,8 +148,14 @@ std::string worst_run_text(const DrawnRuns& drawn, std::size_t quantity) {
                      model().results().quantities[quantity].name);
 }
 
-std::span<const Sensitivity> first_of(const std::vector<Sensitivity>& rows, std::size_t num_rows) {
-  return std::span(rows).first(std::min(num_rows, rows.size()));
+/// The rows to name: as many as were asked for, else the first five, but none where no quantity has
+/// an influence that chance does not explain.
+std::span<const Sensitivity> first_of(const std::vector<Sensitivity>& rows,
+                                      std::optional<std::size_t> num_rows) {
+  const bool is_found = std::ranges::any_of(
+      rows, [](const Sensitivity& row) { return row.adjusted_p_value < 1.0 - default_confidence; });
+  const std::size_t count = num_rows.value_or(is_found ? num_rows_by_default : 0);
+  return std::span(rows).first(std::min(count, rows.size()));
 }
 
 std::size_t position_of(const DrawnRuns& drawn, RunIndex run) {
@@ -171,7 +183,7 @@ double percentile_of(const std::vector<double>& values, double value) {
 
 std::string explanation_rows(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
                              std::size_t position, std::string_view output) {
-  const std::string title = fmt::format("drives {}", output);
+  const std::string title = driver_heading(rows, output);
   const std::array<TextColumn, 4> columns{
       {{title, 38, true}, {"% of variance (95 %)", 21}, {"value", 10}, {"percentile", 11}}};
   std::string text = table_heading(columns);
@@ -260,7 +272,8 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
   return drawn;
 }
 
-std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity, std::size_t num_rows) {
+std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
+                             std::optional<std::size_t> num_rows) {
   const auto both = sensitivities_of(drawn, quantity);
   return fmt::format("{}: {} runs\n{}{}\n{}\n{}{}\n{}\n{}",
                      model().results().quantities[quantity].symbol, drawn.runs.size(),
@@ -271,7 +284,7 @@ std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity, std::
 }
 
 std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIndex run,
-                             std::size_t num_rows) {
+                             std::optional<std::size_t> num_rows) {
   const std::size_t position = position_of(drawn, run);
   const Quantity& info = model().results().quantities[quantity];
   const std::vector<double>& errors = drawn.errors[quantity];
@@ -314,7 +327,7 @@ std::string choice_text(const DrawnRuns& drawn, RunIndex run, std::span<const do
 }
 
 std::string sensitivity_json(const DrawnRuns& drawn, std::span<const std::size_t> quantities,
-                             std::optional<RunIndex> run, std::size_t num_rows) {
+                             std::optional<RunIndex> run, std::optional<std::size_t> num_rows) {
   std::optional<std::size_t> position;
   if (run) position = position_of(drawn, *run);
   Json json{{"run", run ? Json(run->value) : Json(nullptr)},

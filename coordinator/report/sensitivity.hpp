@@ -48,25 +48,30 @@ inline constexpr std::size_t num_terms_max = 3;
 /// The name of a column, of its square or of the product of two: `truth_gain × truth_offset_m`.
 [[nodiscard]] std::string term_name(const DrawnRuns& drawn, const ExplanatoryTerm& term);
 
+/// Quantities that are named for an error unless another number is asked for. None is where chance
+/// alone explains the influence of each.
+inline constexpr std::size_t num_rows_by_default = 5;
+
 /// Which drawn quantities drive a parameter's error, and which its magnitude: the first `num_rows`
-/// of sensitivities() of each, and the error as a sum of explanatory_terms(), and how to ask why
-/// the worst run is so. Lines have at most 80 characters.
+/// of sensitivities() of each, see num_rows_by_default, and the error as a sum of
+/// explanatory_terms(), and how to ask why the worst run is so. Lines have at most 80 characters.
 /// @throws InvalidArgument below 16 runs.
 [[nodiscard]] std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
-                                           std::size_t num_rows);
+                                           std::optional<std::size_t> num_rows = {});
 
 /// Why a run is as far off as it is: the place of its |error| among the runs, and its values of the
 /// quantities that drive |error| and error of the parameter, each with its percentile.
 /// @throws InvalidArgument if the run is not among those, or they are below 16.
 [[nodiscard]] std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity,
-                                           RunIndex run, std::size_t num_rows);
+                                           RunIndex run, std::optional<std::size_t> num_rows = {});
 
 /// Both for programs, of these parameters, in full precision and SI units; of the run's values only
 /// if there is one. coordinator/cli/README.md lists the keys.
 /// @throws InvalidArgument if the run is not among those, or they are below 16.
 [[nodiscard]] std::string sensitivity_json(const DrawnRuns& drawn,
                                            std::span<const std::size_t> quantities,
-                                           std::optional<RunIndex> run, std::size_t num_rows);
+                                           std::optional<RunIndex> run,
+                                           std::optional<std::size_t> num_rows = {});
 
 /// The parameter whose |error| is the largest in units of its objective; of those without
 /// objectives, the one for which the |error| has the highest rank.

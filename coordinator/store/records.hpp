@@ -112,29 +112,6 @@ struct Comparison {
   bool operator==(const Comparison&) const = default;
 };
 
-/// What people have to say of a campaign.
-struct Note {
-  std::string time_utc;  ///< As in `2024-02-29T12:00:10Z`.
-  std::string text;
-};
-
-/// Marks the campaign with a word: 1 to 64 of the characters A-Z a-z 0-9 . _ and -.
-struct AddTag {
-  std::string tag;
-};
-
-struct RemoveTag {
-  std::string tag;
-};
-
-/// Text in UTF-8, at most 2,000 bytes, without control characters but the end of a line.
-struct AddNote {
-  std::string text;
-};
-
-/// What people add to a campaign database, also while a coordinator serves it.
-using Annotation = std::variant<AddTag, RemoveTag, AddNote>;
-
 /// When a campaign ends before all of its runs are finished.
 struct StopPlan {
   std::string stop_rule;                      ///< `std(gain) within 5%`; empty: none.

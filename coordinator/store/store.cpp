@@ -51,25 +51,6 @@ void check_name(const std::filesystem::path& path) {
   throw StoreError(fmt::format("campaign database = {} (names no file)", path.string()));
 }
 
-// Nothing if a coordinator serves the file, which can be written to all the same.
-std::unique_ptr<detail::StoreLock> lock_if_free(const std::filesystem::path& path) {
-  try {
-    return std::make_unique<detail::StoreLock>(path);
-  } catch (const StoreError&) {
-    return nullptr;
-  }
-}
-
-// As a coordinator does: a log may be that of the file that had the name before, and folding it in
-// would destroy the file.
-void check_what_log_makes_of_it(Database& database, const std::filesystem::path& path) {
-  if (!detail::has_log(path)) return;
-  const detail::ReadTransaction one_state(database);
-  const detail::RowCounts counts = detail::check_all_pages(database);
-  detail::check_after_unclean_end(database);
-  detail::check_results(database, counts);
-}
-
 /// @param fill  Writes what a new campaign does not have.
 void write_draft(const std::filesystem::path& draft, const Campaign& campaign,
                  std::string_view definition, const std::function<void(Database&)>& fill) {
@@ -137,31 +118,6 @@ Store Store::open(const std::filesystem::path& path) {
 Store Store::open_read_only(const std::filesystem::path& path) {
   detail::check_presence(path);
   return Store(std::make_unique<Impl>(path));
-}
-
-void Store::annotate(const std::filesystem::path& path,
-                     const std::vector<Annotation>& annotations) {
-  detail::check_presence(path);
-  check_that_name_is_the_only_one(path);
-  detail::check_directory_of(path);
-  const std::unique_ptr<detail::StoreLock> lock = lock_if_free(path);
-  Database database(path, Access::read_write);
-  database.leave_files_alone();  // Until the file is known to be sound.
-  detail::configure(database);
-  detail::check_campaign_file(database, path);
-  detail::check_up_to_date(database, path);
-  detail::check_that_log_is_there(database, path);
-  check_what_log_makes_of_it(database, path);
-  database.fold_log_at_close();
-  {
-    Transaction transaction(database);
-    for (const Annotation& annotation : annotations) {
-      detail::write_annotation(database, annotation);
-    }
-    transaction.commit();
-  }
-  // What the last coordinator had to leave in the log, as somebody was reading.
-  if (lock != nullptr) (void)detail::bring_to_rest(database);
 }
 
 void Store::check_absence(const std::filesystem::path& path) { detail::check_absence(path); }
@@ -269,10 +225,6 @@ std::vector<StopCheckRow> Store::stop_checks() const {
 std::uint64_t Store::num_without_estimate() const {
   return impl_->database.count("SELECT count(*) FROM run_result WHERE status <> 1");
 }
-
-std::vector<std::string> Store::tags() const { return detail::read_tags(impl_->database); }
-
-std::vector<Note> Store::notes() const { return detail::read_notes(impl_->database); }
 
 std::vector<RunRange> Store::finished_runs() const {
   return detail::read_runs(impl_->database, "SELECT run_index FROM delivery ORDER BY 1");

@@ -66,7 +66,7 @@ class Store {
                       std::string_view definition);
 
   /// Makes a new campaign database of all that several databases of the campaign hold of its runs,
-  /// complete or not at all, and opens it like open(). Tags, notes and events stay where they are.
+  /// complete or not at all, and opens it like open(). Events stay where they are.
   /// The campaign is finished if every run is, and else active.
   ///
   /// @param campaign, definition  As of create().
@@ -91,14 +91,6 @@ class Store {
   /// @throws StoreError as open() does, but for lock, file system and hard links; if the file lacks
   ///         the log that it needs; if there is no room for the copy of an older file.
   static Store open_read_only(const std::filesystem::path& path);
-
-  /// Adds tags and notes or removes tags, all or none of them, also while a coordinator serves the
-  /// file. A tag that is there already stays as it is. At most 100 tags and 1,000 notes.
-  /// @throws InvalidArgument `tag = x (rule)`, `note = x (rule)`.
-  /// @throws StoreError as open() does, but for the lock; if the file is older than this program,
-  ///         has no such tag or too many.
-  static void annotate(const std::filesystem::path& path,
-                       const std::vector<Annotation>& annotations);
 
   /// For a program that gives a finished campaign database a name that is new.
   /// @throws StoreError if a file has it, or if the log or the journal of one that is gone lies
@@ -159,9 +151,6 @@ class Store {
 
   /// How the runs were computed. Takes 0.1 s for a million runs.
   [[nodiscard]] Execution execution() const;
-
-  [[nodiscard]] std::vector<std::string> tags() const;  ///< Ascending.
-  [[nodiscard]] std::vector<Note> notes() const;        ///< In the order in which they were added.
 
   /// Ascending; neighbours are one range.
   [[nodiscard]] std::vector<RunRange> finished_runs() const;

@@ -52,10 +52,15 @@ std::vector<std::string> Store::parameter_differences(const Campaign& campaign) 
       std::span(tables).first(has_own_budget(impl_->database) ? 2 : 1));
 }
 
+// Intervals are of functions whose last bits depend on the processor, see
+// core/statistics/distribution.hpp.
+constexpr double rounding = 1e-12;
+
 std::vector<std::string> Store::statistic_differences(
     const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget) const {
-  constexpr std::array tables{ComparedTable{.name = "statistic", .row_name = "parameter"},
-                              ComparedTable{.name = "budget_entry", .row_name = "term"}};
+  constexpr std::array tables{
+      ComparedTable{.name = "statistic", .row_name = "parameter", .tolerance = rounding},
+      ComparedTable{.name = "budget_entry", .row_name = "term", .tolerance = rounding}};
   return detail::table_differences(
       impl_->database, [&](Database& expected) { replace_all(expected, statistics, budget); },
       std::span(tables).first(has_own_budget(impl_->database) ? 2 : 1));
@@ -66,7 +71,8 @@ std::vector<std::string> Store::stop_check_differences(
   constexpr std::array tables{
       ComparedTable{.name = "stop_check",
                     .row_name = "statistic || ' after ' || num_runs || ' runs'",
-                    .columns = "estimate, lower, upper, relative_half_width, is_reached"}};
+                    .columns = "estimate, lower, upper, relative_half_width, is_reached",
+                    .tolerance = rounding}};
   return detail::table_differences(
       impl_->database,
       [&](Database& database) {

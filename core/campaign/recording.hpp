@@ -12,7 +12,7 @@
 namespace proofmass {
 
 // The time series of a run. No simulation keeps them: Plan::replay() computes a run again and
-// passes each sample on, and a Recording says what its numbers are.
+// passes each sample on to a SampleSink, and a Recording says what its numbers are.
 
 /// A signal of a simulation: a number in each sample.
 struct RecordedSignal {

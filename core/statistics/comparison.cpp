@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <utility>
 
 #include "core/statistics/detail/check.hpp"
@@ -156,29 +155,9 @@ UnpairedComparison compare_means(const Moments& first, const Moments& second, do
   return comparison;
 }
 
-PairedComparison compare_paired(std::span<const double> first, std::span<const double> second,
-                                double confidence) {
-  detail::check_same_size("second", second, first);
-  detail::check_values("first", first, 1);
-  detail::check_values("second", second, 1);
-  std::vector<double> differences(first.size());
-  std::ranges::transform(second, first, differences.begin(), std::minus<>());
-  return compare_differences(std::move(differences), confidence);
-}
-
-PairedComparison compare_differences(std::vector<double> differences, double confidence) {
-  const Moments about = moments(differences);
-  PairedComparison comparison;
-  comparison.num_pairs = differences.size();
-  comparison.mean_difference = about.mean;
-  comparison.interval = mean_interval(about, confidence);
-  for (const double difference : differences) {
-    if (difference > 0.0) ++comparison.num_larger;
-    if (difference < 0.0) ++comparison.num_smaller;
-  }
-  comparison.sign_p_value = sign_test_p_value(comparison.num_larger, comparison.num_smaller);
-  comparison.rank_p_value = rank_p_value(signed_ranks(std::move(differences)));
-  return comparison;
+double rank_test_p_value(std::vector<double> differences) {
+  detail::check_values("differences", differences, 1);
+  return rank_p_value(signed_ranks(std::move(differences)));
 }
 
 UnpairedComparison compare_unpaired(std::span<const double> first, std::span<const double> second,

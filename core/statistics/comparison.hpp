@@ -10,28 +10,11 @@
 
 namespace proofmass {
 
-/// Two campaigns whose runs are the same draws, run by run; differences are second − first.
-struct PairedComparison {
-  std::size_t num_pairs = 0;
-  double mean_difference = 0.0;
-  std::optional<Interval> interval;  ///< Of the mean difference (Student); empty for one pair.
-  std::size_t num_larger = 0;        ///< Pairs whose second value is larger.
-  std::size_t num_smaller = 0;       ///< Pairs whose second value is smaller.
-  double sign_p_value = 1.0;         ///< Two-sided, exact: larger as often as smaller?
-  /// Wilcoxon's signed-rank test, two-sided, pairs without difference left out: are differences
-  /// symmetric about 0? Exact up to 50 pairs without equal ones, else by the normal law.
-  double rank_p_value = 1.0;
-};
-
-/// @throws InvalidArgument if there is no pair, sizes differ or a value is not finite; confidence
-/// must be in (0, 1).
-[[nodiscard]] PairedComparison compare_paired(std::span<const double> first,
-                                              std::span<const double> second, double confidence);
-
-/// compare_paired() from the differences second − first. Ranks need all of them; nothing else is
-/// kept.
-[[nodiscard]] PairedComparison compare_differences(std::vector<double> differences,
-                                                   double confidence);
+/// Two-sided p-value of Wilcoxon's signed-rank test of pairs, those without a difference left out:
+/// are differences symmetric about 0? Exact up to 50 pairs without equal ones, else by the normal
+/// law.
+/// @throws InvalidArgument if there is no difference or one is not finite.
+[[nodiscard]] double rank_test_p_value(std::vector<double> differences);
 
 /// Two campaigns with draws of their own; differences are second − first.
 struct UnpairedComparison {

@@ -124,10 +124,8 @@ void PairedErrors::add(const CentredError& first, const CentredError& second, do
 }
 
 ChangePValues compare_paired_errors(PairedErrors pairs) {
-  return {.location =
-              compare_differences(std::move(pairs.differences), default_confidence).rank_p_value,
-          .scale = compare_differences(std::move(pairs.deviation_differences), default_confidence)
-                       .rank_p_value,
+  return {.location = rank_test_p_value(std::move(pairs.differences)),
+          .scale = rank_test_p_value(std::move(pairs.deviation_differences)),
           .tail = sign_test_p_value(pairs.num_only_first, pairs.num_only_second)};
 }
 

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "core/statistics/detail/check.hpp"
-#include "core/statistics/detail/special.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/order.hpp"
 
@@ -48,7 +47,7 @@ double level_p_value(std::span<const double> ascending, std::size_t num_levels) 
     begin = end;
   }
   const double freedom = static_cast<double>(num_levels) - 1.0;
-  return detail::regularised_gamma(0.5 * freedom, 0.5 * chi_square).lower;
+  return chi_square_at_most(chi_square, freedom);
 }
 
 /// Two neighbouring gaps a and b of ordered independent values are exponential with nearly the

@@ -7,7 +7,6 @@
 #include "core/math/elementary.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/detail/check.hpp"
-#include "core/statistics/detail/special.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/moments.hpp"
 #include "core/statistics/order.hpp"
@@ -124,8 +123,7 @@ double dependence_p_value(std::span<const std::size_t> order, const Ranks& outpu
     between.add(sum * sum / static_cast<double>(end - first));
   }
   const double statistic = (n - 1.0) * between.value() / output.square_sum;
-  return detail::regularised_gamma(0.5 * (static_cast<double>(num_bins) - 1.0), 0.5 * statistic)
-      .upper;
+  return chi_square_above(statistic, static_cast<double>(num_bins) - 1.0);
 }
 
 /// @pre Both columns vary and have sensitivity_values_min values.
@@ -172,18 +170,6 @@ void rank(std::vector<Sensitivity>& of_output, double significance) {
 }
 
 }  // namespace
-
-std::optional<FirstOrderIndex> first_order_index(std::span<const double> input,
-                                                 std::span<const double> output,
-                                                 double confidence) {
-  detail::check_fraction("confidence", confidence);
-  detail::check_same_size("output", output, input);
-  detail::check_values("input", input, 0);
-  detail::check_values("output", output, 0);
-  if (input.size() < sensitivity_values_min) return std::nullopt;
-  if (!varies(input) || !varies(output)) return std::nullopt;
-  return index_of(ascending_order(input), output, ranks_of(output), confidence);
-}
 
 std::vector<std::vector<Sensitivity>> sensitivities(std::span<const Column> inputs,
                                                     std::span<const Column> outputs,

@@ -10,7 +10,11 @@
 
 namespace proofmass {
 
-/// Share of an output's variance that goes with one input alone (first-order Sobol index).
+/// Share of an output's variance that goes with one input alone (first-order Sobol index),
+/// estimated from runs as they are, each with all of its inputs drawn anew: the outputs in the
+/// order of the input are compared with their neighbours [GamboaEtAl2022], whose half squared
+/// differences are the variance that the input leaves [Rice1984]. The bias goes as 1/n², so that it
+/// can be left out from 100 values on.
 struct FirstOrderIndex {
   /// 1 − (mean squared half-difference of neighbours)/variance; for an input without influence it
   /// is below 0 as often as above.
@@ -24,17 +28,6 @@ struct FirstOrderIndex {
 
 /// Below so many values no sensitivity can be told.
 inline constexpr std::size_t sensitivity_values_min = 16;
-
-/// Estimates a first-order index from runs as they are, each with all of its inputs drawn anew: the
-/// outputs in the order of the input are compared with their neighbours [GamboaEtAl2022], whose
-/// half squared differences are the variance that the input leaves [Rice1984]. The bias goes as
-/// 1/n², so that it can be left out from 100 values on.
-///
-/// @returns Empty below sensitivity_values_min or if a column does not vary.
-/// @throws InvalidArgument if sizes differ, a value is not finite or confidence is not in (0, 1).
-[[nodiscard]] std::optional<FirstOrderIndex> first_order_index(std::span<const double> input,
-                                                               std::span<const double> output,
-                                                               double confidence);
 
 /// How one output depends on one input.
 struct Sensitivity {

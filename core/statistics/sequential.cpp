@@ -5,7 +5,7 @@
 
 #include "core/error.hpp"
 #include "core/statistics/detail/check.hpp"
-#include "core/statistics/detail/special.hpp"
+#include "core/statistics/distribution.hpp"
 
 namespace proofmass {
 namespace {
@@ -28,9 +28,8 @@ double evidence_of_less(double num_hits, double num_runs, double probability) {
   PROOFMASS_EXPECT(probability > 0.0 && probability < 1.0);
   const double a = num_hits + 0.5;
   const double b = num_runs - num_hits + 1.0;
-  const double rest = 1.0 - probability;
-  return ratio(detail::regularised_beta(a, b, probability, rest).lower, 0.5 * rest,
-               detail::beta_power(a, b, probability, rest));
+  return ratio(beta_at_most(probability, a, b), 0.5 * (1.0 - probability),
+               beta_power(probability, a, b));
 }
 
 double evidence_of_more(double num_hits, double num_runs, double probability) {
@@ -39,10 +38,9 @@ double evidence_of_more(double num_hits, double num_runs, double probability) {
   if (num_hits < 1.0) return 0.0;
   const double a = num_hits - 0.5;
   const double b = num_runs - num_hits + 1.0;
-  const double rest = 1.0 - probability;
   // (1 − p)/(1 − √p) = 1 + √p.
-  return ratio(detail::regularised_beta(a, b, probability, rest).upper,
-               0.5 * (1.0 + std::sqrt(probability)), detail::beta_power(a, b, probability, rest));
+  return ratio(beta_above(probability, a, b), 0.5 * (1.0 + std::sqrt(probability)),
+               beta_power(probability, a, b));
 }
 
 Interval sequential_bounds(double num_hits, double num_runs, double confidence) {

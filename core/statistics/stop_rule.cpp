@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "core/error.hpp"
-#include "core/statistics/detail/check.hpp"
 #include "core/statistics/detail/phrase.hpp"
 
 namespace proofmass {
@@ -130,15 +129,6 @@ ValuePasses::Wanted wanted_by(const StopRule& rule) {
   if (rule.statistic == StopRule::Statistic::percentile) wanted.levels = {rule.level};
   wanted.has_deviation_interval = rule.statistic == StopRule::Statistic::standard_deviation;
   return wanted;
-}
-
-StopCheck check_stop_rule(const StopRule& rule, std::span<const double> errors) {
-  detail::check_values("errors", errors, 0);
-  ValuePasses passes(wanted_by(rule));
-  do {
-    for (const double error : errors) passes.add(error);
-  } while (passes.end_pass());
-  return check_stop_rule(rule, passes);
 }
 
 StopCheck check_stop_rule(const StopRule& rule, const ValuePasses& errors) {

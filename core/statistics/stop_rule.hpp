@@ -62,17 +62,10 @@ struct StopCheck {
   std::optional<double> relative_half_width;
 };
 
-/// A pure function of its arguments. The intervals are mean_interval(),
-/// bootstrap_deviation_interval() and percentile_interval(). A statistic that is exactly 0 with
-/// an interval of no width is known.
-///
+/// A pure function of its arguments. The intervals are mean_interval(), the bootstrap's and the
+/// percentile's. A statistic that is exactly 0 with an interval of no width is known.
 /// @param errors  |estimate − truth| of the rule's parameter, SI, in run order, of the runs among
-/// those that have an estimate.
-/// @throws InvalidArgument if an error is not finite.
-[[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, std::span<const double> errors);
-
-/// Checks a stop rule by errors that were seen in passes.
-/// @param errors  Made for wanted_by(rule); no further pass is needed.
+/// those that have an estimate. Made for wanted_by(rule); no further pass is needed.
 [[nodiscard]] StopCheck check_stop_rule(const StopRule& rule, const ValuePasses& errors);
 [[nodiscard]] ValuePasses::Wanted wanted_by(const StopRule& rule);
 

@@ -4,8 +4,6 @@
 #include <functional>
 #include <vector>
 
-#include "core/error.hpp"
-#include "core/runs.hpp"
 #include "core/statistics/detail/check.hpp"
 #include "core/statistics/distribution.hpp"
 
@@ -25,23 +23,6 @@ bool is_bound(const Tolerance& tolerance, std::uint64_t num_runs, std::uint64_t 
 void Tolerance::validate() const {
   detail::check_fraction("coverage", coverage);
   detail::check_fraction("confidence", confidence);
-}
-
-std::optional<std::uint64_t> wilks_num_runs(const Tolerance& tolerance, std::uint64_t order) {
-  tolerance.validate();
-  PROOFMASS_EXPECT(order >= 1);
-  std::uint64_t too_few = 0;
-  std::uint64_t enough = order;
-  while (!is_bound(tolerance, enough, order)) {
-    too_few = enough;
-    if (enough >= num_runs_max) return std::nullopt;
-    enough = std::min(2 * enough, num_runs_max);
-  }
-  while (enough - too_few > 1) {
-    const std::uint64_t middle = too_few + (enough - too_few) / 2;
-    (is_bound(tolerance, middle, order) ? enough : too_few) = middle;
-  }
-  return enough;
 }
 
 std::uint64_t wilks_order(const Tolerance& tolerance, std::uint64_t num_runs) {

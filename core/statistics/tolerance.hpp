@@ -29,12 +29,6 @@ struct ToleranceBound {
   std::size_t index = 0;    ///< Place of the value; the first of equal ones.
 };
 
-/// Runs needed until the value of this order, from the largest, is a bound: 59 for 95 % with 95 %
-/// and order 1. Empty above num_runs_max.
-/// @pre order ≥ 1.
-[[nodiscard]] std::optional<std::uint64_t> wilks_num_runs(const Tolerance& tolerance,
-                                                          std::uint64_t order);
-
 /// Largest order that is a bound among so many runs: order − 1 runs may exceed a limit and the
 /// tolerance is shown all the same. 0 if there are too few runs.
 [[nodiscard]] std::uint64_t wilks_order(const Tolerance& tolerance, std::uint64_t num_runs);

@@ -8,7 +8,7 @@ set -euo pipefail
 
 packages=(
   libc6-dev libstdc++6
-  libeigen3-dev libhwy-dev librandom123-dev
+  libeigen3-dev libhwy-dev librandom123-dev libboost-dev
   libzmq3-dev cppzmq-dev libsodium-dev libprotobuf-dev
   libfmt-dev libspdlog-dev libcli11-dev libtomlplusplus-dev
   nlohmann-json3-dev libutfcpp-dev libgtest-dev libgmock-dev

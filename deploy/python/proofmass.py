@@ -12,6 +12,7 @@ needs h5py. Results are read with Python's sqlite3 alone; only Campaign.draws() 
 because what a run draws is computed and not stored. All numbers are SI.
 """
 
+import array
 import collections
 import collections.abc
 import contextlib
@@ -170,20 +171,17 @@ class Campaign:
 
         The values are not in the file: `program` computes them again, bit for bit.
         """
-        runs, rows = [], []
-        with self._lines_of(program, "export", "--format", "csv", "--draws") as lines:
-            heading = next(lines)
-            drawn = [i for i, name in enumerate(heading) if name.startswith("draw_")]
-            for line in lines:
-                runs.append(int(line[0]))
-                rows.append(numpy.array([float(line[i] or "nan") for i in drawn]))
-        values = numpy.array(rows).reshape(len(runs), len(drawn))
+        runs, values, units = array.array("q"), {}, {}
+        sql = "SELECT run_index, quantity, unit, value FROM run_result JOIN draw USING (run_index)"
+        with self._lines_of(program, "query", sql, "--format", "csv", "--timeout", "86400") as lines:
+            next(lines)
+            for run, quantity, unit, value in lines:
+                if not runs or int(run) != runs[-1]:
+                    runs.append(int(run))
+                units[quantity] = unit
+                values.setdefault(quantity, array.array("d")).append(float(value or "nan"))
         columns = {"run_index": numpy.array(runs, dtype=numpy.int64)}
-        columns |= {heading[i].removeprefix("draw_"): values[:, column]
-                    for column, i in enumerate(drawn)}
-        sql = "SELECT quantity, unit FROM draw WHERE run_index < 100 GROUP BY quantity"
-        with self._lines_of(program, "query", sql, "--format", "csv") as lines:
-            units = dict(list(lines)[1:])
+        columns |= {quantity: numpy.array(column) for quantity, column in values.items()}
         return _table(columns, units, "run_index")
 
     def query(self, sql, index=None):

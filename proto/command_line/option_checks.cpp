@@ -16,7 +16,6 @@
 #include <system_error>
 
 #include "core/definition/definition_text.hpp"
-#include "proto/command_line/described_program.hpp"
 #include "proto/text/byte_order_mark.hpp"
 
 namespace proofmass::wire {

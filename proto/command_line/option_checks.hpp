@@ -13,6 +13,12 @@
 
 namespace proofmass::wire {
 
+// Type names of options whose values are paths; `--help` shows them behind the option's name, and
+// completions offer files for them (deploy/completions.awk). `FILE.db` stands for files with that
+// extension.
+inline constexpr const char* file_type = "FILE";
+inline constexpr const char* directory_type = "DIR";
+
 // What checks say is `value (rule)`; refusal_of() puts the option's name before it.
 
 /// Takes numbers of a closed range. CLI11 alone would read -1 as the largest number without a sign.

@@ -31,13 +31,9 @@ std::string text_of(const char* file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// Version 2 has both numbers in one file, with `max` for no quota; version 1 has -1.
 double quota_of_group(const std::filesystem::path& group) {
-  double quota_us = -1.0, period_us = 0.0;
-  if (!(std::ifstream(group / "cpu.max") >> quota_us >> period_us)) {
-    std::ifstream(group / "cpu.cfs_quota_us") >> quota_us;
-    std::ifstream(group / "cpu.cfs_period_us") >> period_us;
-  }
+  double quota_us = 0.0, period_us = 0.0;  // The file has `max` for no quota.
+  std::ifstream(group / "cpu.max") >> quota_us >> period_us;
   const bool has_quota = quota_us > 0.0 && period_us > 0.0;
   return has_quota ? quota_us / period_us : std::numeric_limits<double>::infinity();
 }
@@ -56,18 +52,17 @@ unsigned num_processors() {
   return static_cast<unsigned>(std::max(1.0, std::min(count, std::ceil(quota))));
 }
 
-// A line is `0::/a/b` in version 2 and `4:cpu,cpuacct:/a/b` in version 1. In a container, where
-// the path may be that of the host, the uppermost group is the container's own.
+// The group is on a line `0::/a/b`. In a container, where the path may be that of the host, the
+// uppermost group is the container's own.
 double processor_quota(std::string_view memberships, const std::filesystem::path& root) {
+  constexpr std::string_view label = "0::/";
   double quota = std::numeric_limits<double>::infinity();
   std::istringstream lines{std::string(memberships)};
-  for (std::string number, controllers, path; std::getline(lines, number, ':');) {
-    if (!std::getline(lines, controllers, ':') || !std::getline(lines, path)) break;
-    const bool has_processors = ("," + controllers + ",").find(",cpu,") != std::string::npos;
-    if (!controllers.empty() && !has_processors) continue;
-    const std::filesystem::path top = controllers.empty() ? root : root / "cpu";
-    for (std::filesystem::path group = path;; group = group.parent_path()) {
-      quota = std::min(quota, quota_of_group(top / group.relative_path()));
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with(label)) continue;
+    std::filesystem::path group = line.substr(label.size() - 1);
+    for (;; group = group.parent_path()) {
+      quota = std::min(quota, quota_of_group(root / group.relative_path()));
       if (!group.has_relative_path()) break;
     }
   }

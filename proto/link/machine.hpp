@@ -30,7 +30,7 @@ inline constexpr bool has_address_space_limit = true;
 [[nodiscard]] unsigned num_processors();
 
 /// The quota of a process in processors, the smallest of its control groups and those above them;
-/// infinite if there is none. Both versions of control groups.
+/// infinite if there is none. Of control groups of version 2.
 /// @param memberships  As in /proc/self/cgroup.
 /// @param root         Where control groups are mounted: /sys/fs/cgroup.
 [[nodiscard]] double processor_quota(std::string_view memberships,

@@ -18,8 +18,8 @@ import tempfile
 import threading
 import time
 
-USES = ["list", "report", "requirement", "sensitivity", "export_text", "export_hdf5", "compare",
-        "query", "verify", "annotate", "back_up", "run", "serve"]
+USES = ["list", "report", "requirement", "sensitivity", "export_hdf5", "compare",
+        "query", "verify", "back_up", "run", "serve"]
 
 
 class Findings:

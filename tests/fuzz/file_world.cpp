@@ -145,14 +145,6 @@ void query(const fs::path& file) {
   }
 }
 
-void export_text(const fs::path& file) {
-  const Store store = Store::open_read_only(file);
-  for (const auto write : {export_csv, export_json}) {
-    TextOutput output(file.parent_path() / "export.out");
-    write(store, output, never, DrawColumns::included);
-  }
-}
-
 void read_drawn(const fs::path& file) {
   const Store store = Store::open_read_only(file);
   const std::shared_ptr<const Campaign> campaign = stored_campaign(store);
@@ -251,8 +243,6 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
     }
     case FileUse::sensitivity:
       return read_drawn(file);
-    case FileUse::export_text:
-      return export_text(file);
     case FileUse::export_hdf5:
       return export_hdf5(Store::open_read_only(file), file.parent_path() / "export.out", never,
                          DrawColumns::included);
@@ -263,11 +253,6 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
     case FileUse::verify:
       (void)verify(
           file, {.fraction = 0.0}, [](const Check& check) { (void)check_text(check); }, never);
-      return;
-    case FileUse::annotate:
-      Store::annotate(file, {AddTag{"tag"}, AddNote{"note"}});
-      (void)Store::open_read_only(file).tags();
-      (void)Store::open_read_only(file).notes();
       return;
     case FileUse::back_up:
       return back_up(file);
@@ -294,7 +279,6 @@ std::vector<fs::path> make_seed_files(const fs::path& directory) {
     Store store = make_file(files[1], half, 16);
     add_troubles(store, half);
   }
-  Store::annotate(files[1], {AddTag{"old"}, AddNote{"A note."}});
   const MicroscopeCampaign tables = table_campaign();
   Store store = make_file(files[2], tables, num_runs);
   update_statistics(store, tables);

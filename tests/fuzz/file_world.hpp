@@ -14,18 +14,16 @@ enum class FileUse : std::uint8_t {
   report,
   requirement,
   sensitivity,
-  export_text,
   export_hdf5,
   compare,
   query,
   verify,
-  annotate,
   back_up,
   run,    ///< Opened for writing as by `proofmass run`, asked for more runs, and summarised.
   serve,  ///< By a coordinator that is told to stop at once.
 };
 
-inline constexpr std::size_t num_file_uses = 13;
+inline constexpr std::size_t num_file_uses = 11;
 
 /// Makes three campaign databases: one that is finished, one half done after losses, crashes and
 /// second results, and one whose environment and draws come from tables.

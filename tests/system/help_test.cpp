@@ -92,9 +92,7 @@ TEST_F(Usage, IsRefusedWithTheRule) {
       {{"run", "a.toml", "--until", "std(k2c) within 5"},
        "until = std(k2c) within 5 (must read \"STATISTIC(PARAMETER) within PERCENT%\", "
        "\"all objectives within PERCENT%\" or \"REQUIREMENT decided\")"},
-      {{"export", "a.db", "--format", "xml"},
-       "--format = xml (must be one of csv, hdf5, json, sqlite)"},
-      {{"tag", "a.db", "delete"}, "ACTION = delete (must be one of add, remove)"},
+      {{"export", "a.db", "--format", "xml"}, "--format = xml (must be one of hdf5, sqlite)"},
       {{"sensitivity", "a.db", "--run", "one"},
        "--run = one (must be a whole number in [0, 999999999])"},
   };

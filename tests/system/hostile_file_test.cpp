@@ -82,15 +82,13 @@ TEST_F(HostileFile, IsRefusedByEveryCommand) {
                                         {"report", "hostile.db", "--html", "-"},
                                         {"plot", "hostile.db", "--list"},
                                         {"verify", "hostile.db"},
-                                        {"export", "hostile.db"},
+                                        {"export", "hostile.db", "--output", "a.h5"},
                                         {"replay", "hostile.db", "--run", "0"},
                                         {"backup", "hostile.db", "copy.db"},
                                         {"compare", "hostile.db", "good.db"},
                                         {"compare", "good.db", "hostile.db"},
                                         {"compare", "good.db", "hostile.db", "good.db"},
                                         {"sensitivity", "hostile.db"},
-                                        {"tag", "hostile.db", "add", "a"},
-                                        {"note", "hostile.db", "text"},
                                         {"query", "hostile.db", "SELECT 1"},
                                         {"run", "short.toml", "--db", "hostile.db"}};
   for (const auto& [sql, reason] : attacks) {
@@ -152,8 +150,7 @@ std::vector<std::pair<std::string, std::string>> text_columns(const fs::path& fi
 }
 
 TEST_F(HostileFile, CannotSteerATerminalOrForgeALine) {
-  EXPECT_EQ(answer({"tag", "good.db", "add", "old"}), "");
-  EXPECT_EQ(answer({"note", "good.db", "text"}), "");
+  make("good.db", "INSERT INTO tag (tag) VALUES ('old'); INSERT INTO note (text) VALUES ('text')");
   fs::create_directory(path(served));
   const auto columns = text_columns(path("good.db"));
   EXPECT_GT(columns.size(), 30U);
@@ -173,8 +170,6 @@ TEST_F(HostileFile, CannotSteerATerminalOrForgeALine) {
       commands.push_back({"query", file, "SELECT * FROM draw LIMIT 1"});
       commands.push_back({"run", "short.toml", "--db", file, "--runs", "16"});
     }
-    if (table == "tag") commands.push_back({"tag", file, "list"});
-    if (table == "note") commands.push_back({"note", file});
     for (const Arguments& command : commands) {
       const std::string text = output_of(command);
       EXPECT_EQ(obeyed(text), "") << command.front() << " " << file << ": " << text;

@@ -16,7 +16,9 @@
 namespace proofmass::test {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::UnorderedElementsAreArray;
 
 const std::filesystem::path share = std::filesystem::path(programs) / "../share";
 const std::vector<std::string> names{"proofmass", "proofmass-coordinator", "proofmass-worker"};
@@ -57,15 +59,15 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// The commands that a help text lists, and the program itself, as "".
+/// The commands that a help text lists behind its options, and the program itself, as "".
 std::vector<std::string> commands_of(const std::string& program) {
   std::vector<std::string> commands{""};
   const std::string help = help_of(program, "");
-  const std::size_t list = help.find("Subcommands:\n");
-  if (list == std::string::npos) return commands;
-  for (const std::string& line : lines_of(help.substr(list + 13))) {
-    if (!line.starts_with("  ")) break;
-    commands.push_back(line.substr(2, line.find(' ', 2) - 2));
+  const std::size_t list = help.find("\n\n", help.find("\nOptions:\n"));
+  for (const std::string& line : lines_of(help.substr(list, help.find("Exit codes:") - list))) {
+    if (line.starts_with("  ") && line[2] != ' ') {
+      commands.push_back(line.substr(2, line.find(' ', 2) - 2));
+    }
   }
   return commands;
 }
@@ -77,16 +79,25 @@ std::string offered(const std::string& program, std::vector<std::string> words) 
   return offered_by_bash(bash_file(program), function, words);
 }
 
+/// What fish offers for the end of a command line, one a line, without the descriptions.
+std::vector<std::string> offered_by_fish(const std::string& program, const std::string& line) {
+  const ShellAnswer answer = shell_answer("HOME=/tmp fish --no-config -c 'source " +
+                                          fish_file(program) + "; complete -C \"" + line + "\"'");
+  std::vector<std::string> offers = lines_of(answer.output);
+  for (std::string& offer : offers) offer = offer.substr(0, offer.find('\t'));
+  return offers;
+}
+
 /// The part of a man page about a command; without a command the part before all commands.
 std::string part_about(const std::string& page, const std::string& command) {
-  if (command.empty()) return page.substr(0, page.find(".SH COMMANDS\n"));
-  std::string heading = "\n.SS ";
-  for (const char c : command) heading += c == '-' ? std::string("\\-") : std::string(1, c);
-  const std::size_t begin = page.find(heading + "\n");
+  if (command.empty()) return page.substr(0, page.find("\n.SH COMMANDS\n"));
+  const std::size_t begin = page.find("\n.SS \"proofmass " + command + " [OPTIONS]");
   return begin == std::string::npos ? "" : page.substr(begin, page.find("\n.S", begin + 1) - begin);
 }
 
 TEST(ManPages, HaveEachOptionOfEachCommandThatHelpShows) {
+  if (!has_program("help2man")) return skip_for_want("help2man is not installed");
+  EXPECT_THAT(commands_of("proofmass"), testing::IsSupersetOf({"run", "set-priority", "merge"}));
   for (const std::string& program : names) {
     const std::string page = read_file(man_file(program));
     for (const std::string& command : commands_of(program)) {
@@ -125,34 +136,49 @@ TEST(Completions, OfBashOfferWhatHelpShowsAndNothingElse) {
 }
 
 TEST(Completions, OfBashOfferValues) {
-  EXPECT_EQ(offered("proofmass", {"export", "a.db", "--format", "''"}),
-            "csv\nhdf5\njson\nsqlite\n");
-  EXPECT_EQ(offered("proofmass", {"tag", "a.db", "r"}), "remove\n");
+  EXPECT_EQ(offered("proofmass", {"export", "a.db", "--format", "''"}), "hdf5\nsqlite\n");
+  EXPECT_EQ(offered("proofmass", {"plot", "a.db", "--format", "=", "p"}), "");
+  EXPECT_EQ(offered("proofmass", {"status", "--connect", "tcp", ":", "//host", ":", "5555", "--k"}),
+            "--keys\n");
+  EXPECT_EQ(offered("proofmass", {"--config", "=", "query", "ini"}), "init\n");
   EXPECT_EQ(offered("proofmass-worker", {"--log-format", "=", "j"}), "json\n");
   const TemporaryDirectory directory;
   for (const char* name : {"a.toml", "a.db", "a.txt"}) std::ofstream(directory / name);
   const std::string here = (directory / "").string();
   EXPECT_EQ(offered("proofmass", {"run", here}), here + "a.toml\n");
   EXPECT_EQ(offered("proofmass", {"run", "a.toml", "--db", here}), here + "a.db\n");
-  EXPECT_EQ(offered("proofmass", {"compare", "a.db", here}), here + "a.db\n");
+  EXPECT_EQ(offered("proofmass", {"compare", "a.db", "b.db", "c.db", "d.db", here}),
+            here + "a.db\n");
+  EXPECT_EQ(offered("proofmass", {"query", "a.db", "b", here}), "");
+  std::filesystem::create_directory(directory / "sub");
+  EXPECT_EQ(offered("proofmass", {"query", "--keys", here}), here + "sub\n");
 }
 
-TEST(Completions, OfZshAndFishHaveEachOptionAndValidSyntax) {
+TEST(Completions, OfFishOfferWhatHelpShowsAndValues) {
+  if (!has_program("fish")) return skip_for_want("fish is not installed");
+  std::vector<std::string> commands = commands_of("proofmass");
+  commands.erase(commands.begin());
+  EXPECT_THAT(offered_by_fish("proofmass", "proofmass "), UnorderedElementsAreArray(commands));
+  for (const std::string& command : {"run", "query", "compare"}) {
+    std::vector<std::string> options = options_in(help_of("proofmass", command));
+    std::erase_if(options, [](const std::string& option) { return !option.starts_with("--"); });
+    EXPECT_THAT(offered_by_fish("proofmass", "proofmass " + command + " --"),
+                UnorderedElementsAreArray(options));
+  }
+  EXPECT_THAT(offered_by_fish("proofmass", "proofmass export --format "),
+              ElementsAre("hdf5", "sqlite"));
+}
+
+TEST(Completions, OfZshHaveEachOptionAndValidSyntax) {
   for (const std::string& program : names) {
-    const std::string zsh = read_file(zsh_file(program)), fish = read_file(fish_file(program));
+    const std::string zsh = read_file(zsh_file(program));
     for (const std::string& command : commands_of(program)) {
       for (const std::string& option : options_in(help_of(program, command))) {
-        EXPECT_THAT(zsh, HasSubstr(option)) << program << " " << command;
-        if (option.starts_with("--")) {
-          EXPECT_THAT(fish, HasSubstr("-l '" + option.substr(2) + "'"))
-              << program << " " << command;
-        }
+        EXPECT_THAT(zsh, HasSubstr("'" + option)) << program << " " << command;
       }
     }
     if (!has_program("zsh")) return skip_for_want("zsh is not installed");
     EXPECT_EQ(shell_answer("zsh -f -n " + zsh_file(program)).output, "");
-    if (!has_program("fish")) return skip_for_want("fish is not installed");
-    EXPECT_EQ(shell_answer("HOME=/tmp fish --no-execute " + fish_file(program)).output, "");
   }
 }
 

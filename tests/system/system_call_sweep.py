@@ -4,7 +4,7 @@
     tests/system/system_call_sweep.py --programs build/release/bin --jobs 4
     tests/system/system_call_sweep.py --programs build/release/bin --sample 60 --seed 7
 
-A small campaign, whose runs cost nothing, is made, resumed, extended, finished, backed up, annotated
+A small campaign, whose runs cost nothing, is made, resumed, extended, finished, backed up
 and read. For each of these phases, each kind of call and each n, the n-th call fails (faulty_calls.cpp).
 A program that still lives after 3 s is given back what it lacks. In the end:
 
@@ -59,10 +59,9 @@ PHASES = {
     "grow": (SERVED, "finished", NUM_RUNS_EXTENDED, []),
     "backup": (LOCAL, "finished", NUM_RUNS, ["backup", "{db}", "{copy}"]),
     "backup_killed": (LOCAL, "killed", NUM_RUNS, ["backup", "{db}", "{copy}"]),
-    "tag": (LOCAL, "finished", NUM_RUNS, ["tag", "{db}", "add", "here"]),
     "report": (LOCAL, "killed", NUM_RUNS, ["report", "{db}"]),
     "export": (LOCAL, "finished", NUM_RUNS,
-               ["export", "{db}", "--format", "csv", "--output", "{copy}"]),
+               ["export", "{db}", "--output", "{copy}"]),
 }
 
 

@@ -98,6 +98,9 @@ std::string broken_layer(const SourceFile& file, const std::string& include) {
   if (matches(include, "^boost/(asio|beast)") && file.path != "coordinator/page/http_server.cpp") {
     return "HTTP stays in coordinator/page/http_server.cpp";
   }
+  if (matches(include, "^boost/math") && file.path != "core/statistics/distribution.cpp") {
+    return "laws whose last bits depend on the processor stay in core/statistics/distribution.cpp";
+  }
   if (matches(include, "\\.pb\\.h$|^google/protobuf") && !(file.is_in("proto/wire") && is_source)) {
     return "Protobuf types stay in proto/wire/*.cpp";
   }

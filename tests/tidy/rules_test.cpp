@@ -51,6 +51,7 @@ TEST(CheckLayers, AllowsWhatTheLayersAreFor) {
   EXPECT_THAT(layers("coordinator/query/virtual_table-inl.hpp", "<sqlite3ext.h>"), IsEmpty());
   EXPECT_THAT(layers("worker/net/a.cpp", "<zmq.hpp>"), IsEmpty());
   EXPECT_THAT(layers("coordinator/page/http_server.cpp", "<boost/beast/http.hpp>"), IsEmpty());
+  EXPECT_THAT(layers("core/random/normal.cpp", "<boost/math/distributions/normal.hpp>"), SizeIs(1));
   EXPECT_THAT(layers("proto/wire/a.cpp", "\"proto/proofmass.pb.h\""), IsEmpty());
   EXPECT_THAT(layers("core/a.cpp", "<cmath>"), IsEmpty());
   EXPECT_THAT(layers("core/definition/a.hpp", "<toml++/toml.h>"), IsEmpty());

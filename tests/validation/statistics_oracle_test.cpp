@@ -13,7 +13,6 @@
 #include "core/statistics/bootstrap.hpp"
 #include "core/statistics/comparison.hpp"
 #include "core/statistics/correlation.hpp"
-#include "core/statistics/detail/special.hpp"
 #include "core/statistics/distribution.hpp"
 #include "core/statistics/error_change.hpp"
 #include "core/statistics/interval.hpp"
@@ -118,7 +117,7 @@ void ask_about_dependence(Questions& questions, const std::string& x, const std:
   const std::string names = fmt::format(" {} {}", x, y);
   const auto linear = linear_correlation(first, second, confidence);
   const auto rank = rank_correlation(first, second, confidence);
-  const auto index = first_order_index(first, second, confidence);
+  const auto index = test::first_order_index(first, second, confidence);
   questions.ask("linear_correlation" + names + " 0.9",
                 {linear->coefficient, linear->interval.lower, linear->interval.upper});
   questions.ask("rank_correlation" + names + " 0.9",
@@ -129,11 +128,8 @@ void ask_about_dependence(Questions& questions, const std::string& x, const std:
 }
 
 void ask_about_pair(Questions& questions, const std::string& a, const std::string& b) {
-  const PairedComparison found =
-      compare_paired(questions.column(a), questions.column(b), confidence);
-  questions.ask(fmt::format("compare_paired {} {} 0.9", a, b),
-                {found.mean_difference, found.interval->lower, found.interval->upper,
-                 found.sign_p_value, found.rank_p_value});
+  const auto differences = test::differences_of(questions.column(a), questions.column(b));
+  questions.ask(fmt::format("rank_test {} {}", a, b), {rank_test_p_value(differences)});
 }
 
 void ask_about_campaigns(Questions& questions, const std::string& a, const std::string& b) {
@@ -182,8 +178,6 @@ void ask_about_laws(Questions& questions) {
     for (const double degrees : {1.0, 2.5, 19.0, 399.0, 1e6}) {
       questions.ask(fmt::format("student_quantile {} {}", p, degrees),
                     {student_quantile(p, degrees)});
-      questions.ask(fmt::format("fisher_quantile {} 9 {}", p, degrees),
-                    {fisher_quantile(p, 9.0, degrees)});
     }
     questions.ask(fmt::format("beta_quantile {} 3.5 40", p), {beta_quantile(p, 3.5, 40.0)});
     questions.ask(fmt::format("beta_quantile {} 900 20000", p), {beta_quantile(p, 900.0, 2e4)});
@@ -210,14 +204,13 @@ void ask_about_special_functions(Questions& questions) {
       for (const double steps : {-6.0, -1.0, 0.0, 1.5, 6.0}) {
         const double x = mean + steps * deviation;
         if (x <= 0.0 || x >= 1.0) continue;
-        const detail::Tails tails = detail::regularised_beta(a, b, x, 1.0 - x);
         questions.ask(fmt::format("regularised_beta {} {} {:a}", a, b, x),
-                      {tails.lower, tails.upper});
+                      {beta_at_most(x, a, b), beta_above(x, a, b)});
       }
     }
     for (const double x : {0.5 * a, a, 1.01 * a, a + 6.0 * std::sqrt(a)}) {
-      const detail::Tails tails = detail::regularised_gamma(a, x);
-      questions.ask(fmt::format("regularised_gamma {} {:a}", a, x), {tails.lower, tails.upper});
+      questions.ask(fmt::format("regularised_gamma {} {:a}", a, x),
+                    {chi_square_at_most(2.0 * x, 2.0 * a), chi_square_above(2.0 * x, 2.0 * a)});
     }
   }
 }
@@ -241,11 +234,6 @@ void ask_about_probabilities(Questions& questions) {
 void ask_about_tolerances(Questions& questions) {
   for (const double coverage : {0.5, 0.9, 0.95, 0.99}) {
     for (const double shown_with : {0.6, 0.9, 0.95, 0.999}) {
-      for (const std::uint64_t order : {1u, 2u, 7u}) {
-        const auto num_runs = wilks_num_runs({coverage, shown_with}, order);
-        questions.ask(fmt::format("wilks_num_runs {} {} {}", coverage, shown_with, order),
-                      {static_cast<double>(*num_runs)});
-      }
       const auto bound = wilks_upper(questions.column("magnitudes"), {coverage, shown_with});
       if (!bound) continue;
       questions.ask(

@@ -46,7 +46,7 @@ inline void add_force_flag(CLI::App& command, wire::IfThere& if_there) {
       "--force", [&if_there] { if_there = wire::IfThere::replace; }, "Replace an existing file");
 }
 
-/// Type names of campaign databases and campaign files, see described_program().
+/// Type names of campaign databases and campaign files, see wire::file_type.
 inline constexpr const char* database_type = "FILE.db";
 inline constexpr const char* campaign_file_type = "FILE.toml";
 
@@ -86,8 +86,6 @@ void add_backup(CLI::App& app, Command& chosen);
 void add_compare(CLI::App& app, Command& chosen);
 void add_merge(CLI::App& app, Command& chosen);
 void add_list(CLI::App& app, Command& chosen);
-void add_tag(CLI::App& app, Command& chosen);
-void add_note(CLI::App& app, Command& chosen);
 
 // Commands that ask a coordinator.
 void add_submit(CLI::App& app, Command& chosen);

@@ -15,7 +15,7 @@
 #include "coordinator/net/authentication/allow_list.hpp"
 #include "core/campaign/name.hpp"
 #include "core/error.hpp"
-#include "proto/command_line/described_program.hpp"
+#include "proto/command_line/option_checks.hpp"
 #include "proto/link/keys.hpp"
 #include "proto/link/whole_file.hpp"
 #include "proto/wire/names.hpp"

@@ -18,7 +18,6 @@
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/model.hpp"
-#include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/link/machine.hpp"
 #include "proto/link/start_program.hpp"

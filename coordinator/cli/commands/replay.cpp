@@ -18,7 +18,6 @@
 #include "coordinator/cli/standard_output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "core/model.hpp"
-#include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {

@@ -26,7 +26,6 @@
 #include "coordinator/report/review_markdown.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/independence.hpp"
-#include "proto/command_line/described_program.hpp"
 #include "proto/command_line/option_checks.hpp"
 
 namespace proofmass::coordinator {

@@ -28,7 +28,7 @@ struct SensitivityOptions {
   std::filesystem::path database;
   std::optional<std::string> parameter;  ///< Name; all by default.
   std::optional<std::uint64_t> run;      ///< To be explained.
-  std::size_t num_rows = 5;              ///< Drawn quantities that are named for each error.
+  std::optional<std::size_t> num_rows;   ///< Drawn quantities that are named for each error.
   OutputFormat format = OutputFormat::text;
   ClientConnectionConfig connection;  ///< Of a coordinator, if it is to be asked.
 };
@@ -43,7 +43,8 @@ std::size_t quantity_named(std::string_view name) {
 int print_remote_sensitivity(const SensitivityOptions& options) {
   wire::AnswerRequest question{.campaign = checked_campaign_name(options.database),
                                .question = wire::Question::sensitivity,
-                               .options = {fmt::format("--rows={}", options.num_rows)}};
+                               .options = {}};
+  if (options.num_rows) question.options.push_back(fmt::format("--rows={}", *options.num_rows));
   if (options.parameter) question.options.push_back("--parameter=" + *options.parameter);
   if (options.run) question.options.push_back(fmt::format("--run={}", *options.run));
   if (options.format == OutputFormat::json) question.options.emplace_back("--json");
@@ -104,10 +105,12 @@ void add_sensitivity(CLI::App& app, Command& chosen) {
                      "with the largest error beside its objective");
   command.add_option("--run", options.run, "Explain the error of this run")
       ->check(wire::in_range(std::uint64_t{0}, num_runs_max - 1));
-  command.add_option("--rows", options.num_rows, "Quantities to name for each error")
+  command
+      .add_option("--rows", options.num_rows,
+                  "Quantities to name for each error; by default 5,\n"
+                  "or none if chance explains all influences")
       ->check(wire::in_range(std::size_t{1},
-                             model().drawn().size() + model().results().quantities.size()))
-      ->capture_default_str();
+                             model().drawn().size() + model().results().quantities.size()));
   add_json_flag(command, options.format);
   add_optional_connection(command, options.connection);
 }

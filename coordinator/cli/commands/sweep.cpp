@@ -24,7 +24,7 @@
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
-#include "proto/command_line/described_program.hpp"
+#include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/surroundings.hpp"
 

@@ -32,11 +32,4 @@ void check_extension(const Database& database, const Campaign& campaign);
 /// Stores number of runs, definition and the table values of the new runs. @pre check_extension().
 void extend_campaign(Database& database, const Campaign& campaign, std::string_view definition);
 
-/// Changes `tag` or `note`. @pre Inside a transaction.
-/// @throws StoreError `tag = x (rule)` or `note = x (rule)`.
-void write_annotation(const Database& database, const Annotation& annotation);
-
-[[nodiscard]] std::vector<std::string> read_tags(const Database& database);
-[[nodiscard]] std::vector<Note> read_notes(const Database& database);
-
 }  // namespace proofmass::coordinator::detail

@@ -104,7 +104,7 @@ std::string explanation_of_readonly(int code, sqlite3* connection) {
   switch (code) {
     case SQLITE_READONLY_ROLLBACK:
       return "was being changed by a program that was killed; whoever writes to it next takes that "
-             "back: resume the campaign, or add a tag";
+             "back: resume the campaign";
     case SQLITE_READONLY_RECOVERY:
     case SQLITE_READONLY_CANTINIT:
       return std::string(log_out_of_reach);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -229,6 +230,18 @@ Content content_of(const Database& database, const ComparedTable& table) {
   return content;
 }
 
+/// Numbers that agree but for what another processor or another version of Boost.Math rounds.
+bool agree(const std::string& stored, const std::string& expected, double tolerance) {
+  if (stored == expected) return true;
+  const auto number_in = [](const std::string& text) {
+    double number = std::numeric_limits<double>::quiet_NaN();
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    return end == text.data() + text.size() ? number : std::numeric_limits<double>::quiet_NaN();
+  };
+  const double a = number_in(stored), b = number_in(expected);
+  return std::abs(a - b) <= tolerance * std::max(std::abs(a), std::abs(b));
+}
+
 void compare(const ComparedTable& table, const Content& stored, const Content& expected,
              FurtherRows further, std::vector<std::string>& differences) {
   for (const Row& must : expected.rows) {
@@ -238,7 +251,7 @@ void compare(const ComparedTable& table, const Content& stored, const Content& e
       continue;
     }
     for (std::size_t i = 0; i < must.cells.size(); ++i) {
-      if (row->cells[i] == must.cells[i]) continue;
+      if (agree(row->cells[i], must.cells[i], table.tolerance)) continue;
       differences.push_back(fmt::format("{}.{} of {} = {} (must be {})", table.name,
                                         expected.columns[i], must.name, row->cells[i],
                                         must.cells[i]));

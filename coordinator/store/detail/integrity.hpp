@@ -33,13 +33,14 @@ struct ComparedTable {
   std::string_view name;
   std::string_view row_name;       ///< An SQL expression that no two rows share: `parameter`.
   std::string_view columns = "*";  ///< All of them, or `a, b`.
+  double tolerance = 0.0;          ///< Relative, of numbers; 0: their bits are equal.
 };
 
 /// Rows that are not expected.
 enum class FurtherRows : std::uint8_t { refuse, ignore };
 
 /// What tables have other than they would have in a new file, a line each: `statistic lacks gain`,
-/// `statistic.mean of gain = 1 (must be 25.5)`. Numbers are equal if their bits are.
+/// `statistic.mean of gain = 1 (must be 25.5)`.
 ///
 /// @param write  Writes to a new file in memory what is expected. The same functions as those that
 /// write to a campaign database: nothing is said twice of what a table holds.

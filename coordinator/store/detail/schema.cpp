@@ -175,15 +175,6 @@ void check_results(const Database& database, const RowCounts& counts) {
       fmt::format("results = {}, deliveries = {}", num_rows("run_result"), num_rows("delivery")));
 }
 
-void check_up_to_date(const Database& database, const std::filesystem::path& path) {
-  const std::int64_t version = database.integer("PRAGMA user_version");
-  if (version == schema_version()) return;
-  throw StoreError(
-      fmt::format("campaign database = {} (is older than this program: its user_version is "
-                  "{}, not {}; resuming the campaign brings it up to date)",
-                  path.string(), version, schema_version()));
-}
-
 bool is_older(const Database& database) {
   return database.integer("PRAGMA user_version") < schema_version();
 }

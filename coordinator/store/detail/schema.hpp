@@ -59,11 +59,6 @@ void check_after_unclean_end(const Database& database);
 /// @throws StoreError naming the first that is not.
 void check_schema(const Database& database, std::int64_t version);
 
-/// Checks that a campaign database has the version of this program: a reader cannot migrate it.
-/// @param path  For the message.
-/// @throws StoreError otherwise.
-void check_up_to_date(const Database& database, const std::filesystem::path& path);
-
 /// Whether a campaign database has an older version than this program writes.
 [[nodiscard]] bool is_older(const Database& database);
 

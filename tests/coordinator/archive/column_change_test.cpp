@@ -8,6 +8,7 @@
 
 #include "coordinator/report/summarise.hpp"
 #include "tests/coordinator/archive/verification_fixture.hpp"
+#include "tests/core/statistics/columns.hpp"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
@@ -111,7 +112,7 @@ class ColumnChange : public test::VerificationTest {
     for (const RunResult& result : results_) {
       errors.push_back(std::abs(result.error(index(Parameter::k2c))));
     }
-    return check_stop_rule(parse_stop_rule("mean(k2c) within 90%"), errors);
+    return test::check_of(parse_stop_rule("mean(k2c) within 90%"), errors);
   }
 
   /// Other values of a column of this type, as SQL.

@@ -1,12 +1,10 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include <charconv>
 #include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,7 +12,6 @@
 #include "coordinator/archive/export.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
-#include "tests/coordinator/archive/csv_cells.hpp"
 #include "tests/coordinator/query/query_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -85,52 +82,50 @@ class ExportDraws : public test::StoreTest {
 
   [[nodiscard]] std::filesystem::path output() const { return directory() / "output"; }
 
-  /// What is exported as CSV or JSON.
-  template <typename Export>
-  [[nodiscard]] std::string text_of(const Export& write, DrawColumns draws) const {
-    const Store store = Store::open_read_only(file());
-    TextOutput text(output());
-    write(store, text, test::never_stopped, draws);
-    return test::content_of(output());
+  /// The columns `draw/` of an export, as h5py reads them.
+  [[nodiscard]] nlohmann::json exported(const Store& store,
+                                        const IsStopped& is_stopped = test::never_stopped) const {
+    export_hdf5(store, output(), is_stopped, DrawColumns::included);
+    const auto text = directory() / "read";
+    EXPECT_EQ(std::system(fmt::format("/usr/bin/python3 '{}' '{}' > '{}' 2>&1", PROOFMASS_READ_HDF5,
+                                      output().string(), text.string())
+                              .c_str()),
+              0)
+        << test::content_of(text);
+    return nlohmann::json::parse(test::content_of(text));
+  }
+
+  [[nodiscard]] Bits bits_in(const nlohmann::json& read) const {
+    EXPECT_EQ(read["run_index"].size(), runs_.size());
+    Bits bits;
+    for (const std::string& name : drawn_names()) {
+      const auto& column = read["bits"].at("draw/" + name);
+      EXPECT_EQ(column.size(), runs_.size());
+      for (std::size_t i = 0; i < runs_.size(); ++i) {
+        bits[{runs_[i], name}] =
+            column[i].is_null() ? std::nullopt : std::optional(column[i].get<std::uint64_t>());
+      }
+    }
+    return bits;
   }
 
   std::vector<std::uint64_t> runs_;  ///< Those with a result.
   Bits expected_;
 };
 
-Bits bits_in_csv(const std::string& text) {
-  Bits bits;
-  std::vector<std::string> names;
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) {
-    line.pop_back();  // A carriage return.
-    const std::vector<std::string> cells = test::cells_of(line);
-    if (names.empty()) {
-      names = cells;
-      continue;
-    }
-    EXPECT_EQ(cells.size(), names.size());
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (!names[i].starts_with("draw_")) continue;
-      bits[{std::stoull(cells[0]), names[i].substr(5)}] =
-          cells[i].empty() ? std::nullopt : std::optional(test::bits_of(test::number(cells[i])));
-    }
-  }
-  return bits;
-}
-
-// The run without a draw among them has no values, and no run without a result has a line.
-TEST_F(ExportDraws, OfCsvAreThoseOfAnIndependentDraw) {
-  const std::string text = text_of(export_csv, DrawColumns::included);
-  EXPECT_THAT(text, HasSubstr(",loss_cause,loss_session,draw_scale_factor_error.sensor_1_x,"));
-  const Bits bits = bits_in_csv(text);
-  EXPECT_EQ(bits.size(), runs_.size() * num_drawn);
+// The run without a draw among them has no values, and no run without a result has a row.
+TEST_F(ExportDraws, AreThoseOfAnIndependentDrawWithUnits) {
+  const nlohmann::json read = exported(Store::open_read_only(file()));
+  const Bits bits = bits_in(read);
   EXPECT_EQ(bits, expected_);
   EXPECT_FALSE((bits.at({run_without_draw, drawn_names()[0]}).has_value()));
   EXPECT_EQ((bits.at({23, drawn_names()[table_element]})), test::bits_of(1e-5 / 26.0));
+  EXPECT_EQ(read["bits"].size(), 35U + num_drawn);
+  EXPECT_EQ(read["units"]["draw/offcentring_m.x"], "m");
+  EXPECT_EQ(read["units"]["draw/scale_factor_error.sensor_1_x"], "1");
 }
 
-TEST_F(ExportDraws, OfCsvAreThoseOfTheTableOfQuery) {
+TEST_F(ExportDraws, AreThoseOfTheTableOfQuery) {
   test::RecordingWriter writer;
   ASSERT_EQ(run_query(file(), "SELECT run_index, quantity, value FROM draw", {}, writer),
             QueryEnd::complete);
@@ -144,66 +139,7 @@ TEST_F(ExportDraws, OfCsvAreThoseOfTheTableOfQuery) {
   ASSERT_EQ(asked.size(), num_runs * num_drawn);
   std::erase_if(asked,
                 [](const auto& entry) { return entry.first.first == 3 || entry.first.first == 7; });
-  EXPECT_EQ(bits_in_csv(text_of(export_csv, DrawColumns::included)), asked);
-}
-
-TEST_F(ExportDraws, OfJsonAreThoseOfAnIndependentDrawWithUnits) {
-  const auto json = nlohmann::json::parse(text_of(export_json, DrawColumns::included));
-  Bits bits;
-  for (const auto& run : json["runs"]) {
-    for (const auto& [name, value] : run.items()) {
-      if (!name.starts_with("draw_")) continue;
-      bits[{run["run_index"].get<std::uint64_t>(), name.substr(5)}] =
-          value.is_null() ? std::nullopt : std::optional(test::bits_of(value.get<double>()));
-    }
-  }
-  EXPECT_EQ(bits, expected_);
-  std::map<std::string, std::string> units;
-  for (const auto& column : json["columns"]) units[column["name"]] = column["unit"];
-  EXPECT_EQ(units.size(), 35U + num_drawn);
-  EXPECT_EQ(units["draw_offcentring_m.x"], "m");
-  EXPECT_EQ(units["draw_misalignment_rad.sensor_1_x"], "rad");
-  EXPECT_EQ(units["draw_scale_factor_error.sensor_2_z"], "1");
-}
-
-TEST_F(ExportDraws, OfHdf5AreThoseOfAnIndependentDrawWithUnits) {
-  export_hdf5(Store::open_read_only(file()), output(), test::never_stopped, DrawColumns::included);
-  const auto text = directory() / "read";
-  ASSERT_EQ(std::system(fmt::format("/usr/bin/python3 '{}' '{}' > '{}' 2>&1", PROOFMASS_READ_HDF5,
-                                    output().string(), text.string())
-                            .c_str()),
-            0)
-      << test::content_of(text);
-  const auto read = nlohmann::json::parse(test::content_of(text));
-  ASSERT_EQ(read["run_index"].size(), runs_.size());
-  Bits bits;
-  for (const std::string& name : drawn_names()) {
-    const auto& column = read["bits"].at("draw/" + name);
-    ASSERT_EQ(column.size(), runs_.size());
-    for (std::size_t i = 0; i < runs_.size(); ++i) {
-      bits[{runs_[i], name}] =
-          column[i].is_null() ? std::nullopt : std::optional(column[i].get<std::uint64_t>());
-    }
-  }
-  EXPECT_EQ(bits, expected_);
-  EXPECT_EQ(read["bits"].size(), 35U + num_drawn);
-  EXPECT_EQ(read["units"]["draw/offcentring_m.x"], "m");
-  EXPECT_EQ(read["units"]["draw/scale_factor_error.sensor_1_x"], "1");
-}
-
-// Each line begins as it does without them, so that readers of today's columns still work.
-TEST_F(ExportDraws, FollowTheOtherColumns) {
-  std::istringstream plain(text_of(export_csv, DrawColumns::left_out));
-  std::istringstream with(text_of(export_csv, DrawColumns::included));
-  std::string a, b;
-  std::size_t num_lines = 0;
-  while (std::getline(plain, a) && std::getline(with, b)) {
-    a.pop_back();
-    EXPECT_TRUE(b.starts_with(a + ",")) << b;
-    ++num_lines;
-  }
-  EXPECT_EQ(num_lines, runs_.size() + 1);
-  EXPECT_EQ(text_of(export_json, DrawColumns::left_out).find("draw_"), std::string::npos);
+  EXPECT_EQ(expected_, asked);
 }
 
 // A campaign that grows while it is exported, run by run, is drawn as it was when the export began.
@@ -217,21 +153,19 @@ TEST_F(ExportDraws, AreOfTheStateThatTheRunsAreOf) {
     return false;
   };
   const Store store = Store::open_read_only(file());
-  TextOutput text(output());
-  export_csv(store, text, grow, DrawColumns::included);
-  EXPECT_EQ(bits_in_csv(test::content_of(output())), expected_);
+  EXPECT_EQ(bits_in(exported(store, grow)), expected_);
 
   runs_.push_back(num_runs);
-  EXPECT_EQ(bits_in_csv(text_of(export_csv, DrawColumns::included)),
+  EXPECT_EQ(bits_in(exported(Store::open_read_only(file()))),
             drawn_again(varied_campaign(num_runs + 1), runs_));
 }
 
 TEST_F(ExportDraws, SayThatADefinitionIsNoCampaign) {
   Store store = Store::create(directory() / "bad.db", test::campaign_of(2), "name = 1");
-  TextOutput text(output());
-  EXPECT_THAT(
-      test::error_of([&] { export_csv(store, text, test::never_stopped, DrawColumns::included); }),
-      HasSubstr("stored definition:1: name = 1 (unknown key"));
+  EXPECT_THAT(test::error_of([&] {
+                export_hdf5(store, output(), test::never_stopped, DrawColumns::included);
+              }),
+              HasSubstr("stored definition:1: name = 1 (unknown key"));
 }
 
 }  // namespace

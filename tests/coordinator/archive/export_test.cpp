@@ -2,15 +2,11 @@
 
 #include <gmock/gmock.h>
 
-#include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "coordinator/report/digest.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
-#include "tests/coordinator/archive/csv_cells.hpp"
 #include "tests/support/microscope_results.hpp"
 
 namespace proofmass::coordinator {
@@ -18,9 +14,7 @@ namespace {
 
 using ::testing::Each;
 using ::testing::EndsWith;
-using ::testing::HasSubstr;
 using ::testing::Not;
-using ::testing::StartsWith;
 
 class Export : public test::StoreTest {
  protected:
@@ -29,79 +23,8 @@ class Export : public test::StoreTest {
 
   [[nodiscard]] std::filesystem::path output() const { return directory() / "output"; }
 
-  std::string csv() {
-    TextOutput text(output());
-    export_csv(store_, text, test::never_stopped);
-    return test::content_of(output());
-  }
-  std::string json() {
-    TextOutput text(output());
-    export_json(store_, text, test::never_stopped);
-    return test::content_of(output());
-  }
-
   Store store_;
 };
-
-TEST_F(Export, OfCsvHasALineARunThatReadsBackToTheSameBits) {
-  const std::string text = csv();
-  std::istringstream stream(text);
-  std::vector<std::vector<std::string>> rows;
-  for (std::string line; std::getline(stream, line);) {
-    ASSERT_EQ(line.back(), '\r');  // As of RFC 4180.
-    line.pop_back();
-    rows.push_back(test::cells_of(line));
-  }
-  ASSERT_EQ(rows.size(), 6U);
-  EXPECT_EQ(rows[0][0], "run_index");
-  EXPECT_EQ(rows[0][4], "truth_a_c11_delta_x_m");
-  EXPECT_EQ(rows[0][33], "error_k2c_s2_m");
-  EXPECT_EQ(rows[0][34], "health_acceleration_m_s2");
-  EXPECT_EQ(rows[0][40], "loss_session");
-  const std::vector<RunResult> results = test::results_in(store_);
-  for (std::size_t run = 0; run < results.size(); ++run) {
-    const auto& row = rows[run + 1];
-    ASSERT_EQ(row.size(), 41U);
-    EXPECT_EQ(row[0], std::to_string(run));
-    EXPECT_EQ(row[2], "2");
-    EXPECT_EQ(row[3], "3");
-    for (std::size_t i = 0; i < num_parameters; ++i) {
-      const RunResult& result = results[run];
-      EXPECT_EQ(row[4 + i].empty(), !result.has_truth());
-      EXPECT_EQ(row[14 + i].empty(), !result.has_estimate());
-      EXPECT_EQ(row[24 + i].empty(), !result.has_estimate());
-      if (!result.has_estimate()) continue;
-      EXPECT_EQ(test::bits_of(test::number(row[4 + i])), test::bits_of(result.truth[i]));
-      EXPECT_EQ(test::bits_of(test::number(row[14 + i])), test::bits_of(result.estimate[i]));
-      EXPECT_EQ(test::bits_of(test::number(row[24 + i])),
-                test::bits_of(result.estimate[i] - result.truth[i]));
-    }
-  }
-  EXPECT_EQ(rows[1][1], "completed");
-  EXPECT_EQ(rows[4][1], "no_draw");
-}
-
-TEST_F(Export, OfJsonHoldsCampaignColumnsRunsAndDigest) {
-  const auto parsed = nlohmann::json::parse(json());
-  EXPECT_EQ(parsed["campaign"]["name"], "hardy2013");
-  EXPECT_EQ(parsed["campaign"]["seed"], "1");
-  EXPECT_EQ(parsed["campaign"]["num_runs"], 5);
-  EXPECT_EQ(parsed["campaign"]["definition"], store_.definition());
-  EXPECT_EQ(parsed["num_finished"], 5);
-  EXPECT_EQ(parsed["digest"], digest_of(store_));
-  EXPECT_EQ(parsed["columns"].size(), 35U);
-  EXPECT_EQ(parsed["columns"][3]["unit"], "rad");
-  const RunResult result = test::result_of(0);
-  EXPECT_EQ(test::bits_of(parsed["runs"][0]["estimate_k2d_s2_m"]),
-            test::bits_of(result.estimate[8]));
-  EXPECT_EQ(test::bits_of(parsed["runs"][0]["error_a_c12_rad"]),
-            test::bits_of(result.estimate[3] - result.truth[3]));
-  EXPECT_EQ(parsed["runs"][1]["status"], "not_converged");
-  EXPECT_FALSE(parsed["runs"][2]["truth_k2d_s2_m"].is_null());
-  EXPECT_TRUE(parsed["runs"][2]["estimate_k2d_s2_m"].is_null());
-  EXPECT_TRUE(parsed["runs"][3]["truth_k2d_s2_m"].is_null());
-  EXPECT_EQ(parsed["runs"][4].size(), 41U);
-}
 
 /// A lost run, one that is completed, and one of an older program, without health.
 Store store_with_health(const std::filesystem::path& file) {
@@ -116,64 +39,8 @@ Store store_with_health(const std::filesystem::path& file) {
   return store;
 }
 
-TEST_F(Export, OfCsvHasHealthAndWhereARunWasLost) {
-  const Store store = store_with_health(directory() / "lost.db");
-  TextOutput text(output());
-  export_csv(store, text, test::never_stopped);
-  const std::string content = test::content_of(output());
-  EXPECT_THAT(content, HasSubstr(",health_acceleration_m_s2,health_attitude_rad,"
-                                 "health_residual_m_s2,health_quadratic_noise,health_square_noise,"
-                                 "loss_cause,loss_session\r\n0,lost,"));
-  EXPECT_THAT(content,
-              HasSubstr(",2e-05,0.3333333333333333,1e-12,0.25,1e+90,saturation,k2_sensor_1\r\n"));
-  EXPECT_THAT(content, HasSubstr(",1e-07,2e-05,1e-12,0.25,0.0003,,\r\n2,completed,"));
-  EXPECT_THAT(content, EndsWith(",,,,,,,\r\n"));
-}
-
-TEST_F(Export, OfJsonHasHealthAndWhereARunWasLost) {
-  const Store store = store_with_health(directory() / "lost.db");
-  TextOutput text(output());
-  export_json(store, text, test::never_stopped);
-  const auto runs = nlohmann::json::parse(test::content_of(output()))["runs"];
-  EXPECT_EQ(runs[0]["status"], "lost");
-  EXPECT_EQ(runs[0]["health_attitude_rad"], 1.0 / 3.0);
-  EXPECT_EQ(runs[0]["loss_cause"], "saturation");
-  EXPECT_EQ(runs[0]["loss_session"], "k2_sensor_1");
-  EXPECT_TRUE(runs[1]["loss_cause"].is_null());
-  EXPECT_EQ(runs[1]["health_square_noise"], 3e-4);
-  EXPECT_TRUE(runs[2]["health_square_noise"].is_null());
-}
-
-TEST_F(Export, OfJsonHasALineARun) {
-  const std::string text = json();
-  EXPECT_EQ(std::ranges::count(text, '\n'), 11);
-  EXPECT_THAT(text, HasSubstr("\n{\"run_index\":4,\"status\":\"completed\",\"num_draws\":2,"));
-}
-
-TEST_F(Export, OfNoRunIsWhole) {
-  Store empty = Store::create(directory() / "empty.db", test::campaign_of(1), "");
-  TextOutput text(output());
-  export_json(empty, text, test::never_stopped);
-  const auto json = nlohmann::json::parse(test::content_of(output()));
-  EXPECT_EQ(json["runs"].size(), 0U);
-  EXPECT_EQ(json["num_finished"], 0);
-}
-
 TEST_F(Export, CanBeInterrupted) {
-  const auto stopped = [] { return true; };
-  EXPECT_THROW(
-      {
-        TextOutput text(output());
-        export_csv(store_, text, stopped);
-      },
-      Interrupted);
-  EXPECT_THROW(
-      {
-        TextOutput text(output());
-        export_json(store_, text, stopped);
-      },
-      Interrupted);
-  EXPECT_THROW(export_hdf5(store_, output(), stopped), Interrupted);
+  EXPECT_THROW(export_hdf5(store_, output(), [] { return true; }), Interrupted);
   EXPECT_FALSE(file_names().contains("output"));
   EXPECT_THAT(file_names(), Each(Not(EndsWith(".new"))));
 }
@@ -209,6 +76,14 @@ TEST_F(Export, OfHdf5HasHealthAndWhereARunWasLost) {
   EXPECT_EQ(read["units"]["health/residual_m_s2"], "m/s²");
   EXPECT_EQ(read["bits"]["health/attitude_rad"][0], test::bits_of(1.0 / 3.0));
   EXPECT_TRUE(read["bits"]["health/attitude_rad"][2].is_null());
+}
+
+TEST_F(Export, OfNoRunIsWhole) {
+  const Store empty = Store::create(directory() / "empty.db", test::campaign_of(1), "");
+  export_hdf5(empty, output(), test::never_stopped);
+  const auto read = read_by_h5py(output(), directory() / "read");
+  EXPECT_EQ(read["run_index"].size(), 0U);
+  EXPECT_EQ(read["attributes"]["num_finished"], 0);
 }
 
 TEST_F(Export, OfHdf5IsReadByAnotherProgram) {

@@ -12,7 +12,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
@@ -39,7 +38,6 @@ class Listing : public test::StoreTest {
 TEST_F(Listing, TellsWhereEachCampaignStands) {
   const auto path = make("b.db", 3);
   make("a.db");
-  Store::annotate(path, {AddTag{"thesis"}});
   const auto campaigns = list();
   ASSERT_EQ(campaigns.size(), 2U);
   EXPECT_EQ(campaigns[0].file, directory() / "a.db");
@@ -52,7 +50,6 @@ TEST_F(Listing, TellsWhereEachCampaignStands) {
   EXPECT_EQ(campaign.num_finished, 3U);
   EXPECT_EQ(campaign.phase, wire::CampaignPhase::active);
   EXPECT_EQ(campaign.created_utc, Store::open_read_only(path).created_utc());
-  EXPECT_THAT(campaign.tags, ElementsAre("thesis"));
 }
 
 TEST_F(Listing, LeavesOtherFilesOutOfDirectories) {
@@ -142,8 +139,7 @@ const ListedCampaign extreme{.file = "/some/where/a-file-with-a-rather-long-name
                              .num_runs = 1'000'000'000,
                              .num_finished = 999'999'999,
                              .phase = wire::CampaignPhase::cancelled,
-                             .created_utc = "2024-02-29T12:00:10Z",
-                             .tags = {"a", "thesis"}};
+                             .created_utc = "2024-02-29T12:00:10Z"};
 
 TEST(ListingText, FitsATerminal) {
   const std::string text = listing_text({&extreme, 1}, 80);
@@ -151,15 +147,7 @@ TEST(ListingText, FitsATerminal) {
   for (std::string line; std::getline(lines, line);) EXPECT_LE(display_width(line), 80U) << line;
   EXPECT_THAT(text, HasSubstr("a-file-with-a-ra… "));
   EXPECT_THAT(text, HasSubstr("cancelled"));
-  EXPECT_THAT(text, HasSubstr("2024-02-29\n  tags: a thesis\n"));
-}
-
-TEST(ListingText, BreaksTagsBetweenLines) {
-  ListedCampaign campaign = extreme;
-  const std::string longest(64, 'a');
-  campaign.tags = {longest, "bcdefg", "h", longest};
-  EXPECT_THAT(listing_text({&campaign, 1}, 80),
-              HasSubstr("\n  tags: " + longest + " bcdefg\n        h " + longest + "\n"));
+  EXPECT_THAT(text, HasSubstr("2024-02-29\n"));
 }
 
 TEST(ListingJson, IsComplete) {
@@ -173,7 +161,6 @@ TEST(ListingJson, IsComplete) {
   EXPECT_EQ(json[0]["num_runs"], 1'000'000'000);
   EXPECT_EQ(json[0]["num_finished"], 999'999'999);
   EXPECT_EQ(json[0]["created_utc"], "2024-02-29T12:00:10Z");
-  EXPECT_EQ(json[0]["tags"], nlohmann::json({"a", "thesis"}));
   EXPECT_EQ(json[1], nlohmann::json({{"file", "b.db"}, {"problem", "is damaged"}}));
 }
 

@@ -22,9 +22,9 @@ MicroscopeCampaign campaign_of(std::string_view text, const Overrides& overrides
 
 TEST(ReadCampaign, CompletesAFileThatHasANameAloneWithTheNominalValues) {
   const MicroscopeCampaign campaign = campaign_of("campaign.name = \"hardy2013\"");
-  EXPECT_THAT(definition_differences(campaign, MicroscopeCampaign{}), IsEmpty());
+  EXPECT_THAT(definition_differences(campaign, hardy2013_campaign()), IsEmpty());
   EXPECT_EQ(campaign.num_runs, 100u);
-  EXPECT_EQ(campaign.scenario.estimation.correction, Correction::second_order);
+  EXPECT_EQ(campaign.scenario.estimation.correction, Correction::hardy2013);
 }
 
 TEST(ReadCampaign, TakesEveryKindOfValue) {

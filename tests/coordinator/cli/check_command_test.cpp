@@ -74,8 +74,7 @@ TEST_F(Check, ShowsWhatAFileAndTheOptionsChange) {
                 "Beside the number of runs, these differ from what `proofmass init` writes:\n"
                 "  name = \"mine\" (instead of \"hardy2013\")\n"
                 "  seed = 3 (instead of 1)\n"
-                "  noise.scale = 0 (instead of 1)\n"
-                "  estimation.correction = \"second_order\" (instead of \"hardy2013\")\n");
+                "  noise.scale = 0 (instead of 1)\n");
 }
 
 TEST_F(Check, PrintsJson) {

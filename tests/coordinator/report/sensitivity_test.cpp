@@ -80,6 +80,22 @@ TEST(SensitivityText, CorrectsForAllQuantitiesTried) {
   }
 }
 
+// The error is that of other runs, so that no quantity has to do with it.
+TEST(SensitivityText, SaysThatNoInputIsFoundAndListsSomeOnlyIfAsked) {
+  DrawnRuns drawn = made_up_runs();
+  std::vector<double>& errors = drawn.errors[index(Parameter::k2c)];
+  std::ranges::rotate(errors, errors.begin() + 7);
+  const std::string text = sensitivity_text(drawn, index(Parameter::k2c));
+  EXPECT_THAT(text, HasSubstr("\n|error|: no input found "));
+  EXPECT_THAT(text, HasSubstr("\nerror: no input found "));
+  EXPECT_THAT(text, Not(HasSubstr("drives")));
+  for (const std::string& name : drawn_names()) EXPECT_THAT(text, Not(HasSubstr("\n" + name)));
+  EXPECT_THAT(sensitivity_text(drawn, index(Parameter::k2c), 2), HasSubstr("\ndrives |error| "));
+  EXPECT_THAT(explanation_text(drawn, index(Parameter::k2c), {42}),
+              HasSubstr("|error|: no input found "));
+  EXPECT_THAT(sensitivity_text(made_up_runs(), index(Parameter::k2c)), HasSubstr("drives |error|"));
+}
+
 // Quantities 7 and 20 make no difference to the mean of the error, only together.
 TEST(SensitivityText, NamesTheProductThatMakesAnError) {
   DrawnRuns drawn = made_up_runs();

@@ -53,12 +53,6 @@ void make_older(const std::filesystem::path& path) {
 class StoreMigration : public test::StoreTest {
  protected:
   void make_older_file() const { make_older(file()); }
-
-  [[nodiscard]] std::string older_than_the_program() const {
-    return "campaign database = " + file().string() +
-           " (is older than this program: its user_version is 8, not 10; resuming the campaign "
-           "brings it up to date)";
-  }
 };
 
 // If the linker took the library's own files, there would be one version less.
@@ -142,12 +136,6 @@ TEST_F(StoreMigration, OfAFileThatIsReadLeavesItAsItIs) {
     EXPECT_THAT(file_names(), ElementsAre("campaign.db"));
   }
   EXPECT_TRUE(test::content_of(file()) == before);
-}
-
-TEST_F(StoreMigration, IsNeededBeforeTagsAndNotes) {
-  make_older_file();
-  EXPECT_EQ(test::store_error_of([&] { Store::annotate(file(), {AddTag{"tag"}}); }),
-            older_than_the_program());
 }
 
 TEST_F(StoreMigration, OfAFileThatIsListedReadsACopy) {

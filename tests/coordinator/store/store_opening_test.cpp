@@ -77,16 +77,14 @@ class StoreOpening : public test::StoreTest {
 
 TEST_F(StoreOpening, ForReadingCostsTheSameForAnyNumberOfRuns) {
   const auto read = [&] { Store::open_read_only(file()); };
-  const auto annotate = [&] { Store::annotate(file(), {}); };
   create(1000);
   read();  // What is read once in a process.
-  const std::uint64_t cost = cost_of(read), cost_of_annotation = cost_of(annotate);
+  const std::uint64_t cost = cost_of(read);
   create(20'000);
   ASSERT_GT(std::filesystem::file_size(file()), 4'000'000u);
   // Trees are a page or two deeper.
   constexpr std::uint64_t tolerance = 32 * 1024;
   EXPECT_LE(cost_of(read), cost + tolerance);
-  EXPECT_LE(cost_of(annotate), cost_of_annotation + tolerance);
 }
 
 TEST_F(StoreOpening, FindsADamagedPageOfATableThatDoesNotGrow) {
@@ -94,7 +92,6 @@ TEST_F(StoreOpening, FindsADamagedPageOfATableThatDoesNotGrow) {
     create(10);
     damage(table, true);
     EXPECT_EQ(store_error_of([&] { Store::open_read_only(file()); }), damaged()) << table;
-    EXPECT_EQ(store_error_of([&] { Store::annotate(file(), {}); }), damaged()) << table;
   }
 }
 
@@ -169,7 +166,6 @@ TEST_F(StoreOpening, TellsThatALogBesideARestoredFileIsNotItsOwn) {
       "log is that of the file before it, and removing the log suffices)";
   EXPECT_THAT(store_error_of(read), HasSubstr(remedy));
   EXPECT_THAT(store_error_of([&] { Store::open(file()); }), HasSubstr(remedy));
-  EXPECT_THAT(store_error_of([&] { Store::annotate(file(), {AddTag{"tag"}}); }), HasSubstr(remedy));
   EXPECT_TRUE(test::content_of(file()) == test::content_of(backup));
   std::filesystem::remove(file().string() + "-wal");
   std::filesystem::remove(file().string() + "-shm");
@@ -188,7 +184,7 @@ TEST_F(StoreOpening, OfAFileThatIsDamagedWithoutItsLogNamesNoSuchRemedy) {
 }
 
 // Closing the file would fold the log in, which may not be its own.
-TEST_F(StoreOpening, ForATagFindsAnyDamagedPageOfAFileWithALog) {
+TEST_F(StoreOpening, ForWritingFindsAnyDamagedPageOfAFileWithALog) {
   create(2000);
   damage("run_result", false);
   test::change(file(), "PRAGMA journal_mode = WAL");
@@ -197,7 +193,7 @@ TEST_F(StoreOpening, ForATagFindsAnyDamagedPageOfAFileWithALog) {
   test::change(file(), "UPDATE campaign SET priority = 1");
   ASSERT_TRUE(detail::has_log(file()));
   const std::string before = test::content_of(file());
-  EXPECT_EQ(store_error_of([&] { Store::annotate(file(), {AddTag{"tag"}}); }), damaged());
+  EXPECT_EQ(store_error_of([&] { Store::open(file()); }), damaged());
   EXPECT_TRUE(test::content_of(file()) == before);
   EXPECT_TRUE(detail::has_log(file()));
 }

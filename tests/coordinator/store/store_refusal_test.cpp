@@ -119,8 +119,6 @@ TEST_F(StoreRefusal, OfAFileWithTheLogOfAnotherLeavesItAsItIs) {
   std::filesystem::rename(kept, log);
   const std::string bytes = test::content_of(file());
   EXPECT_THAT(error_of_open(), HasSubstr("is damaged"));
-  EXPECT_THAT(store_error_of([&] { Store::annotate(file(), {AddTag{"tag"}}); }),
-              HasSubstr("is damaged"));
   EXPECT_EQ(test::content_of(file()), bytes);
   std::filesystem::remove(log);
   EXPECT_THAT(Store::open(file()).finished_runs(), ElementsAre(RunRange{RunIndex{0}, 10}));
@@ -201,7 +199,6 @@ TEST_F(StoreRefusal, OfAFileWhoseSchemaIsNotThatOfACampaign) {
     Database(file(), Access::read_write).execute(sql);
     EXPECT_EQ(error_of_open(), message(reason)) << sql;
     EXPECT_EQ(error_of_open_read_only(), message(reason)) << sql;
-    EXPECT_EQ(store_error_of([&] { Store::annotate(file(), {}); }), message(reason)) << sql;
   }
 }
 
@@ -394,9 +391,6 @@ TEST_F(StoreRefusal, ToMakeALogOrAJournalInADirectoryThatIsNotWritable) {
       "directory that is");
   create();
   std::filesystem::permissions(file(), std::filesystem::perms(0666));
-  EXPECT_EQ(
-      error_with(std::filesystem::perms(0555), [&] { Store::annotate(file(), {AddTag{"tag"}}); }),
-      expected);
   test::change(file(), "PRAGMA journal_mode = WAL");
   EXPECT_EQ(error_with(std::filesystem::perms(0555), [&] { Store::open_read_only(file()); }),
             expected);

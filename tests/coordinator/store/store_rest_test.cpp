@@ -101,8 +101,6 @@ TEST_F(StoreRest, ACampaignIsResumedThroughALinkWithItsLog) {
   const Store store = Store::open(link());
   EXPECT_FALSE(store.has_lost_its_log());
   EXPECT_EQ(results_in(store).size(), 64u);
-  Store::annotate(link(), {AddTag{"tag"}});
-  EXPECT_THAT(store.tags(), ElementsAre("tag"));
 }
 
 TEST_F(StoreRest, ACopyOfACampaignAtRestIsWhole) {
@@ -176,7 +174,7 @@ TEST_F(StoreRest, AFileClosedWhileSomebodyReadsIsFoldedInByWhoeverOpensItNext) {
   // The mark could not reach the file, nor could the log: both are beside it.
   ASSERT_GT(std::filesystem::file_size(file().string() + "-wal"), 0u);
   EXPECT_EQ(results_in(Store::open_read_only(file())).size(), 64u);
-  Store::annotate(file(), {AddTag{"kept"}});
+  { const Store next = Store::open(file()); }
   EXPECT_EQ(results_in(Store::open_read_only(copy())).size(), 64u);
 }
 

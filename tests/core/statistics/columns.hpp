@@ -3,10 +3,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "core/random/normal.hpp"
 #include "core/random/stream.hpp"
+#include "core/statistics/sensitivity.hpp"
+#include "core/statistics/stop_rule.hpp"
 
 namespace proofmass::test {
 
@@ -39,6 +43,31 @@ inline std::vector<double> normal_column(std::size_t count, const Selection& sel
 /// |x| of a normal x: the law of an absolute error.
 inline std::vector<double> half_normal_column(std::size_t count, const Selection& selection) {
   return column_of(count, selection, [](double u) { return std::abs(inverse_normal(u)); });
+}
+
+/// The rule against errors that are all there.
+inline StopCheck check_of(const StopRule& rule, std::span<const double> errors) {
+  ValuePasses passes(wanted_by(rule));
+  do {
+    for (const double error : errors) passes.add(error);
+  } while (passes.end_pass());
+  return check_stop_rule(rule, passes);
+}
+
+/// second − first, pair by pair.
+inline std::vector<double> differences_of(std::span<const double> first,
+                                          std::span<const double> second) {
+  std::vector<double> differences;
+  for (std::size_t i = 0; i < first.size(); ++i) differences.push_back(second[i] - first[i]);
+  return differences;
+}
+
+/// That of sensitivities() of one input and one output; empty if one of them does not vary.
+inline std::optional<FirstOrderIndex> first_order_index(const Column& input, const Column& output,
+                                                        double confidence) {
+  const auto all = sensitivities({&input, 1}, {&output, 1}, confidence);
+  if (all[0].empty()) return std::nullopt;
+  return all[0][0].first_order;
 }
 
 }  // namespace proofmass::test

@@ -85,7 +85,7 @@ std::vector<double> coverage_of(const Law& law, const Repetitions& repetitions) 
       output.push_back(law.output(u));
     }
     for (std::size_t i = 0; i < num_inputs; ++i) {
-      const Interval interval = first_order_index(inputs[i], output, 0.95)->interval;
+      const Interval interval = test::first_order_index(inputs[i], output, 0.95)->interval;
       if (interval.lower <= law.indices[i] && law.indices[i] <= interval.upper) covered[i] += 1.0;
     }
   }

@@ -41,9 +41,9 @@ TEST(FirstOrderIndex, OfALinearFunctionIsItsShareOfTheVariance) {
   const Columns u = uniform_columns(3, 10'000, 41);
   const auto y =
       evaluated(u, [&](std::size_t i) { return 3.0 * u[0][i] - 2.0 * u[1][i] + u[2][i]; });
-  expect_index(first_order_index(u[0], y, 0.95), 9.0 / 14.0);
-  expect_index(first_order_index(u[1], y, 0.95), 4.0 / 14.0);
-  expect_index(first_order_index(u[2], y, 0.95), 1.0 / 14.0);
+  expect_index(test::first_order_index(u[0], y, 0.95), 9.0 / 14.0);
+  expect_index(test::first_order_index(u[1], y, 0.95), 4.0 / 14.0);
+  expect_index(test::first_order_index(u[2], y, 0.95), 1.0 / 14.0);
 }
 
 // Ishigami's function with a = 7, b = 0.1 on (−π, π)³: V₁ = ½(1 + bπ⁴/5)², V₂ = a²/8, V₃ = 0 though
@@ -61,9 +61,9 @@ TEST(FirstOrderIndex, OfIshigamisFunctionIsTheKnownOne) {
   const double first = 0.5 * std::pow(1.0 + 0.1 * fourth / 5.0, 2);
   const double second = 49.0 / 8.0;
   const double all = 0.5 + second + 0.1 * fourth / 5.0 + 0.01 * fourth * fourth / 18.0;
-  expect_index(first_order_index(u[0], y, 0.95), first / all);
-  expect_index(first_order_index(u[1], y, 0.95), second / all);
-  expect_index(first_order_index(u[2], y, 0.95), 0.0);
+  expect_index(test::first_order_index(u[0], y, 0.95), first / all);
+  expect_index(test::first_order_index(u[1], y, 0.95), second / all);
+  expect_index(test::first_order_index(u[2], y, 0.95), 0.0);
 }
 
 // y = x on a grid of n: neighbours differ by 2/n, half the square is 2/n². With the ends, which
@@ -75,9 +75,9 @@ TEST(FirstOrderIndex, LeavesOutTheSquareOfTheSpacingOnly) {
     x.push_back((2.0 * i + 1.0) / n - 1.0);
     square.push_back(x.back() * x.back());
   }
-  EXPECT_NEAR(first_order_index(x, x, 0.95)->index, 1.0 - 2.0 / (n * n) * 3.0 * n / (n + 1.0),
+  EXPECT_NEAR(test::first_order_index(x, x, 0.95)->index, 1.0 - 2.0 / (n * n) * 3.0 * n / (n + 1.0),
               1e-12);
-  EXPECT_NEAR(first_order_index(x, square, 0.95)->index, 1.0, 0.003);
+  EXPECT_NEAR(test::first_order_index(x, square, 0.95)->index, 1.0, 0.003);
 }
 
 // Values 1 to 4 in bins of four along the input, ranks 1 to 16: mean ranks 2.5, 6.5, 10.5 and 14.5
@@ -89,7 +89,7 @@ TEST(FirstOrderIndex, HasThePValueOfKruskalAndWallis) {
   const double h = 12.0 / (16.0 * 17.0) * 4.0 * 80.0;
   const double beyond =
       std::erfc(std::sqrt(0.5 * h)) + std::sqrt(2.0 * h / std::numbers::pi) * std::exp(-0.5 * h);
-  EXPECT_NEAR(first_order_index(x, x, 0.95)->p_value, beyond, 1e-12);
+  EXPECT_NEAR(test::first_order_index(x, x, 0.95)->p_value, beyond, 1e-12);
 }
 
 // Unrelated inputs: a p-value below 5 % in 5 % of 1000 cases, standard error 0.7 %; mean 0,
@@ -100,7 +100,7 @@ TEST(FirstOrderIndex, OfAnUnrelatedInputIsNoise) {
   for (std::uint64_t repetition = 0; repetition < 1000; ++repetition) {
     const auto x = test::uniform_column(200, {.seed = 43, .repetition = repetition, .column = 0});
     const auto y = test::normal_column(200, {.seed = 43, .repetition = repetition, .column = 1});
-    const auto found = first_order_index(x, y, 0.95);
+    const auto found = test::first_order_index(x, y, 0.95);
     if (found->p_value < 0.05) ++num_below;
     sum += found->index;
   }
@@ -117,7 +117,7 @@ TEST(FirstOrderIndex, KnowsItsStandardError) {
     const auto x = test::uniform_column(400, {.seed = 44, .repetition = repetition, .column = 0});
     auto y = test::uniform_column(400, {.seed = 44, .repetition = repetition, .column = 1});
     for (std::size_t i = 0; i < y.size(); ++i) y[i] += x[i];
-    const auto found = first_order_index(x, y, 0.95);
+    const auto found = test::first_order_index(x, y, 0.95);
     indices.push_back(found->index);
     claimed += found->standard_error / 400.0;
   }
@@ -127,11 +127,9 @@ TEST(FirstOrderIndex, KnowsItsStandardError) {
 
 TEST(FirstOrderIndex, NeedsValuesThatVary) {
   const auto x = test::uniform_column(16, {.seed = 45});
-  EXPECT_TRUE(first_order_index(x, x, 0.95).has_value());
-  EXPECT_FALSE(first_order_index(x, std::vector<double>(16, 1.0), 0.95).has_value());
-  EXPECT_FALSE(first_order_index(std::vector<double>(16, 1.0), x, 0.95).has_value());
-  const std::vector<double> few(x.begin(), x.end() - 1);
-  EXPECT_FALSE(first_order_index(few, few, 0.95).has_value());
+  EXPECT_TRUE(test::first_order_index(x, x, 0.95).has_value());
+  EXPECT_FALSE(test::first_order_index(x, std::vector<double>(16, 1.0), 0.95).has_value());
+  EXPECT_FALSE(test::first_order_index(std::vector<double>(16, 1.0), x, 0.95).has_value());
 }
 
 // Drawn: three quantities and a fixed one. Outputs: an error, its magnitude, a constant.
@@ -171,7 +169,7 @@ TEST_F(SensitivitiesOfAnError, AreThoseOfTheSingleFunctions) {
             linear_correlation(inputs_[1], outputs_[0], 0.9)->coefficient);
   EXPECT_EQ(first.rank.interval.upper,
             rank_correlation(inputs_[1], outputs_[0], 0.9)->interval.upper);
-  const auto index = first_order_index(inputs_[1], outputs_[0], 0.9);
+  const auto index = test::first_order_index(inputs_[1], outputs_[0], 0.9);
   EXPECT_EQ(first.first_order.index, index->index);
   EXPECT_EQ(first.first_order.interval.lower, index->interval.lower);
   EXPECT_EQ(first.first_order.p_value, index->p_value);

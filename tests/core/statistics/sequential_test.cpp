@@ -268,11 +268,16 @@ Report report_after(std::optional<std::uint64_t> num_fixed) {
   };
 }
 
+/// The first number of runs, from `num_runs` on, of which the value of this order is a bound.
+std::uint64_t num_runs_for(std::uint64_t order, std::uint64_t num_runs) {
+  while (wilks_order(tolerance_99_95, num_runs) < order) ++num_runs;
+  return num_runs;
+}
+
 /// What a verdict of a fixed number at each look says.
 Said said_of_fixed_count(const ExceedanceCount& count) {
   return {.is_met = fixed_count(count) == Verdict::met,
-          .num_runs_next = std::max(count.num_runs,
-                                    *wilks_num_runs(tolerance_99_95, count.num_exceedances + 1))};
+          .num_runs_next = num_runs_for(count.num_exceedances + 1, count.num_runs)};
 }
 
 /// A verdict of a fixed number at the first look, and then the sequential one with all of the 5 %.

@@ -33,7 +33,7 @@ inline bool has_program(const std::string& name) {
 }
 
 /// What bash offers for the last of some words, one a line.
-/// @param script  File of bash_completion().
+/// @param script  As deploy/manual.sh writes it.
 /// @param words   As bash splits a command line, each in the quotes that bash needs.
 inline std::string offered_by_bash(const std::string& script, const std::string& function,
                                    const std::vector<std::string>& words) {
