@@ -101,7 +101,7 @@ class CoordinatorLink::Impl {
   std::optional<wire::FaultyLink> sending_;
   std::optional<wire::FaultyLink> receiving_;
   bool was_connected_ = false;
-  bool is_newly_connected_ = false;  ///< And nobody has been told.
+  bool is_newly_connected_ = false;  ///< The connection is new, and nobody has been told.
   bool can_send_ = false;            ///< At the last look; looked at only while nobody was told.
 };
 
