@@ -79,8 +79,8 @@ class Statement {
   [[nodiscard]] int num_columns() const;
   [[nodiscard]] std::string column_name(int column) const;
 
-  [[noreturn]] void refuse_as_damaged(
-      std::string_view what) const;  ///< See Database::refuse_as_damaged().
+  /// See Database::refuse_as_damaged().
+  [[noreturn]] void refuse_as_damaged(std::string_view what) const;
 
  private:
   friend class Database;
