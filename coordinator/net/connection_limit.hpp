@@ -20,7 +20,7 @@ struct ConnectionLimit {
   /// A connection whose descriptor has this number or a higher one is closed. The system gives each
   /// the lowest number that is free, so that about as many descriptors are open then.
   int workers_end = std::numeric_limits<int>::max();
-  int clients_end = std::numeric_limits<int>::max();  ///< Of `clients_endpoint`, as workers_end.
+  int clients_end = std::numeric_limits<int>::max();  ///< The same for `clients_endpoint`.
   std::string clients_endpoint = {};                  ///< As bound; empty without clients.
   /// Connections of workers for which there is room at the start.
   int num_workers_max = 0;

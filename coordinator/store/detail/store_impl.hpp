@@ -45,7 +45,7 @@ struct Store::Impl {
 
   /// Stores what `action` changes, durable in the open file when it returns, or nothing.
   void commit(const std::function<void(detail::Database&)>& action);
-  /// commit(), after which the file must have its name.
+  /// The same, and the file must have its name afterwards.
   void change(const std::function<void(detail::Database&)>& action);
   /// @throws StoreError if the file has lost its name, or its log has.
   void check_place() const;
@@ -55,8 +55,8 @@ struct Store::Impl {
   /// Folds the log into the file, which is whole without it afterwards. Does not wait for readers:
   /// returns why it could not. @throws StoreError if the disk does not take it.
   [[nodiscard]] std::optional<std::string> rest();
-  /// Folds the log of a file that has lost its name, and with it its log: all that is stored is to
-  /// be in the file itself, by whatever name it has now.
+  /// The same for a file that has lost its name, and with it its log: all that is stored is to be
+  /// in the file itself, by whatever name it has now.
   [[nodiscard]] detail::OwnLog fold_own_log();
 
   std::filesystem::path path;
