@@ -94,7 +94,8 @@ class Answers {
   };
 
   void require_room(const std::string& owner) const;
-  /// Drops the answer that was read to its end longest ago, if as many are held as may be.
+  /// Drops the answer that was read to its end longest ago, if the limit of held answers is
+  /// reached.
   void make_room();
   void finish(Computing& computing);
 
