@@ -119,8 +119,8 @@ class CsvSeries final : public SeriesOutput {
   std::filesystem::path directory_;
   RunIndex run_;
   const SignalSelection& selection_;
-  std::size_t session_ = 0;                         ///< That of the last file.
-  std::vector<std::unique_ptr<SeriesFile>> files_;  ///< One a session; at most one is open.
+  std::size_t session_ = 0;                         ///< The session of the last file.
+  std::vector<std::unique_ptr<TextOutput>> files_;  ///< One a session; at most one is open.
   fmt::memory_buffer line_;
 };
 

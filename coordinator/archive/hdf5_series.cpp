@@ -146,7 +146,7 @@ class Hdf5Series final : public SeriesOutput {
   wire::DraftFile draft_;
   Hdf5File file_;
   std::optional<std::size_t> session_;
-  std::vector<SignalTable> tables_;  ///< Of that session.
+  std::vector<SignalTable> tables_;  ///< Of the session that is being written.
 };
 
 }  // namespace

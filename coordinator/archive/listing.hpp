@@ -18,7 +18,7 @@ struct ListedCampaign {
   std::string name = {};
   std::uint64_t seed = 0;
   std::uint64_t num_runs = 0;      ///< Wanted.
-  std::uint64_t num_finished = 0;  ///< Of them.
+  std::uint64_t num_finished = 0;  ///< Runs with a result.
   wire::CampaignPhase phase = wire::CampaignPhase::active;
   std::string created_utc = {};
 };

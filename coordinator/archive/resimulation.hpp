@@ -58,7 +58,7 @@ struct ResultDifference {
 /// What drawing all runs of a file again finds.
 struct Redraw {
   std::uint64_t num_drawn = 0;      ///< Runs that have a draw.
-  std::uint64_t num_different = 0;  ///< Those of another draw.
+  std::uint64_t num_different = 0;  ///< Runs whose stored draw is another one.
   /// The first ones by run: `run 3: truth_offset_m = 1 (must be 2)`.
   std::vector<std::string> differences;
 };

@@ -41,7 +41,7 @@ struct Check {
 struct VerifyOptions {
   double fraction = 0.01;       ///< Of the finished runs, simulated again; in [0, 1], one at least.
   std::size_t num_threads = 1;  ///< That draw and simulate; at least 1.
-  std::string_view model_version = model().version();  ///< That of the simulation.
+  std::string_view model_version = model().version();  ///< The model that simulates.
 };
 
 /// Checks whether a campaign database is whole and holds what its definition yields, in this order:

@@ -16,7 +16,7 @@ struct AxisMap {
   Scale scale = Scale::linear;
   AxisRange range;
   double begin = 0.0;  ///< Coordinate of the axis' lower end.
-  double end = 0.0;    ///< And of its upper one.
+  double end = 0.0;    ///< Coordinate of the upper end.
 
   /// Also beyond the ends. On a logarithmic axis what is not above 0 is at the lower end.
   [[nodiscard]] double at(double value) const;

@@ -33,7 +33,7 @@ struct Adoption {
   CampaignId campaign_id;
   TimePoint now;
 
-  /// Those of the runs that were lent to the worker before. What was lent before this coordinator
+  /// The part of `runs` that was lent to the worker before. What was lent before this coordinator
   /// started is not known by runs.
   [[nodiscard]] RunSet claimable(const RunSet& runs) const {
     const SessionId session = state.workers.at(id).session;
@@ -44,8 +44,7 @@ struct Adoption {
     return before == found->second.end() ? RunSet() : before->second.overlap(runs);
   }
 
-  /// Those of the runs that are pending, and were lent to the worker before, are lent to it from
-  /// now on.
+  /// Lends the worker from now on those runs that are pending and were lent to it before.
   void adopt(Attempt held_as, const RunSet& claimed) const {
     const RunSet runs = claimable(claimed);
     auto& pending = state.campaigns.at(campaign_id).pending;

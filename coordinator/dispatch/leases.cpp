@@ -228,7 +228,7 @@ void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const
     make_pending(state, lease.campaign, std::move(open), after(lease.attempt), outbox);
   }
   if (lease.kind == LeaseKind::audit) {
-    // Whoever was to check it does not: then any worker may.
+    // The worker that was to check it does not, so that any worker may.
     add_to_audit(state.campaigns.at(lease.campaign),
                  {.first_worker = {}, .attempt = after(lease.attempt)}, runs);
   }

@@ -78,7 +78,7 @@ struct DispatchConfig {
   /// `hung_after_min`, hangs.
   double hung_after_steps = 50.0;
   Duration hung_after_min = std::chrono::seconds(60);
-  std::uint32_t crashes_per_run_max = 3;  ///< Then a run is given up.
+  std::uint32_t crashes_per_run_max = 3;  ///< A run that crashed so many workers is given up.
   /// A run that one host alone saw crash waits for others to try it: so long, while nothing is
   /// lent.
   Duration lone_witness_wait = std::chrono::minutes(5);

@@ -318,7 +318,7 @@ void on_give_back(State& state, WorkerId id, const wire::GiveBack& give_back, Ti
     }
   }
   if (give_back.reason == LossReason::retracted) worker->num_retracts = 0;
-  // The others first: it may give back again what it is lent.
+  // Other workers come first: this one may give back again what it is lent.
   state.hungry.erase(id);
   detail::settle(state, now, outbox);
   detail::lend(state, id, now, outbox);

@@ -36,7 +36,7 @@ struct BatchSystem {
   std::string (*id_of)(std::string_view output);
   /// Lists the allocations of the factory.
   BatchCommand (*listing)(const AllocationConfig& config);
-  /// Those of the list. @throws Error if it cannot be read.
+  /// The allocations in what `listing` printed. @throws Error if it cannot be read.
   std::vector<Allocation> (*allocations_of)(const AllocationConfig& config,
                                             std::string_view output);
   BatchCommand (*cancellation)(const std::string& id);

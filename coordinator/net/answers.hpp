@@ -43,7 +43,7 @@ class UnnamedFile {
 class Answers {
  public:
   static constexpr std::size_t num_computing_max = 4;      ///< Processes at a time.
-  static constexpr std::size_t num_computing_per_key = 2;  ///< Of those.
+  static constexpr std::size_t num_computing_per_key = 2;  ///< Computed at a time for one key.
   static constexpr std::size_t num_kept_max = 16;          ///< Answers that are being read.
   static constexpr std::chrono::seconds kept_for{60};      ///< After it was last read.
   /// How long an answer stays that was read to its end: another client may still be reading it. It
@@ -94,7 +94,8 @@ class Answers {
   };
 
   void require_room(const std::string& owner) const;
-  /// Drops the answer that was read to its end longest ago, if as many are held as may be.
+  /// Drops the answer that was read to its end longest ago, if the limit of held answers is
+  /// reached.
   void make_room();
   void finish(Computing& computing);
 

@@ -16,7 +16,7 @@ class FactoryReports {
  public:
   /// Replaces the report of the same name and owner.
   /// @param owner  Name of the key that reports; empty without keys.
-  /// @throws Error if as many others are known as may be.
+  /// @throws Error if the limit of known factories is reached.
   void take(const wire::FactoryReport& report, const std::string& owner, TimePoint now);
 
   /// By name, at most wire::factories_max.

@@ -34,7 +34,7 @@ constexpr std::chrono::seconds review_interval(1);
 constexpr std::chrono::seconds follow_up_max(3);
 constexpr std::chrono::seconds dismissal_max(1);
 constexpr std::chrono::milliseconds dismissal_interval(10);
-// So that ticks, completions and clients are not put off by workers that talk much ...
+// A limit, so that busy workers cannot starve ticks, completions and clients ...
 constexpr int worker_messages_per_turn_max = 1000;
 // ... nor workers by clients that ask much.
 constexpr int client_messages_per_turn_max = 16;

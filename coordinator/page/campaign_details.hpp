@@ -72,8 +72,9 @@ struct DetailSources {
   ReadPart<CampaignResults> read_results;  ///< Some results at a time.
 };
 
-/// Those of a coordinator. A file that lacks what was read of it before is read anew from the
-/// beginning: it is an older copy, or another campaign has its place.
+/// Reads campaign databases, as a coordinator and `run` want it. A file that lacks what was read of
+/// it before is read anew from the beginning: it is an older copy, or another campaign has its
+/// place.
 [[nodiscard]] DetailSources database_sources();
 
 /// When something is read again whose reading ended at `ended_at` and took so much processor time:

@@ -59,7 +59,7 @@ HttpAnswer plain_answer(unsigned status, std::string_view text) {
 
 HttpAnswer content_refusal() { return plain_answer(413, "a request must have no content"); }
 
-/// Whoever may have many addresses counts as one client: of IPv6, a network of 64 bits.
+/// A client of IPv6 may have many addresses: a network of 64 bits counts as one client.
 std::string client_of(const tcp::socket& socket) {
   ErrorCode error;
   const asio::ip::address address = socket.remote_endpoint(error).address();
@@ -166,7 +166,7 @@ class Session : public std::enable_shared_from_this<Session> {
                 .host = text(http::field::host),
                 .authorization = text(http::field::authorization),
                 .cookie = text(http::field::cookie)};
-    // Two of them may be meant differently by whoever passes the request on.
+    // A proxy may take another one of two such headers for the valid one.
     if (message.count(http::field::host) > 1) request_.host.clear();
     asked_at_ = std::chrono::steady_clock::now();
   }

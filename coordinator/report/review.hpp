@@ -41,7 +41,7 @@ struct Review {
   Interpretation interpretation = Interpretation::mixed;
   std::optional<ErrorBudget> budget;
   std::vector<QuantityFigures> figures;  ///< Of each quantity.
-  std::vector<MatrixRow> matrix;         ///< That of all objectives together is the last one.
+  std::vector<MatrixRow> matrix;         ///< The row of all objectives together is the last one.
   /// See why_not_independent(); then the matrix has no verdicts to be shown.
   std::string why_not_independent;
   std::optional<Causes> causes;       ///< Empty if runs are too few, or not asked for.

@@ -80,7 +80,7 @@ struct WorkerRecord {
 struct RecentAttempts {
   std::vector<ComputedRuns> computed = {};  ///< The newest first.
   std::vector<LostAttempt> lost = {};       ///< The newest first.
-  std::vector<WorkerRecord> workers = {};   ///< Those of both, by key.
+  std::vector<WorkerRecord> workers = {};   ///< The workers of `computed` and `lost`, by key.
   std::uint64_t num_runs_left_out = 0;      ///< Older delivered runs.
   std::uint64_t num_losses_left_out = 0;    ///< Older losses.
 };

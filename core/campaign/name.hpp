@@ -19,7 +19,7 @@ inline constexpr std::string_view is_name_rule =
 /// option, no directory and no hidden file, and stands in files, logs and addresses as it is.
 [[nodiscard]] bool has_name_form(std::string_view text);
 
-/// Files of before may have names that begin with another character; they stay readable.
+/// Files of older programs may have names that begin with another character; they stay readable.
 enum class NameOrigin : std::uint8_t { given, stored };
 
 /// @throws ConfigError `campaign.name = "..." (rule)` unless it is a campaign's name.

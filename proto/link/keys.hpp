@@ -117,7 +117,7 @@ struct ClientSecurity {
 [[nodiscard]] Protection protection_by(const std::optional<std::filesystem::path>& keys,
                                        bool is_plain_waived);
 
-/// Whoever may write to a directory of keys decides who may do what.
+/// A user who may write to a directory of keys decides who may do what.
 /// @throws Error reading `key directory = PATH (rule)` if others than this user and root can.
 void check_key_directory(const std::filesystem::path& directory);
 

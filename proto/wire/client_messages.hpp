@@ -127,7 +127,7 @@ struct CampaignStatus {
   int priority = 0;
   std::uint64_t num_runs = 0;
   std::uint64_t num_done = 0;              ///< Durably stored.
-  std::uint64_t num_without_estimate = 0;  ///< Of those stored since the coordinator started.
+  std::uint64_t num_without_estimate = 0;  ///< Of results stored since the coordinator started.
   std::uint64_t num_given_up = 0;          ///< Crashed too many workers.
   std::uint64_t num_lent = 0;
   std::uint64_t num_duplicates = 0;  ///< Results that were there already.

@@ -99,7 +99,7 @@ class CoordinatorLink::Impl {
   std::unique_ptr<wire::LinkFaults> receiving_ =
       wire::link_faults(wire::LinkFaults::Direction::receiving);
   bool was_connected_ = false;
-  bool is_newly_connected_ = false;  ///< And nobody has been told.
+  bool is_newly_connected_ = false;  ///< The connection is new, and nobody has been told.
   bool can_send_ = false;            ///< At the last look; looked at only while nobody was told.
 };
 

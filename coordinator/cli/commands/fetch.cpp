@@ -138,7 +138,7 @@ class ArrivedPart {
   std::string sha256_;  ///< As it was last read.
 };
 
-/// Whoever answers may announce what they like.
+/// A coordinator may announce any size, also one for which the disk has no room.
 void require_space(const std::filesystem::path& file, std::uint64_t size) {
   std::error_code error;
   const std::filesystem::space_info space = std::filesystem::space(wire::directory_of(file), error);

@@ -24,7 +24,7 @@ enum class WatchMode : std::uint8_t {
 /// A text and what makes it take the place of the one drawn before.
 struct Drawing {
   std::string text;
-  std::size_t num_lines = 0;  ///< Of it, on the screen.
+  std::size_t num_lines = 0;  ///< Of the table that is on the screen.
 };
 
 /// Text cut to the screen, lines ended by `\n`, to be drawn over `num_lines_before` lines that end

@@ -20,7 +20,7 @@ constexpr const char* zap_address = "inproc://zeromq.zap.01";
 constexpr std::string_view zap_version = "1.0";
 constexpr std::size_t frames_max = 16;
 constexpr std::size_t frame_size_max = 1024;
-constexpr int requests_per_turn_max = 1000;  // So that handshakes do not put off all else.
+constexpr int requests_per_turn_max = 1000;  // Handshakes must not starve all else.
 constexpr std::size_t key_size = 32;
 constexpr std::size_t key_text_size = 40;
 

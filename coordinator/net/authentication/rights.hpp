@@ -20,10 +20,11 @@ class Rights {
  public:
   constexpr Rights() = default;
 
-  /// Those of a comma list such as `observe,submit`; nothing if it is not such a list.
+  /// The rights that a comma list grants, such as `observe,submit`; nothing if it is not such a
+  /// list.
   [[nodiscard]] static std::optional<Rights> parse(std::string_view text);
   [[nodiscard]] static constexpr Rights all() { return Rights(7); }
-  /// Those of a client whose line in the list names none: observe and submit.
+  /// The rights of a client whose line in the list names none: observe and submit.
   [[nodiscard]] static constexpr Rights usual() { return Rights(3); }
 
   [[nodiscard]] constexpr bool has(Right right) const {

@@ -79,7 +79,8 @@ class Statement {
   [[nodiscard]] int num_columns() const;
   [[nodiscard]] std::string column_name(int column) const;
 
-  [[noreturn]] void refuse_as_damaged(std::string_view what) const;  ///< As that of the Database.
+  /// See Database::refuse_as_damaged().
+  [[noreturn]] void refuse_as_damaged(std::string_view what) const;
 
  private:
   friend class Database;

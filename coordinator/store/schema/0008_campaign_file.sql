@@ -82,7 +82,7 @@ CREATE TABLE note (
 -- One row a finished run, with what depends on campaign and run alone: two files of one campaign
 -- hold the same rows. Insert with ON CONFLICT DO NOTHING: a second delivery changes nothing.
 --   truth_     of what was drawn, NULL if no draw was acceptable (status 4)
---   estimate_  of the same, NULL unless the estimation came to an end (status 1 and 2)
+--   estimate_  of the run, NULL unless the estimation came to an end (status 1 and 2)
 --   error_     estimate - truth, computed when read
 --   health_    of the loops, NULL if no draw was acceptable
 --   loss_      why and in which session a run was lost, NULL unless it was (status 5)
@@ -192,7 +192,8 @@ CREATE TABLE overrun (
   parameters  INTEGER NOT NULL CHECK (parameters > 0)  -- bit n: the one at position n + 1
 ) STRICT;
 
--- The ten runs with the largest |error| of each parameter; of equal ones the first. Kept likewise.
+-- The ten runs with the largest |error| of each parameter; of equal ones the first. Kept with the
+-- results, as `overrun` is.
 CREATE TABLE worst_run (
   parameter  TEXT NOT NULL REFERENCES parameter (parameter),
   run_index  INTEGER NOT NULL REFERENCES run_result (run_index),
