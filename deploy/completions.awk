@@ -1,15 +1,14 @@
 # Writes a completion script of a program from the help texts of it and its commands; a line
-# `@ COMMAND` comes before each but the first. Set `program`, and `shell` to bash, zsh or fish; for bash
-# it writes the list that completion.bash reads.
+# `@ COMMAND` comes before each but the first. Set `program`, and `shell` to bash, zsh or fish; for
+# bash it writes the list that completion.bash reads.
 #
 # A line of a help text is `  -h,--help TYPE ...   TEXT`. The type tells what a value is: one of the
-# words of `a|b`, a FILE, a FILE.db with that extension, a directory DIR, or else nothing that can be
-# offered.
+# words of `a|b`, a FILE, a FILE.db with that extension, a directory DIR, or else nothing that can
+# be offered.
 
 /^@ / { command = $2; part = ""; next }
 /^Exit codes:/ { part = "codes"; next }
 /^[A-Z].*:$/ { part = $0; next }
-# mawk knows no ^ {20}.
 /^                    / {
   if (part != "codes") text[count] = text[count] (text[count] == "" ? "" : " ") trimmed($0)
   next
@@ -71,7 +70,8 @@ function zsh_specifications(wanted,   i, j, n, name, all, one) {
         one = (is_repeated[i] ? "*" : place[i]) (is_required[i] ? ":" : "::") \
               escaped(name[j], "\\:") ":" zsh_action(i)
       else
-        one = (is_repeated[i] ? "*" : "") name[j] (type[i] == "" ? "" : name[j] ~ /^--/ ? "=" : "+") \
+        one = (is_repeated[i] ? "*" : "") name[j] \
+              (type[i] == "" ? "" : name[j] ~ /^--/ ? "=" : "+") \
               "[" escaped(text[i], "\\[]") "]" \
               (type[i] == "" ? "" : ":" escaped(type[i], "\\:") ":" zsh_action(i))
       all = all " \\\n    " quoted(one)
@@ -80,7 +80,8 @@ function zsh_specifications(wanted,   i, j, n, name, all, one) {
   return all
 }
 function write_zsh(   i) {
-  print "#compdef " program "\nlocal curcontext=$curcontext state line\ntypeset -A opt_args"
+  print "#compdef " program
+  print "local curcontext=$curcontext state line\ntypeset -A opt_args"
   if (num_commands) print "local -a commands=("
   for (i = 1; i <= count; ++i)
     if (is_command[i]) print "  " quoted(names[i] ":" escaped(text[i], "\\:"))

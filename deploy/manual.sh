@@ -4,8 +4,8 @@
 #
 #   manual.sh SHARE PROGRAM...
 #
-# Files go below SHARE where `share` of an installation has them. PROGRAM may be several words, as in
-# `qemu-aarch64 proofmass-worker`. Without help2man there is no man page.
+# Files go below SHARE where `share` of an installation has them. PROGRAM may be several words, as
+# in `qemu-aarch64 proofmass-worker`. Without help2man there is no man page.
 set -euo pipefail
 
 share=$1
@@ -19,8 +19,8 @@ commands_in() {
   sed -n '/^Options:/,/^Exit codes:/p' | sed -n '/^$/,$p' | sed -n 's/^  \([a-z-]*\) .*/\1/p'
 }
 
-# A line `@ COMMAND` before the help of each command. Texts begin in column 31; a head that ends just
-# before gets a second space behind it, as others have.
+# A line `@ COMMAND` before the help of each command. Texts begin in column 31; a head that ends
+# just before gets a second space behind it, as others have.
 "${start[@]}" --help >"$stage/program"
 {
   cat "$stage/program"
@@ -30,7 +30,9 @@ commands_in() {
   done
 } | sed -E '/^.{30}(\(Env|REQUIRED|[0-9])/!s/^(  [^ ].{26}) ([^ ])/\1  \2/' >"$stage/help"
 
-mkdir -p "$share"/{man/man1,bash-completion/completions,zsh/site-functions,fish/vendor_completions.d}
+for place in man/man1 bash-completion/completions zsh/site-functions fish/vendor_completions.d; do
+  mkdir -p "$share/$place"
+done
 words_for() { awk -v shell="$1" -v program="$name" -f "${0%/*}/completions.awk" "$stage/help"; }
 words_for bash >"$stage/list"
 sed -e "/^LIST$/{r $stage/list" -e 'd}' -e "s/PROGRAM/$name/; s/FUNCTION/_${name//-/_}/" \
@@ -48,12 +50,8 @@ command -v help2man >/dev/null || {
 awk '
   NR == 1 { next }  # The purpose, which is in NAME.
   codes && !/^  [0-9]+ / { print codes; codes = "" }
-  /^@ / {
-    if (!has_commands++) print "*Commands*\n"
-    getline purpose
-    is_command = 1
-    next
-  }
+  /^@ / && !is_command++ { print "*Commands*\n" }
+  /^@ / { getline purpose; next }
   is_command && /^Usage: / { print "\n" substr($0, 8) ":\n    " purpose "\n"; next }
   is_command && /^(Positionals|Options):$/ { next }
   is_command && /^  -h,--help/ { next }
@@ -63,7 +61,8 @@ awk '
   { sub(/^  -h,/, "  -h, "); print }
   END { if (codes) print codes }
 ' "$stage/help" >"$stage/text"
-printf '[SEE ALSO]\n.BR proofmass (1), proofmass-coordinator (1), proofmass-worker (1)\n' >"$stage/include"
+echo '[SEE ALSO]
+.BR proofmass (1), proofmass-coordinator (1), proofmass-worker (1)' >"$stage/include"
 # Nothing that a reader copies may be broken into two words: neither hyphenation nor adjustment.
 help2man --no-info --name "$(head --lines 1 "$stage/help" | sed 's/\.$//')" \
   --version-string "$("${start[@]}" --version)" --manual Proofmass --include "$stage/include" \
