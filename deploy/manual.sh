@@ -13,7 +13,6 @@ start=("${@:2}")
 name=$(basename "${start[-1]}")
 stage=$(mktemp --directory)
 trap 'rm -rf "$stage"' EXIT
-
 # The commands that a help text lists: after the options, between headings in lines of their own.
 commands_in() {
   sed -n '/^Options:/,/^Exit codes:/p' | sed -n '/^$/,$p' | sed -n 's/^  \([a-z-]*\) .*/\1/p'
@@ -63,7 +62,8 @@ awk '
 ' "$stage/help" >"$stage/text"
 echo '[SEE ALSO]
 .BR proofmass (1), proofmass-coordinator (1), proofmass-worker (1)' >"$stage/include"
-# Nothing that a reader copies may be broken into two words: neither hyphenation nor adjustment.
+# Nothing that a reader copies may be broken into two words. Without a date, a page is reproducible.
 help2man --no-info --name "$(head --lines 1 "$stage/help" | sed 's/\.$//')" \
   --version-string "$("${start[@]}" --version)" --manual Proofmass --include "$stage/include" \
-  "cat '$stage/text' #" | sed 's/^\.SH NAME$/.nh\n.ad l\n&/' >"$share/man/man1/$name.1"
+  "cat '$stage/text' #" | sed -e 's/^\(\.TH .* "1" \)"[^"]*"/\1""/' \
+  -e 's/^\.SH NAME$/.nh\n.ad l\n&/' >"$share/man/man1/$name.1"

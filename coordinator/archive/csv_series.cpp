@@ -1,7 +1,5 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <cerrno>
 #include <cstddef>
 #include <iterator>
 #include <memory>
@@ -38,48 +36,6 @@ std::string series_heading(const SignalSelection& selection) {
   return line + "\r\n";
 }
 
-/// Text that goes to a file, which appears when it is complete.
-class SeriesFile {
- public:
-  /// @throws Error `output = path (cannot be written: why)`; so do all below.
-  explicit SeriesFile(const std::filesystem::path& path) : file_("output", path) {
-    descriptor_ = file_.open();
-  }
-  ~SeriesFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  SeriesFile(const SeriesFile&) = delete;
-  SeriesFile& operator=(const SeriesFile&) = delete;
-
-  void write(std::string_view text) {
-    constexpr std::size_t buffer_size = 1 << 18;
-    buffer_ += text;
-    if (buffer_.size() >= buffer_size) flush();
-  }
-  /// Writes what is left and closes the file.
-  void write_rest() {
-    flush();
-    if (descriptor_ >= 0 && ::close(std::exchange(descriptor_, -1)) != 0) file_.fail(errno);
-  }
-  /// Gives the file its name, replacing one that has it.
-  void publish() { file_.publish(wire::IfThere::replace); }
-
- private:
-  void flush() {
-    std::string_view rest = buffer_;
-    while (!rest.empty()) {
-      const ssize_t size = ::write(descriptor_, rest.data(), rest.size());
-      if (size < 0 && errno != EINTR) file_.fail(errno);
-      if (size > 0) rest.remove_prefix(static_cast<std::size_t>(size));
-    }
-    buffer_.clear();
-  }
-
-  wire::DraftFile file_;
-  int descriptor_ = -1;
-  std::string buffer_;
-};
-
 class CsvSeries final : public SeriesOutput {
  public:
   CsvSeries(std::filesystem::path directory, RunIndex run, const SignalSelection& selection)
@@ -88,8 +44,7 @@ class CsvSeries final : public SeriesOutput {
   void add(const RecordedSample& sample) override {
     if (!selection_.has_session(sample.session)) return;
     if (files_.empty() || session_ != sample.session) begin_session(sample.session);
-    line_.clear();
-    const auto end = std::back_inserter(line_);
+    const auto end = std::back_inserter(text_);
     fmt::format_to(end, "{}", sample.time_s);
     for (const SignalSelection::Group& group : selection_.groups()) {
       for (const double value :
@@ -98,30 +53,37 @@ class CsvSeries final : public SeriesOutput {
       }
     }
     fmt::format_to(end, "\r\n");
-    files_.back()->write({line_.data(), line_.size()});
+    constexpr std::size_t text_size_max = 1 << 18;
+    if (text_.size() >= text_size_max) flush();
   }
 
   void finish() override {
     // A full disk is found before any file appears.
-    for (const auto& file : files_) file->write_rest();
-    for (const auto& file : files_) file->publish();
+    flush();
+    for (const auto& file : files_) file->publish(wire::IfThere::replace);
   }
 
  private:
+  void flush() {
+    if (!files_.empty()) files_.back()->write({text_.data(), text_.size()});
+    text_.clear();
+  }
+
   void begin_session(std::size_t index) {
-    if (!files_.empty()) files_.back()->write_rest();
+    flush();
     session_ = index;
     const RecordedSession& session = selection_.recording().sessions[index];
-    files_.push_back(std::make_unique<SeriesFile>(csv_series_file(directory_, run_, session)));
-    files_.back()->write(series_heading(selection_));
+    files_.push_back(
+        std::make_unique<wire::DraftFile>("output", csv_series_file(directory_, run_, session)));
+    text_.append(series_heading(selection_));
   }
 
   std::filesystem::path directory_;
   RunIndex run_;
   const SignalSelection& selection_;
-  std::size_t session_ = 0;                         ///< The session of the last file.
-  std::vector<std::unique_ptr<TextOutput>> files_;  ///< One a session; at most one is open.
-  fmt::memory_buffer line_;
+  std::size_t session_ = 0;                              ///< That of the last file.
+  std::vector<std::unique_ptr<wire::DraftFile>> files_;  ///< One a session.
+  fmt::memory_buffer text_;                              ///< What the last file does not have yet.
 };
 
 }  // namespace

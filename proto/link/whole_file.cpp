@@ -94,14 +94,9 @@ DraftFile::~DraftFile() {
   if (!is_published_) remove_draft(draft_);
 }
 
-int DraftFile::open() const {
-  const int descriptor = ::open(draft_.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC);
-  if (descriptor < 0) fail(errno);
-  return descriptor;
-}
-
 void DraftFile::write(std::string_view text) const {
-  const int descriptor = open();
+  const int descriptor = ::open(draft_.c_str(), O_WRONLY | O_APPEND | O_NOFOLLOW | O_CLOEXEC);
+  if (descriptor < 0) fail(errno);
   const int error_number = write_all(descriptor, text) ? 0 : errno;
   ::close(descriptor);
   if (error_number != 0) fail(error_number);

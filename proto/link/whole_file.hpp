@@ -40,9 +40,8 @@ class DraftFile {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] const std::filesystem::path& draft() const { return draft_; }
 
-  /// A descriptor to write the draft with; the caller closes it.
+  /// Appends to the draft.
   /// @throws Error as the constructor does; so do all below.
-  [[nodiscard]] int open() const;
   void write(std::string_view text) const;
 
   /// Makes the draft durable and gives it its name. A file that it replaces hands on its

@@ -159,7 +159,7 @@ TEST(Completions, OfFishOfferWhatHelpShowsAndValues) {
   std::vector<std::string> commands = commands_of("proofmass");
   commands.erase(commands.begin());
   EXPECT_THAT(offered_by_fish("proofmass", "proofmass "), UnorderedElementsAreArray(commands));
-  for (const std::string& command : {"run", "query", "compare"}) {
+  for (const std::string command : {"run", "query", "compare"}) {
     std::vector<std::string> options = options_in(help_of("proofmass", command));
     std::erase_if(options, [](const std::string& option) { return !option.starts_with("--"); });
     EXPECT_THAT(offered_by_fish("proofmass", "proofmass " + command + " --"),
