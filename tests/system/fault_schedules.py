@@ -31,6 +31,7 @@ import fault_kinds
 import fault_world
 from fault_world import Failure
 
+ADVICE = "mv --backup"  # What a coordinator says of a database that lost its name.
 HEAL_MAX_S = 300.0
 ACT_AFTER_S = 6.0  # What a healed coordinator does not serve by then is submitted again.
 STEP_S = 0.05
@@ -162,8 +163,10 @@ def remove_fault_plans(world):
         world.coordinator.is_end_expected = True
         world.coordinator.signal(signal.SIGTERM)
         code = world.coordinator.wait()
-        # It may be one that is told to die somewhere, or that has just begun.
-        if code not in (0, -signal.SIGKILL, -signal.SIGTERM):
+        # It may be one that is told to die somewhere, or that has just begun, or that has
+        # abandoned a database.
+        if code not in (0, -signal.SIGKILL, -signal.SIGTERM) and not (
+                code == 1 and ADVICE in world.coordinator.text()):
             raise Failure(f"{world.coordinator.name} ended with {code} after SIGTERM")
         world.start_coordinator(is_faulty=False)
     for worker in [worker for worker in world.workers if worker.is_faulty]:
@@ -173,6 +176,30 @@ def remove_fault_plans(world):
         world.check_worker_end(worker)
         world.replace_worker(worker, is_faulty=False)
     world.plans.clear()
+
+
+def follow_advice(world):
+    """Databases that lost their names: the operator ends the coordinator, and gives each name to the
+    file that has most, which is the copy that the log names unless the coordinator went on with it."""
+    copies = sorted(world.served.glob("*.recovered-*.db"))
+    if not copies:
+        return
+    if not world.coordinator.has_ended():
+        world.coordinator.is_end_expected = True
+        world.coordinator.signal(signal.SIGTERM)
+        world.coordinator.wait()
+    for campaign in world.campaigns:
+        file = world.file_of(campaign)
+        own = [copy for copy in copies if copy.name.startswith(f"{campaign.name}.recovered-")]
+        best = max([file, *own], key=lambda one: len(world.rows_in(one) or {}))
+        if best != file:
+            for suffix in ("-wal", "-shm"):
+                file.with_name(file.name + suffix).unlink(missing_ok=True)
+            best.rename(file)
+            world.tell(f"{campaign.name}: goes on from {best.name}")
+        for copy in own:
+            copy.unlink(missing_ok=True)
+    world.start_coordinator(is_faulty=False)
 
 
 def remove_refused_log(world, campaign):
@@ -196,6 +223,9 @@ def is_done(world, campaign, status):
 def attend_to(world, campaign, status):
     """What a patient operator does about a campaign that does not get on by itself."""
     one = status.get(campaign.name)
+    if one is not None and ADVICE in (one["storage_failure"] or ""):
+        follow_advice(world)
+        return
     if one is not None and one["phase"] == "paused":
         world.ask("resume", campaign.name)
         return
@@ -286,6 +316,7 @@ def carry_out(options, seed, directory):
         report["faults"] = act_out(world, moments)
         pass_time(world, time.monotonic() + 2 * fault_world.RESTART_DELAY_S)
         remove_fault_plans(world)
+        follow_advice(world)
         report["healed_s"] = round(wait_until_done(world), 1)
         end_all(world)
         report["digests"] = [(campaign.name, campaign.num_runs, check_campaign(world, campaign))

@@ -348,8 +348,10 @@ class World(Setting):
         return self.served / f"{campaign.name}.db"
 
     def rows(self, campaign):
+        return self.rows_in(self.file_of(campaign))
+
+    def rows_in(self, file):
         """Time of receipt of each stored run; nothing if the file cannot be read now."""
-        file = self.file_of(campaign)
         try:
             connection = sqlite3.connect(f"file:{file}?mode=ro", uri=True, timeout=0.2)
             try:
