@@ -28,9 +28,9 @@ constexpr std::chrono::milliseconds delay_max(20);
 constexpr std::size_t buffer_size = std::size_t{64} << 10;
 
 /// Takes from this process what the query must not have.
-/// @return The limits that hold. A process whose address space was limited before is to take nothing
-///         beside it: temporary files, of which a statement may make many, have no limit of their
-///         own.
+/// @return The limits that hold. A process whose address space was limited before is to take
+///         nothing beside it: temporary files, of which a statement may make many, have no limit of
+///         their own.
 QueryLimits limit_process(QueryLimits limits) {
   if (!wire::has_address_space_limit) return limits;
   rlimit memory{};

@@ -13,7 +13,8 @@ namespace proofmass::coordinator {
 struct QueryOutput {
   RowFormat format = RowFormat::table;
   TableLimits table;
-  /// Called with whole rows of text, from one thread at a time. They have been read when it returns.
+  /// Called with whole rows of text, from one thread at a time. It has passed them on when it
+  /// returns.
   TextSink sink;
   /// Called in place of an exception or an end when a query cannot be ended in order. Must end the
   /// process: what SQLite is doing goes on until then.

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <regex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/proto/link/notice_receiver.hpp"
@@ -230,9 +231,10 @@ TEST_F(CoordinatorProcess, KilledWhileItMakesAFileLeavesNoHalfFile) {
 
 // What tests can make go wrong nobody else can.
 TEST_F(CoordinatorProcess, HasNoFaultsWhereItIsInstalled) {
-  for (const std::string name : {"proofmass-coordinator", "proofmass-worker"}) {
-    Process program(directory / "", "program", programs + "/" + name,
-                    {"--connect", endpoint(), "--faults", "drop=0.5"});
+  for (const auto& [name, address] : {std::pair<std::string, std::string>("coordinator", "--bind"),
+                                      {"worker", "--connect"}}) {
+    Process program(directory / "", "program", programs + "/proofmass-" + name,
+                    {address, endpoint(), "--faults", "drop=0.5"});
     EXPECT_EQ(program.wait(), 2);
     EXPECT_TRUE(contains(errors_of("program"), "--faults")) << errors_of("program");
   }

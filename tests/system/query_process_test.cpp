@@ -202,9 +202,9 @@ TEST_F(QueryProcess, EndsWith1WhenItNeedsMoreMemoryThanItMayHave) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "sanitizers need more address space than any limit";
 #endif
-  const auto query_within_256_mib = [&](const std::string& sql) {
+  const auto query_within_300_mib = [&](const std::string& sql) {
     return Process(directory(), "query", "/usr/bin/prlimit",
-                   {"--as=268435456", program(), "query", file().string(), sql, "--format", "csv"})
+                   {"--as=314572800", program(), "query", file().string(), sql, "--format", "csv"})
         .wait();
   };
   const std::vector<std::string> greedy{
@@ -214,12 +214,12 @@ TEST_F(QueryProcess, EndsWith1WhenItNeedsMoreMemoryThanItMayHave) {
       "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 1000) SELECT " +
           columns("percentile(a.i * b.i, ", 40) + " FROM n AS a, n AS b"};
   for (const std::string& sql : greedy) {
-    EXPECT_EQ(query_within_256_mib(sql), 1);
+    EXPECT_EQ(query_within_300_mib(sql), 1);
     EXPECT_EQ(errors(),
-              "proofmass: error: memory = 256 MiB (the query and what it sorts need more; ask for "
+              "proofmass: error: memory = 300 MiB (the query and what it sorts need more; ask for "
               "less, or query a copy of the database elsewhere)\n");
   }
-  EXPECT_EQ(query_within_256_mib("SELECT length(hex(zeroblob(30000000))) AS n"), 0) << errors();
+  EXPECT_EQ(query_within_300_mib("SELECT length(hex(zeroblob(30000000))) AS n"), 0) << errors();
   EXPECT_EQ(output(), "n\r\n60000000\r\n");
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/error.hpp"
+#include "proto/link/start_program.hpp"
 #include "tests/message_of.hpp"
 
 namespace proofmass::coordinator {
