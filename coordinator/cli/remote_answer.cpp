@@ -43,7 +43,6 @@ int print_answer(const ClientConnectionConfig& connection, const wire::AnswerReq
     hash.add_bytes(bytes);
     if (hash.finish() != answer.sha256) throw Error("answer = another one than was announced");
     if (text == AnswerText::lines) print_lines(bytes);
-    if (text == AnswerText::tables) print_tables(bytes);
     if (text == AnswerText::bytes) write_standard_output(bytes);
     flush_standard_output();
     if (!answer.error_text.empty()) wire::say(wire::visible_lines(answer.error_text));

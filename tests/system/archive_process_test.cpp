@@ -68,8 +68,6 @@ TEST_F(ArchiveProcess, WorksOnAFileThatIsBeingServed) {
   const auto of_copy = stored_runs(path("copy.db"));
   EXPECT_GE(of_copy.size(), 2U);
   for (const auto& [index, stored] : of_copy) EXPECT_EQ(stored, reference().at(index));
-  EXPECT_EQ(proofmass("list", {"list"}).wait(), 0);
-  EXPECT_TRUE(contains(output_of("list"), "tags: thesis")) << output_of("list");
 }
 
 // Whatever a file holds, no command ends by a signal: rows out of order reached an assertion.
