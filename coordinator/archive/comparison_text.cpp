@@ -1,54 +1,101 @@
-#include "coordinator/archive/comparison_text.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
-#include "coordinator/archive/detail/comparison_json.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/archive/several_comparison.hpp"
+#include "coordinator/table/figures.hpp"
 #include "core/model.hpp"
 #include "core/statistics/comparison.hpp"
 
 namespace proofmass::coordinator {
 namespace {
 
-constexpr std::size_t line_width = 80;
-
-constexpr std::array<TextColumn, 9> bias_columns{{{"parameter", 11, true},
-                                                  {"unit", 9, true},
-                                                  {"A", 9},
-                                                  {"B", 9},
-                                                  {"change", 10},
-                                                  {"from", 10},
-                                                  {"to", 10},
-                                                  {"p", 9},
-                                                  {"", 2, true}}};
-
-constexpr std::array<TextColumn, 11> scatter_columns{{{"parameter", 11, true},
-                                                      {"unit", 9, true},
-                                                      {"std A", 8},
-                                                      {"std B", 8},
-                                                      {"p", 8},
-                                                      {"", 2, true},
-                                                      {"found", 8},
-                                                      {"tail A", 8},
-                                                      {"tail B", 8},
-                                                      {"p", 8},
-                                                      {"", 2, true}}};
-
-constexpr std::array<TextColumn, 6> magnitude_columns{{{"parameter", 11, true},
-                                                       {"unit", 9, true},
-                                                       {"mean A", 10},
-                                                       {"mean B", 10},
-                                                       {"worst A", 10},
-                                                       {"worst B", 10}}};
-
 constexpr double significance = 1.0 - default_confidence;
+
+/// What some of the campaigns have in common, and which ones they are.
+using Shared = std::pair<std::string, std::vector<std::string>>;
+
+void share(std::vector<Shared>& all, const std::string& text, const std::string& name) {
+  const auto same = std::ranges::find(all, text, &Shared::first);
+  if (same == all.end()) {
+    all.emplace_back(text, std::vector{name});
+  } else {
+    same->second.push_back(name);
+  }
+}
+
+/// Keys of the definitions in which not all campaigns agree, and the campaigns with each value.
+std::vector<std::pair<std::string, std::vector<Shared>>> differing_keys(
+    std::span<const ComparedMember> members, const MemberNames& names) {
+  std::vector<std::pair<std::string, std::vector<Shared>>> keys;
+  const auto values_of = [&](const DefinitionDifference& difference) -> std::vector<Shared>& {
+    for (auto& [key, values] : keys) {
+      if (key == difference.field) return values;
+    }
+    return keys.emplace_back(difference.field, std::vector<Shared>()).second;
+  };
+  for (const ComparedMember& member : members.subspan(1)) {
+    for (const auto& difference : member.comparison->differences) (void)values_of(difference);
+  }
+  for (auto& [key, values] : keys) {
+    std::string of_first;
+    for (const ComparedMember& member : members.subspan(1)) {
+      for (const auto& difference : member.comparison->differences) {
+        if (difference.field == key) of_first = difference.first;
+      }
+    }
+    share(values, of_first, names.names.front());
+    for (std::size_t i = 1; i < members.size(); ++i) {
+      const auto& differences = members[i].comparison->differences;
+      const auto own = std::ranges::find(differences, key, &DefinitionDifference::field);
+      share(values, own == differences.end() ? of_first : own->second, names.names[i]);
+    }
+  }
+  return keys;
+}
+
+Table definition_table(std::span<const ComparedMember> members, const MemberNames& names) {
+  const auto keys = differing_keys(members, names);
+  if (keys.empty()) return {.remarks = {{"The definitions agree."}}};
+  Table table{.columns = {{"the definitions differ in", true}, {"value", true}, {"of", true}}};
+  for (const auto& [key, values] : keys) {
+    for (const auto& [value, of] : values) {
+      const bool is_first = &value == &values.front().first;
+      table.rows.push_back({is_first ? key : "", value, fmt::format("{}", fmt::join(of, " "))});
+    }
+  }
+  return table;
+}
+
+std::string how_compared(const CampaignComparison& comparison) {
+  if (!comparison.why_not_compared.empty()) return "cannot be: " + comparison.why_not_compared;
+  if (!comparison.is_paired()) return "as a whole, as " + comparison.why_unpaired;
+  return fmt::format("run by run, {} {} of the same draws", comparison.num_first,
+                     comparison.num_first == 1 ? "run" : "runs");
+}
+
+Table campaign_table(std::span<const ComparedMember> members, const MemberNames& names) {
+  Table table{.columns = {{names.title, true},
+                          {"file", true},
+                          {"runs"},
+                          {"compared with " + names.names.front(), true}}};
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const ComparedMember& member = members[i];
+    table.rows.push_back({names.names[i], names.notes[i] + member.file.string(),
+                          std::to_string(member.statistics.num_estimated),
+                          member.comparison ? how_compared(*member.comparison) : ""});
+    if (member.missing.total() == 0) continue;
+    table.remarks.push_back({fmt::format("Left out of {}, without an estimate: {}.", names.names[i],
+                                         reasons_text(member.missing))});
+  }
+  return table;
+}
 
 std::string figure_with_sign(double value) {
   const std::string figure = measured_figure(std::abs(value));
@@ -56,64 +103,20 @@ std::string figure_with_sign(double value) {
   return (value < 0.0 ? "-" : "+") + figure;
 }
 
-std::string definitions(const CampaignComparison& comparison) {
-  if (comparison.differences.empty()) return "The definitions agree.\n";
-  std::string text = "The definitions differ:\n";
-  for (const auto& [field, first, second] : comparison.differences) {
-    const std::string line = fmt::format("  {}: {} in A, {} in B", field, first, second);
-    text += display_width(line) <= line_width
-                ? line + "\n"
-                : fmt::format("  {}\n    A  {}\n    B  {}\n", field, first, second);
-  }
-  return text;
+bool has_changes(const ComparedMember& member) {
+  return member.comparison && member.comparison->why_not_compared.empty();
 }
 
-std::string basis(const CampaignComparison& comparison) {
-  if (!comparison.why_not_compared.empty()) {
-    return line_of("The results cannot be compared:", comparison.why_not_compared + ".", 0);
+/// Errors of a campaign in the runs that are compared: of the first one, with the first other that
+/// can be. Null if it has none.
+const ComparedAccuracy* accuracy_of(std::span<const ComparedMember> members, std::size_t member,
+                                    std::size_t parameter) {
+  if (member > 0) {
+    if (!has_changes(members[member])) return nullptr;
+    return &members[member].comparison->parameters[parameter].second;
   }
-  if (comparison.is_paired()) {
-    return fmt::format("Compared run by run: {} {} of the same draws.\n", comparison.num_first,
-                       comparison.num_first == 1 ? "run" : "runs");
-  }
-  return fmt::format("Compared as a whole, as {}: {} runs of A, {} of B.\n",
-                     comparison.why_unpaired, comparison.num_first, comparison.num_second);
-}
-
-std::string left_out(const CampaignComparison& comparison) {
-  std::string text;
-  for (const auto& [name, missing] : {std::pair("A", comparison.missing_in_first),
-                                      std::pair("B", comparison.missing_in_second)}) {
-    if (missing.total() == 0) continue;
-    text += fmt::format("Left out of {}, without an estimate: {}.\n", name, reasons_text(missing));
-  }
-  return text;
-}
-
-using Cells = std::vector<std::string>;
-
-Cells label_cells(const Quantity& quantity) {
-  return {std::string(quantity.symbol), std::string(quantity.display_unit)};
-}
-
-/// The p-value, and a mark if it is significant.
-void add_p(double p_value, Cells& cells) {
-  cells.push_back(measured_figure(p_value));
-  cells.emplace_back(p_value < significance ? " *" : "");
-}
-
-std::string bias_row(const Quantity& quantity, const ParameterComparison& parameter) {
-  const double scale = quantity.display_scale;
-  Cells cells = label_cells(quantity);
-  for (const double bias : {parameter.first.bias, parameter.second.bias,
-                            parameter.second.bias - parameter.first.bias}) {
-    cells.push_back(figure_with_sign(bias / scale));
-  }
-  const auto& interval = parameter.bias_interval;
-  cells.push_back(interval ? figure_with_sign(interval->lower / scale) : "-");
-  cells.push_back(interval ? figure_with_sign(interval->upper / scale) : "-");
-  add_p(parameter.adjusted_p_values.location, cells);
-  return table_row(bias_columns, cells, WideCell::keep);
+  const auto other = std::ranges::find_if(members, has_changes);
+  return other == members.end() ? nullptr : &other->comparison->parameters[parameter].first;
 }
 
 /// The tests of bias, scatter and tail.
@@ -122,151 +125,188 @@ struct TestNames {
 };
 
 TestNames tests_of(const CampaignComparison& comparison) {
-  if (comparison.is_paired()) {
-    return {"Wilcoxon's signed ranks", "Wilcoxon's signed ranks", "sign test"};
-  }
-  return std::min(comparison.num_first, comparison.num_second) < num_welch_min
-             ? TestNames{"larger of Welch's and Smirnov's test",
-                         "larger of Welch's and Smirnov's test", "Fisher's exact test"}
-             : TestNames{"Welch's t", "Welch's t", "Fisher's exact test"};
+  constexpr std::string_view ranks = "Wilcoxon's signed ranks";
+  constexpr std::string_view larger = "larger of Welch's and Smirnov's test";
+  constexpr std::string_view exact = "Fisher's exact test";
+  if (comparison.is_paired()) return {ranks, ranks, "sign test"};
+  const bool are_few = std::min(comparison.num_first, comparison.num_second) < num_welch_min;
+  return are_few ? TestNames{larger, larger, exact} : TestNames{"Welch's t", "Welch's t", exact};
 }
 
-std::string bias_table(const CampaignComparison& comparison) {
-  std::string text = "Bias: mean of estimate − truth\n\n" + table_heading(bias_columns);
-  for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
-    const Quantity& quantity = model().results().quantities[i];
-    text += bias_row(quantity, comparison.parameters[i]);
+/// The names of one of the tests, with the campaigns if they are not all tested by the same.
+std::string test_text(std::span<const ComparedMember> members, const MemberNames& names,
+                      std::string_view TestNames::*test) {
+  std::vector<Shared> all;
+  for (std::size_t i = 1; i < members.size(); ++i) {
+    if (!has_changes(members[i])) continue;
+    share(all, std::string(tests_of(*members[i].comparison).*test), names.names[i]);
   }
-  return text +
-         fmt::format("from, to: 95 % interval of the change; p: {}\n", tests_of(comparison).bias);
+  if (all.size() == 1) return all.front().first;
+  std::string text;
+  for (const auto& [name, of] : all) {
+    text += fmt::format("{}{} of {}", text.empty() ? "" : ", ", name, fmt::join(of, " "));
+  }
+  return text;
+}
+
+/// The p-value, and a mark if it is significant.
+void add_p(double p_value, Row& row) {
+  row.emplace_back(measured_figure(p_value));
+  row.emplace_back(p_value < significance ? " *" : "", Tone::changed);
 }
 
 std::string percent(std::size_t count, std::size_t of) {
   return fmt::format("{:.1f} %", 100.0 * static_cast<double>(count) / static_cast<double>(of));
 }
 
-std::string scatter_table(const CampaignComparison& comparison) {
-  std::string text =
-      "Scatter and tail: standard deviation of estimate − truth, and runs far off\n\n" +
-      table_heading(scatter_columns);
-  for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
-    const Quantity& quantity = model().results().quantities[i];
-    const auto& parameter = comparison.parameters[i];
-    Cells cells = label_cells(quantity);
-    for (const ComparedAccuracy& side : {parameter.first, parameter.second}) {
-      cells.push_back(measured_figure(side.standard_deviation / quantity.display_scale));
+/// A row for each parameter and campaign, which begins with their names.
+/// @param columns      Behind those of the names.
+/// @param add_cells    Called with the row, the campaign and the parameter; cells that it does not
+///                     add are empty.
+template <typename AddCells>
+Table table_of(std::span<const ComparedMember> members, const MemberNames& names,
+               std::string caption, std::vector<Column> columns, const AddCells& add_cells) {
+  Table table{.caption = std::move(caption),
+              .columns = {{"parameter", true, 10}, {"unit", true, 9}, {names.title, true, 9}}};
+  std::ranges::move(columns, std::back_inserter(table.columns));
+  const std::vector<Quantity>& quantities = model().results().quantities;
+  for (std::size_t parameter = 0; parameter < quantities.size(); ++parameter) {
+    for (std::size_t member = 0; member < members.size(); ++member) {
+      Row& row = table.rows.emplace_back();
+      row.emplace_back(member == 0 ? quantities[parameter].symbol : "");
+      row.emplace_back(member == 0 ? quantities[parameter].display_unit : "");
+      row.emplace_back(names.names[member]);
+      add_cells(row, member, parameter);
+      row.resize(table.columns.size(), Cell(""));
     }
-    add_p(parameter.adjusted_p_values.scale, cells);
-    const auto& factor = parameter.smallest_scale_factor;
-    cells.push_back(factor ? measured_figure(100.0 * (*factor - 1.0)) + " %" : "-");
-    cells.push_back(percent(parameter.first.num_in_tail, comparison.num_first));
-    cells.push_back(percent(parameter.second.num_in_tail, comparison.num_second));
-    add_p(parameter.adjusted_p_values.tail, cells);
-    text += table_row(scatter_columns, cells, WideCell::keep);
   }
-  const TestNames tests = tests_of(comparison);
-  return text + fmt::format(
-                    "p: {} of distances from the mean; found: the smallest\n"
-                    "change of the scatter that this finds in {:.0f} % of such campaigns\n"
-                    "tail: beyond twice the root mean square of A and B, p: {}\n"
-                    "All p are adjusted for three tests of all parameters (Holm); *: below "
-                    "{:.2f}\n",
-                    tests.scatter, 100.0 * finding_probability, tests.tail, significance);
+  return table;
 }
 
-std::string magnitude_table(const CampaignComparison& comparison) {
-  std::string text = "Mean and worst of |estimate − truth|\n\n" + table_heading(magnitude_columns);
-  for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
-    const Quantity& quantity = model().results().quantities[i];
-    const auto& parameter = comparison.parameters[i];
-    Cells cells = label_cells(quantity);
-    for (const double value : {parameter.first.mean, parameter.second.mean, parameter.first.worst,
-                               parameter.second.worst}) {
-      cells.push_back(measured_figure(value / quantity.display_scale));
+double scale_of(std::size_t parameter) {
+  return model().results().quantities[parameter].display_scale;
+}
+
+Table bias_table(std::span<const ComparedMember> members, const MemberNames& names) {
+  const auto add_cells = [&](Row& row, std::size_t member, std::size_t i) {
+    const ComparedAccuracy* const accuracy = accuracy_of(members, member, i);
+    row.emplace_back(accuracy == nullptr ? "-" : figure_with_sign(accuracy->bias / scale_of(i)));
+    if (member == 0 || accuracy == nullptr) return;
+    const ParameterComparison& change = members[member].comparison->parameters[i];
+    row.emplace_back(figure_with_sign((change.second.bias - change.first.bias) / scale_of(i)));
+    const auto& interval = change.bias_interval;
+    row.emplace_back(interval ? figure_with_sign(interval->lower / scale_of(i)) : "-");
+    row.emplace_back(interval ? figure_with_sign(interval->upper / scale_of(i)) : "-");
+    add_p(change.adjusted_p_values.location, row);
+  };
+  Table table = table_of(members, names, "Bias: mean of estimate − truth",
+                         {{"bias", false, 9},
+                          {"change", false, 10},
+                          {"from", false, 10},
+                          {"to", false, 10},
+                          {"p", false, 9},
+                          {"", true, 2}},
+                         add_cells);
+  table.notes.push_back(fmt::format("from, to: 95 % interval of the change from {}; p: {}",
+                                    names.names.front(),
+                                    test_text(members, names, &TestNames::bias)));
+  return table;
+}
+
+Table scatter_table(std::span<const ComparedMember> members, const MemberNames& names) {
+  const auto add_cells = [&](Row& row, std::size_t member, std::size_t i) {
+    const ComparedAccuracy* const accuracy = accuracy_of(members, member, i);
+    row.emplace_back(
+        accuracy == nullptr ? "-" : measured_figure(accuracy->standard_deviation / scale_of(i)));
+    if (member == 0 || accuracy == nullptr) return;
+    const CampaignComparison& comparison = *members[member].comparison;
+    const ParameterComparison& change = comparison.parameters[i];
+    add_p(change.adjusted_p_values.scale, row);
+    const auto& factor = change.smallest_scale_factor;
+    row.emplace_back(factor ? measured_figure(100.0 * (*factor - 1.0)) + " %" : "-");
+    row.emplace_back(percent(change.first.num_in_tail, comparison.num_first));
+    row.emplace_back(percent(change.second.num_in_tail, comparison.num_second));
+    add_p(change.adjusted_p_values.tail, row);
+  };
+  const std::string& first = names.names.front();
+  Table table = table_of(
+      members, names, "Scatter and tail: standard deviation of estimate − truth, and runs far off",
+      {{"std", false, 8},
+       {"p", false, 8},
+       {"", true, 2},
+       {"found", false, 8},
+       {"tail " + first, false, 8},
+       {"tail", false, 8},
+       {"p", false, 8},
+       {"", true, 2}},
+      add_cells);
+  table.notes = {
+      fmt::format("p: {} of distances from the mean; found: the smallest change of the scatter "
+                  "that this finds in {:.0f} % of such campaigns",
+                  test_text(members, names, &TestNames::scatter), 100.0 * finding_probability),
+      fmt::format("tail: beyond twice the root mean square of {} and the campaign, p: {}", first,
+                  test_text(members, names, &TestNames::tail)),
+      fmt::format("All p are adjusted for three tests of all parameters of all campaigns (Holm); "
+                  "*: below {:.2f}",
+                  significance)};
+  return table;
+}
+
+/// Of all runs of each campaign, which has them even if it cannot be compared.
+Table magnitude_table(std::span<const ComparedMember> members, const MemberNames& names) {
+  const auto add_cells = [&](Row& row, std::size_t member, std::size_t i) {
+    const double objective = members[member].objectives[i];
+    row.emplace_back(std::isfinite(objective) ? given_figure(objective / scale_of(i)) : "-");
+    const std::uint64_t num_runs = members[member].statistics.num_estimated;
+    if (num_runs == 0) {
+      row.insert(row.end(), 4, Cell("-"));
+      return;
     }
-    text += table_row(magnitude_columns, cells, WideCell::keep);
-  }
-  return text;
-}
-
-using Json = nlohmann::ordered_json;
-
-Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
-
-Json json_of(const ComparedAccuracy& accuracy) {
-  return {{"bias", accuracy.bias},
-          {"standard_deviation", accuracy.standard_deviation},
-          {"mean_magnitude", accuracy.mean},
-          {"worst_magnitude", accuracy.worst},
-          {"num_in_tail", accuracy.num_in_tail}};
-}
-
-Json json_of(const ChangePValues& p_values) {
-  return {{"bias", p_values.location}, {"scatter", p_values.scale}, {"tail", p_values.tail}};
-}
-
-Json json_of(const Quantity& quantity, const ParameterComparison& parameter) {
-  Json json{{"parameter", quantity.name},
-            {"unit", quantity.unit},
-            {"tail_limit", parameter.tail_limit},
-            {"first", json_of(parameter.first)},
-            {"second", json_of(parameter.second)},
-            {"bias_change", parameter.second.bias - parameter.first.bias},
-            {"bias_change_interval", nullptr},
-            {"smallest_scatter_factor", nullptr},
-            {"p_values", json_of(parameter.p_values)},
-            {"adjusted_p_values", json_of(parameter.adjusted_p_values)}};
-  if (parameter.bias_interval) {
-    json["bias_change_interval"] = {parameter.bias_interval->lower, parameter.bias_interval->upper};
-  }
-  if (parameter.smallest_scale_factor) {
-    json["smallest_scatter_factor"] = *parameter.smallest_scale_factor;
-  }
-  return json;
+    const AccuracyStatistic& accuracy = members[member].statistics.accuracy[i];
+    row.emplace_back(measured_figure(accuracy.worst / scale_of(i)));
+    row.emplace_back(measured_figure(accuracy.mean / scale_of(i)));
+    row.emplace_back(num_runs < 2 ? "-"
+                                  : measured_figure(accuracy.standard_deviation / scale_of(i)));
+    const std::uint64_t beyond = accuracy.num_beyond_objective;
+    row.emplace_back(std::isfinite(objective) ? std::to_string(beyond) : "-",
+                     beyond > 0 ? Tone::bad : Tone::plain);
+  };
+  Table table = table_of(members, names, "|estimate − truth| of all runs with an estimate",
+                         {{"objective", false, 10},
+                          {"worst", false, 9},
+                          {"mean", false, 9},
+                          {"std", false, 9},
+                          {"beyond", false, 9}},
+                         add_cells);
+  table.notes.emplace_back("beyond: runs whose error exceeds the objective");
+  return table;
 }
 
 }  // namespace
 
-std::string comparison_text(const CampaignComparison& comparison, std::string_view first,
-                            std::string_view second) {
-  std::string text = fmt::format("A  {}\nB  {}\n\n{}{}{}", first, second, definitions(comparison),
-                                 basis(comparison), left_out(comparison));
-  if (!comparison.why_not_compared.empty()) return text;
-  return text + "\n" + bias_table(comparison) + "\n" + scatter_table(comparison) + "\n" +
-         magnitude_table(comparison);
-}
-
-nlohmann::ordered_json detail::comparison_object(const CampaignComparison& comparison,
-                                                 std::string_view first, std::string_view second) {
-  Json json{{"first", first},
-            {"second", second},
-            {"differences", Json::array()},
-            {"is_paired", comparison.is_paired()},
-            {"why_unpaired", text_or_null(comparison.why_unpaired)},
-            {"why_not_compared", text_or_null(comparison.why_not_compared)},
-            {"num_first", comparison.num_first},
-            {"num_second", comparison.num_second},
-            {"num_first_without_estimate", comparison.missing_in_first.total()},
-            {"num_second_without_estimate", comparison.missing_in_second.total()},
-            {"confidence", default_confidence},
-            {"parameters", Json::array()}};
-  for (const auto& [field, of_first, of_second] : comparison.differences) {
-    json["differences"].push_back({{"field", field}, {"first", of_first}, {"second", of_second}});
-  }
-  if (comparison.why_not_compared.empty()) {
-    for (std::size_t i = 0; i < comparison.parameters.size(); ++i) {
-      const Quantity& quantity = model().results().quantities[i];
-      json["parameters"].push_back(json_of(quantity, comparison.parameters[i]));
+MemberNames lettered(std::size_t count) {
+  constexpr std::size_t num_letters = 26;
+  MemberNames names{.title = "campaign", .names = {}, .notes = std::vector<std::string>(count)};
+  for (std::size_t i = 0; i < count; ++i) {
+    std::string name;
+    for (std::size_t rest = i + 1; rest > 0; rest = (rest - 1) / num_letters) {
+      name.insert(name.begin(), static_cast<char>('A' + (rest - 1) % num_letters));
     }
+    names.names.push_back(name);
   }
-  return json;
+  return names;
 }
 
-std::string comparison_json(const CampaignComparison& comparison, std::string_view first,
-                            std::string_view second) {
-  constexpr int indent = 2;
-  const Json json = detail::comparison_object(comparison, first, second);
-  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
+std::string comparison_text(std::span<const ComparedMember> members, const MemberNames& names,
+                            Paint paint) {
+  const TerminalStyle style{.paint = paint};
+  std::string text = terminal_text(campaign_table(members, names), style) + "\n" +
+                     terminal_text(definition_table(members, names), style);
+  if (std::ranges::any_of(members, has_changes)) {
+    text += "\n" + terminal_text(bias_table(members, names), style) + "\n" +
+            terminal_text(scatter_table(members, names), style);
+  }
+  return text + "\n" + terminal_text(magnitude_table(members, names), style);
 }
 
 }  // namespace proofmass::coordinator

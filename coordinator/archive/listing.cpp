@@ -3,17 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "coordinator/archive/archive_error.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/report/text_cells.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
-#include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator {
@@ -57,25 +54,6 @@ std::vector<std::filesystem::path> campaign_files_in(const std::filesystem::path
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::array<TextColumn, 7> columns{{{"file", 18, true},
-                                             {"campaign", 14, true},
-                                             {"phase", 10, true},
-                                             {"done", 9},
-                                             {"runs", 9},
-                                             {"seed", 9},
-                                             {"created", 11}}};
-
-std::vector<std::string> cells_of(const ListedCampaign& campaign) {
-  constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10Z.
-  return {wire::visible_text(campaign.file.filename().string()),
-          wire::visible_text(campaign.name),
-          std::string(wire::name_of(campaign.phase)),
-          std::to_string(campaign.num_finished),
-          std::to_string(campaign.num_runs),
-          std::to_string(campaign.seed),
-          wire::visible_text(campaign.created_utc.substr(0, date_size))};
-}
-
 Json json_of(const ListedCampaign& campaign) {
   const std::string file = campaign.file.string();
   if (!campaign.problem.empty()) return {{"file", file}, {"problem", campaign.problem}};
@@ -106,21 +84,29 @@ std::vector<ListedCampaign> list_campaigns(std::span<const std::filesystem::path
   return campaigns;
 }
 
-std::string listing_text(std::span<const ListedCampaign> campaigns, std::size_t line_width_max) {
-  if (campaigns.empty()) return "no campaigns\n";
-  std::vector<std::vector<std::string>> rows;
-  for (const ListedCampaign& campaign : campaigns) rows.push_back(cells_of(campaign));
-  const std::vector<TextColumn> wide = widened(columns, rows, line_width_max);
-  std::string text = table_heading(wide);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const ListedCampaign& campaign = campaigns[i];
-    if (campaign.problem.empty()) {
-      text += table_row(wide, rows[i]);
-    } else {
-      text += rows[i].front() + "\n  " + campaign.problem + "\n";
+Table listing_table(std::span<const ListedCampaign> campaigns) {
+  if (campaigns.empty()) return {.remarks = {{"no campaigns"}}};
+  constexpr std::size_t date_size = 10;  // 2024-02-29 of 2024-02-29T12:00:10Z.
+  Table table{.columns = {{"file", true, 18},
+                          {"campaign", true, 14},
+                          {"phase", true, 10},
+                          {"done", false, 9},
+                          {"runs", false, 9},
+                          {"seed", false, 9},
+                          {"created", false, 11}}};
+  for (const ListedCampaign& campaign : campaigns) {
+    const std::string file = campaign.file.filename().string();
+    if (!campaign.problem.empty()) {
+      table.rows.push_back({file, "", "", "-", "-", "-", "-"});
+      table.remarks.push_back({campaign.problem, Tone::bad});
+      continue;
     }
+    table.rows.push_back({file, campaign.name, wire::name_of(campaign.phase),
+                          std::to_string(campaign.num_finished), std::to_string(campaign.num_runs),
+                          std::to_string(campaign.seed),
+                          campaign.created_utc.substr(0, date_size)});
   }
-  return text;
+  return table;
 }
 
 std::string listing_json(std::span<const ListedCampaign> campaigns) {

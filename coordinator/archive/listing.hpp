@@ -1,12 +1,12 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "coordinator/table/table.hpp"
 #include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
@@ -31,12 +31,10 @@ struct ListedCampaign {
 [[nodiscard]] std::vector<ListedCampaign> list_campaigns(
     std::span<const std::filesystem::path> places);
 
-/// A line a campaign, and below it what is wrong. The table is 80 columns wide, or wider if
-/// names are long and `line_width_max` has room for them.
-[[nodiscard]] std::string listing_text(std::span<const ListedCampaign> campaigns,
-                                       std::size_t line_width_max);
+/// A row a campaign, and a line for each that cannot be opened.
+[[nodiscard]] Table listing_table(std::span<const ListedCampaign> campaigns);
 
-/// A listing as JSON, complete.
+/// The campaigns as JSON, complete.
 [[nodiscard]] std::string listing_json(std::span<const ListedCampaign> campaigns);
 
 }  // namespace proofmass::coordinator

@@ -12,12 +12,13 @@
 
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/report/read_results.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "core/campaign/statistics.hpp"
 
 namespace proofmass::coordinator {
 
-/// Most campaigns that `compare` takes: each is compared with the first, and has a row in the table
-/// of each parameter.
+/// Most campaigns that `compare` takes: each is compared with the first, and has a row for each
+/// parameter.
 inline constexpr std::size_t num_compared_max = 64;
 
 /// One of several campaigns: all its runs with an estimate, and how it differs from the first.
@@ -54,18 +55,20 @@ struct MemberNames {
 /// `A` to `Z`, `AA`, `AB` and so on.
 [[nodiscard]] MemberNames lettered(std::size_t count);
 
-/// The campaigns, the keys of their definitions that differ, and a table for each parameter with a
-/// row for each campaign. Lines have at most 80 characters but for names of files and values of
-/// definitions that are longer.
-[[nodiscard]] std::string several_text(std::span<const ComparedMember> members,
-                                       const MemberNames& names);
+/// The campaigns, the keys of their definitions that differ, and tables of bias, scatter and
+/// |error| with a row for each parameter and campaign. Lines have at most 80 characters but for
+/// names of files and values of definitions that are longer.
+[[nodiscard]] std::string comparison_text(std::span<const ComparedMember> members,
+                                          const MemberNames& names, Paint paint = Paint::no);
 
 /// A text of a key, for JSON.
 using KeyText = std::pair<std::string, std::string>;
 
-/// A comparison of several campaigns as JSON, complete and in SI units.
-/// @param varied  Keys with their values for each campaign; empty if none was varied.
-[[nodiscard]] std::string several_json(std::span<const ComparedMember> members,
-                                       std::span<const std::vector<KeyText>> varied = {});
+/// The same as JSON, complete and in SI units: of two campaigns one comparison, of several a list
+/// of campaigns, each with its comparison with the first.
+/// @param varied  Keys with their values for each campaign, which is in the list then, even of two;
+///                empty if none was varied.
+[[nodiscard]] std::string comparison_json(std::span<const ComparedMember> members,
+                                          std::span<const std::vector<KeyText>> varied = {});
 
 }  // namespace proofmass::coordinator

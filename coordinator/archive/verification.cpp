@@ -10,7 +10,6 @@
 #include "coordinator/archive/resimulation.hpp"
 #include "coordinator/archive/result_scan.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
-#include "coordinator/report/text_cells.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/runs.hpp"
 #include "proto/text/visible_text.hpp"
@@ -306,10 +305,15 @@ std::string_view word_for(Verdict verdict) {
   return words[static_cast<std::size_t>(verdict)];
 }
 
-std::string check_text(const Check& check) {
+std::string check_text(const Check& check, Paint paint) {
+  constexpr std::array tones{Tone::good, Tone::bad, Tone::plain};
+  const std::string_view word = word_for(check.verdict);
   std::string text = left_aligned(check.name, name_width) +
-                     left_aligned(word_for(check.verdict), verdict_width) +
-                     wrapped(check.finding, name_width + verdict_width) + "\n";
+                     in_tone(word, tones[static_cast<std::size_t>(check.verdict)], paint) +
+                     std::string(verdict_width - word.size(), ' ') +
+                     wrapped(wire::visible_text(check.finding), name_width + verdict_width,
+                             name_width + verdict_width) +
+                     "\n";
   for (const std::string& detail : check.details) {
     text += "  " + wire::visible_text(detail) + "\n";  // It may quote the file.
   }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "coordinator/archive/archive_error.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "core/model.hpp"
 
 namespace proofmass::coordinator {
@@ -63,6 +64,6 @@ struct VerifyOptions {
 
 /// A check as text: a line, then one for each detail; at most 80 characters each unless a detail
 /// has no place to break.
-[[nodiscard]] std::string check_text(const Check& check);
+[[nodiscard]] std::string check_text(const Check& check, Paint paint = Paint::no);
 
 }  // namespace proofmass::coordinator

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +12,7 @@
 #include "coordinator/cli/progress_display.hpp"
 #include "coordinator/report/status_json.hpp"
 #include "coordinator/report/status_notes.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/figures.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
@@ -23,26 +22,6 @@ namespace {
 using wire::CampaignPhase;
 using wire::CampaignStatus;
 using wire::WorkerStatus;
-
-constexpr std::size_t table_width = 79;
-
-constexpr std::array<TextColumn, 8> status_columns{{{"campaign", 17, true},
-                                                    {"phase", 10, true},
-                                                    {"prio", 5},
-                                                    {"done", 11},
-                                                    {"runs", 11},
-                                                    {"%", 5},
-                                                    {"runs/s", 8},
-                                                    {"time left", 12}}};
-
-constexpr std::array<TextColumn, 8> worker_columns{{{"id", 8},
-                                                    {"  worker", 17, true},
-                                                    {"host", 14, true},
-                                                    {"pid", 8},
-                                                    {"slots", 6},
-                                                    {"lent", 8},
-                                                    {"results", 9},
-                                                    {"heard", 9}}};
 
 std::uint64_t percent_done(const CampaignStatus& campaign) {
   return campaign.num_done * 100 / std::max<std::uint64_t>(1, campaign.num_runs);
@@ -57,39 +36,46 @@ std::string rate(const CampaignStatus& campaign) {
   return campaign.rate_hz > 0.0 ? measured_figure(campaign.rate_hz) : "-";
 }
 
-/// A row for each thing, below the titles.
-template <typename Thing, typename CellsOf>
-std::string table_of(std::span<const TextColumn> columns, const std::vector<Thing>& things,
-                     const CellsOf& cells_of, std::size_t line_width_max) {
-  std::vector<std::vector<std::string>> rows;
-  for (const Thing& thing : things) rows.push_back(cells_of(thing));
-  const std::vector<TextColumn> wide = widened(columns, rows, line_width_max);
-  std::string text = table_heading(wide);
-  for (const auto& cells : rows) text += table_row(wide, cells);
-  return text;
+void add_further(std::uint64_t count, std::size_t num_shown, std::string_view thing,
+                 std::vector<Remark>& remarks) {
+  const std::string note = further_note(count, num_shown, thing);
+  if (!note.empty()) remarks.push_back({note});
 }
 
-std::vector<std::string> campaign_cells(const CampaignStatus& campaign) {
-  return {campaign.name,
-          std::string(wire::phase_name(campaign)),
-          std::to_string(campaign.priority),
-          std::to_string(campaign.num_done),
-          std::to_string(campaign.num_runs),
-          std::to_string(percent_done(campaign)),
-          rate(campaign),
-          time_left(campaign)};
+Table campaigns_table(const wire::StatusReply& status) {
+  Table table;
+  if (status.campaigns.empty()) table.remarks.push_back({"no campaigns"});
+  if (!status.campaigns.empty()) {
+    table.columns = {{"campaign", true, 17}, {"phase", true, 10},     {"prio", false, 5},
+                     {"done", false, 11},    {"runs", false, 11},     {"%", false, 5},
+                     {"runs/s", false, 8},   {"time left", false, 12}};
+  }
+  for (const CampaignStatus& campaign : status.campaigns) {
+    table.rows.push_back({campaign.name, wire::phase_name(campaign),
+                          std::to_string(campaign.priority), std::to_string(campaign.num_done),
+                          std::to_string(campaign.num_runs), std::to_string(percent_done(campaign)),
+                          rate(campaign), time_left(campaign)});
+    for (Remark note : notes_about(campaign)) {
+      note.text = fmt::format("{}: {}", campaign.name, note.text);
+      table.remarks.push_back(std::move(note));
+    }
+  }
+  add_further(status.num_campaigns, status.campaigns.size(), "more campaign", table.remarks);
+  for (Remark& note : service_notes(status)) table.remarks.push_back(std::move(note));
+  return table;
 }
 
 std::string service_lines(const wire::StatusReply& status, std::size_t line_width_max) {
   std::uint64_t num_lent = 0;
   for (const CampaignStatus& campaign : status.campaigns) num_lent += campaign.num_lent;
-  const std::size_t width = std::max(table_width, line_width_max);
+  const std::size_t width = line_width_max;
   const std::string service = fmt::format("Proofmass {}, model {}, up {}", status.version,
                                           status.model_version, duration_text(status.uptime_s));
   const std::string workers =
       fmt::format("{} with {}, {} lent", counted(status.num_workers, "worker"),
                   counted(status.num_slots, "slot"), counted(num_lent, "run"));
-  return fmt::format("{}\n{}\n\n", shortened(service, width), shortened(workers, width));
+  return fmt::format("{}\n{}\n\n", shortened(wire::visible_text(service), width),
+                     shortened(workers, width));
 }
 
 /// Seven characters at most.
@@ -108,53 +94,40 @@ std::string ago(double seconds) {
   return fmt::format("{} d", total / 86400);
 }
 
-std::vector<std::string> worker_cells(const WorkerStatus& worker) {
-  return {count_cell(worker.id.value),    "  " + worker.name,           worker.host,
-          count_cell(worker.process_id),  count_cell(worker.num_slots), count_cell(worker.num_lent),
-          count_cell(worker.num_results), ago(worker.silent_s)};
-}
-
-std::string further(std::uint64_t count, std::size_t num_shown, std::string_view thing) {
-  const std::string note = further_note(count, num_shown, thing);
-  return note.empty() ? note : note + "\n";
-}
-
-std::string lines_of(const std::vector<std::string>& notes) {
-  std::string text;
-  for (const std::string& note : notes) text += note + "\n";
-  return text;
-}
-
 }  // namespace
 
 bool is_over(const CampaignStatus& campaign) {
   return campaign.phase == CampaignPhase::finished || campaign.phase == CampaignPhase::cancelled;
 }
 
-std::string status_table(const wire::StatusReply& status, std::size_t line_width_max) {
-  std::string text = service_lines(status, line_width_max);
-  const std::string notes = lines_of(service_notes(status));
-  if (status.campaigns.empty()) return text + "no campaigns\n" + notes;
-  text += table_of(status_columns, status.campaigns, campaign_cells, line_width_max);
-  for (const CampaignStatus& campaign : status.campaigns) {
-    for (const std::string& note : notes_about(campaign)) {
-      text += fmt::format("{}: {}\n", campaign.name, note);
-    }
-  }
-  text += further(status.num_campaigns, status.campaigns.size(), "more campaign");
-  return text + notes;
+std::string status_text(const wire::StatusReply& status, const TerminalStyle& style) {
+  return service_lines(status, style.line_width_max) +
+         terminal_text(campaigns_table(status), style);
 }
 
-std::string workers_table(const wire::WorkersReply& workers, std::size_t line_width_max) {
-  if (workers.workers.empty()) return "no workers\n";
-  std::string text = table_of(worker_columns, workers.workers, worker_cells, line_width_max);
+Table workers_table(const wire::WorkersReply& workers) {
+  if (workers.workers.empty()) return {.remarks = {{"no workers"}}};
+  Table table{.columns = {{"id", false, 8},
+                          {"  worker", true, 17},
+                          {"host", true, 14},
+                          {"pid", false, 8},
+                          {"slots", false, 6},
+                          {"lent", false, 8},
+                          {"results", false, 9},
+                          {"heard", false, 9}}};
   for (const WorkerStatus& worker : workers.workers) {
+    table.rows.push_back({count_cell(worker.id.value), "  " + worker.name, worker.host,
+                          count_cell(worker.process_id), count_cell(worker.num_slots),
+                          count_cell(worker.num_lent), count_cell(worker.num_results),
+                          ago(worker.silent_s)});
     if (!worker.is_quarantined) continue;
-    text += fmt::format("{}: in quarantine, is lent nothing: too many crashes on {}\n",
-                        worker.id.value, worker.host);
+    table.remarks.push_back(
+        {fmt::format("{}: in quarantine, is lent nothing: too many crashes on {}", worker.id.value,
+                     worker.host),
+         Tone::bad});
   }
-  text += further(workers.num_workers, workers.workers.size(), "more worker");
-  return text;
+  add_further(workers.num_workers, workers.workers.size(), "more worker", table.remarks);
+  return table;
 }
 
 std::string campaign_line(const CampaignStatus& campaign) {
@@ -165,7 +138,7 @@ std::string campaign_line(const CampaignStatus& campaign) {
     if (campaign.rate_hz > 0.0) text += fmt::format(", {} runs/s", rate(campaign));
     if (campaign.remaining_s) text += fmt::format(", {} left", time_left(campaign));
   }
-  for (const std::string& note : notes_about(campaign)) text += "; " + note;
+  for (const Remark& note : notes_about(campaign)) text += "; " + note.text;
   return text;
 }
 

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 
-#include "coordinator/cli/painting.hpp"
 #include "coordinator/cli/standard_output.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/text/visible_text.hpp"
@@ -106,10 +105,9 @@ void ProgressDisplay::show_bar(const wire::CampaignStatus& status) {
   shown_ = std::move(line);
 }
 
-void ProgressDisplay::note(std::string_view text) {
+void ProgressDisplay::note(std::string_view text, Tone tone) {
   if (has_bar_) wire::say_on(stream_, "\r\033[K");
-  const std::string visible = wire::visible_lines(text);
-  wire::say_on(stream_, (takes_paint(stream_) ? painted(visible) : visible) + "\n");
+  wire::say_on(stream_, in_tone(wire::visible_lines(text), tone, style_of(stream_).paint) + "\n");
   has_bar_ = false;
 }
 

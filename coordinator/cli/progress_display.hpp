@@ -8,7 +8,8 @@
 #include <string>
 #include <string_view>
 
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/figures.hpp"
+#include "coordinator/table/table.hpp"
 #include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
@@ -49,7 +50,7 @@ class ProgressDisplay {
   /// May be called as often as one likes.
   void update(const wire::CampaignStatus& status);
   /// A line of its own that stays.
-  void note(std::string_view text);
+  void note(std::string_view text, Tone tone = Tone::plain);
 
  private:
   void show_bar(const wire::CampaignStatus& status);

@@ -45,7 +45,6 @@ int print_answer(const ClientConnectionConfig& connection, const wire::AnswerReq
     if (hash.finish() != answer.sha256)
       throw Error("the answer is not the one that was announced; ask again");
     if (text == AnswerText::lines) print_lines(bytes);
-    if (text == AnswerText::tables) print_tables(bytes);
     if (text == AnswerText::bytes) write_standard_output(bytes);
     flush_standard_output();
     if (!answer.error_text.empty()) wire::say(wire::visible_lines(answer.error_text));

@@ -33,9 +33,8 @@ void read_answer(const Ask& ask, const wire::AnswerReply& answer,
 
 /// How the answer to a question is printed.
 enum class AnswerText : std::uint8_t {
-  lines,   ///< As print_lines() does.
-  tables,  ///< As print_tables() does.
-  bytes,   ///< As it is.
+  lines,  ///< As print_lines() does.
+  bytes,  ///< As it is.
 };
 
 /// Asks a coordinator and prints what its command writes, to standard output and standard error.

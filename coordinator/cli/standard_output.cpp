@@ -5,11 +5,10 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
-#include <limits>
 #include <string>
 
-#include "coordinator/cli/painting.hpp"
 #include "core/error.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -18,6 +17,11 @@ namespace {
 
 [[noreturn]] void fail_to_write() {
   throw Error(fmt::format("standard output: {}", std::strerror(errno)));
+}
+
+std::string_view value_of_variable(const char* name) {
+  const char* const value = std::getenv(name);
+  return value == nullptr ? std::string_view() : value;
 }
 
 }  // namespace
@@ -29,17 +33,20 @@ ScreenSize screen_size_of(std::FILE* stream) {
   return {.columns = size.ws_col, .rows = size.ws_row};
 }
 
-std::size_t line_width_max_of(std::FILE* stream) {
-  if (isatty(fileno(stream)) == 0) return std::numeric_limits<std::size_t>::max();
-  return screen_size_of(stream).columns - 1;
+bool takes_escapes(std::FILE* stream) {
+  const std::string_view terminal = value_of_variable("TERM");
+  return isatty(fileno(stream)) != 0 && !terminal.empty() && terminal != "dumb";
+}
+
+TerminalStyle style_of(std::FILE* stream) {
+  TerminalStyle style;
+  if (isatty(fileno(stream)) != 0) style.line_width_max = screen_size_of(stream).columns - 1;
+  const bool is_painted = takes_escapes(stream) && value_of_variable("NO_COLOR").empty();
+  style.paint = is_painted ? Paint::yes : Paint::no;
+  return style;
 }
 
 void print_lines(std::string_view text) { write_standard_output(wire::visible_lines(text)); }
-
-void print_tables(std::string_view text) {
-  const std::string visible = wire::visible_lines(text);
-  write_standard_output(takes_paint(stdout) ? painted(visible) : visible);
-}
 
 void write_standard_output(std::string_view text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) fail_to_write();

@@ -6,8 +6,8 @@
 #include <ranges>
 
 #include "coordinator/cli/program.hpp"
-#include "coordinator/report/text_cells.hpp"
 #include "coordinator/store/sha256.hpp"
+#include "coordinator/table/terminal_table.hpp"
 
 namespace proofmass::coordinator {
 namespace {

@@ -97,7 +97,8 @@ void LocalWorkers::replace(const WorkerProcesses::Exit& exit) {
   if (worker) service_.worker_ended(*worker, exit.reason);
   check(exit, runs);
   display_.note(fmt::format("worker {} (pid {}) ended: {}; it held runs {}; starting another",
-                            exit.name, exit.process_id, exit.text, runs));
+                            exit.name, exit.process_id, exit.text, runs),
+                Tone::bad);
   processes_.start(exit.name);
 }
 

@@ -4,9 +4,9 @@
 
 #include "coordinator/page/attempts_chart.hpp"
 #include "coordinator/page/page_views.hpp"
-#include "coordinator/report/html_table.hpp"
 #include "coordinator/report/status_notes.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/figures.hpp"
+#include "coordinator/table/html_table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
@@ -44,7 +44,7 @@ std::string results_of(const CampaignDetails& details, std::uint64_t num_done, T
   const CampaignResults& results = *details.results;
   std::string notes;
   if (!results.failure.empty()) {
-    notes = notes_list({"the results cannot be read now: " + results.failure});
+    notes = notes_list({{"the results cannot be read now: " + results.failure}});
   }
   if (results.html.empty()) return notes;
   return fmt::format(
@@ -54,49 +54,43 @@ std::string results_of(const CampaignDetails& details, std::uint64_t num_done, T
       reading_line(details.results_at, now), results.html);
 }
 
+/// A table under a heading; nothing without rows.
+std::string titled(std::string_view title, const Table& table) {
+  if (table.rows.empty()) return {};
+  return fmt::format("<h3>{}</h3>\n{}", title, html_table(table));
+}
+
 std::string ends_table(const CampaignEvents& events) {
-  if (events.ends.empty()) return {};
-  std::vector<HtmlRow> rows;
+  Table table{.caption = "Finished runs without an estimate",
+              .columns = {{"status", true}, {"cause", true}, {"session", true}, {"runs"}}};
   for (const EndCount& end : events.ends) {
-    rows.push_back({markup_text(end.status), markup_text(end.cause), markup_text(end.session),
-                    grouped(end.num_runs)});
+    table.rows.push_back({end.status, end.cause, end.session, grouped(end.num_runs)});
   }
-  return "<h3>Finished runs without an estimate</h3>\n" +
-         html_table({.name = "Finished runs without an estimate",
-                     .columns = {{"status", true}, {"cause", true}, {"session", true}, {"runs"}},
-                     .rows = std::move(rows)});
+  return titled(table.caption, table);
 }
 
 std::string given_up_table(const CampaignEvents& events, std::uint64_t num_given_up) {
-  if (events.given_up.empty()) return {};
-  std::vector<HtmlRow> rows;
+  Table table{.caption = "Runs that were given up",
+              .columns = {{"run"}, {"reason", true}, {"attempts"}, {"given up", true}}};
   for (const GivenUpRecord& run : events.given_up) {
-    rows.push_back({std::to_string(run.run.value), markup_text(run.reason),
-                    grouped(run.num_attempts), markup_text(run.given_up_utc)});
+    table.rows.push_back(
+        {std::to_string(run.run.value), run.reason, grouped(run.num_attempts), run.given_up_utc});
   }
-  std::string html =
-      "<h3>Runs that were given up</h3>\n" +
-      html_table({.name = "Runs that were given up",
-                  .columns = {{"run"}, {"reason", true}, {"attempts"}, {"given up", true}},
-                  .rows = std::move(rows)});
-  if (num_given_up > rows.size()) {
-    html += fmt::format("<p class=\"note\">showing the first {} of {}</p>\n", rows.size(),
-                        grouped(num_given_up));
+  if (num_given_up > table.rows.size()) {
+    table.notes.push_back(
+        fmt::format("showing the first {} of {}", table.rows.size(), grouped(num_given_up)));
   }
-  return html;
+  return titled(table.caption, table);
 }
 
 std::string losses_table(const CampaignEvents& events) {
-  if (events.losses.empty()) return {};
-  std::vector<HtmlRow> rows;
+  Table table{.caption = "Attempts without a result",
+              .columns = {{"reason", true}, {"losses"}, {"runs"}, {"counted against runs"}}};
   for (const LossCount& loss : events.losses) {
-    rows.push_back({markup_text(loss.reason), grouped(loss.num_losses), grouped(loss.num_runs),
-                    grouped(loss.num_blamed)});
+    table.rows.push_back(
+        {loss.reason, grouped(loss.num_losses), grouped(loss.num_runs), grouped(loss.num_blamed)});
   }
-  return "<h3>Attempts without a result, lent again</h3>\n" +
-         html_table({.name = "Attempts without a result",
-                     .columns = {{"reason", true}, {"losses"}, {"runs"}, {"counted against runs"}},
-                     .rows = std::move(rows)});
+  return titled("Attempts without a result, lent again", table);
 }
 
 std::string failures_of(const CampaignEvents& events, std::uint64_t num_given_up) {
@@ -120,18 +114,14 @@ std::string attempts_of(const CampaignEvents& events) {
 std::string events_of(const CampaignEvents& events, const std::string& name, std::size_t page) {
   const std::size_t count = std::min(events.events.size(), shown_events_max);
   const PageOfList list = page_of_list(page, count, rows_per_page);
-  std::vector<HtmlRow> rows;
+  Table table{.caption = "Events", .columns = {{"time", true}, {"event", true}, {"details", true}}};
   for (std::size_t i = list.first; i < list.end; ++i) {
     const StoredEvent& event = events.events[events.events.size() - 1 - i];
-    rows.push_back({markup_text(event.time_utc), markup_text(event.kind),
-                    "<span class=\"long\">" + markup_text(event.text) + "</span>"});
+    Cell details(event.text);
+    details.markup = "<span class=\"long\">" + markup_text(event.text) + "</span>";
+    table.rows.push_back({event.time_utc, event.kind, std::move(details)});
   }
-  std::string html = "<section><h2>Events</h2>\n";
-  if (!rows.empty()) {
-    html += html_table({.name = "Events",
-                        .columns = {{"time", true}, {"event", true}, {"details", true}},
-                        .rows = std::move(rows)});
-  }
+  std::string html = "<section><h2>Events</h2>\n" + table_or_nothing(table);
   html += list_navigation(list, "events, the newest first", percent_encoded(name) + "?events=");
   if (events.events.size() > count) {
     html += fmt::format(
@@ -148,7 +138,7 @@ std::string history_of(const CampaignDetails& details, const CampaignSnapshot& c
   const CampaignEvents& events = *details.events;
   std::string html;
   if (!events.failure.empty()) {
-    html += notes_list({"the database cannot be read now: " + events.failure});
+    html += notes_list({{"the database cannot be read now: " + events.failure}});
   }
   const std::string& name = campaign.status.name;
   return html + failures_of(events, campaign.status.num_given_up) + attempts_of(events) +

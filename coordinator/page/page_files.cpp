@@ -1,7 +1,7 @@
 #include <string>
 
 #include "coordinator/page/page_layout.hpp"
-#include "coordinator/report/html_table.hpp"
+#include "coordinator/report/review_html.hpp"
 
 namespace proofmass::coordinator {
 

@@ -79,10 +79,10 @@ std::string grouped(std::uint64_t count) {
   return digits;
 }
 
-std::string notes_list(const std::vector<std::string>& notes) {
+std::string notes_list(const std::vector<Remark>& notes) {
   if (notes.empty()) return {};
   std::string html = "<ul class=\"notes\">\n";
-  for (const std::string& note : notes) html += fmt::format("<li>{}</li>\n", markup_text(note));
+  for (const Remark& note : notes) html += fmt::format("<li>{}</li>\n", markup_text(note.text));
   return html + "</ul>\n";
 }
 

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "coordinator/table/table.hpp"
+
 namespace proofmass::coordinator {
 
 /// The parts of a page of the live page.
@@ -45,7 +47,7 @@ struct PageOfList {
 [[nodiscard]] std::string grouped(std::uint64_t count);
 
 /// A list of notes; nothing if there are none.
-[[nodiscard]] std::string notes_list(const std::vector<std::string>& notes);
+[[nodiscard]] std::string notes_list(const std::vector<Remark>& notes);
 
 /// The style sheet and the script of all pages.
 [[nodiscard]] std::string page_style();

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <tuple>
 
-#include "coordinator/report/html_table.hpp"
 #include "coordinator/report/status_notes.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/figures.hpp"
+#include "coordinator/table/html_table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
@@ -17,9 +17,17 @@ namespace {
 using wire::CampaignStatus;
 using wire::markup_text;
 
-std::string campaign_link(const CampaignStatus& campaign) {
-  return fmt::format("<a href=\"campaigns/{}\">{}</a>", percent_encoded(campaign.name),
-                     markup_text(campaign.name));
+Cell campaign_link(const CampaignStatus& campaign) {
+  Cell cell(campaign.name);
+  cell.markup = fmt::format("<a href=\"campaigns/{}\">{}</a>", percent_encoded(campaign.name),
+                            markup_text(campaign.name));
+  return cell;
+}
+
+Cell progress_cell(const CampaignStatus& campaign) {
+  Cell cell("");
+  cell.markup = progress_bar(campaign.num_done, campaign.num_runs, "progress of " + campaign.name);
+  return cell;
 }
 
 std::string rate_cell(const CampaignStatus& campaign) {
@@ -52,21 +60,20 @@ std::string age_line(TimePoint taken_at, TimePoint now) {
   const double age_s = seconds(now - taken_at);
   if (age_s < 10.0) return {};
   return notes_list(
-      {fmt::format("the coordinator has not answered for {}: this is what it said "
-                   "then",
-                   duration_text(age_s))});
+      {{fmt::format("the coordinator has not answered for {}: this is what it said then",
+                    duration_text(age_s))}});
 }
 
 std::size_t page_number(const PageRequest& request, const std::string& parameter) {
   return request.number(parameter).value_or(1);
 }
 
-std::vector<std::string> overview_notes(const ServiceSnapshot& service, const PageOfList& list) {
-  std::vector<std::string> notes = service_notes(service.status);
+std::vector<Remark> overview_notes(const ServiceSnapshot& service, const PageOfList& list) {
+  std::vector<Remark> notes = service_notes(service.status);
   for (std::size_t i = list.first; i < list.end; ++i) {
     const CampaignStatus& campaign = service.campaigns[i].status;
-    for (const std::string& note : notes_about(campaign)) {
-      notes.push_back(campaign.name + ": " + note);
+    for (const Remark& note : notes_about(campaign)) {
+      notes.push_back({campaign.name + ": " + note.text, note.tone});
     }
   }
   return notes;
@@ -108,11 +115,12 @@ std::string sort_link(const WorkerChoice& choice, WorkerOrder order, std::string
                      percent_encoded(choice.filter), text);
 }
 
-std::vector<HtmlColumn> worker_columns_of(const WorkerChoice& choice) {
+std::vector<Column> worker_columns_of(const WorkerChoice& choice) {
   const auto column = [&](WorkerOrder order, std::string_view text, std::string_view direction) {
-    return HtmlColumn{.title = sort_link(choice, order, text),
-                      .is_text = order != WorkerOrder::throughput,
-                      .sort = choice.order == order ? std::string(direction) : std::string()};
+    return Column{.title = std::string(text),
+                  .is_text = order != WorkerOrder::throughput,
+                  .sort = choice.order == order ? std::string(direction) : std::string(),
+                  .markup = sort_link(choice, order, text)};
   };
   return {column(WorkerOrder::name, "worker", "ascending"),
           {"host", true},
@@ -125,11 +133,11 @@ std::vector<HtmlColumn> worker_columns_of(const WorkerChoice& choice) {
           {"process"}};
 }
 
-HtmlRow worker_row(const WorkerSnapshot& worker) {
+Row worker_row(const WorkerSnapshot& worker) {
   const wire::WorkerStatus& status = worker.status;
-  return {markup_text(status.name),
-          markup_text(status.host),
-          std::string(name_of(worker.activity)),
+  return {status.name,
+          status.host,
+          name_of(worker.activity),
           grouped(status.num_slots),
           grouped(status.num_lent),
           grouped(status.num_results),
@@ -210,44 +218,40 @@ PageContent overview_page(const PageSnapshot& snapshot, const PageRequest& reque
   const std::vector<CampaignSnapshot>& campaigns = snapshot.service.campaigns;
   const PageOfList list =
       page_of_list(page_number(request, "page"), campaigns.size(), rows_per_page);
-  const std::vector<HtmlColumn> columns{{"campaign", true}, {"phase", true}, {"progress", true},
-                                        {"done"},           {"runs"},        {"runs/s"},
-                                        {"time left"},      {"priority"}};
-  std::vector<HtmlRow> rows;
+  Table table{.caption = "Campaigns",
+              .columns = {{"campaign", true},
+                          {"phase", true},
+                          {"progress", true},
+                          {"done"},
+                          {"runs"},
+                          {"runs/s"},
+                          {"time left"},
+                          {"priority"}}};
   for (std::size_t i = list.first; i < list.end; ++i) {
     const CampaignStatus& campaign = campaigns[i].status;
-    rows.push_back(
-        {campaign_link(campaign), std::string(wire::phase_name(campaign)),
-         progress_bar(campaign.num_done, campaign.num_runs, "progress of " + campaign.name),
-         grouped(campaign.num_done), grouped(campaign.num_runs), rate_cell(campaign),
-         time_left_cell(campaign), std::to_string(campaign.priority)});
+    table.rows.push_back({campaign_link(campaign), wire::phase_name(campaign),
+                          progress_cell(campaign), grouped(campaign.num_done),
+                          grouped(campaign.num_runs), rate_cell(campaign), time_left_cell(campaign),
+                          std::to_string(campaign.priority)});
   }
-  const std::string table =
-      rows.empty() ? ""
-                   : html_table({.name = "Campaigns", .columns = columns, .rows = std::move(rows)});
   return {.title = "Campaigns",
           .live = title_of(snapshot) + summary_line(snapshot) + age_line(snapshot.taken_at, now) +
-                  notes_list(overview_notes(snapshot.service, list)) + table +
+                  notes_list(overview_notes(snapshot.service, list)) + table_or_nothing(table) +
                   list_navigation(list, "campaigns", "./?page=")};
 }
 
 PageContent workers_page(const PageSnapshot& snapshot, const PageRequest& request, TimePoint now) {
   const WorkerChoice choice = worker_choice(request);
   const ChosenWorkers chosen = choose_workers(snapshot.service.workers, choice);
-  std::vector<HtmlRow> rows;
-  for (const WorkerSnapshot* worker : chosen.workers) rows.push_back(worker_row(*worker));
-  const std::string table =
-      rows.empty()
-          ? ""
-          : html_table(
-                {.name = "Workers", .columns = worker_columns_of(choice), .rows = std::move(rows)});
+  Table table{.caption = "Workers", .columns = worker_columns_of(choice)};
+  for (const WorkerSnapshot* worker : chosen.workers) table.rows.push_back(worker_row(*worker));
   const std::string address =
       fmt::format("workers?sort={}&amp;filter={}&amp;page=", name_of(choice.order),
                   percent_encoded(choice.filter));
   return {.title = "Workers",
           .form = filter_form(choice),
           .live = summary_line(snapshot) + age_line(snapshot.taken_at, now) +
-                  worker_counts(snapshot.service) + table +
+                  worker_counts(snapshot.service) + table_or_nothing(table) +
                   list_navigation(chosen.list, "workers", address) +
                   "<p class=\"note\">results/h: since the worker registered with this coordinator"
                   "</p>\n"};

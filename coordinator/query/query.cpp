@@ -12,8 +12,8 @@
 
 #include "coordinator/query/functions.hpp"
 #include "coordinator/query/read_only_connection.hpp"
-#include "coordinator/report/text_cells.hpp"
 #include "coordinator/store/store_error.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
@@ -229,7 +229,7 @@ bool Reader::step(sqlite3_stmt* statement, const std::string& sql) {
   fail(code, sql);
 }
 
-Cell cell_of(sqlite3_stmt* statement, int column) {
+Value cell_of(sqlite3_stmt* statement, int column) {
   const auto size = [&] {
     return static_cast<std::size_t>(sqlite3_column_bytes(statement, column));
   };
@@ -283,7 +283,7 @@ QueryEnd run_query(const QueryFiles& files, const std::string& sql, const QueryL
   const Statement statement = reader.prepare(sql);
   const std::vector<std::string> names = column_names(statement.get());
   writer.begin(names);
-  std::vector<Cell> cells(names.size());
+  std::vector<Value> cells(names.size());
   while (reader.step(statement.get(), sql)) {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       cells[i] = cell_of(statement.get(), static_cast<int>(i));

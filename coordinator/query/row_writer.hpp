@@ -18,7 +18,7 @@ struct Blob {
 };
 
 /// A value of SQL; monostate is NULL. Text and bytes live until the next row.
-using Cell = std::variant<std::monostate, std::int64_t, double, std::string_view, Blob>;
+using Value = std::variant<std::monostate, std::int64_t, double, std::string_view, Blob>;
 
 /// The shortest text that reads back as the same double: `0.1`, `1e+20`, `-0`, `inf`.
 [[nodiscard]] std::string shortest_text(double value);
@@ -27,9 +27,9 @@ using Cell = std::variant<std::monostate, std::int64_t, double, std::string_view
 [[nodiscard]] std::string blob_text(const Blob& blob);
 
 /// Numbers in shortest form, text as it is, bytes as blob_text(), NULL as nothing.
-[[nodiscard]] std::string cell_text(const Cell& cell);
+[[nodiscard]] std::string text_of(const Value& value);
 
-[[nodiscard]] bool is_number(const Cell& cell);
+[[nodiscard]] bool is_number(const Value& value);
 
 /// What becomes of the rows of a query: begin() once, row() for each until it wants no more, end()
 /// once.
@@ -39,7 +39,7 @@ class RowWriter {
   /// @throws InvalidArgument if the format cannot hold such columns.
   virtual void begin(std::span<const std::string> columns) = 0;
   /// @returns False if it wants no further row.
-  [[nodiscard]] virtual bool row(std::span<const Cell> cells) = 0;
+  [[nodiscard]] virtual bool row(std::span<const Value> values) = 0;
   virtual void end() = 0;
 };
 

@@ -57,8 +57,8 @@ void add_input(Causes& causes, const std::string& name, Correlations correlation
   causes.correlations.push_back(std::move(correlations));
 }
 
-void add_terms(const DrawnRuns& drawn, std::size_t quantity, std::span<const Column> inputs,
-               Causes& causes) {
+void add_terms(const DrawnRuns& drawn, std::size_t quantity,
+               std::span<const proofmass::Column> inputs, Causes& causes) {
   for (const ExplanatoryTerm& term :
        explanatory_terms(inputs, drawn.errors[quantity], num_terms_max, default_confidence)) {
     const std::string name = term_name(drawn, term);
@@ -102,9 +102,9 @@ std::optional<Causes> find_causes(const Store& store, const Campaign& campaign) 
                 .terms = {},
                 .inputs = {},
                 .correlations = {}};
-  const std::vector<Column> inputs(drawn.columns.begin(), drawn.columns.end());
+  const std::vector<proofmass::Column> inputs(drawn.columns.begin(), drawn.columns.end());
   std::vector<Correlations> of_columns;
-  for (const Column input : inputs) of_columns.push_back(correlations_of(input, drawn));
+  for (const proofmass::Column input : inputs) of_columns.push_back(correlations_of(input, drawn));
   for (std::size_t i = 0; i < drawn.errors.size(); ++i) add_terms(drawn, i, inputs, causes);
   for (std::size_t i = 0; i < drawn.errors.size(); ++i) {
     add_correlated(drawn, i, of_columns, causes);

@@ -5,10 +5,10 @@
 #include <utility>
 
 #include "coordinator/charts/svg.hpp"
-#include "coordinator/report/html_table.hpp"
+#include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/review.hpp"
 #include "coordinator/report/review_charts.hpp"
-#include "coordinator/report/review_tables.hpp"
+#include "coordinator/table/html_table.hpp"
 #include "core/campaign/independence.hpp"
 
 namespace proofmass::coordinator {
@@ -46,7 +46,8 @@ std::string LiveResults::html() const {
     }
     review.figures.push_back(std::move(figures));
   }
-  return "<h3>Accuracy so far</h3>\n" + html_table(review_accuracy_table(review)) +
+  return "<h3>Accuracy so far</h3>\n" +
+         html_table(accuracy_table(objectives_, review.results.statistics)) +
          "<h3>Errors so far</h3>\n<figure>\n" +
          svg_of(magnitude_overview(review), SvgUse::embedded) + "</figure>\n";
 }

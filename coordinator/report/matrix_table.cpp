@@ -11,19 +11,11 @@
 namespace proofmass::coordinator {
 namespace {
 
-using Kind = ReviewCell::Kind;
-
 bool is_joint_row(const MatrixRow& row) {
   return row.answer.requirement.subject == Requirement::Subject::all_objectives;
 }
 
-ReviewCell words_cell(std::string_view text) {
-  return {.text = std::string(text), .kind = Kind::words};
-}
-
-ReviewCell count_cell(std::uint64_t count) {
-  return {.text = std::to_string(count), .value = static_cast<double>(count)};
-}
+Cell count_cell(std::uint64_t count) { return {std::to_string(count), static_cast<double>(count)}; }
 
 Quantity quantity_of(const MatrixRow& row) {
   return requirement_subject(row.answer.requirement.parameter);
@@ -38,17 +30,17 @@ std::string subject_of(const MatrixRow& row) {
 }
 
 /// In the unit of the tables; a ratio to the objectives without one.
-ReviewCell value_cell(const MatrixRow& row, const std::optional<double>& value) {
-  if (!value) return words_cell("none");
-  return {.text = is_joint_row(row) ? figure_text(*value) + " × objective"
-                                    : quantity_text(*value, quantity_of(row)),
-          .value = *value};
+Cell value_cell(const MatrixRow& row, const std::optional<double>& value) {
+  if (!value) return "none";
+  return {is_joint_row(row) ? figure_text(*value) + " × objective"
+                            : quantity_text(*value, quantity_of(row)),
+          *value};
 }
 
-ReviewCell margin_cell(const MatrixRow& row) {
+Cell margin_cell(const MatrixRow& row) {
   const std::optional<double> margin = row.relative_margin();
-  if (!margin) return words_cell("none");
-  return {.text = figure_text(100.0 * *margin) + " %", .value = *margin};
+  if (!margin) return "none";
+  return {figure_text(100.0 * *margin) + " %", *margin};
 }
 
 /// `|error| of a_c12, for 95 % with 90 %`, after the words of the project.
@@ -61,26 +53,20 @@ std::string statement_of(const MatrixRow& row) {
                                                     : fmt::format("{} ({})", row.stated.text, text);
 }
 
-std::vector<ReviewCell> matrix_cells(const MatrixRow& row) {
+Row matrix_cells(const MatrixRow& row) {
   const RequirementCheck& check = row.answer.check;
-  std::vector<ReviewCell> cells{
-      words_cell(requirement_name(row)),
-      words_cell(statement_of(row)),
-      value_cell(row, row.limit),
-      count_cell(check.num_runs),
-      count_cell(check.num_without_estimate),
-      count_cell(check.num_exceedances),
-      count_cell(check.num_allowed),
-      value_cell(row, row.bound),
-      margin_cell(row),
-      {.text = std::string(name_of(check.verdict)), .kind = Kind::verdict}};
-  if (!row.worst) {
-    cells.insert(cells.end(), {words_cell("none"), words_cell("none")});
-    return cells;
-  }
-  cells.push_back(value_cell(row, row.worst->value));
-  cells.push_back(count_cell(row.worst->run.value));
-  return cells;
+  return {requirement_name(row),
+          statement_of(row),
+          value_cell(row, row.limit),
+          count_cell(check.num_runs),
+          count_cell(check.num_without_estimate),
+          count_cell(check.num_exceedances),
+          count_cell(check.num_allowed),
+          value_cell(row, row.bound),
+          margin_cell(row),
+          {name_of(check.verdict), tone_of(check.verdict)},
+          value_cell(row, row.worst ? std::optional(row.worst->value) : std::nullopt),
+          row.worst ? count_cell(row.worst->run.value) : Cell("none")};
 }
 
 std::string_view draw_sentence(Interpretation interpretation) {
@@ -133,24 +119,36 @@ std::string requirement_name(const MatrixRow& row) {
                                                : row.stated.id;
 }
 
-ReviewTable matrix_table(const Review& review) {
-  ReviewTable table{.id = "matrix",
-                    .caption = fmt::format("Verification matrix (statistical interpretation: {})",
-                                           name_of(review.interpretation)),
-                    .columns = {{.title = "id", .is_text = true},
-                                {.title = "requirement", .is_text = true},
-                                {.title = "limit"},
-                                {.title = "draws"},
-                                {.title = "without estimate"},
-                                {.title = "exceedances"},
-                                {.title = "allowed"},
-                                {.title = "bound"},
-                                {.title = "margin"},
-                                {.title = "verdict", .is_text = true},
-                                {.title = "worst value"},
-                                {.title = "in run"}},
-                    .rows = {},
-                    .notes = matrix_notes(review)};
+std::string shell_word(std::string_view text) {
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '/' || c == '-' || c == '+';
+  };
+  if (!text.empty() && std::ranges::all_of(text, is_plain) && text[0] != '-') {
+    return std::string(text);
+  }
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
+  return word + "'";
+}
+
+Table matrix_table(const Review& review) {
+  Table table{.id = "matrix",
+              .caption = fmt::format("Verification matrix (statistical interpretation: {})",
+                                     name_of(review.interpretation)),
+              .columns = {{"id", true},
+                          {"requirement", true},
+                          {"limit"},
+                          {"draws"},
+                          {"without estimate"},
+                          {"exceedances"},
+                          {"allowed"},
+                          {"bound"},
+                          {"margin"},
+                          {"verdict", true},
+                          {"worst value"},
+                          {"in run"}},
+              .notes = matrix_notes(review)};
   if (!review.why_not_independent.empty()) {
     table.notes = {fmt::format("No verdicts: {}.", review.why_not_independent)};
     return table;

@@ -6,10 +6,11 @@
 #include <string>
 
 #include "coordinator/report/digest.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
 #include "core/model_rules.hpp"
 #include "core/runs.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -233,11 +234,17 @@ std::vector<RequirementAnswer> check_requirements(const Store& store,
   return answers;
 }
 
-std::string requirement_text(const RequirementAnswer& answer) {
+Tone tone_of(Verdict verdict) {
+  if (verdict == Verdict::undecided) return Tone::open;
+  return verdict == Verdict::met ? Tone::good : Tone::bad;
+}
+
+std::string requirement_text(const RequirementAnswer& answer, Paint paint) {
   const bool is_joint = answer.requirement.subject == Requirement::Subject::all_objectives;
-  return fmt::format("Requirement  {}\nAnswer       {}\nRule         {}\n{}{}{}", answer.text,
-                     name_of(answer.check.verdict), rule_text(answer),
-                     is_joint ? holding_lines(answer) : exceedance_lines(answer),
+  return fmt::format("Requirement  {}\nAnswer       {}\nRule         {}\n{}{}{}",
+                     wire::visible_text(answer.text),
+                     in_tone(name_of(answer.check.verdict), tone_of(answer.check.verdict), paint),
+                     rule_text(answer), is_joint ? holding_lines(answer) : exceedance_lines(answer),
                      bound_line(answer), needed_line(answer));
 }
 

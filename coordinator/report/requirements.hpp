@@ -10,6 +10,7 @@
 
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/campaign/run_result.hpp"
 #include "core/statistics/interval.hpp"
@@ -96,6 +97,10 @@ struct RequirementAnswer {
 /// Answer, what it rests on, the bound by which it was decided, the tolerance bound, and the draws
 /// it takes; lines of
 /// at most 80 characters unless the requirement is longer.
-[[nodiscard]] std::string requirement_text(const RequirementAnswer& answer);
+[[nodiscard]] std::string requirement_text(const RequirementAnswer& answer,
+                                           Paint paint = Paint::no);
+
+/// What a verdict is painted for.
+[[nodiscard]] Tone tone_of(Verdict verdict);
 
 }  // namespace proofmass::coordinator

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "coordinator/charts/ticks.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "core/model.hpp"
 #include "core/statistics/distribution.hpp"
 

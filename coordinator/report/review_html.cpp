@@ -7,10 +7,12 @@
 #include <string_view>
 
 #include "coordinator/charts/svg.hpp"
-#include "coordinator/report/html_table.hpp"
+#include "coordinator/charts/theme.hpp"
+#include "coordinator/report/report_tables.hpp"
 #include "coordinator/report/review_charts.hpp"
 #include "coordinator/report/review_summary.hpp"
 #include "coordinator/report/review_tables.hpp"
+#include "coordinator/table/html_table.hpp"
 #include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
 
@@ -75,7 +77,8 @@ std::string wide_figure_of(const HeatMap& map) {
       markup_text(map.text.title), figure_of(map));
 }
 
-std::string table_or_nothing(const ReviewTable& table) {
+/// A table as a part of a flow; nothing without rows.
+std::string table_part(const Table& table) {
   return table.rows.empty() ? "" : "<div>\n" + html_table(table) + "</div>\n";
 }
 
@@ -110,7 +113,9 @@ std::string characteristics_markup(const Review& review) {
 std::string budget_markup(const Review& review) {
   const std::optional<BarChart> chart = budget_chart(review);
   if (!chart) return "";
-  return flow(table_or_nothing(review_budget_table(review)) + figure_of(*chart));
+  return flow(
+      table_part(budget_table(review.budget, review.results.statistics, review.results.totals)) +
+      figure_of(*chart));
 }
 
 std::string causes_markup(const Review& review) {
@@ -122,7 +127,7 @@ std::string causes_markup(const Review& review) {
         "the errors with their signs. Cells below four standard errors are empty.</p>\n" +
         wide_figure_of(*map);
   }
-  return html + table_or_nothing(cause_table(review));
+  return html + table_part(cause_table(review));
 }
 
 std::string spectra_markup(const Review& review) {
@@ -141,14 +146,13 @@ std::string spectra_markup(const Review& review) {
       spectra.run.value, markup_text(spectra.sessions.front().noise_meaning));
   std::string figures;
   for (const Chart& chart : spectrum_charts(spectra)) figures += figure_of(chart);
-  return html + flow(figures + table_or_nothing(spectrum_table(spectra)));
+  return html + flow(figures + table_part(spectrum_table(spectra)));
 }
 
 std::string execution_markup(const Review& review) {
-  std::string html =
-      flow(table_or_nothing(identity_table(review)) + table_or_nothing(execution_table(review)) +
-           table_or_nothing(host_table(review))) +
-      "<h3>How to reproduce it</h3>\n<ul>\n";
+  std::string html = flow(table_part(identity_table(review)) + table_part(execution_table(review)) +
+                          table_part(host_table(review))) +
+                     "<h3>How to reproduce it</h3>\n<ul>\n";
   for (const auto& [command, effect] : reproducing_commands(review)) {
     html += fmt::format("<li><code>{}</code> {}</li>\n", markup_text(command), markup_text(effect));
   }
@@ -156,10 +160,13 @@ std::string execution_markup(const Review& review) {
 }
 
 std::vector<Section> sections_of(const Review& review) {
+  const CampaignStatistics& statistics = review.results.statistics;
   return {{"verification", "Verification matrix", html_table(matrix_table(review))},
           {"results", "Accuracy",
-           flow(table_or_nothing(review_accuracy_table(review)) + characteristics_markup(review)) +
-               table_or_nothing(inference_table(review))},
+           flow(table_part(accuracy_table(review.objectives, statistics)) +
+                characteristics_markup(review)) +
+               table_part(interval_table(statistics, review.num_given_up)) +
+               table_part(error_table(statistics, review.num_given_up, review.interpretation))},
           {"distributions", "Errors by parameter", error_figures_markup(review)},
           {"budget-section", "Budget", budget_markup(review)},
           {"causes-section", "Causes of the errors", causes_markup(review)},
@@ -203,6 +210,42 @@ std::string review_html(const Review& review) {
       "</body>\n</html>\n",
       policy, markup_text(review.identity.name), review_style(), page_style,
       summary_markup(review, sections), navigation, content, markup_text(review.database));
+}
+
+std::string review_style() {
+  // Verdicts: the inks of the charts are for lines; text needs 4.5:1.
+  constexpr std::string_view light =
+      "--met:#00603f;--unmet:#a83c00;--open:#6b4a00;--heading:#f2f4f6;";
+  constexpr std::string_view dark =
+      "--met:#45c79b;--unmet:#ff9d5c;--open:#e6b84d;--heading:#1f242b;";
+  return fmt::format(
+             ":root{{color-scheme:light dark;{}{}}}\n"
+             "@media (prefers-color-scheme:dark){{:root{{{}{}}}}}\n"
+             "@media print{{:root{{{}{}}}}}\n",
+             light_colours(), light, dark_colours(), dark, light_colours(), light) +
+         R"(.scroll{overflow-x:auto;max-width:100%;margin:.5rem 0}
+.scroll:focus-visible,a:focus-visible{outline:3px solid var(--chart-first);outline-offset:2px}
+table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
+caption{text-align:left;font-weight:600;padding:.3rem 0;white-space:nowrap}
+th,td{padding:.25rem .6rem;text-align:right;vertical-align:top}
+th,td{border-bottom:1px solid var(--chart-grid)}
+thead th{vertical-align:bottom}
+thead th,thead td{background:var(--heading)}
+th[scope=colgroup]{text-align:center}
+th.words,td.words{text-align:left}
+td{white-space:nowrap}
+td.words{white-space:normal}
+tbody th{font-weight:600;position:sticky;left:0;background:var(--chart-ground)}
+.met{color:var(--met)}.unmet{color:var(--unmet)}.open{color:var(--open)}
+td strong{white-space:nowrap}
+.note{font-size:.9rem;margin:.3rem 0;max-width:48rem}
+code{font-family:ui-monospace,monospace;font-size:.9em}
+figure{margin:.5rem 0;max-width:100%}
+figure svg{display:block;height:auto;max-width:100%}
+.scroll figure,.scroll svg{max-width:none}
+.flow{display:flex;flex-wrap:wrap;align-items:flex-start;gap:.5rem 1rem}
+.flow>div{max-width:100%}
+)";
 }
 
 }  // namespace proofmass::coordinator

@@ -11,4 +11,8 @@ namespace proofmass::coordinator {
 /// the same review.
 [[nodiscard]] std::string review_html(const Review& review);
 
+/// The style that html_table() and embedded charts need: rules of CSS without their element.
+/// Colours are custom properties, for light and dark.
+[[nodiscard]] std::string review_style();
+
 }  // namespace proofmass::coordinator

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -11,7 +10,7 @@
 #include <vector>
 
 #include "coordinator/report/digest.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/figures.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
@@ -21,8 +20,6 @@
 namespace proofmass::coordinator {
 namespace {
 
-constexpr std::array<TextColumn, 4> term_columns{
-    {{"error as a sum of", 44, true}, {"slope", 12}, {"of variance", 13}, {"p", 11}}};
 constexpr double p_value_min = 1e-9;  // Below it the approximations of the tests do not hold.
 
 std::vector<std::string> column_names() {
@@ -50,7 +47,7 @@ std::vector<double> magnitudes_of(const std::vector<double>& errors) {
   return magnitudes;
 }
 
-std::vector<Column> inputs_of(const DrawnRuns& drawn) {
+std::vector<proofmass::Column> inputs_of(const DrawnRuns& drawn) {
   return {drawn.columns.begin(), drawn.columns.end()};
 }
 
@@ -59,8 +56,8 @@ std::vector<std::vector<Sensitivity>> sensitivities_of(const DrawnRuns& drawn,
                                                        std::size_t quantity) {
   const std::vector<double>& errors = drawn.errors[quantity];
   const std::vector<double> magnitudes = magnitudes_of(errors);
-  const std::vector<Column> inputs = inputs_of(drawn);
-  const std::vector<Column> outputs{errors, magnitudes};
+  const std::vector<proofmass::Column> inputs = inputs_of(drawn);
+  const std::vector<proofmass::Column> outputs{errors, magnitudes};
   return sensitivities(inputs, outputs, default_confidence);
 }
 
@@ -73,53 +70,64 @@ std::string p_value_cell(double p_value) {
   return p_value < p_value_min ? fmt::format("<{:.0e}", p_value_min) : measured_figure(p_value);
 }
 
+double percentile_of(const std::vector<double>& values, double value) {
+  const auto below = std::ranges::count_if(values, [&](double other) { return other < value; });
+  return 100.0 * static_cast<double>(below) / static_cast<double>(values.size());
+}
+
 /// Heading of the quantities that drive an output.
 std::string driver_heading(std::span<const Sensitivity> rows, std::string_view output) {
   return rows.empty() ? fmt::format("{}: no input found", output)
                       : fmt::format("drives {}", output);
 }
 
-std::string sensitivity_rows(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
-                             std::string_view output) {
-  const std::string title = driver_heading(rows, output);
-  const std::array<TextColumn, 4> columns{
-      {{title, 39, true}, {"% of variance (95 %)", 21}, {"rank", 9}, {"p", 11}}};
-  std::string text = table_heading(columns);
-  for (const Sensitivity& row : rows) {
-    const std::array cells{drawn.names[row.input], share_of(row.first_order),
-                           fmt::format("{:+.2f}", row.rank.coefficient),
-                           p_value_cell(row.adjusted_p_value)};
-    text += table_row(columns, cells, WideCell::keep);
+/// The quantities that drive an output: how sure that is, or, of one run, what it drew.
+/// @param position  Of the run.
+Table driver_table(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
+                   std::string_view output, std::optional<std::size_t> position) {
+  Table table{.columns = {{driver_heading(rows, output), true, 39},
+                          {"% of variance (95 %)", false, 21}}};
+  if (position) {
+    table.columns.insert(table.columns.end(), {{"value", false, 10}, {"% below", false, 10}});
+  } else {
+    table.columns.insert(table.columns.end(), {{"rank", false, 9}, {"p", false, 11}});
   }
-  return text;
-}
-
-std::string key_of(const std::vector<Sensitivity>& rows) {
-  if (rows.empty()) return "";
-  return fmt::format(
-      "% of variance: with its 95 % interval; rank: rank correlation; p: that chance\n"
-      "alone makes one of {} quantities look so influential (Kruskal-Wallis, Holm)\n",
-      rows.size());
-}
-
-std::string term_row(const DrawnRuns& drawn, const ExplanatoryTerm& term) {
-  const std::string name = term_name(drawn, term);
-  const bool fits = display_width(name) < term_columns[0].width;
-  const std::array cells{fits ? name : std::string(), fmt::format("{:.3g}", term.slope),
-                         fmt::format("{:.1f} %", 100.0 * term.share), p_value_cell(term.p_value)};
-  return (fits ? "" : name + "\n") + table_row(term_columns, cells, WideCell::keep);
+  for (const Sensitivity& row : rows) {
+    Row& cells = table.rows.emplace_back();
+    cells = {drawn.names[row.input], share_of(row.first_order)};
+    if (position) {
+      const std::vector<double>& values = drawn.columns[row.input];
+      const double value = values[*position];
+      cells.emplace_back(fmt::format("{:.3g}", value));
+      cells.emplace_back(fmt::format("{:.1f}", percentile_of(values, value)));
+    } else {
+      cells.emplace_back(fmt::format("{:+.2f}", row.rank.coefficient));
+      cells.emplace_back(p_value_cell(row.adjusted_p_value));
+    }
+  }
+  return table;
 }
 
 /// The sum of quantities and products of two that explains the error.
-std::string term_table(const DrawnRuns& drawn, std::size_t quantity) {
+Table term_table(const DrawnRuns& drawn, std::size_t quantity) {
   const std::vector<ExplanatoryTerm> terms = explanatory_terms(
       inputs_of(drawn), drawn.errors[quantity], num_terms_max, default_confidence);
-  if (terms.empty()) return "No quantity and no product of two explains the error.\n";
-  std::string text = table_heading(term_columns);
-  for (const ExplanatoryTerm& term : terms) text += term_row(drawn, term);
-  return text +
-         "slope: in SI units; of variance: R², beyond that of the terms above; p: that\n"
-         "chance alone makes one of all quantities and products of two look so\n";
+  if (terms.empty()) return {.notes = {"No quantity and no product of two explains the error."}};
+  Table table{.columns = {{.title = "error as a sum of",
+                           .is_text = true,
+                           .width = 44,
+                           .has_lines_of_its_own = true},
+                          {"slope", false, 12},
+                          {"of variance", false, 13},
+                          {"p", false, 11}},
+              .notes = {"slope: in SI units; of variance: R², beyond that of the terms above; p: "
+                        "that chance alone makes one of all quantities and products of two look "
+                        "so"}};
+  for (const ExplanatoryTerm& term : terms) {
+    table.rows.push_back({term_name(drawn, term), fmt::format("{:.3g}", term.slope),
+                          fmt::format("{:.1f} %", 100.0 * term.share), p_value_cell(term.p_value)});
+  }
+  return table;
 }
 
 std::string left_out(const DrawnRuns& drawn) {
@@ -174,28 +182,6 @@ std::size_t rank_of(const std::vector<double>& errors, std::size_t position) {
   const double magnitude = std::abs(errors[position]);
   return 1 + static_cast<std::size_t>(std::ranges::count_if(
                  errors, [&](double error) { return std::abs(error) > magnitude; }));
-}
-
-double percentile_of(const std::vector<double>& values, double value) {
-  const auto below = std::ranges::count_if(values, [&](double other) { return other < value; });
-  return 100.0 * static_cast<double>(below) / static_cast<double>(values.size());
-}
-
-std::string explanation_rows(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
-                             std::size_t position, std::string_view output) {
-  const std::string title = driver_heading(rows, output);
-  const std::array<TextColumn, 4> columns{
-      {{title, 38, true}, {"% of variance (95 %)", 21}, {"value", 10}, {"percentile", 11}}};
-  std::string text = table_heading(columns);
-  for (const Sensitivity& row : rows) {
-    const std::vector<double>& values = drawn.columns[row.input];
-    const double value = values[position];
-    const std::array cells{drawn.names[row.input], share_of(row.first_order),
-                           fmt::format("{:.3g}", value),
-                           fmt::format("{:.1f}", percentile_of(values, value))};
-    text += table_row(columns, cells, WideCell::keep);
-  }
-  return text;
 }
 
 using Json = nlohmann::ordered_json;
@@ -273,27 +259,38 @@ DrawnRuns read_drawn_runs(const Store& store, const Campaign& campaign, std::uin
 }
 
 std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
-                             std::optional<std::size_t> num_rows) {
+                             std::optional<std::size_t> num_rows, Paint paint) {
+  const TerminalStyle style{.paint = paint};
   const auto both = sensitivities_of(drawn, quantity);
-  return fmt::format("{}: {} runs\n{}{}\n{}\n{}{}\n{}\n{}",
-                     model().results().quantities[quantity].symbol, drawn.runs.size(),
-                     limit_line(drawn), left_out(drawn),
-                     sensitivity_rows(drawn, first_of(both[1], num_rows), "|error|"),
-                     sensitivity_rows(drawn, first_of(both[0], num_rows), "error"), key_of(both[1]),
-                     term_table(drawn, quantity), worst_run_text(drawn, quantity));
+  Table drivers = driver_table(drawn, first_of(both[0], num_rows), "error", std::nullopt);
+  if (!both[1].empty()) {
+    drivers.notes.push_back(
+        fmt::format("% of variance: with its 95 % interval; rank: rank correlation; p: that chance "
+                    "alone makes one of {} quantities look so influential (Kruskal-Wallis, Holm)",
+                    both[1].size()));
+  }
+  return fmt::format(
+      "{}: {} runs\n{}{}\n{}\n{}\n{}\n{}", model().results().quantities[quantity].symbol,
+      drawn.runs.size(), limit_line(drawn), left_out(drawn),
+      terminal_text(driver_table(drawn, first_of(both[1], num_rows), "|error|", std::nullopt),
+                    style),
+      terminal_text(drivers, style), terminal_text(term_table(drawn, quantity), style),
+      worst_run_text(drawn, quantity));
 }
 
 std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity, RunIndex run,
-                             std::optional<std::size_t> num_rows) {
+                             std::optional<std::size_t> num_rows, Paint paint) {
+  const TerminalStyle style{.paint = paint};
   const std::size_t position = position_of(drawn, run);
   const Quantity& info = model().results().quantities[quantity];
   const std::vector<double>& errors = drawn.errors[quantity];
   const auto both = sensitivities_of(drawn, quantity);
-  return fmt::format("Run {}: error of {} {:.3g} {}, rank {} of {}\n{}{}\n{}\n{}", run.value,
-                     info.symbol, errors[position] / info.display_scale, info.display_unit,
-                     rank_of(errors, position), errors.size(), limit_line(drawn), left_out(drawn),
-                     explanation_rows(drawn, first_of(both[1], num_rows), position, "|error|"),
-                     explanation_rows(drawn, first_of(both[0], num_rows), position, "error"));
+  return fmt::format(
+      "Run {}: error of {} {:.3g} {}, rank {} of {}\n{}{}\n{}\n{}", run.value, info.symbol,
+      errors[position] / info.display_scale, info.display_unit, rank_of(errors, position),
+      errors.size(), limit_line(drawn), left_out(drawn),
+      terminal_text(driver_table(drawn, first_of(both[1], num_rows), "|error|", position), style),
+      terminal_text(driver_table(drawn, first_of(both[0], num_rows), "error", position), style));
 }
 
 std::size_t worst_quantity_of(const DrawnRuns& drawn, RunIndex run,

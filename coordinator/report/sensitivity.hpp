@@ -9,6 +9,7 @@
 
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/store/store.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/runs.hpp"
 #include "core/statistics/term_search.hpp"
@@ -57,13 +58,15 @@ inline constexpr std::size_t num_rows_by_default = 5;
 /// explanatory_terms(), and how to ask why the worst run is so. Lines have at most 80 characters.
 /// @throws InvalidArgument below 16 runs.
 [[nodiscard]] std::string sensitivity_text(const DrawnRuns& drawn, std::size_t quantity,
-                                           std::optional<std::size_t> num_rows = {});
+                                           std::optional<std::size_t> num_rows = {},
+                                           Paint paint = Paint::no);
 
 /// Why a run is as far off as it is: the place of its |error| among the runs, and its values of the
 /// quantities that drive |error| and error of the parameter, each with its percentile.
 /// @throws InvalidArgument if the run is not among those, or they are below 16.
 [[nodiscard]] std::string explanation_text(const DrawnRuns& drawn, std::size_t quantity,
-                                           RunIndex run, std::optional<std::size_t> num_rows = {});
+                                           RunIndex run, std::optional<std::size_t> num_rows = {},
+                                           Paint paint = Paint::no);
 
 /// Both for programs, of these parameters, in full precision and SI units; of the run's values only
 /// if there is one. coordinator/cli/README.md lists the keys.

@@ -68,14 +68,13 @@ Chart spectrum_chart(const SessionSpectrum& spectrum, RunIndex run) {
 }
 
 /// A line of the estimate, and the noise about it.
-std::vector<ReviewCell> line_cells(const SessionSpectrum& spectrum, const SpectrumLine& line) {
-  return {{.text = name_in_symbols(spectrum.session), .kind = ReviewCell::Kind::words},
-          {.text = figure_text(1e3 * line.frequency_hz), .value = line.frequency_hz},
-          {.text = figure_text(line.amplitude), .value = line.amplitude},
-          {.text = spectrum.unit, .kind = ReviewCell::Kind::words},
-          spectrum.noise_ratio ? ReviewCell{.text = ratio_text(*spectrum.noise_ratio),
-                                            .value = spectrum.noise_ratio->value}
-                               : ReviewCell{.text = "–"}};
+Row line_cells(const SessionSpectrum& spectrum, const SpectrumLine& line) {
+  const auto& ratio = spectrum.noise_ratio;
+  return {name_in_symbols(spectrum.session),
+          {figure_text(1e3 * line.frequency_hz), line.frequency_hz},
+          {figure_text(line.amplitude), line.amplitude},
+          spectrum.unit,
+          ratio ? Cell(ratio_text(*ratio), ratio->value) : Cell("–")};
 }
 
 }  // namespace
@@ -90,19 +89,17 @@ std::vector<Chart> spectrum_charts(const RunSpectra& spectra) {
 
 std::string spectrum_name(std::string_view session) { return fmt::format("spectrum:{}", session); }
 
-ReviewTable spectrum_table(const RunSpectra& spectra) {
-  ReviewTable table{
-      .id = "spectra",
-      .caption = fmt::format("Lines that the estimates of run {} use", spectra.run.value),
-      .columns = {{.title = "session", .is_text = true},
-                  {.title = "frequency, mHz"},
-                  {.title = "amplitude"},
-                  {.title = "unit", .is_text = true},
-                  {.title = "noise power ÷ model"}},
-      .rows = {},
-      .notes = {"Noise power: from the median of all frequencies up to a factor of "
-                "three from these lines, without what is within two bins of a fitted "
-                "line, ± its standard error."}};
+Table spectrum_table(const RunSpectra& spectra) {
+  Table table{.id = "spectra",
+              .caption = fmt::format("Lines that the estimates of run {} use", spectra.run.value),
+              .columns = {{"session", true},
+                          {"frequency, mHz"},
+                          {"amplitude"},
+                          {"unit", true},
+                          {"noise power ÷ model"}},
+              .notes = {"Noise power: from the median of all frequencies up to a factor of three "
+                        "from these lines, without what is within two bins of a fitted line, ± its "
+                        "standard error."}};
   for (const SessionSpectrum& spectrum : spectra.sessions) {
     for (const SpectrumLine& line : spectrum.lines) {
       if (line.is_used) table.rows.push_back(line_cells(spectrum, line));

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/figures.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
@@ -21,25 +21,26 @@ std::string further_note(std::uint64_t count, std::size_t num_shown, std::string
 
 namespace {
 
-std::string comparison_note(const wire::CampaignStatus& campaign) {
+Remark comparison_note(const wire::CampaignStatus& campaign) {
   const std::string compared =
       counted(campaign.num_audited, "result") + " compared with a second computation: ";
-  if (campaign.num_mismatches == 0) return compared + "all equal";
-  return compared + fmt::format("{} differ (none may)", campaign.num_mismatches);
+  if (campaign.num_mismatches == 0) return {compared + "all equal"};
+  return {compared + fmt::format("{} differ (none may)", campaign.num_mismatches), Tone::bad};
 }
 
 }  // namespace
 
-std::vector<std::string> notes_about(const wire::CampaignStatus& campaign) {
-  std::vector<std::string> notes;
+std::vector<Remark> notes_about(const wire::CampaignStatus& campaign) {
+  std::vector<Remark> notes;
+  const auto add_trouble = [&](std::string text) { notes.push_back({std::move(text), Tone::bad}); };
   if (!campaign.storage_failure.empty()) {
-    notes.push_back("nothing can be stored: " + wire::visible_text(campaign.storage_failure));
+    add_trouble("nothing can be stored: " + wire::visible_text(campaign.storage_failure));
   }
   if (campaign.num_given_up > 0) {
-    notes.push_back(counted(campaign.num_given_up, "run") + " given up: too many workers crashed");
+    add_trouble(counted(campaign.num_given_up, "run") + " given up: too many workers crashed");
   }
   if (campaign.num_without_estimate > 0) {
-    notes.push_back(counted(campaign.num_without_estimate, "run") + " without an estimate");
+    add_trouble(counted(campaign.num_without_estimate, "run") + " without an estimate");
   }
   if (campaign.num_audited > 0 || campaign.num_mismatches > 0) {
     notes.push_back(comparison_note(campaign));
@@ -70,19 +71,22 @@ std::string factory_note(const wire::FactoryStatus& factory) {
 
 }  // namespace
 
-std::vector<std::string> service_notes(const wire::StatusReply& status) {
-  std::vector<std::string> notes;
-  const auto add = [&](std::string note) {
-    if (!note.empty()) notes.push_back(std::move(note));
+std::vector<Remark> service_notes(const wire::StatusReply& status) {
+  std::vector<Remark> notes;
+  const auto add = [&](std::string note, Tone tone) {
+    if (!note.empty()) notes.push_back({std::move(note), tone});
   };
   for (const wire::UnservedFile& file : status.unserved_files) {
-    add("not served, tried again: " + wire::visible_text(file.reason));
+    add("not served, tried again: " + wire::visible_text(file.reason), Tone::bad);
   }
-  add(further_note(status.num_unserved_files, status.unserved_files.size(), "more such file"));
-  for (const std::string& host : status.quarantined_hosts) add(quarantine_note(host));
-  add(further_note(status.num_quarantined_hosts, status.quarantined_hosts.size(),
-                   "more such host"));
-  for (const wire::FactoryStatus& factory : status.factories) add(factory_note(factory));
+  add(further_note(status.num_unserved_files, status.unserved_files.size(), "more such file"),
+      Tone::plain);
+  for (const std::string& host : status.quarantined_hosts) add(quarantine_note(host), Tone::bad);
+  add(further_note(status.num_quarantined_hosts, status.quarantined_hosts.size(), "more such host"),
+      Tone::plain);
+  for (const wire::FactoryStatus& factory : status.factories) {
+    add(factory_note(factory), Tone::plain);
+  }
   return notes;
 }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "coordinator/table/table.hpp"
 #include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
@@ -20,9 +21,9 @@ namespace proofmass::coordinator {
                                        std::string_view thing);
 
 /// About a campaign.
-[[nodiscard]] std::vector<std::string> notes_about(const wire::CampaignStatus& campaign);
+[[nodiscard]] std::vector<Remark> notes_about(const wire::CampaignStatus& campaign);
 
 /// About the coordinator itself: files that are not served, hosts in quarantine, factories.
-[[nodiscard]] std::vector<std::string> service_notes(const wire::StatusReply& status);
+[[nodiscard]] std::vector<Remark> service_notes(const wire::StatusReply& status);
 
 }  // namespace proofmass::coordinator

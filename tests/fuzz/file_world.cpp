@@ -11,9 +11,9 @@
 #include <utility>
 
 #include "coordinator/archive/comparison.hpp"
-#include "coordinator/archive/comparison_text.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/listing.hpp"
+#include "coordinator/archive/several_comparison.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/net/service.hpp"
@@ -158,16 +158,10 @@ void read_drawn(const fs::path& file) {
 }
 
 void compare(const fs::path& file, const fs::path& pristine) {
-  const Store first = Store::open_read_only(file);
-  const Store second = Store::open_read_only(pristine);
-  CampaignComparison comparison;
-  first.read_one_state([&] {
-    second.read_one_state([&] {
-      comparison = compare_campaigns(read_compared(first, never), read_compared(second, never));
-    });
-  });
-  (void)comparison_text(comparison, "a", "b");
-  (void)comparison_json(comparison, "a", "b");
+  const std::array<fs::path, 2> files{file, pristine};
+  const std::vector<ComparedMember> members = compare_several(files, never);
+  (void)comparison_text(members, lettered(2));
+  (void)comparison_json(members);
 }
 
 void back_up(const fs::path& file) {
@@ -222,7 +216,7 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
     case FileUse::list: {
       const std::array<fs::path, 1> places{file};
       const auto campaigns = list_campaigns(places);
-      (void)listing_text(campaigns, 80);
+      (void)terminal_text(listing_table(campaigns));
       (void)listing_json(campaigns);
       return;
     }

@@ -19,7 +19,7 @@ int list_databases(const ListOptions& options) {
   if (options.format == OutputFormat::json) {
     print_lines(listing_json(campaigns));
   } else {
-    print_tables(listing_text(campaigns, line_width_max_of(stdout)));
+    write_standard_output(terminal_text(listing_table(campaigns), style_of(stdout)));
   }
   return exit_done;
 }

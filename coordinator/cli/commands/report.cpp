@@ -65,10 +65,10 @@ std::vector<RequirementAnswer> answers_of(const Store& store, const Campaign& ca
   }
 }
 
-std::string answers_text(const std::vector<RequirementAnswer>& answers) {
+std::string answers_text(const std::vector<RequirementAnswer>& answers, Paint paint) {
   std::string text;
   for (const RequirementAnswer& answer : answers) {
-    text += (text.empty() ? "" : "\n") + requirement_text(answer);
+    text += (text.empty() ? "" : "\n") + requirement_text(answer, paint);
   }
   return text;
 }
@@ -85,9 +85,7 @@ int print_remote_report(const ReportOptions& options) {
     question.options.push_back("--requirement=" + requirement);
   }
   if (options.format == OutputFormat::json) question.options.emplace_back("--json");
-  return print_answer(
-      options.connection, question,
-      options.format == OutputFormat::json ? AnswerText::lines : AnswerText::tables);
+  return print_answer(options.connection, question, AnswerText::lines);
 }
 
 int exit_code_of(bool are_met) { return are_met ? exit_done : exit_not_met; }
@@ -152,7 +150,9 @@ int print_report(const ReportOptions& options) {
   if (options.format == OutputFormat::json) {
     print_lines(report_json(store, *campaign, answers, stated));
   } else {
-    print_tables(answers.empty() ? report_text(store, *campaign) : answers_text(answers));
+    const Paint paint = style_of(stdout).paint;
+    write_standard_output(answers.empty() ? report_text(store, *campaign, paint)
+                                          : answers_text(answers, paint));
   }
   return exit_code_of(std::ranges::all_of(answers, [](const RequirementAnswer& answer) {
     return answer.check.verdict == Verdict::met;

@@ -155,7 +155,7 @@ Log log_to(ProgressDisplay& display) {
   return [&display](const Event& event) {
     // StorageNotes tells of the storage.
     if (event.severity != Severity::error || event.kind == "storage_failed") return;
-    display.note("proofmass: error: " + to_text(event));
+    display.note("proofmass: error: " + to_text(event), Tone::bad);
   };
 }
 
@@ -169,10 +169,10 @@ class StorageNotes {
     if (status.storage_failure == shown_) return;
     shown_ = status.storage_failure;
     if (shown_.empty()) return display_.note("proofmass: all results are stored again");
+    display_.note("proofmass: error: " + wire::visible_text(shown_), Tone::bad);
     display_.note(fmt::format(
-        "proofmass: error: {}\nproofmass: results are kept, and stored when that is possible; "
-        "tried again every {} s",
-        wire::visible_text(shown_), retry_after_s_));
+        "proofmass: results are kept, and stored when that is possible; tried again every {} s",
+        retry_after_s_));
   }
 
  private:
@@ -307,7 +307,8 @@ void check_part(const RunOptions& options, const Campaign& campaign) {
 }
 
 void print_outcome(const Store& store, const Campaign& campaign, RunOutput output) {
-  if (output == RunOutput::tables) print_tables(report_text(store, campaign));
+  if (output == RunOutput::tables)
+    write_standard_output(report_text(store, campaign, style_of(stdout).paint));
   if (output == RunOutput::json) print_lines(report_json(store, campaign, {}, {}));
 }
 

@@ -48,9 +48,7 @@ int print_remote_sensitivity(const SensitivityOptions& options) {
   if (options.parameter) question.options.push_back("--parameter=" + *options.parameter);
   if (options.run) question.options.push_back(fmt::format("--run={}", *options.run));
   if (options.format == OutputFormat::json) question.options.emplace_back("--json");
-  return print_answer(
-      options.connection, question,
-      options.format == OutputFormat::json ? AnswerText::lines : AnswerText::tables);
+  return print_answer(options.connection, question, AnswerText::lines);
 }
 
 int print_sensitivity(const SensitivityOptions& options) {
@@ -70,7 +68,7 @@ int print_sensitivity(const SensitivityOptions& options) {
   const bool is_json = options.format == OutputFormat::json;
   if (explained && quantities.empty()) {
     const std::vector<double> objectives = campaign->objectives();
-    if (!is_json) print_tables(choice_text(drawn, *explained, objectives));
+    if (!is_json) print_lines(choice_text(drawn, *explained, objectives));
     quantities.push_back(worst_quantity_of(drawn, *explained, objectives));
   }
   if (quantities.empty()) {
@@ -80,14 +78,16 @@ int print_sensitivity(const SensitivityOptions& options) {
     print_lines(sensitivity_json(drawn, quantities, explained, options.num_rows));
     return exit_done;
   }
+  const Paint paint = style_of(stdout).paint;
   if (explained) {
-    print_tables(explanation_text(drawn, quantities.front(), *explained, options.num_rows));
+    write_standard_output(
+        explanation_text(drawn, quantities.front(), *explained, options.num_rows, paint));
     return exit_done;
   }
   std::string_view separator = "";
   for (const std::size_t quantity : quantities) {
-    print_tables(
-        fmt::format("{}{}", separator, sensitivity_text(drawn, quantity, options.num_rows)));
+    write_standard_output(
+        fmt::format("{}{}", separator, sensitivity_text(drawn, quantity, options.num_rows, paint)));
     separator = "\n";
   }
   return exit_done;

@@ -12,7 +12,7 @@ int show_status(const ClientOptions& options) {
     if (options.format == OutputFormat::json) {
       print_lines(status_json(status, JsonLayout::indented));
     } else {
-      print_tables(status_table(status, line_width_max_of(stdout)));
+      write_standard_output(status_text(status, style_of(stdout)));
     }
     return exit_done;
   });
@@ -24,7 +24,7 @@ int show_workers(const ClientOptions& options) {
     if (options.format == OutputFormat::json) {
       print_lines(workers_json(workers));
     } else {
-      print_tables(workers_table(workers, line_width_max_of(stdout)));
+      write_standard_output(terminal_text(workers_table(workers), style_of(stdout)));
     }
     return exit_done;
   });

@@ -27,6 +27,7 @@
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/link/surroundings.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -201,8 +202,9 @@ std::string sweep_text(const Sweep& sweep, OutputFormat format, const IsStopped&
     values.push_back(swept.values);
   }
   const std::vector<ComparedMember> members = compare_several(files, is_stopped);
-  return format == OutputFormat::json ? several_json(members, values)
-                                      : several_text(members, sweep_names(values));
+  return format == OutputFormat::json
+             ? wire::visible_lines(comparison_json(members, values))
+             : comparison_text(members, sweep_names(values), style_of(stdout).paint);
 }
 
 int sweep_campaigns(const SweepOptions& options) {
@@ -216,8 +218,7 @@ int sweep_campaigns(const SweepOptions& options) {
     return exit_code;
   }
   return run_until_stopped([&](const IsStopped& is_stopped) {
-    const auto print = options.format == OutputFormat::json ? print_lines : print_tables;
-    print(sweep_text(sweep, options.format, is_stopped));
+    write_standard_output(sweep_text(sweep, options.format, is_stopped));
     return exit_code;
   });
 }

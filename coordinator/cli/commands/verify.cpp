@@ -50,7 +50,7 @@ int verify_database(const VerifyCommandOptions& options) {
         checks.push_back(json_of_check(check));
         return;
       }
-      print_tables(check_text(check));
+      write_standard_output(check_text(check, style_of(stdout).paint));
       flush_standard_output();  // The simulation may take long.
     };
     const bool holds = verify(options.database, how, report, is_stopped);

@@ -14,8 +14,6 @@
 
 #include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/painting.hpp"
-#include "coordinator/report/text_cells.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 
@@ -39,17 +37,17 @@ wire::StatusReply with_open_ones_first(wire::StatusReply status) {
 
 }  // namespace
 
-Drawing drawn_over(std::size_t num_lines_before, std::string_view text, ScreenSize size,
-                   const std::function<std::string(std::string_view)>& paint) {
+Drawing drawn_over(std::size_t num_lines_before, std::string_view text, std::size_t num_rows) {
   // The cursor stands below the last line, so one row stays free.
-  const std::size_t rows_max = std::max<std::size_t>(2, size.rows) - 1;
+  const std::size_t rows_max = std::max<std::size_t>(2, num_rows) - 1;
   const auto num_lines = static_cast<std::size_t>(std::ranges::count(text, '\n')) +
                          (text.empty() || text.ends_with('\n') ? 0 : 1);
   const std::size_t num_shown = num_lines > rows_max ? rows_max - 1 : num_lines;
   Drawing drawing;
-  std::string lines;
+  if (num_lines_before > 0) drawing.text = fmt::format("\033[{}A", num_lines_before);
+  // What a longer line left behind is erased to the end of the line.
   const auto draw = [&](std::string_view line) {
-    lines += shortened(line, size.columns) + "\n";
+    drawing.text.append(line).append("\033[K\n");
     ++drawing.num_lines;
   };
   while (drawing.num_lines < num_shown) {
@@ -58,12 +56,6 @@ Drawing drawn_over(std::size_t num_lines_before, std::string_view text, ScreenSi
     text.remove_prefix(std::min(end + 1, text.size()));
   }
   if (num_shown < num_lines) draw(fmt::format("and {} more lines", num_lines - num_shown));
-  if (num_lines_before > 0) drawing.text = fmt::format("\033[{}A", num_lines_before);
-  // What a longer line left behind is erased to the end of the line.
-  for (const char character : paint ? paint(lines) : lines) {
-    if (character == '\n') drawing.text += "\033[K";
-    drawing.text += character;
-  }
   drawing.text += "\033[J";
   return drawing;
 }
@@ -86,12 +78,11 @@ void WatchDisplay::update(const wire::StatusReply& status) {
 }
 
 void WatchDisplay::show_screen(const wire::StatusReply& status) {
-  const ScreenSize size = screen_size_of(stream_);
-  const std::string table =
-      wire::visible_lines(status_table(with_open_ones_first(status), size.columns - 1));
-  std::function<std::string(std::string_view)> paint;
-  if (takes_paint(stream_)) paint = painted;
-  const Drawing drawing = drawn_over(num_lines_drawn_, table, size, paint);
+  TerminalStyle style = style_of(stream_);
+  style.cuts_remarks = true;
+  const Drawing drawing =
+      drawn_over(num_lines_drawn_, status_text(with_open_ones_first(status), style),
+                 screen_size_of(stream_).rows);
   fmt::print(stream_, "{}", drawing.text);
   num_lines_drawn_ = drawing.num_lines;
 }

@@ -27,13 +27,11 @@ struct Drawing {
   std::size_t num_lines = 0;  ///< Of the table that is on the screen.
 };
 
-/// Text cut to the screen, lines ended by `\n`, to be drawn over `num_lines_before` lines that end
-/// right above the cursor. If there are more lines than the screen has rows, the last one says how
-/// many are left out.
-/// @param paint  Paints the lines that are left, see painted(); by default none.
+/// Lines ended by `\n`, none longer than the screen, to be drawn over `num_lines_before` lines that
+/// end right above the cursor. If there are more lines than the screen has rows, the last one says
+/// how many are left out.
 [[nodiscard]] Drawing drawn_over(std::size_t num_lines_before, std::string_view text,
-                                 ScreenSize size,
-                                 const std::function<std::string(std::string_view)>& paint = {});
+                                 std::size_t num_rows);
 
 /// Shows where campaigns stand, again and again.
 class WatchDisplay {

@@ -8,7 +8,8 @@
 #include <regex>
 #include <utility>
 
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/figures.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "core/microscope/simulation/run.hpp"
 
 namespace proofmass::test {

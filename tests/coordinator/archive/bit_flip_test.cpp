@@ -9,9 +9,9 @@
 #include <string>
 
 #include "coordinator/archive/comparison.hpp"
-#include "coordinator/archive/comparison_text.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/listing.hpp"
+#include "coordinator/archive/several_comparison.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/summarise.hpp"
@@ -73,10 +73,8 @@ class BitFlips : public test::StoreTest {
 
   [[nodiscard]] std::string comparison_of(const std::filesystem::path& path) const {
     return printed([&] {
-      const Store first = Store::open_read_only(path), second = Store::open_read_only(file());
-      return comparison_json(compare_campaigns(read_compared(first, test::never_stopped),
-                                               read_compared(second, test::never_stopped)),
-                             "a", "b");
+      const std::vector<std::filesystem::path> files{path, file()};
+      return comparison_json(compare_several(files, test::never_stopped));
     });
   }
 
@@ -138,7 +136,7 @@ TEST_F(BitFlips, EndNoVerificationAndNoListing) {
       EXPECT_FALSE(holds) << what;
       return std::string();
     });
-    (void)printed([&] { return listing_text(list_campaigns(std::vector{path}), 80); });
+    (void)printed([&] { return terminal_text(listing_table(list_campaigns(std::vector{path}))); });
   });
 }
 

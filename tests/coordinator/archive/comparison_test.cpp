@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "coordinator/archive/comparison_text.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/archive/several_comparison.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "core/statistics/error_change.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
@@ -18,6 +19,7 @@
 namespace proofmass::coordinator {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 /// A campaign with its results.
@@ -67,6 +69,27 @@ void worsen(Side& side, Parameter parameter, double change) {
     const double larger = change * static_cast<double>(result.run.value + 1);
     result.estimate[index(parameter)] += std::copysign(larger, result.error(index(parameter)));
   }
+}
+
+/// A comparison as `compare` holds it, of campaigns whose objectives and statistics do not matter.
+std::vector<ComparedMember> both(const CampaignComparison& comparison) {
+  ComparedMember first, second;
+  first.file = "a.db";
+  second.file = "b.db";
+  first.missing = comparison.missing_in_first;
+  second.missing = comparison.missing_in_second;
+  second.comparison = comparison;
+  first.objectives = second.objectives =
+      std::vector<double>(num_parameters, std::numeric_limits<double>::infinity());
+  first.statistics.num_estimated = comparison.num_first;
+  second.statistics.num_estimated = comparison.num_second;
+  first.statistics.accuracy.resize(num_parameters);
+  second.statistics.accuracy.resize(num_parameters);
+  return {first, second};
+}
+
+std::string text_of(const CampaignComparison& comparison) {
+  return comparison_text(both(comparison), lettered(2));
 }
 
 // Errors of a_c12 are 4, −8, 12 and −16 in the first campaign, 4.5, −9, 13.5 and −18 in the second;
@@ -206,9 +229,9 @@ TEST(Comparison, OfTwoRunsFindsNoChange) {
     EXPECT_GT(parameter.adjusted_p_values.scale, 0.05);
     EXPECT_GT(parameter.adjusted_p_values.tail, 0.05);
   }
-  EXPECT_THAT(comparison_text(comparison, "a", "b"),
-              HasSubstr("\nfrom, to: 95 % interval of the change; "
-                        "p: larger of Welch's and Smirnov's test\n"));
+  EXPECT_THAT(text_of(comparison),
+              HasSubstr("\nfrom, to: 95 % interval of the change from A; p: larger of Welch's and\n"
+                        "  Smirnov's test\n"));
 }
 
 TEST(Comparison, OfOtherDrawsIsOfAllRuns) {
@@ -238,9 +261,8 @@ TEST(Comparison, OfTooFewRunsIsOfTheDefinitionsAlone) {
   for (RunResult& result : second.results) result.status = RunStatus::not_finite;
   const CampaignComparison comparison = compare_campaigns(first, second);
   EXPECT_EQ(comparison.why_not_compared, "0 and 0 runs with an estimate (must be at least 1)");
-  EXPECT_THAT(comparison_text(comparison, "a", "b"),
-              HasSubstr("The results cannot be compared:\n0 and 0 runs with an estimate (must be "
-                        "at least 1).\n"));
+  EXPECT_THAT(text_of(comparison),
+              HasSubstr("     0  cannot be: 0 and 0 runs with an estimate (must be at least 1)\n"));
 }
 
 TEST(Comparison, NamesOtherModelsAndBuilds) {
@@ -312,16 +334,20 @@ TEST(ComparisonText, FitsATerminalAndMarksWhatIsSignificant) {
   Side second = side(40);
   worsen(second, Parameter::a_c12, 1e-3);
   second.campaign.scenario.noise.scale = 2.0;
-  const std::string text = comparison_text(compare_campaigns(first, second), "one.db", "two.db");
-  EXPECT_THAT(text, HasSubstr("A  one.db\nB  two.db\n"));
-  EXPECT_THAT(text, HasSubstr("  noise.scale: 1 in A, 2 in B\n"));
-  EXPECT_THAT(text, HasSubstr("Compared run by run: 40 runs of the same draws.\n"));
+  const std::string text = text_of(compare_campaigns(first, second));
+  EXPECT_THAT(text, HasSubstr("A         a.db    40\n"
+                              "B         b.db    40  run by run, 40 runs of the same draws\n"));
+  EXPECT_THAT(
+      text,
+      HasSubstr("\nnoise.scale                1      A\n                           2      B\n"));
   std::istringstream lines(text);
   std::size_t num_marks = 0;
-  for (std::string line; std::getline(lines, line);) {
+  std::string before;  // The row of A, which has the name of the parameter.
+  for (std::string line; std::getline(lines, line); before = line) {
     EXPECT_LE(display_width(line), 80U) << line;
     if (line.find(" *") != std::string::npos && line.find("*:") == std::string::npos) {
-      EXPECT_TRUE(line.starts_with("a_c12 ")) << line;
+      EXPECT_THAT(before, testing::StartsWith("a_c12 "));
+      EXPECT_THAT(line, testing::StartsWith(std::string(19, ' ') + "B "));
       ++num_marks;
     }
   }
@@ -335,10 +361,10 @@ TEST(ComparisonText, CountsTheRunsThatItLeavesOut) {
   for (std::size_t run = 6; run < 8; ++run) second.results[run].status = RunStatus::not_finite;
   second.num_given_up = 1;
   const CampaignComparison comparison = compare_campaigns(side(8), second);
-  EXPECT_THAT(comparison_text(comparison, "a", "b"),
-              HasSubstr("6 runs of the same draws.\n"
+  EXPECT_THAT(text_of(comparison),
+              HasSubstr("6 runs of the same draws\n"
                         "Left out of B, without an estimate: 2 not finite, 1 given up.\n"));
-  const auto json = nlohmann::json::parse(comparison_json(comparison, "a", "b"));
+  const auto json = nlohmann::json::parse(comparison_json(both(comparison)));
   EXPECT_EQ(json["num_first_without_estimate"], 0);
   EXPECT_EQ(json["num_second_without_estimate"], 3);
 }
@@ -346,26 +372,17 @@ TEST(ComparisonText, CountsTheRunsThatItLeavesOut) {
 TEST(ComparisonText, SaysWhyRunsAreNotPaired) {
   Side second = side(3);
   second.campaign.seed = 2;
-  EXPECT_THAT(comparison_text(compare_campaigns(side(4), second), "a", "b"),
-              HasSubstr("Compared as a whole, as the seeds differ: 4 runs of A, 3 of B.\n"));
-  EXPECT_THAT(comparison_text(compare_campaigns(side(4), side(4)), "a", "b"),
-              HasSubstr("The definitions agree.\n"));
-}
-
-TEST(ComparisonText, BreaksALongDefinition) {
-  Side second = side(3);
-  second.campaign.name = std::string(70, 'n');
-  EXPECT_THAT(comparison_text(compare_campaigns(side(3), second), "a", "b"),
-              HasSubstr("  name\n    A  \"hardy2013\"\n    B  \"nnn"));
+  EXPECT_THAT(text_of(compare_campaigns(side(4), second)),
+              HasSubstr("  as a whole, as the seeds differ\n"));
+  EXPECT_THAT(text_of(compare_campaigns(side(4), side(4))), HasSubstr("The definitions agree.\n"));
 }
 
 TEST(ComparisonJson, HoldsAllNumbers) {
   const Side first = side(4);
   Side second = side(4);
   worsen(second, Parameter::a_c12, 0.5);
-  const auto json =
-      nlohmann::json::parse(comparison_json(compare_campaigns(first, second), "a", "b"));
-  EXPECT_EQ(json["first"], "a");
+  const auto json = nlohmann::json::parse(comparison_json(both(compare_campaigns(first, second))));
+  EXPECT_EQ(json["first"], "a.db");
   EXPECT_EQ(json["is_paired"], true);
   EXPECT_TRUE(json["why_unpaired"].is_null());
   EXPECT_EQ(json["num_first"], 4);

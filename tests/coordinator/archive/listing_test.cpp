@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "tests/coordinator/archive/archive_fixture.hpp"
 
 namespace proofmass::coordinator {
@@ -78,8 +78,8 @@ TEST_F(Listing, SaysWhatIsWrongWithACampaignFile) {
   EXPECT_THAT(campaigns[1].problem, HasSubstr("damaged"));
   EXPECT_THAT(campaigns[2].problem, HasSubstr("is newer than this program"));
   EXPECT_THAT(campaigns[3].problem, HasSubstr("was made before the first release"));
-  const std::string text = listing_text(campaigns, 80);
-  EXPECT_THAT(text, HasSubstr("damaged.db\n  " + campaigns[1].problem + "\n"));
+  const std::string text = terminal_text(listing_table(campaigns));
+  EXPECT_THAT(text, HasSubstr("\n" + campaigns[1].problem + "\n"));
 }
 
 TEST_F(Listing, RefusesAFileOfAnotherKindThatIsNamed) {
@@ -128,7 +128,7 @@ TEST_F(Listing, NamesDamagedFilesThatAreNamed) {
 
 TEST_F(Listing, OfNothingSaysSo) {
   EXPECT_THAT(list(), IsEmpty());
-  EXPECT_EQ(listing_text({}, 80), "no campaigns\n");
+  EXPECT_EQ(terminal_text(listing_table({})), "no campaigns\n");
   EXPECT_EQ(nlohmann::json::parse(listing_json({}))["campaigns"].size(), 0U);
 }
 
@@ -142,12 +142,12 @@ const ListedCampaign extreme{.file = "/some/where/a-file-with-a-rather-long-name
                              .created_utc = "2024-02-29T12:00:10Z"};
 
 TEST(ListingText, FitsATerminal) {
-  const std::string text = listing_text({&extreme, 1}, 80);
+  const std::string text = terminal_text(listing_table({&extreme, 1}), {.line_width_max = 80});
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) EXPECT_LE(display_width(line), 80U) << line;
-  EXPECT_THAT(text, HasSubstr("a-file-with-a-ra… "));
+  EXPECT_THAT(text, HasSubstr("… "));
   EXPECT_THAT(text, HasSubstr("cancelled"));
-  EXPECT_THAT(text, HasSubstr("2024-02-29\n"));
+  EXPECT_THAT(text, HasSubstr(" 18446744073709551615 2024-02-29\n"));
 }
 
 TEST(ListingJson, IsComplete) {

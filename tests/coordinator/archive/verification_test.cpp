@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "coordinator/report/digest.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "tests/coordinator/archive/verification_fixture.hpp"
 
 namespace proofmass::coordinator {

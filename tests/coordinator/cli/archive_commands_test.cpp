@@ -59,7 +59,10 @@ TEST_F(ArchiveCommands, CompareMoreThanTwoWithTheFirst) {
   campaign.scenario.noise.scale = 2.0;
   (void)Store::create(other, campaign, canonical_definition(campaign));
   const std::string text = printed_by({"compare", database_, other, database_});
-  EXPECT_NE(text.find("\n  noise.scale: 1 in A C, 2 in B\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\nnoise.scale                1      A C\n"
+                      "                           2      B\n"),
+            std::string::npos)
+      << text;
   const auto json =
       nlohmann::json::parse(printed_by({"compare", database_, other, database_, "--json"}));
   EXPECT_EQ(json["campaigns"].size(), 3U);

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "coordinator/report/text_cells.hpp"
 #include "core/runs.hpp"
 
 namespace proofmass::coordinator {
@@ -56,7 +55,7 @@ TEST(StatusTable, ShowsFilesThatAreNotServedAndHostsInQuarantine) {
   status.num_unserved_files = 2;
   status.quarantined_hosts = {"n7"};
   status.num_quarantined_hosts = 1;
-  const std::string text = status_table(status, 79);
+  const std::string text = status_text(status, {.line_width_max = 79});
   EXPECT_TRUE(
       text.ends_with("and 2 more campaigns\n"
                      "not served, tried again: campaign database = d/b.db (is locked)\n"
@@ -71,7 +70,7 @@ TEST(StatusTable, ShowsAReasonInOneLine) {
   wire::StatusReply status = status_with({campaign("a", 1)});
   status.campaigns[0].storage_failure = "full\nb: all is well";
   status.unserved_files = {{.file = "d/b.db", .reason = "d/b.db: campaign b\nc \x1b[2J"}};
-  const std::string text = status_table(status, 79);
+  const std::string text = status_text(status, {.line_width_max = 79});
   EXPECT_TRUE(
       text.ends_with("a: nothing can be stored: full\\nb: all is well\n"
                      "not served, tried again: d/b.db: campaign b\\nc \\u001b[2J\n"))
@@ -100,7 +99,7 @@ TEST(StatusTable, ShowsFactoriesAndWhyTheyDoNotSubmit) {
                       factory(FactoryPhase::waiting, 5.0, "late"),
                       factory(FactoryPhase::paused, 0.0, "3 workers in a row did not start")};
   const std::string counts = ": 3 workers wanted, 2 registered, 1 in the queue";
-  const std::string text = status_table(status, 79);
+  const std::string text = status_text(status, {.line_width_max = 79});
   EXPECT_TRUE(
       text.ends_with("no campaigns\n"
                      "factory fleet (pbs) active" +
@@ -124,7 +123,7 @@ TEST(StatusTable, ShowsCampaignsAndWhatIsOutOfTheOrdinary) {
   second.num_without_estimate = 2;
   second.num_audited = 10;
   second.num_mismatches = 3;
-  EXPECT_EQ(status_table(status_with({first, second}), 79),
+  EXPECT_EQ(status_text(status_with({first, second}), {.line_width_max = 79}),
             R"(Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min
 12 workers with 48 slots, 16 runs lent
 
@@ -139,7 +138,7 @@ second-order: 10 results compared with a second computation: 3 differ (none may)
 }
 
 TEST(StatusTable, SaysThatThereIsNoCampaign) {
-  EXPECT_EQ(status_table(status_with({}), 79),
+  EXPECT_EQ(status_text(status_with({}), {.line_width_max = 79}),
             "Proofmass 0.1.0, model hardy2013-2, up 3 h 20 min\n"
             "12 workers with 48 slots, 0 runs lent\n\nno campaigns\n");
 }
@@ -147,32 +146,35 @@ TEST(StatusTable, SaysThatThereIsNoCampaign) {
 TEST(StatusTable, SaysWhyNothingCanBeStored) {
   wire::CampaignStatus status = campaign("a", 0);
   status.storage_failure = "a.db: disk full";
-  EXPECT_NE(
-      status_table(status_with({status}), 79).find("\na: nothing can be stored: a.db: disk full\n"),
-      std::string::npos);
+  EXPECT_NE(status_text(status_with({status}), {.line_width_max = 79})
+                .find("\na: nothing can be stored: a.db: disk full\n"),
+            std::string::npos);
 }
 
 TEST(StatusTable, ShowsNoTimeLeftOfACampaignThatIsOver) {
   wire::CampaignStatus status = campaign("a", 100);
   status.phase = wire::CampaignPhase::finished;
   status.remaining_s = 0.0;
-  EXPECT_NE(status_table(status_with({status}), 79).find("100  100       -           -\n"),
+  EXPECT_NE(status_text(status_with({status}), {.line_width_max = 79})
+                .find("100  100       -           -\n"),
             std::string::npos);
 }
 
 TEST(StatusTable, KeepsALongNameApartFromTheNextColumn) {
-  const std::string text = status_table(status_with({campaign(std::string(128, 'x'), 1)}), 79);
+  const std::string text =
+      status_text(status_with({campaign(std::string(128, 'x'), 1)}), {.line_width_max = 79});
   EXPECT_NE(text.find("\nxxxxxxxxxxxxxxx… active "), std::string::npos) << text;
 }
 
 TEST(StatusTable, GivesALongNameTheRoomThatTheLineHas) {
   const std::string name(30, 'x');
   const wire::StatusReply status = status_with({campaign(name, 1), campaign("b", 1)});
-  const std::string text = status_table(status, 200);
+  const std::string text = status_text(status, {.line_width_max = 200});
   EXPECT_NE(text.find("\n" + name + " active "), std::string::npos) << text;
   EXPECT_NE(text.find("\nb" + std::string(30, ' ') + "active "), std::string::npos) << text;
-  expect_width_at_most(status_table(status, 85), 85);
-  EXPECT_NE(status_table(status, 85).find("\nxxxxxxxxxxxxxxxxxxxxx… active "), std::string::npos);
+  expect_width_at_most(status_text(status, {.line_width_max = 85}), 85);
+  EXPECT_NE(status_text(status, {.line_width_max = 85}).find("\nxxxxxxxxxxxxxxxxxxxxx… active "),
+            std::string::npos);
 }
 
 TEST(StatusTable, HasAtMost79Columns) {
@@ -186,23 +188,46 @@ TEST(StatusTable, HasAtMost79Columns) {
     wire::StatusReply status = status_with({wide});
     status.version = std::string(128, 'v');
     status.num_slots = std::numeric_limits<std::uint64_t>::max();
-    expect_width_at_most(status_table(status, 79), 79);
+    expect_width_at_most(status_text(status, {.line_width_max = 79}), 79);
   }
 }
 
 TEST(StatusTable, CutsNothingInAFile) {
   wire::StatusReply status = status_with({campaign(std::string(128, 'x'), 1)});
   status.model_version = std::string(128, 'm');
-  const std::string table = status_table(status, std::numeric_limits<std::size_t>::max());
+  const std::string table = status_text(status, {});
   EXPECT_NE(table.find(std::string(128, 'x') + " "), std::string::npos) << table;
   EXPECT_NE(table.find(std::string(128, 'm') + ","), std::string::npos) << table;
+}
+
+TEST(StatusTable, MarksTroubleAndNothingElse) {
+  wire::CampaignStatus status = campaign("mine", 1);
+  status.storage_failure = "disk full";
+  status.num_given_up = 2;
+  status.num_without_estimate = 3;
+  status.num_audited = status.num_mismatches = 1;
+  wire::StatusReply reply = status_with({status});
+  reply.unserved_files = {{.file = "b.db", .reason = "is damaged"}};
+  reply.quarantined_hosts = {"node7"};
+  const std::string text = status_text(reply, {.paint = Paint::yes});
+  const std::string bad = "\033[1;38;5;130m", plain = "\033[0m";
+  for (const std::string line :
+       {"mine: nothing can be stored: disk full", "mine: 2 runs given up: too many workers crashed",
+        "mine: 3 runs without an estimate",
+        "mine: 1 result compared with a second computation: 1 differ (none may)",
+        "not served, tried again: is damaged",
+        "host node7 is in quarantine: too many workers crashed there; `proofmass release node7`"}) {
+    EXPECT_NE(text.find(bad + line + plain + "\n"), std::string::npos) << line << "\n" << text;
+  }
+  EXPECT_EQ(std::ranges::count(text, '\033'), 14) << "and the titles";
 }
 
 TEST(WorkersTable, ShowsWorkersAndWhoIsInQuarantine) {
   wire::WorkerStatus second = worker(1234, "local-2");
   second.silent_s = 3.0 * 3600.0;
   second.is_quarantined = true;
-  EXPECT_EQ(workers_table({.workers = {worker(7, "local-1"), second}}, 79),
+  EXPECT_EQ(terminal_text(workers_table({.workers = {worker(7, "local-1"), second}}),
+                          {.line_width_max = 79}),
             R"(      id  worker         host               pid slots    lent  results    heard
 ───────────────────────────────────────────────────────────────────────────────
        7  local-1        n7                4711     4      64     1234      2 s
@@ -211,7 +236,9 @@ TEST(WorkersTable, ShowsWorkersAndWhoIsInQuarantine) {
 )");
 }
 
-TEST(WorkersTable, SaysThatThereIsNoWorker) { EXPECT_EQ(workers_table({}, 79), "no workers\n"); }
+TEST(WorkersTable, SaysThatThereIsNoWorker) {
+  EXPECT_EQ(terminal_text(workers_table({})), "no workers\n");
+}
 
 TEST(WorkersTable, HasAtMost79Columns) {
   constexpr auto most = std::numeric_limits<std::uint64_t>::max();
@@ -219,7 +246,8 @@ TEST(WorkersTable, HasAtMost79Columns) {
   wide.host = std::string(128, 'y');
   wide.process_id = wide.num_slots = wide.num_lent = wide.num_results = most;
   wide.silent_s = 1e300;
-  expect_width_at_most(workers_table({.workers = {wide}}, 79), 79);
+  expect_width_at_most(terminal_text(workers_table({.workers = {wide}}), {.line_width_max = 79}),
+                       79);
 }
 
 TEST(CampaignLine, SaysHowFarItIsAndHowFast) {

@@ -34,30 +34,22 @@ wire::StatusReply status_of(const std::string& name, std::uint64_t num_done) {
 }
 
 TEST(Drawing, TakesThePlaceOfTheOneBefore) {
-  const Drawing first = drawn_over(0, "a\nb\n", {});
+  const Drawing first = drawn_over(0, "a\nb\n", 24);
   EXPECT_EQ(first.text, "a\033[K\nb\033[K\n\033[J");
   EXPECT_EQ(first.num_lines, 2U);
-  const Drawing second = drawn_over(first.num_lines, "c\n", {});
+  const Drawing second = drawn_over(first.num_lines, "c\n", 24);
   EXPECT_EQ(second.text, "\033[2Ac\033[K\n\033[J");
   EXPECT_EQ(second.num_lines, 1U);
 }
 
-// A line that wraps, or one that scrolls the others away, would make the next drawing miss its
-// place.
-TEST(Drawing, FitsOnTheScreen) {
-  const Drawing drawing = drawn_over(0, "abcdef\nb\n", {.columns = 4, .rows = 3});
-  EXPECT_EQ(drawing.text, "abc…\033[K\nb\033[K\n\033[J");
-  EXPECT_EQ(drawing.num_lines, 2U);
-}
-
 TEST(Drawing, SaysHowManyLinesItLeavesOut) {
-  const Drawing drawing = drawn_over(0, "a\nb\nc\nd", {.columns = 80, .rows = 4});
+  const Drawing drawing = drawn_over(0, "a\nb\nc\nd", 4);
   EXPECT_EQ(drawing.text, "a\033[K\nb\033[K\nand 2 more lines\033[K\n\033[J");
   EXPECT_EQ(drawing.num_lines, 3U);
 }
 
 TEST(Drawing, NeedsNoEndOfTheLastLine) {
-  EXPECT_EQ(drawn_over(0, "a", {}).text, "a\033[K\n\033[J");
+  EXPECT_EQ(drawn_over(0, "a", 24).text, "a\033[K\n\033[J");
 }
 
 TEST(ScreenSize, IsTheUsualOneWhereThereIsNoTerminal) {
@@ -70,7 +62,7 @@ TEST(ScreenSize, IsTheUsualOneWhereThereIsNoTerminal) {
 
 TEST(LineWidth, HasNoLimitWhereThereIsNoTerminal) {
   std::FILE* const file = std::tmpfile();
-  EXPECT_EQ(line_width_max_of(file), std::numeric_limits<std::size_t>::max());
+  EXPECT_EQ(style_of(file).line_width_max, std::numeric_limits<std::size_t>::max());
   std::fclose(file);
 }
 

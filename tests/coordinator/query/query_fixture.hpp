@@ -35,15 +35,15 @@ class RecordingWriter : public coordinator::RowWriter {
   void begin(std::span<const std::string> names) override {
     columns.assign(names.begin(), names.end());
   }
-  [[nodiscard]] bool row(std::span<const coordinator::Cell> cells) override {
+  [[nodiscard]] bool row(std::span<const coordinator::Value> cells) override {
     auto& own = rows.emplace_back();
-    for (const coordinator::Cell& cell : cells) own.push_back(own_cell(cell));
+    for (const coordinator::Value& cell : cells) own.push_back(own_cell(cell));
     return rows.size() < num_wanted;
   }
   void end() override { has_ended = true; }
 
  private:
-  static OwnCell own_cell(const coordinator::Cell& cell) {
+  static OwnCell own_cell(const coordinator::Value& cell) {
     if (const auto* integer = std::get_if<std::int64_t>(&cell)) return *integer;
     if (const auto* real = std::get_if<double>(&cell)) return *real;
     if (const auto* text = std::get_if<std::string_view>(&cell)) return std::string(*text);

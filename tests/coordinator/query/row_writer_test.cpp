@@ -16,12 +16,12 @@
 namespace proofmass::coordinator {
 namespace {
 
-using CellRow = std::vector<Cell>;
-constexpr Cell null{};
+using CellRow = std::vector<Value>;
+constexpr Value null{};
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-Cell integer(std::int64_t value) { return value; }
-Cell text(std::string_view value) { return value; }
+Value integer(std::int64_t value) { return value; }
+Value text(std::string_view value) { return value; }
 
 std::string written(RowFormat format, const std::vector<std::string>& columns,
                     const std::vector<CellRow>& rows, const TableLimits& limits = {}) {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "coordinator/report/review_tables.hpp"
+#include "coordinator/report/report_tables.hpp"
 #include "core/model.hpp"
 #include "proto/text/visible_text.hpp"
 #include "tests/coordinator/charts/markup_reading.hpp"
@@ -35,9 +35,10 @@ TEST_F(LiveResultsTest, ShowTheTableOfAReview) {
   EXPECT_EQ(test::malformed_part(html), "");
   EXPECT_THAT(html, AllOf(HasSubstr("id=\"accuracy\""), HasSubstr("id=\"errors-title\""),
                           Not(HasSubstr("<html"))));
-  for (const auto& row : review_accuracy_table(review_of(store, 150)).rows) {
-    for (const auto& cell : row) {
-      EXPECT_THAT(html, HasSubstr(">" + wire::markup_text(cell.text) + "<"));
+  const Review review = review_of(store, 150);
+  for (const Row& row : accuracy_table(review.objectives, review.results.statistics).rows) {
+    for (const Cell& cell : row) {
+      EXPECT_THAT(html, HasSubstr(">" + wire::markup_text(cell.in_document()) + "<"));
     }
   }
   EXPECT_THAT(html, HasSubstr("50 runs exceed the objective"));  // 101 to 150 % of it.

@@ -6,14 +6,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "coordinator/report/digest.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/report/report_tables.hpp"
 #include "coordinator/store/detail/database.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "tests/coordinator/report/text_lines.hpp"
 #include "tests/coordinator/store/store_fixture.hpp"
 #include "tests/support/microscope_results.hpp"
@@ -24,6 +26,25 @@ namespace {
 using ::testing::Contains;
 using ::testing::Each;
 using ::testing::HasSubstr;
+
+// Tables as lines of a terminal.
+
+std::string accuracy_text(const Campaign& campaign, const CampaignStatistics& statistics) {
+  return terminal_text(accuracy_table(campaign.objectives(), statistics));
+}
+
+std::string interval_text(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
+  return terminal_text(interval_table(statistics, num_given_up));
+}
+
+std::string error_text(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
+  return terminal_text(error_table(statistics, num_given_up, Interpretation::mixed));
+}
+
+std::string budget_text(const Campaign& campaign, const CampaignStatistics& statistics,
+                        const std::optional<RunTotals>& totals) {
+  return terminal_text(budget_table(campaign.error_budget(), statistics, totals));
+}
 
 /// Statistics with the paper's own errors and `num_runs` runs, all of them estimated.
 CampaignStatistics paper_statistics(std::uint64_t num_runs) {
@@ -61,7 +82,7 @@ TEST(AccuracyTable, ShowsEachParameterBesideThePaper) {
   CampaignStatistics statistics = paper_statistics(100);
   statistics.accuracy[index(Parameter::a_c13)].num_beyond_objective = 3;
   const std::vector<std::string> lines =
-      test::lines_of(accuracy_table(MicroscopeCampaign{}, statistics));
+      test::lines_of(accuracy_text(MicroscopeCampaign{}, statistics));
   // Figures of [Hardy2013] tab:perfo-numerical in the units of the table, left and right.
   EXPECT_THAT(lines, Contains("a_c11·Δx   nm             100    40.0    10.0    7.30      0 │"
                               "    40    10   7.3"));
@@ -77,22 +98,37 @@ TEST(AccuracyTable, ShowsEachParameterBesideThePaper) {
             "beyond: runs whose error exceeds the objective; the paper: Hardy et al. 2013");
 }
 
+// Documents have room for the run, and for figures in full.
+TEST(AccuracyTable, NamesTheWorstRunAndMarksWhatIsBeyondItsObjective) {
+  CampaignStatistics statistics = paper_statistics(100);
+  AccuracyStatistic& accuracy = statistics.accuracy[index(Parameter::a_c13)];
+  accuracy.num_beyond_objective = 3;
+  accuracy.worst_run = {57};
+  const Table table = accuracy_table(MicroscopeCampaign{}.objectives(), statistics);
+  const Row& row = table.rows[index(Parameter::a_c13)];
+  EXPECT_EQ(row[1].in_document(), "10⁻⁴ rad");
+  EXPECT_EQ(row[3].value, 11e-4);
+  EXPECT_EQ(row[4].text, "57");
+  EXPECT_EQ(row[7].tone, Tone::bad);
+  EXPECT_EQ(table.rows[index(Parameter::a_c12)][7].tone, Tone::plain);
+}
+
 TEST(AccuracyTable, CountsTheRunsThatItIsAbout) {
-  EXPECT_THAT(accuracy_table(MicroscopeCampaign{}, paper_statistics(100)),
+  EXPECT_THAT(accuracy_text(MicroscopeCampaign{}, paper_statistics(100)),
               HasSubstr(" of 100 runs\n"));
-  EXPECT_THAT(accuracy_table(MicroscopeCampaign{}, paper_statistics(1)), HasSubstr(" of 1 run\n"));
+  EXPECT_THAT(accuracy_text(MicroscopeCampaign{}, paper_statistics(1)), HasSubstr(" of 1 run\n"));
 }
 
 TEST(AccuracyTable, HasDashesWhileNoRunHasAnEstimate) {
   const std::vector<std::string> lines =
-      test::lines_of(accuracy_table(MicroscopeCampaign{}, CampaignStatistics{}));
+      test::lines_of(accuracy_text(MicroscopeCampaign{}, CampaignStatistics{}));
   EXPECT_THAT(lines, Contains("a_c12      1e-4 rad         9       -       -       -      - │"
                               "    10   2.6   2.3"));
 }
 
 TEST(BudgetTable, ShowsEachTermBesideThePaper) {
   const std::vector<std::string> lines =
-      test::lines_of(budget_table(MicroscopeCampaign{}, paper_statistics(100), {}));
+      test::lines_of(budget_text(MicroscopeCampaign{}, paper_statistics(100), {}));
   EXPECT_THAT(lines, Contains("a_c11·T_xx·Δx            8.4e-14  1.7e-16  4.2e-17 │"
                               "  8.4e-14  1.7e-16  4.2e-17"));
   EXPECT_THAT(lines, Contains("2·K2d·(Γ_d²+Γ_res,x²)    8.0e-16  7.1e-18  1.4e-18 │"
@@ -108,18 +144,18 @@ TEST(BudgetTable, IsOfTheResidueOfTheRuns) {
   statistics.health.resize(num_health_values);
   statistics.health[budget_level()] = {.worst = 3.5e-11, .mean = 1e-11};
   const std::vector<std::string> lines =
-      test::lines_of(budget_table(MicroscopeCampaign{}, statistics, {}));
+      test::lines_of(budget_text(MicroscopeCampaign{}, statistics, {}));
   EXPECT_THAT(lines, Contains("2·a_d11·Γ_res,x          2.0e-13  3.5e-16  3.2e-17 │"
                               "  2.0e-14  1.0e-17  3.2e-18"));
   EXPECT_THAT(lines, Contains("Γ_res is that of the runs: worst 3.5e-11, mean 1e-11 m/s²; "
                               "assumed was 1e-12"));
-  EXPECT_THAT(budget_table(MicroscopeCampaign{}, paper_statistics(100), {}),
+  EXPECT_THAT(budget_text(MicroscopeCampaign{}, paper_statistics(100), {}),
               HasSubstr("Γ_res is assumed: 1e-12 m/s²\n"));
 }
 
 TEST(BudgetTable, HasDashesAfterEstimationWhileNoRunHasAnEstimate) {
   const std::vector<std::string> lines =
-      test::lines_of(budget_table(MicroscopeCampaign{}, CampaignStatistics{}, {}));
+      test::lines_of(budget_text(MicroscopeCampaign{}, CampaignStatistics{}, {}));
   EXPECT_THAT(lines, Contains("Total                    2.0e-13        -        - │"
                               "  2.0e-13  1.1e-15  3.6e-16"));
 }
@@ -131,7 +167,7 @@ TEST(IntervalTable, ShowsHowSureTheFiguresAre) {
   accuracy.deviation_interval = Interval{.lower = 47.25, .upper = 63.75, .confidence = 0.95};
   accuracy.error.bias = -12.5;
   accuracy.error.skewness = -0.756;
-  const std::vector<std::string> lines = test::lines_of(interval_table(statistics, 0));
+  const std::vector<std::string> lines = test::lines_of(interval_text(statistics, 0));
   EXPECT_THAT(lines, Contains("K2c/K1c²       62.0    51.5    72.5 │    54.0    47.2    63.8 │"
                               "    -12.5  -0.76"));
   EXPECT_THAT(lines, Contains("K2d/K1c²       25.0       -       - │    23.0       -       - │"
@@ -140,12 +176,12 @@ TEST(IntervalTable, ShowsHowSureTheFiguresAre) {
 
 // 59 draws are what 95 % with 95 % confidence takes [Wilks1941]: 0.95^59 = 0.0485.
 TEST(IntervalTable, TellsWhatTheWorstIsWorth) {
-  EXPECT_THAT(interval_table(paper_statistics(59), 0),
+  EXPECT_THAT(interval_text(paper_statistics(59), 0),
               HasSubstr("worst of 59: with 95 % confidence 95.049 % of all draws"));
-  EXPECT_THAT(interval_table(paper_statistics(58), 0),
+  EXPECT_THAT(interval_text(paper_statistics(58), 0),
               HasSubstr("worst of 58: with 95 % confidence 94.966 % of all draws"));
   // 95.1297 %, of which no more is claimed than holds.
-  EXPECT_THAT(interval_table(paper_statistics(60), 0),
+  EXPECT_THAT(interval_text(paper_statistics(60), 0),
               HasSubstr("worst of 60: with 95 % confidence 95.129 % of all draws"));
 }
 
@@ -153,11 +189,13 @@ TEST(IntervalTable, TellsWhatTheWorstIsWorth) {
 TEST(IntervalTable, ClaimsNothingOfDrawsWithoutAnEstimate) {
   CampaignStatistics statistics = paper_statistics(97);
   statistics.num_runs = 99;
-  EXPECT_THAT(interval_table(statistics, 1),
-              HasSubstr("worst of 97: with 95 % confidence 96.958 % of all draws stay below,\n"
-                        "  of those that have an estimate; 3 more have none\n"));
+  EXPECT_THAT(
+      interval_text(statistics, 1),
+      HasSubstr("worst of 97: with 95 % confidence 96.958 % of all draws stay below, of those\n"
+                "  that have an estimate; 3 more have none (one parameter by itself, not all\n"
+                "  together)\n"));
   statistics.num_runs = 97;
-  EXPECT_THAT(interval_table(statistics, 1), HasSubstr("; 1 more has none\n"));
+  EXPECT_THAT(interval_text(statistics, 1), HasSubstr("; 1 more has none ("));
 }
 
 // 21.2 nm ± 104.2 nm by Student's law with one degree of freedom: no mean |error| is below 0.
@@ -165,24 +203,24 @@ TEST(IntervalTable, BeginsAtZeroWhereAMagnitudeDoes) {
   CampaignStatistics statistics = paper_statistics(2);
   AccuracyStatistic& accuracy = statistics.accuracy[index(Parameter::a_c11_delta_x)];
   accuracy.mean_interval = Interval{.lower = -83.0e-9, .upper = 125.4e-9, .confidence = 0.95};
-  EXPECT_THAT(test::lines_of(interval_table(statistics, 0)),
+  EXPECT_THAT(test::lines_of(interval_text(statistics, 0)),
               Contains("a_c11·Δx       10.0       0     125 │    7.30       -       - │"
                        "        0      -"));
 }
 
 TEST(IntervalTable, HasNoFiguresThatSoFewRunsDoNotGive) {
-  EXPECT_THAT(test::lines_of(interval_table(paper_statistics(1), 0)),
+  EXPECT_THAT(test::lines_of(interval_text(paper_statistics(1), 0)),
               Contains("a_c11·Δx       10.0       -       - │       -       -       - │"
                        "        0      -"));
-  EXPECT_THAT(test::lines_of(accuracy_table(MicroscopeCampaign{}, paper_statistics(1))),
+  EXPECT_THAT(test::lines_of(accuracy_text(MicroscopeCampaign{}, paper_statistics(1))),
               Contains("a_c11·Δx   nm             100    40.0    10.0       -      0 │"
                        "    40    10   7.3"));
 }
 
 TEST(IntervalTable, WarnsOfTheBootstrapOfFewRuns) {
   const auto warning = HasSubstr("std: an interval from fewer than 200 runs is too narrow");
-  EXPECT_THAT(interval_table(paper_statistics(199), 0), warning);
-  EXPECT_THAT(interval_table(paper_statistics(200), 0), testing::Not(warning));
+  EXPECT_THAT(interval_text(paper_statistics(199), 0), warning);
+  EXPECT_THAT(interval_text(paper_statistics(200), 0), testing::Not(warning));
 }
 
 // 0 of 100: to 1 − 0.025^(1/100) = 3.62 %; 2 of 100: 0.243 to 7.04 %; 97 of 100: 91.5 to 99.4 %
@@ -196,12 +234,15 @@ TEST(ErrorTable, ShowsBiasPercentilesAndHowOftenObjectivesHold) {
   accuracy.error.bias_interval = Interval{.lower = -1.25e-5, .upper = 9e-5, .confidence = 0.95};
   accuracy.percentiles[0].value = 2.5e-4;
   accuracy.percentiles[3].value = 1.1e-3;
-  const std::vector<std::string> lines = test::lines_of(error_table(statistics, 0));
+  const std::vector<std::string> lines = test::lines_of(error_text(statistics, 0));
   EXPECT_THAT(lines, Contains("a_c12        -0.125    0.900 │    2.50       0       0    11.0 │"
                               "  0.243    7.04"));
   EXPECT_THAT(lines, Contains("K2d/K1c²          -        - │       0       0       0       0 │"
                               "      0    3.62"));
-  EXPECT_EQ(lines.back(), "all objectives together: 97 of 100 runs, 91.5 to 99.4 % of all draws");
+  EXPECT_THAT(
+      error_text(statistics, 0),
+      HasSubstr(
+          "\nall objectives together: 97 of 100 runs, 91.5 to 99.4 % of all draws (mixed)\n"));
 }
 
 // Run 1 has the worst total of all, and no run has the worst error of both parameters.
@@ -233,14 +274,14 @@ TEST(RunTotals, AreThoseOfSingleRuns) {
 TEST(BudgetTable, TellsTheTotalsOfSingleRuns) {
   const RunTotals totals{
       .worst = 6.4e-16, .worst_run = {57}, .median = 2.6e-16, .percentile_95 = 5.1e-16};
-  EXPECT_THAT(budget_table(MicroscopeCampaign{}, paper_statistics(100), totals),
+  EXPECT_THAT(budget_text(MicroscopeCampaign{}, paper_statistics(100), totals),
               testing::EndsWith("single runs: median 2.6e-16, 95 % below 5.1e-16, worst 6.4e-16 "
                                 "(run 57)\n"));
 }
 
 TEST(IntervalTable, IsLeftOutWhileNoRunHasAnEstimate) {
-  EXPECT_EQ(interval_table(CampaignStatistics{}, 0), "");
-  EXPECT_EQ(error_table(CampaignStatistics{}, 0), "");
+  EXPECT_EQ(interval_text(CampaignStatistics{}, 0), "");
+  EXPECT_EQ(error_text(CampaignStatistics{}, 0), "");
 }
 
 TEST(Summary, TellsHowTheRunsEnded) {
@@ -287,10 +328,10 @@ TEST(Report, FitsATerminal) {
     }
     MicroscopeCampaign campaign;
     for (double& objective : campaign.scenario.objectives) objective *= factor;
-    EXPECT_THAT(test::lines_of(accuracy_table(campaign, statistics)), Each(test::FitsATerminal()));
-    EXPECT_THAT(test::lines_of(interval_table(statistics, 0)), Each(test::FitsATerminal()));
-    EXPECT_THAT(test::lines_of(error_table(statistics, most)), Each(test::FitsATerminal()));
-    EXPECT_THAT(test::lines_of(budget_table(campaign, statistics, RunTotals{.worst_run = {most}})),
+    EXPECT_THAT(test::lines_of(accuracy_text(campaign, statistics)), Each(test::FitsATerminal()));
+    EXPECT_THAT(test::lines_of(interval_text(statistics, 0)), Each(test::FitsATerminal()));
+    EXPECT_THAT(test::lines_of(error_text(statistics, most)), Each(test::FitsATerminal()));
+    EXPECT_THAT(test::lines_of(budget_text(campaign, statistics, RunTotals{.worst_run = {most}})),
                 Each(test::FitsATerminal()));
   }
   EXPECT_THAT(
@@ -303,8 +344,8 @@ TEST(Report, FitsATerminal) {
 TEST(Report, AlignsEveryRow) {
   const CampaignStatistics statistics = paper_statistics(100);
   for (const std::string& table :
-       {accuracy_table(MicroscopeCampaign{}, statistics), interval_table(statistics, 0),
-        error_table(statistics, 0), budget_table(MicroscopeCampaign{}, statistics, RunTotals{})}) {
+       {accuracy_text(MicroscopeCampaign{}, statistics), interval_text(statistics, 0),
+        error_text(statistics, 0), budget_text(MicroscopeCampaign{}, statistics, RunTotals{})}) {
     const std::vector<std::string> lines = test::lines_of(table);
     const auto is_row = [](const std::string& line) { return line.find("│") != line.npos; };
     for (std::size_t i = 3; i < lines.size(); ++i) {
@@ -343,9 +384,9 @@ TEST_F(StoredReport, IsThatOfTheResultsInTheFile) {
   EXPECT_EQ(
       report_text(store, campaign),
       summary_text("hardy2013", 1, 12, statistics, digest_of(store), DigestCheck::not_checked) +
-          "\n" + accuracy_table(campaign, statistics) + "\n" + interval_table(statistics, 0) +
-          "\n" + error_table(statistics, 0) + "\n" +
-          budget_table(campaign, statistics, read_results(store, campaign).totals));
+          "\n" + accuracy_text(campaign, statistics) + "\n" + interval_text(statistics, 0) + "\n" +
+          error_text(statistics, 0) + "\n" +
+          budget_text(campaign, statistics, read_results(store, campaign).totals));
 }
 
 // One of nine finished runs has no estimate, nor has the one that was given up.
@@ -358,7 +399,7 @@ TEST_F(StoredReport, CountsWhatWasGivenUpAsWithoutAnEstimate) {
   store.write({&given_up, 1});
   EXPECT_THAT(report_text(store, MicroscopeCampaign{}), HasSubstr("worst of 8: "));
   EXPECT_THAT(report_text(store, MicroscopeCampaign{}),
-              HasSubstr(" have an estimate; 2 more have none\n"));
+              HasSubstr(" have an estimate; 2 more have none ("));
 }
 
 // Every number that is stored, as text of 17 digits, of results with errors that do not add up to

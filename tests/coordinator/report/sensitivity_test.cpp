@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "coordinator/campaign_file/campaign_file.hpp"
-#include "coordinator/report/text_cells.hpp"
+#include "coordinator/table/terminal_table.hpp"
 #include "core/error.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
@@ -65,7 +65,7 @@ TEST(SensitivityText, SaysWhatItsFiguresAre) {
   EXPECT_THAT(
       sensitivity_text(made_up_runs(), index(Parameter::k2c), 2),
       HasSubstr("\n% of variance: with its 95 % interval; rank: rank correlation; p: that "
-                "chance\nalone makes one of 60 quantities look so influential (Kruskal-Wallis, "
+                "chance\n  alone makes one of 60 quantities look so influential (Kruskal-Wallis, "
                 "Holm)\n"));
 }
 

@@ -1,4 +1,4 @@
-#include "coordinator/report/html_table.hpp"
+#include "coordinator/table/html_table.hpp"
 
 #include <gmock/gmock.h>
 
@@ -15,15 +15,12 @@ using ::testing::Not;
 const std::string hostile = "<script>alert(\"1\")</script> & 'x'";
 
 /// The table of a report with this text wherever a text is shown.
-ReviewTable review_table(const std::string& text) {
+Table review_table(const std::string& text) {
   return {.id = "table",
           .caption = text,
-          .columns = {{.title = text, .is_text = true},
-                      {.title = "lower", .group = text},
-                      {.title = "upper", .group = text}},
-          .rows = {{{.text = text},
-                    {.text = "1.23e-4", .value = 1.2345e-4},
-                    {.text = text, .kind = ReviewCell::Kind::words}}},
+          .columns = {{text, true}, {"lower", false, 0, text}, {"upper", false, 0, text}},
+          .rows = {{text, {"1.23e-4", 1.2345e-4}, {text, Tone::bad}}},
+          .remarks = {{text}},
           .notes = {text}};
 }
 
@@ -45,11 +42,16 @@ TEST(HtmlTables, HaveHeadingsOverTheirColumnsAndRows) {
                           HasSubstr("<caption id=\"table-caption\">a</caption>")));
 }
 
+TEST(HtmlTables, TellTonesByAClassBesideTheWords) {
+  EXPECT_THAT(html_table(review_table("a")), HasSubstr("<strong class=\"unmet\">a</strong>"));
+}
+
 TEST(HtmlTables, SayHowTheyAreSorted) {
-  const std::string html = html_table(
-      {.name = "Workers",
-       .columns = {{.title = "name", .is_text = true}, {.title = "results", .sort = "descending"}},
-       .rows = {{std::string("w"), std::string("<b>7</b>")}}});
+  Table table{.caption = "Workers",
+              .columns = {{"name", true}, {.title = "results", .sort = "descending"}},
+              .rows = {{"w", "7"}}};
+  table.rows[0][1].markup = "<b>7</b>";
+  const std::string html = html_table(table);
   EXPECT_EQ(test::malformed_part(html), "");
   EXPECT_THAT(test::tags_of(html, "<th [^>]*>"),
               ElementsAre("<th scope=\"col\" class=\"words\">",

@@ -1,0 +1,340 @@
+#include "coordinator/report/report_tables.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "coordinator/charts/ticks.hpp"
+#include "coordinator/report/requirements.hpp"
+#include "coordinator/table/figures.hpp"
+#include "core/model.hpp"
+#include "core/model_rules.hpp"
+#include "core/statistics/comparison.hpp"
+#include "core/statistics/distribution.hpp"
+#include "core/statistics/interval.hpp"
+
+namespace proofmass::coordinator {
+namespace {
+
+// Widths of columns include the blanks between them. Columns of one table add up to 80 at most.
+
+constexpr const char* ours = "this campaign";
+constexpr const char* theirs = "the paper";
+
+Cell unit_cell(const Quantity& quantity) {
+  Cell cell(quantity.display_unit);
+  cell.document = unit_text(quantity.display_unit);
+  return cell;
+}
+
+/// As somebody gave it, without digits that nobody gave.
+Cell given_cell(double value, double scale) {
+  Cell cell = figure_cell(value, scale);
+  cell.text = given_figure(value / scale);
+  return cell;
+}
+
+Cell count_cell(std::uint64_t count, Tone tone) {
+  const auto value = static_cast<double>(count);
+  Cell cell(count < 1'000'000 ? std::to_string(count) : measured_figure(value), tone);
+  cell.value = value;
+  cell.document = std::to_string(count);
+  return cell;
+}
+
+void add_published(const Quantity& quantity, Row& row) {
+  for (const double PublishedAccuracy::*figure :
+       {&PublishedAccuracy::worst, &PublishedAccuracy::mean,
+        &PublishedAccuracy::standard_deviation}) {
+    row.push_back(quantity.published
+                      ? given_cell((*quantity.published).*figure, quantity.display_scale)
+                      : Cell(""));
+  }
+}
+
+Row accuracy_row(const Quantity& quantity, double objective, const AccuracyStatistic* accuracy,
+                 std::uint64_t num_runs) {
+  const double scale = quantity.display_scale;
+  Row row{quantity.symbol, unit_cell(quantity),
+          std::isfinite(objective) ? given_cell(objective, scale) : no_figure()};
+  if (accuracy == nullptr) {
+    row.insert(row.end(), 5, no_figure());
+  } else {
+    const std::uint64_t beyond = accuracy->num_beyond_objective;
+    row.push_back(figure_cell(accuracy->worst, scale));
+    row.push_back(count_cell(accuracy->worst_run.value, Tone::plain));
+    row.push_back(figure_cell(accuracy->mean, scale));
+    row.push_back(num_runs < 2 ? no_figure() : figure_cell(accuracy->standard_deviation, scale));
+    row.push_back(count_cell(beyond, beyond > 0 ? Tone::bad : Tone::plain));
+  }
+  add_published(quantity, row);
+  return row;
+}
+
+// Of |error|: of few runs the symmetric interval of a mean may begin below 0, where none can lie.
+void add_triple(double value, const std::optional<Interval>& interval, double scale, Row& row) {
+  row.push_back(figure_cell(value, scale));
+  row.push_back(interval ? figure_cell(std::max(interval->lower, 0.0), scale) : no_figure());
+  row.push_back(interval ? figure_cell(interval->upper, scale) : no_figure());
+}
+
+Row interval_row(const Quantity& quantity, const AccuracyStatistic& accuracy,
+                 std::uint64_t num_runs) {
+  const double scale = quantity.display_scale;
+  Row row{quantity.symbol};
+  add_triple(accuracy.mean, accuracy.mean_interval, scale, row);
+  if (num_runs < 2) {
+    row.insert(row.end(), 3, no_figure());
+  } else {
+    add_triple(accuracy.standard_deviation, accuracy.deviation_interval, scale, row);
+  }
+  row.push_back(figure_cell(accuracy.error.bias, scale));
+  row.push_back(num_runs < 3 ? no_figure() : figure_cell(accuracy.error.skewness));
+  if (num_runs >= 3) row.back().text = fmt::format("{:.2f}", accuracy.error.skewness);
+  return row;
+}
+
+/// Fewest runs from which on the bootstrap covers what it says; core/statistics/README.md.
+constexpr std::uint64_t num_runs_of_bootstrap = 200;
+
+/// What "the worst of n" is worth [Wilks1941].
+std::string worth_of_worst(std::uint64_t num_runs, std::uint64_t num_without_estimate) {
+  const double coverage = std::pow(1.0 - default_confidence, 1.0 / static_cast<double>(num_runs));
+  // Rounded down: no more is claimed than holds.
+  std::string text = fmt::format("worst of {}: with 95 % confidence {} % of all draws stay below",
+                                 num_runs, std::floor(coverage * 1e5) / 1e3);
+  if (num_without_estimate > 0) {
+    text += fmt::format(", of those that have an estimate; {} more {} none", num_without_estimate,
+                        num_without_estimate == 1 ? "has" : "have");
+  }
+  return text + " (one parameter by itself, not all together)";
+}
+
+Row error_row(const Quantity& quantity, const AccuracyStatistic& accuracy) {
+  const double scale = quantity.display_scale;
+  const std::optional<Interval>& bias = accuracy.error.bias_interval;
+  Row row{quantity.symbol, bias ? figure_cell(bias->lower, scale) : no_figure(),
+          bias ? figure_cell(bias->upper, scale) : no_figure()};
+  for (const PercentileStatistic& percentile : accuracy.percentiles) {
+    row.push_back(figure_cell(percentile.value, scale));
+  }
+  const bool is_known = accuracy.beyond_objective.upper - accuracy.beyond_objective.lower < 1.0;
+  for (const double share : {accuracy.beyond_objective.lower, accuracy.beyond_objective.upper}) {
+    row.push_back(is_known ? figure_cell(share, 0.01) : no_figure());
+  }
+  return row;
+}
+
+/// That chance alone makes such a bias, by Student's law; 1 where nothing is known.
+double bias_p_value(const ErrorStatistic& error, std::uint64_t num_runs) {
+  if (num_runs < 2 || error.bias == 0.0) return 1.0;
+  if (error.standard_deviation <= 0.0) return 0.0;
+  const auto n = static_cast<double>(num_runs);
+  return student_two_sided(error.bias * std::sqrt(n) / error.standard_deviation, n - 1.0);
+}
+
+/// Which biases differ from 0 if all parameters are looked at together.
+std::string bias_sentence(const CampaignStatistics& statistics) {
+  std::vector<double> p_values;
+  for (const AccuracyStatistic& accuracy : statistics.accuracy) {
+    p_values.push_back(bias_p_value(accuracy.error, statistics.num_estimated));
+  }
+  const std::vector<double> adjusted = holm_adjusted(p_values);
+  std::string names;
+  for (std::size_t i = 0; i < adjusted.size(); ++i) {
+    if (adjusted[i] >= 1.0 - default_confidence) continue;
+    names += (names.empty() ? "" : ", ") + std::string(model().results().quantities[i].symbol);
+  }
+  return fmt::format(
+      "Bias: each interval holds by itself. Of all {} together (Holm, 5 %) {}.", adjusted.size(),
+      names.empty() ? "no bias differs from 0" : "the bias differs from 0 of " + names);
+}
+
+std::string joint_sentence(const CampaignStatistics& statistics, std::uint64_t num_given_up,
+                           Interpretation interpretation) {
+  const std::string seen =
+      fmt::format("all objectives together: {} of {} runs", statistics.num_within_objectives,
+                  statistics.num_runs + num_given_up);
+  const std::optional<Interval> share = statistics.within_objectives(num_given_up);
+  if (!share) return seen;
+  return fmt::format("{}, {} of all draws ({})", seen, interval_percent(*share),
+                     name_of(interpretation));
+}
+
+/// What the level of a budget is, and that it is the one of the runs or an assumed one.
+std::string level_sentence(const ErrorBudget& budget, const CampaignStatistics& statistics) {
+  const std::string_view unit = model().results().health.at(budget.level).unit;
+  if (statistics.health.empty() || statistics.health.at(budget.level).worst == 0.0) {
+    return fmt::format("{} is assumed: {:.3g} {}", budget.level_label, budget.assumed_level, unit);
+  }
+  const HealthStatistic& level = statistics.health.at(budget.level);
+  return fmt::format("{} is that of the runs: worst {:.3g}, mean {:.3g} {}; assumed was {:.3g}",
+                     budget.level_label, level.worst, level.mean, unit, budget.assumed_level);
+}
+
+// Published totals, too, add up the worst errors of all parameters, which no single run has.
+std::string totals_sentence(const RunTotals& totals) {
+  return fmt::format(
+      "worst adds up the worst errors of different runs, as the paper does; totals of single runs: "
+      "median {:.1e}, 95 % below {:.1e}, worst {:.1e} (run {})",
+      totals.median, totals.percentile_95, totals.worst, totals.worst_run.value);
+}
+
+std::vector<std::string> budget_notes(const ErrorBudget& budget,
+                                      const CampaignStatistics& statistics,
+                                      const std::optional<RunTotals>& totals) {
+  std::vector<std::string> notes{
+      "before: bounds of construction; worst, mean: left by errors of the estimates",
+      level_sentence(budget, statistics)};
+  std::istringstream lines(budget.note);
+  for (std::string line; std::getline(lines, line);) notes.push_back(line);
+  if (totals) notes.push_back(totals_sentence(*totals));
+  return notes;
+}
+
+}  // namespace
+
+Cell figure_cell(double value, double scale) {
+  Cell cell(signed_figure(value / scale));
+  cell.value = value;
+  cell.document = figure_text(value / scale);
+  return cell;
+}
+
+Cell no_figure() {
+  Cell cell("-");
+  cell.document = "–";
+  return cell;
+}
+
+Table accuracy_table(std::span<const double> objectives, const CampaignStatistics& statistics) {
+  const ResultSchema& schema = model().results();
+  Table table{.id = "accuracy",
+              .caption = fmt::format("Accuracy of the estimates: |estimate − truth| of {} {}",
+                                     statistics.num_estimated,
+                                     statistics.num_estimated == 1 ? "run" : "runs"),
+              .columns = {{"parameter", true, 11},
+                          {"unit", true, 9},
+                          {"objective", false, 9},
+                          {"worst", false, 8, ours},
+                          {"in run", false, 8, ours, false, true},
+                          {"mean", false, 8, ours},
+                          {"std", false, 8, ours},
+                          {"beyond", false, 8, ours},
+                          {"worst", false, 6, theirs, true},
+                          {"mean", false, 6, theirs},
+                          {"std", false, 6, theirs}},
+              .notes = {"beyond: runs whose error exceeds the objective"}};
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    table.rows.push_back(
+        accuracy_row(schema.quantities[i], objectives[i],
+                     statistics.num_estimated > 0 ? &statistics.accuracy[i] : nullptr,
+                     statistics.num_estimated));
+  }
+  if (!schema.published_source.empty()) {
+    table.notes.back() += fmt::format("; {}: {}", theirs, schema.published_source);
+  }
+  return table;
+}
+
+Table interval_table(const CampaignStatistics& statistics, std::uint64_t num_given_up) {
+  if (statistics.num_estimated == 0) return {};
+  constexpr const char* mean = "mean of |error|";
+  constexpr const char* deviation = "std of |error|";
+  Table table{.id = "interval-table",
+              .caption = "95 % intervals, in the units above",
+              .columns = {{"parameter", true, 11},
+                          {"mean", false, 8, mean},
+                          {"from", false, 8, mean},
+                          {"to", false, 9, mean},
+                          {"std", false, 8, deviation, true},
+                          {"from", false, 8, deviation},
+                          {"to", false, 9, deviation},
+                          {"bias", false, 9, "error", true},
+                          {"skew", false, 7, "error"}}};
+  for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
+    table.rows.push_back(interval_row(model().results().quantities[i], statistics.accuracy[i],
+                                      statistics.num_estimated));
+  }
+  if (!statistics.are_draws_independent) {
+    table.notes.emplace_back(
+        "no intervals: a table of the dispersion is not declared independent, so that the draws "
+        "may be those of a design");
+    return table;
+  }
+  if (statistics.num_estimated < num_runs_of_bootstrap) {
+    table.notes.emplace_back(
+        "std: an interval from fewer than 200 runs is too narrow, see core/statistics");
+  }
+  table.notes.push_back(worth_of_worst(
+      statistics.num_estimated, statistics.num_runs - statistics.num_estimated + num_given_up));
+  return table;
+}
+
+Table error_table(const CampaignStatistics& statistics, std::uint64_t num_given_up,
+                  Interpretation interpretation) {
+  if (statistics.num_estimated == 0) return {};
+  constexpr const char* percentiles = "percentiles of |error|";
+  static_assert(percentile_levels == std::array{0.5, 0.9, 0.95, 0.99});
+  Table table{.id = "error-table",
+              .caption = "95 % intervals of bias and of draws beyond the objective",
+              .columns = {{"parameter", true, 10},
+                          {"from", false, 9, "bias"},
+                          {"to", false, 10, "bias"},
+                          {"50 %", false, 8, percentiles, true},
+                          {"90 %", false, 8, percentiles},
+                          {"95 %", false, 8, percentiles},
+                          {"99 %", false, 9, percentiles},
+                          {"from", false, 7, "beyond, %", true},
+                          {"to", false, 8, "beyond, %"}}};
+  for (std::size_t i = 0; i < statistics.accuracy.size(); ++i) {
+    table.rows.push_back(error_row(model().results().quantities[i], statistics.accuracy[i]));
+  }
+  if (statistics.are_draws_independent) table.notes.push_back(bias_sentence(statistics));
+  table.notes.push_back(joint_sentence(statistics, num_given_up, interpretation));
+  return table;
+}
+
+Table budget_table(const std::optional<ErrorBudget>& budget, const CampaignStatistics& statistics,
+                   const std::optional<RunTotals>& totals) {
+  if (!budget) return {};
+  Table table{.id = "budget-table",
+              .caption = std::string(budget->title),
+              .columns = {{"term", true, 23},
+                          {"before", false, 9, ours},
+                          {"worst", false, 9, ours},
+                          {"mean", false, 10, ours},
+                          {"before", false, 9, theirs, true},
+                          {"worst", false, 9, theirs},
+                          {"mean", false, 9, theirs}},
+              .has_total = true,
+              .notes = budget_notes(*budget, statistics, totals)};
+  const auto figure = [](double value) {
+    Cell cell = figure_cell(value);
+    cell.text = fmt::format("{:.1e}", value);
+    return cell;
+  };
+  const BudgetColumns columns = budget_columns(*budget, statistics);
+  const auto add = [&](const BudgetEntryInfo& info, const auto& value_of) {
+    Row row{info.label, figure(value_of(columns.before))};
+    for (const auto& after : {columns.after_worst, columns.after_mean}) {
+      row.push_back(after ? figure(value_of(*after)) : no_figure());
+    }
+    for (const double value : {info.paper_before, info.paper_after_worst, info.paper_after_mean}) {
+      row.push_back(figure(value));
+    }
+    table.rows.push_back(std::move(row));
+  };
+  for (std::size_t i = 0; i < budget->terms.size(); ++i) {
+    add(budget->terms[i].info, [&](const Budget& of) { return of.entries[i]; });
+  }
+  add(budget->total_info, [](const Budget& of) { return of.total; });
+  return table;
+}
+
+}  // namespace proofmass::coordinator

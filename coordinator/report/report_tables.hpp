@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "coordinator/report/read_results.hpp"
+#include "coordinator/table/table.hpp"
+#include "core/campaign/campaign.hpp"
+#include "core/campaign/statistics.hpp"
+
+namespace proofmass::coordinator {
+
+// The tables of `proofmass report`, which are those of a review report and of the live page, too.
+// Without an estimate, a table has no rows unless it says otherwise.
+
+/// A number in the display unit, and in SI units for programs.
+[[nodiscard]] Cell figure_cell(double value, double scale = 1.0);
+[[nodiscard]] Cell no_figure();
+
+/// Accuracy of each parameter beside the published one, and whose that is; always with rows.
+/// @param objectives  Of each quantity, SI.
+[[nodiscard]] Table accuracy_table(std::span<const double> objectives,
+                                   const CampaignStatistics& statistics);
+
+/// What the draws that were made say about all draws: 95 % intervals of mean and standard
+/// deviation, and the errors' bias and skewness.
+/// @param num_given_up  Runs that have no result, beside those in the statistics.
+[[nodiscard]] Table interval_table(const CampaignStatistics& statistics,
+                                   std::uint64_t num_given_up);
+
+/// Of the error with its sign the interval of its bias; percentiles of |error|; how often a
+/// parameter is beyond its objective; and how often all objectives hold together. One line says
+/// which biases differ from 0 if all parameters are looked at together: a table of ten intervals
+/// invites to look for one without 0, which chance alone makes in 40 % of all campaigns.
+/// @param num_given_up    Runs that have no result, beside those in the statistics.
+/// @param interpretation  What the probabilities are over.
+[[nodiscard]] Table error_table(const CampaignStatistics& statistics, std::uint64_t num_given_up,
+                                Interpretation interpretation);
+
+/// Budget before and after estimation beside the published one, and what single runs have. A
+/// campaign without a budget has no rows; one without an estimate has.
+[[nodiscard]] Table budget_table(const std::optional<ErrorBudget>& budget,
+                                 const CampaignStatistics& statistics,
+                                 const std::optional<RunTotals>& totals);
+
+}  // namespace proofmass::coordinator

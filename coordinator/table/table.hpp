@@ -1,0 +1,79 @@
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace proofmass::coordinator {
+
+/// What a part of a table is painted for. Colour never says anything that the words do not: it only
+/// helps to find them.
+enum class Tone : std::uint8_t {
+  plain,
+  heading,  ///< Titles of a table.
+  good,     ///< A requirement that is met, a check that passes.
+  open,     ///< What is not decided yet.
+  bad,      ///< What somebody should look at: an error beyond its objective, a failure, a loss.
+  changed,  ///< A significant change, good or bad.
+};
+
+/// A cell. Its text may hold anything: each writer makes it safe for its output.
+struct Cell {
+  std::string text;
+  std::optional<double> value = {};  ///< In full precision and SI units, for programs.
+  Tone tone = Tone::plain;
+  /// What documents (HTML, Markdown) show instead, as they have superscripts; empty: the text.
+  std::string document = {};
+  std::string markup = {};  ///< What HTML shows instead, as it is; empty: the text.
+
+  template <std::convertible_to<std::string_view> Text>
+  Cell(const Text& shown, Tone painted = Tone::plain)
+      : text(std::string_view(shown)), tone(painted) {}
+  template <std::convertible_to<std::string_view> Text>
+  Cell(const Text& shown, double number) : text(std::string_view(shown)), value(number) {}
+
+  [[nodiscard]] const std::string& in_document() const {
+    return document.empty() ? text : document;
+  }
+};
+
+/// A column: text stands left, numbers right.
+struct Column {
+  std::string title;
+  bool is_text = false;
+  /// Columns of a terminal that it usually takes, with at least one blank beside the next column;
+  /// 0: as many as its cells need, and two blanks.
+  std::size_t width = 0;
+  /// Heading above this column and the next ones with the same one, up to a vertical line.
+  std::string group = {};
+  bool is_after_line = false;         ///< A vertical line separates it from the column before it.
+  bool is_for_documents = false;      ///< A terminal has no room for it.
+  bool has_lines_of_its_own = false;  ///< A text that is too wide stands on a line above its row.
+  std::string sort = {};    ///< `ascending` or `descending` if the rows are in this column's order.
+  std::string markup = {};  ///< The title as HTML shows it; empty: the title.
+};
+
+/// A line below a table about one thing in it.
+struct Remark {
+  std::string text;
+  Tone tone = Tone::plain;
+};
+
+using Row = std::vector<Cell>;
+
+/// A table, and what is said below it. The first cell of a row is its heading.
+struct Table {
+  std::string id = {};  ///< Unique in a document, of a-z, 0-9 and -; may be empty.
+  std::string caption = {};
+  std::vector<Column> columns = {};
+  std::vector<Row> rows = {};
+  bool has_total = false;               ///< The last row sums up the others.
+  std::vector<Remark> remarks = {};     ///< Below the rows.
+  std::vector<std::string> notes = {};  ///< Sentences about the table, below that.
+};
+
+}  // namespace proofmass::coordinator

@@ -1,0 +1,283 @@
+#include "coordinator/table/terminal_table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+namespace proofmass::coordinator {
+namespace {
+
+constexpr std::size_t columns_max = 80;  // Of what is broken to lines.
+constexpr std::size_t gap = 2;           // Before a column that is as wide as its cells.
+constexpr std::size_t text_width_min = 8;
+
+std::string without_end_blanks(std::string line) {
+  line.erase(line.find_last_not_of(' ') + 1);
+  return line;
+}
+
+/// Writes one table. Columns that are for documents alone are left out from the beginning.
+class TerminalTable {
+ public:
+  TerminalTable(const Table& table, const TerminalStyle& style);
+
+  [[nodiscard]] std::string text() const;
+
+ private:
+  struct ShownColumn {
+    const Column* column;
+    std::size_t index;      ///< Among all columns of the table.
+    std::size_t lead = 0;   ///< Blanks before it.
+    std::size_t width = 0;  ///< With the blanks.
+
+    [[nodiscard]] bool has_own_width() const { return column->width > 0; }
+    /// For text; a column of numbers is as wide as they are.
+    [[nodiscard]] std::size_t room() const {
+      if (!column->is_text) return width - lead;
+      return width - (has_own_width() ? 1 : lead);
+    }
+    [[nodiscard]] std::size_t width_min() const {
+      if (column->has_lines_of_its_own) return column->width;
+      return has_own_width() ? std::min(column->width, text_width_min + 1) : text_width_min + lead;
+    }
+  };
+
+  void fit();
+  [[nodiscard]] bool is_before_line(std::size_t i) const;
+  [[nodiscard]] std::string cell(std::size_t i, const Cell& cell) const;
+  [[nodiscard]] std::string row(const Row& cells) const;
+  [[nodiscard]] std::string groups() const;
+  [[nodiscard]] std::string rule() const;
+  [[nodiscard]] std::string heading() const;
+  [[nodiscard]] std::string records() const;
+
+  const Table& table_;
+  TerminalStyle style_;
+  std::vector<ShownColumn> columns_;
+  bool are_rows_records_ = false;  ///< No row fits in a line.
+};
+
+TerminalTable::TerminalTable(const Table& table, const TerminalStyle& style)
+    : table_(table), style_(style) {
+  for (std::size_t i = 0; i < table.columns.size(); ++i) {
+    const Column& column = table.columns[i];
+    if (column.is_for_documents) continue;
+    ShownColumn shown{.column = &column, .index = i};
+    if (!shown.has_own_width() && !columns_.empty()) shown.lead = gap;
+    const std::size_t title = display_width(wire::visible_text(column.title));
+    const std::size_t blanks = shown.has_own_width() ? 1 : shown.lead;
+    shown.width = std::max(column.width, title + (column.is_text ? blanks : shown.lead));
+    for (const Row& row : table.rows) {
+      const std::size_t needed = display_width(wire::visible_text(row[i].text)) + blanks;
+      if (!column.has_lines_of_its_own) shown.width = std::max(shown.width, needed);
+    }
+    columns_.push_back(shown);
+  }
+  fit();
+}
+
+// Takes from the widest column of text, one at a time.
+void TerminalTable::fit() {
+  std::size_t total = 0;
+  bool have_own_widths = false;
+  for (const ShownColumn& shown : columns_) {
+    total += shown.width + (shown.column->is_after_line ? 1 : 0);
+    have_own_widths = have_own_widths || shown.has_own_width();
+  }
+  const auto to_spare = [](const ShownColumn& shown) {
+    const bool is_cut = shown.column->is_text && shown.width > shown.width_min();
+    return is_cut ? shown.width : 0;
+  };
+  while (total > style_.line_width_max) {
+    ShownColumn& widest = *std::ranges::max_element(columns_, {}, to_spare);
+    if (to_spare(widest) == 0) break;
+    --widest.width;
+    --total;
+  }
+  are_rows_records_ = total > style_.line_width_max && !have_own_widths && !table_.rows.empty();
+}
+
+bool TerminalTable::is_before_line(std::size_t i) const {
+  return i + 1 < columns_.size() && columns_[i + 1].column->is_after_line;
+}
+
+std::string TerminalTable::cell(std::size_t i, const Cell& cell) const {
+  const ShownColumn& shown = columns_[i];
+  const std::string text = shortened(wire::visible_text(cell.text), shown.room());
+  const std::size_t taken = shown.lead + display_width(text);
+  std::string blanks(shown.width > taken ? shown.width - taken : 0, ' ');
+  std::string line = shown.column->is_after_line ? "│" : "";
+  line.append(shown.lead, ' ');
+  const std::string painted = in_tone(text, cell.tone, style_.paint);
+  if (shown.column->is_text && !cell.value) return line + painted + blanks;
+  if (!is_before_line(i) || blanks.empty()) return line + blanks + painted;
+  blanks.pop_back();
+  return line + blanks + painted + " ";
+}
+
+std::string TerminalTable::row(const Row& cells) const {
+  std::string above, line;
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    const Cell& shown = cells[columns_[i].index];
+    const bool is_above = columns_[i].column->has_lines_of_its_own &&
+                          display_width(wire::visible_text(shown.text)) > columns_[i].room();
+    if (is_above) above += wire::visible_text(shown.text) + "\n";
+    line += cell(i, is_above ? Cell("") : shown);
+  }
+  return above + without_end_blanks(std::move(line)) + "\n";
+}
+
+/// Each group in the middle of its columns; empty if no column has one.
+std::string TerminalTable::groups() const {
+  std::string line;
+  bool has_group = false;
+  for (std::size_t i = 0; i < columns_.size();) {
+    const std::string& group = columns_[i].column->group;
+    if (columns_[i].column->is_after_line) line += "│";
+    std::size_t width = columns_[i].width;
+    while (++i < columns_.size() && columns_[i].column->group == group &&
+           !columns_[i].column->is_after_line) {
+      width += columns_[i].width;
+    }
+    const std::size_t taken = display_width(group);
+    line += left_aligned(std::string(width > taken ? (width - taken) / 2 : 0, ' ') + group, width);
+    has_group = has_group || !group.empty();
+  }
+  return has_group ? without_end_blanks(std::move(line)) + "\n" : "";
+}
+
+/// The horizontal line below the titles, up to the last one; the vertical lines cross it.
+std::string TerminalTable::rule() const {
+  std::size_t count = columns_.size();
+  while (count > 0 && columns_[count - 1].column->title.empty()) --count;
+  std::string rule;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (columns_[i].column->is_after_line) rule += "┼";
+    rule.append(columns_[i].lead, ' ');
+    rule += horizontal_rule(columns_[i].width - columns_[i].lead);
+  }
+  return rule + "\n";
+}
+
+std::string TerminalTable::heading() const {
+  std::string titles;
+  for (std::size_t i = 0; i < columns_.size(); ++i) titles += cell(i, columns_[i].column->title);
+  return groups() + in_tone(without_end_blanks(std::move(titles)), Tone::heading, style_.paint) +
+         "\n" + rule();
+}
+
+std::string TerminalTable::records() const {
+  std::size_t name_width = 0;
+  for (const ShownColumn& shown : columns_) {
+    name_width = std::max(name_width, display_width(shown.column->title));
+  }
+  std::string text;
+  for (std::size_t row = 0; row < table_.rows.size(); ++row) {
+    text += fmt::format("row {}\n", row + 1);
+    for (const ShownColumn& shown : columns_) {
+      const Cell& cell = table_.rows[row][shown.index];
+      const std::string line = without_end_blanks(
+          fmt::format("  {}  {}", left_aligned(shown.column->title, name_width), cell.text));
+      text += (cell.value ? line : shortened(line, style_.line_width_max)) + "\n";
+    }
+  }
+  return text;
+}
+
+std::string TerminalTable::text() const {
+  std::string text;
+  if (!table_.caption.empty()) text += wire::visible_text(table_.caption) + "\n\n";
+  if (are_rows_records_) {
+    text += records();
+  } else if (!columns_.empty()) {
+    text += heading();
+    for (const Row& cells : table_.rows) {
+      if (table_.has_total && &cells == &table_.rows.back()) text += rule();
+      text += row(cells);
+    }
+  }
+  for (const Remark& remark : table_.remarks) {
+    const std::string visible = wire::visible_text(remark.text);
+    text += in_tone(style_.cuts_remarks ? shortened(visible, style_.line_width_max) : visible,
+                    remark.tone, style_.paint) +
+            "\n";
+  }
+  for (const std::string& note : table_.notes)
+    text += wrapped(wire::visible_text(note), 2, 0) + "\n";
+  return text;
+}
+
+}  // namespace
+
+int colour_of(Tone tone) {
+  switch (tone) {
+    case Tone::good:
+      return 31;  // #0087af.
+    case Tone::open:
+    case Tone::bad:
+      return 130;  // #af5f00.
+    case Tone::plain:
+    case Tone::heading:
+    case Tone::changed:
+      break;
+  }
+  return 0;
+}
+
+std::string in_tone(std::string_view text, Tone tone, Paint paint) {
+  if (paint == Paint::no || tone == Tone::plain || text.empty()) return std::string(text);
+  const int colour = colour_of(tone);
+  if (colour == 0) return fmt::format("\033[1m{}\033[0m", text);
+  return fmt::format("\033[1;38;5;{}m{}\033[0m", colour, text);
+}
+
+std::string terminal_text(const Table& table, const TerminalStyle& style) {
+  return TerminalTable(table, style).text();
+}
+
+std::string left_aligned(std::string_view text, std::size_t width) {
+  const std::size_t taken = display_width(text);
+  return std::string(text) + std::string(width > taken ? width - taken : 0, ' ');
+}
+
+std::string right_aligned(std::string_view text, std::size_t width) {
+  const std::size_t taken = display_width(text);
+  return std::string(width > taken ? width - taken : 0, ' ') + std::string(text);
+}
+
+std::string wrapped(const std::string& text, std::size_t indent, std::size_t begin) {
+  std::istringstream stream(text);
+  std::string lines, word;
+  std::size_t column = begin;
+  while (stream >> word) {
+    const bool is_first = lines.empty();
+    if (!is_first && column + 1 + display_width(word) > columns_max) {
+      lines += '\n';
+      lines.append(indent, ' ');
+      column = indent;
+    } else if (!is_first) {
+      lines += " ";
+      ++column;
+    }
+    lines += word;
+    column += display_width(word);
+  }
+  return lines;
+}
+
+std::string line_of(std::string_view first, std::string_view second, std::size_t margin) {
+  const bool fits = display_width(first) + 1 + display_width(second) <= columns_max;
+  return fits ? fmt::format("{} {}\n", first, second)
+              : fmt::format("{}\n{:{}}{}\n", first, "", margin, second);
+}
+
+std::string horizontal_rule(std::size_t count) {
+  std::string rule;
+  for (std::size_t i = 0; i < count; ++i) rule += "─";
+  return rule;
+}
+
+}  // namespace proofmass::coordinator
