@@ -1,11 +1,18 @@
 #!/bin/bash
-# Installs what is missing, builds and runs all tests. Arguments go to ctest: test.sh -L unit
+# Installs what is missing, builds, and runs the tests that a change needs; with --all also the long
+# ones (label `long`: batch systems, packages, browsers, emulated processors, fault schedules).
+# Further arguments go to ctest: test.sh -L unit
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+selection=(--label-exclude '^long$')
+if [[ ${1:-} == --all ]]; then
+  selection=()
+  shift
+fi
 
 "$root/deploy/install-deps.sh"
 cd "$root"
 cmake --preset release
 cmake --build --preset release
-exec ctest --preset release "$@"
+exec ctest --preset release "${selection[@]}" "$@"

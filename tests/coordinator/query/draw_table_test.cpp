@@ -1,15 +1,12 @@
 #include "coordinator/query/draw_table.hpp"
 
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <limits>
-#include <map>
 #include <string>
 
 #include "core/microscope/campaign/microscope_campaign.hpp"
@@ -19,7 +16,6 @@ namespace proofmass::test {
 namespace {
 
 using testing::ElementsAre;
-using testing::HasSubstr;
 
 std::uint64_t bits(double value) { return std::bit_cast<std::uint64_t>(value); }
 
@@ -51,19 +47,7 @@ MicroscopeCampaign varied_campaign(std::uint64_t num_runs) {
   return campaign;
 }
 
-class DrawTable : public QueryTest {
- protected:
-  [[nodiscard]] std::vector<std::int64_t> runs_of(const std::string& condition) const {
-    std::vector<std::int64_t> runs;
-    for (const auto& row : rows_of("SELECT DISTINCT run_index FROM draw WHERE " + condition)) {
-      runs.push_back(std::get<std::int64_t>(row[0]));
-    }
-    return runs;
-  }
-  [[nodiscard]] std::int64_t count_of(const std::string& condition) const {
-    return integer_of("SELECT count(*) FROM draw WHERE " + condition);
-  }
-};
+using DrawTable = QueryTest;
 
 // The instrument that a simulation begins with is made of the values, each of which is part of it;
 // so equal bits of all that the instrument was made of are those of the simulation.
@@ -90,91 +74,6 @@ TEST_F(DrawTable, HasTheBitsOfTheSimulationsDraws) {
   EXPECT_GT(num_rejected, 10u);
 }
 
-TEST_F(DrawTable, NamesUnits) {
-  make_file(campaign_of(1));
-  EXPECT_THAT(rows_of("SELECT unit, count(*) FROM draw GROUP BY unit ORDER BY unit"),
-              ElementsAre(ElementsAre(OwnCell("1"), OwnCell(std::int64_t{9})),
-                          ElementsAre(OwnCell("m"), OwnCell(std::int64_t{6})),
-                          ElementsAre(OwnCell("m/s²"), OwnCell(std::int64_t{12})),
-                          ElementsAre(OwnCell("rad"), OwnCell(std::int64_t{24})),
-                          ElementsAre(OwnCell("rad/s²"), OwnCell(std::int64_t{3})),
-                          ElementsAre(OwnCell("s²/m"), OwnCell(std::int64_t{6}))));
-}
-
-TEST_F(DrawTable, HoldsTheRunsOfAnyCondition) {
-  make_file(campaign_of(6));
-  EXPECT_THAT(runs_of("run_index = 3"), ElementsAre(3));
-  EXPECT_THAT(runs_of("run_index > 3"), ElementsAre(4, 5));
-  EXPECT_THAT(runs_of("run_index >= 3 AND run_index < 5"), ElementsAre(3, 4));
-  EXPECT_THAT(runs_of("run_index <= 1.5"), ElementsAre(0, 1));
-  EXPECT_THAT(runs_of("run_index < 1.5"), ElementsAre(0, 1));
-  EXPECT_THAT(runs_of("run_index > 3.5"), ElementsAre(4, 5));
-  EXPECT_THAT(runs_of("run_index = 3.5"), ElementsAre());
-  EXPECT_THAT(runs_of("run_index = '3'"), ElementsAre(3));
-  EXPECT_THAT(runs_of("run_index = NULL"), ElementsAre());
-  EXPECT_THAT(runs_of("run_index IN (4, 1, 9, -2)"), ElementsAre(1, 4));
-  EXPECT_THAT(runs_of("run_index = -1 OR run_index > 9223372036854775806"), ElementsAre());
-  EXPECT_THAT(runs_of("run_index > 2 AND run_index > 4"), ElementsAre(5));
-}
-
-TEST_F(DrawTable, HoldsTheQuantitiesOfAnyCondition) {
-  make_file(campaign_of(2));
-  EXPECT_EQ(count_of("quantity = 'offcentring_m.x'"), 2);
-  EXPECT_EQ(count_of("quantity = 'offcentring_m.x' AND run_index = 1"), 1);
-  EXPECT_EQ(count_of("quantity IN ('offcentring_m.x', 'offcentring_m.y')"), 4);
-  EXPECT_EQ(count_of("quantity LIKE 'offcentring_m.%'"), 6);
-  EXPECT_EQ(count_of("quantity = 'OFFCENTRING_M.X' COLLATE NOCASE"), 2);
-  EXPECT_EQ(count_of("quantity = 'OFFCENTRING_M.X'"), 0);
-  EXPECT_EQ(count_of("quantity = 7"), 0);
-  EXPECT_EQ(count_of("quantity = NULL"), 0);
-}
-
-// Each plan of SQLite's yields what a copy of all rows yields.
-TEST_F(DrawTable, YieldsTheSameInAJoinAsFromACopy) {
-  make_file(campaign_of(20), 20);
-  const std::string join =
-      "SELECT count(*), min(a.value * b.value) FROM run_result AS r JOIN {0} AS a USING "
-      "(run_index) "
-      "JOIN {0} AS b ON b.run_index = a.run_index AND b.quantity = 'offcentring_m.y' "
-      "WHERE a.quantity = 'offcentring_m.x' AND r.run_index % 3 = 0";
-  const auto direct = rows_of(fmt::format(fmt::runtime(join), "draw"));
-  const auto copied = rows_of("WITH copy AS MATERIALIZED (SELECT *, 0 AS plain FROM draw) " +
-                              fmt::format(fmt::runtime(join), "copy"));
-  EXPECT_EQ(direct, copied);
-  EXPECT_EQ(std::get<std::int64_t>(direct[0][0]), 7);
-}
-
-TEST_F(DrawTable, ComesInTheOrderOfRunsWhicheverIsAskedFor) {
-  make_file(campaign_of(3));
-  EXPECT_EQ(integer_of("SELECT run_index FROM draw ORDER BY run_index LIMIT 1"), 0);
-  EXPECT_EQ(integer_of("SELECT run_index FROM draw ORDER BY run_index DESC LIMIT 1"), 2);
-  EXPECT_EQ(std::get<std::string>(
-                rows_of("SELECT quantity FROM draw ORDER BY quantity LIMIT 1").at(0).at(0)),
-            "angular_bias_rad_s2.x");
-  EXPECT_EQ(std::get<std::string>(
-                rows_of("SELECT quantity FROM draw ORDER BY run_index, quantity LIMIT 1")[0][0]),
-            "angular_bias_rad_s2.x");
-}
-
-TEST_F(DrawTable, TakesTheNameOfItsCampaign) {
-  make_file(varied_campaign(2));
-  EXPECT_EQ(integer_of("SELECT count(*) FROM draw('varied')"), 120);
-  EXPECT_EQ(integer_of("SELECT count(*) FROM draw(NULL)"), 120);
-  EXPECT_EQ(integer_of("SELECT count(*) FROM campaign AS c, draw(c.name)"), 120);
-  EXPECT_EQ(std::get<std::string>(rows_of("SELECT campaign FROM draw LIMIT 1").at(0).at(0)),
-            "varied");
-  EXPECT_THAT(error_of("SELECT * FROM draw('hardy2013')"),
-              HasSubstr("(draw: campaign = hardy2013 (the database holds varied))"));
-}
-
-TEST_F(DrawTable, HasNoValueForARunWhoseDrawsWereAllRejected) {
-  MicroscopeCampaign campaign = campaign_of(2);
-  campaign.scenario.acceptance.a_d11_max = 1e-12;
-  make_file(campaign);
-  EXPECT_EQ(integer_of("SELECT count(*) FROM draw"), 120);
-  EXPECT_EQ(integer_of("SELECT count(value) FROM draw"), 0);
-}
-
 // A scale factor that is far off is never accepted, however the rest is drawn.
 TEST_F(DrawTable, HasNoValueForTheOneRunWhoseDrawsWereAllRejected) {
   MicroscopeCampaign campaign = campaign_of(3);
@@ -186,28 +85,6 @@ TEST_F(DrawTable, HasNoValueForTheOneRunWhoseDrawsWereAllRejected) {
       ElementsAre(ElementsAre(OwnCell(std::int64_t{0}), OwnCell(std::int64_t{60})),
                   ElementsAre(OwnCell(std::int64_t{1}), OwnCell(std::int64_t{0})),
                   ElementsAre(OwnCell(std::int64_t{2}), OwnCell(std::int64_t{60}))));
-}
-
-TEST_F(DrawTable, IsTheCampaignOfTheFileAndNothingIsStored) {
-  make_file(varied_campaign(3));
-  EXPECT_EQ(integer_of("SELECT count(*) FROM sqlite_schema WHERE name LIKE '%draw%'"), 0);
-}
-
-TEST_F(DrawTable, SaysThatTheStoredDefinitionIsNoCampaign) {
-  coordinator::Store::create(file(), campaign_of(2), "name = 1");
-  EXPECT_THAT(error_of("SELECT * FROM draw"), HasSubstr("(draw: "));
-}
-
-TEST_F(DrawTable, SaysThatTheStoredDefinitionIsOfAnotherCampaign) {
-  for (const auto& [change, message] : std::map<std::string, std::string>{
-           {"name = 'other'", "campaign.name = other (must be varied, as in the definition)"},
-           {"seed = '9'", "campaign.seed = 9 (must be 20260314, as in the definition)"},
-           {"num_runs = 4", "campaign.num_runs = 4 (must be 3, as in the definition)"}}) {
-    std::filesystem::remove(file());
-    make_file(varied_campaign(3));
-    test::change(file(), "UPDATE campaign SET " + change);
-    EXPECT_THAT(error_of("SELECT * FROM draw"), HasSubstr(message));
-  }
 }
 
 }  // namespace

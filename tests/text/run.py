@@ -1,0 +1,278 @@
+#!/usr/bin/env python3
+"""Runs the sessions of a shell that text files show, and compares what they print.
+
+    tests/text/run.py --programs build/release/bin tests/text/query.test
+    tests/text/run.py --programs build/release/bin --update tests/text/*.test
+
+README.md describes the files. Exit code 0 if everything is as shown, 1 if not; 77 if a file needs
+a program that this machine lacks, but 1 if the environment has CI. With --update, the expected
+output of a command that printed something else is replaced by what it printed.
+"""
+
+import argparse
+import difflib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+SOURCE = Path(__file__).resolve().parents[2]
+INDENT = "  "
+END_OF_ERROR = "! "  # Before a line of standard error.
+TIME_MAX_S = 200
+
+# What the names in braces stand for. Other text in braces stands for itself.
+PATTERNS = {
+    "any": r".*?",
+    "date": r"\d{4}-\d\d-\d\d",
+    "digest": r"[0-9a-f]{64}",
+    "duration": r"\d+(?:\.\d+)? (?:ms|s|min|h|d)(?: \d+ (?:s|min|h))?",
+    "hex": r"[0-9a-f]+",
+    "number": r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?",
+    "time": r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:\.\d+)?Z?",
+    "version": r"\d+\.\d+\.\d+(?:-\w+)?",
+    "word": r"\S+",
+}
+
+
+class Mistake(Exception):
+    """A file that is not written as README.md says."""
+
+
+@dataclass
+class Step:
+    """A command and what it has to print."""
+
+    line: int  # Of the command, from 1.
+    command: str
+    begin: int  # Position of the first line of output among the lines of the file.
+    expected: list[str] = field(default_factory=list)  # Without indentation and blank lines.
+    end: int = 0
+
+    @property
+    def exit_code(self):
+        last = self.expected[-1] if self.expected else ""
+        return int(last[1:-1]) if re.fullmatch(r"\[\d+\]", last) else 0
+
+
+def read_steps(lines):
+    """The steps of a file, and the programs that it needs."""
+    steps, needed, is_open = [], [], False
+    for number, line in enumerate(lines, 1):
+        text = line[len(INDENT):]
+        if line.startswith("needs: "):
+            needed += line.split()[1:]
+        elif line and not line.startswith(INDENT):
+            is_open = False
+        elif text.startswith("$ "):
+            steps.append(Step(number, text[2:], number, end=number))
+            is_open = True
+        elif text.startswith("> ") or text == ">":
+            if not is_open or steps[-1].expected:
+                raise Mistake(f"line {number}: no command goes on here")
+            steps[-1].command += "\n" + text[2:]
+            steps[-1].begin = steps[-1].end = number
+        elif text.strip():
+            if not is_open:
+                raise Mistake(f"line {number}: output without a command")
+            steps[-1].expected.append(text.rstrip())
+            steps[-1].end = number
+    return steps, needed
+
+
+class Session:
+    """One shell in one directory of its own, which goes with it."""
+
+    def __init__(self, programs):
+        self.directory = tempfile.mkdtemp(prefix="proofmass-text-")
+        self._streams = tempfile.mkdtemp(prefix="proofmass-text-")
+        environment = {
+            name: value
+            for name, value in os.environ.items()
+            if not name.startswith(("PROOFMASS_", "SLURM_")) and name not in ("COLUMNS", "NO_COLOR")
+        }
+        environment |= {
+            "PATH": f"{programs}:{environment['PATH']}",
+            "HOME": self.directory,
+            "LC_ALL": "C.UTF-8",
+            "TZ": "UTC",
+            "SOURCE": str(SOURCE),
+            "PROGRAMS": str(programs),
+        }
+        self._environment = environment
+
+    def run(self, steps):
+        """What each step printed, as (lines of output, lines of error, exit code); fewer if the
+        shell ended before."""
+        mark = f"proofmass-text-{os.getpid()}-end"
+        script = "".join(
+            f"{step.command}\nprintf '\\n{mark} %d\\n' $?; printf '\\n{mark}\\n' >&2\n"
+            for step in steps
+        )
+        paths = [Path(self._streams, name) for name in ("script", "output", "error")]
+        paths[0].write_text(script, encoding="utf-8")
+        with open(paths[1], "wb") as output, open(paths[2], "wb") as error:
+            shell = subprocess.Popen(
+                ["sh", paths[0]], cwd=self.directory, env=self._environment, stdout=output,
+                stderr=error, stdin=subprocess.DEVNULL, start_new_session=True)
+            try:
+                shell.wait(TIME_MAX_S)
+            except subprocess.TimeoutExpired:
+                print(f"not finished after {TIME_MAX_S} s")
+            finally:
+                end_group(shell)
+        texts = [path.read_text(encoding="utf-8", errors="replace") for path in paths[1:]]
+        outputs = re.split(rf"\n{mark} (\d+)\n", texts[0])
+        errors = re.split(rf"\n{mark}\n", texts[1])
+        self.rest = outputs[-1], errors[-1]
+        codes = map(int, outputs[1::2])
+        return [(self._lines(output), self._lines(error), code)
+                for output, error, code in zip(outputs[::2], errors, codes)]
+
+    def _lines(self, text):
+        text = text.replace(self.directory, "{dir}").replace(str(SOURCE), "{source}")
+        return [line.rstrip() for line in text.splitlines() if line.strip()]
+
+    def close(self):
+        shutil.rmtree(self.directory, ignore_errors=True)
+        shutil.rmtree(self._streams, ignore_errors=True)
+
+
+def end_group(shell):
+    """Ends the shell and what it left in the background."""
+    try:
+        os.killpg(shell.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        pass
+    shell.wait()
+
+
+def printed_lines(output, error, code):
+    """As a file shows them."""
+    return output + [END_OF_ERROR + line for line in error] + ([f"[{code}]"] if code else [])
+
+
+def pattern_of(line):
+    """Of a line of expected output: blanks in a row count as one, and so do the lines of a rule."""
+    parts = re.split(r"(\{[a-z]+\}| +|─+)", line)
+    pattern = ""
+    for part in parts:
+        if part.startswith("{") and part[1:-1] in PATTERNS:
+            pattern += PATTERNS[part[1:-1]]
+        elif part.startswith(" "):
+            pattern += " +"
+        else:
+            pattern += "─+" if part.startswith("─") else re.escape(part)
+    return pattern
+
+
+def is_as_expected(expected, printed):
+    pattern = "".join(
+        r"(?:.*\n)*?" if line == "..." else pattern_of(line) + r"\n" for line in expected)
+    return re.fullmatch(pattern, "".join(line + "\n" for line in printed)) is not None
+
+
+def in_expected_words(expected, printed):
+    """The printed lines, those that match an expected one in its spelling. Lines where `...` stands
+    stay `...`."""
+    words, position, is_elided = [], 0, False
+    for line in printed:
+        following = range(position, len(expected))
+        found = next((i for i in following
+                      if expected[i] != "..." and re.fullmatch(pattern_of(expected[i]), line)), None)
+        if found is None and position < len(expected) and expected[position] == "...":
+            is_elided = True
+            continue
+        if found is None:
+            words.append(line)
+            continue
+        if "..." in expected[position:found] or is_elided:
+            words.append("...")
+        words.append(expected[found])
+        position, is_elided = found + 1, False
+    return words + (["..."] if is_elided else [])
+
+
+def with_patterns(line):
+    """A printed line as --update writes it."""
+    line = re.sub(PATTERNS["time"], "{time}", line)
+    line = re.sub(PATTERNS["date"], "{date}", line)
+    line = re.sub(rf"\b{PATTERNS['digest']}\b", "{digest}", line)
+    return re.sub(r"(?<=proofmass )\d+\.\d+\.\d+", "{version}", line)
+
+
+def report(path, step, printed):
+    print(f"{path}:{step.line}: {step.command.splitlines()[0]}")
+    words = in_expected_words(step.expected, printed)
+    for line in list(difflib.unified_diff(step.expected, words, "expected", "printed", lineterm=""))[2:]:
+        print("    " + line)
+    if words == step.expected:
+        print("    lines are missing, or in another order")
+
+
+def updated(lines, replacements):
+    """The file with the output of each of these (step, printed) in place of the expected one."""
+    for step, printed in sorted(replacements, key=lambda of: -of[0].line):
+        words = in_expected_words(step.expected, printed)
+        kept = set(step.expected)
+        text = [INDENT + (line if line in kept else with_patterns(line)) for line in words]
+        lines[step.begin:step.end] = text
+    return lines
+
+
+def run_file(path, programs, is_update):
+    """Whether all is as expected; null if the file needs what this machine lacks."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    steps, needed = read_steps(lines)
+    lacking = [program for program in needed if shutil.which(program) is None]
+    if lacking:
+        print(f"{path}: SKIPPED: needs {' '.join(lacking)}")
+        return None
+    session = Session(programs)
+    try:
+        results = session.run(steps)
+    finally:
+        session.close()
+    different = []
+    for step, (output, error, code) in zip(steps, results):
+        printed = printed_lines(output, error, code)
+        expected = [line for line in step.expected]
+        if not is_as_expected(expected, printed):
+            different.append((step, printed))
+    if is_update:
+        path.write_text("\n".join(updated(lines, different)) + "\n", encoding="utf-8")
+    else:
+        for step, printed in different:
+            report(path, step, printed)
+    if len(results) < len(steps):
+        print(f"{path}:{steps[len(results)].line}: the shell ended here", *session.rest, sep="\n")
+        return False
+    return not different
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Runs the sessions that text files show.")
+    parser.add_argument("--programs", required=True, type=Path, help="directory of the programs")
+    parser.add_argument("--update", action="store_true", help="write what was printed into FILE")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
+    options = parser.parse_args()
+    try:
+        passed = [run_file(path, options.programs.resolve(), options.update)
+                  for path in options.files]
+    except Mistake as mistake:
+        print(f"run.py: error: {mistake}", file=sys.stderr)
+        return 1
+    if not all(result is not False for result in passed):
+        return 0 if options.update and len(passed) else 1
+    if None in passed:
+        return 1 if "CI" in os.environ else 77
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
