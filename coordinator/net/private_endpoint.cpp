@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <stdlib.h>
-#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -16,6 +15,7 @@
 #include <utility>
 
 #include "core/error.hpp"
+#include "proto/link/whole_file.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -52,7 +52,7 @@ LockedDirectory make_directory(const std::filesystem::path& parent) {
   const std::filesystem::path path =
       parent / (std::string(prefix) + draft.substr(draft.size() - random_size));
   const int lock = open(lock_file.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  if (lock >= 0 && flock(lock, LOCK_EX | LOCK_NB) == 0 &&
+  if (lock >= 0 && wire::lock_file(lock) == wire::Locked::yes &&
       rename(draft.c_str(), path.c_str()) == 0) {
     return {.path = path, .lock = lock};
   }
@@ -83,7 +83,7 @@ void remove_if_stale(int parent, const char* name) {
   if (is_private(directory)) {
     const int lock = openat(directory, lock_name, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     // While its process lives, also one in another container, the lock is held.
-    const bool is_stale = lock >= 0 && flock(lock, LOCK_EX | LOCK_NB) == 0;
+    const bool is_stale = lock >= 0 && wire::lock_file(lock) == wire::Locked::yes;
     if (is_stale) remove_directory(parent, name, directory);
     if (lock >= 0) close(lock);
   }
