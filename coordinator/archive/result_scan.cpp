@@ -106,18 +106,18 @@ Lines given_up_differences(const Store& store, const Summary& summary) {
 }
 
 Check check_current(const Store& store, const Campaign& campaign, const Summary& summary,
-                    const CampaignStatistics& statistics) {
-  Lines lines = count_differences(summary, statistics);
+                    const ReadResults& results) {
+  Lines lines = count_differences(summary, results.statistics);
   append(lines, given_up_differences(store, summary));
-  append(lines, statistic_differences(store, campaign, statistics));
+  append(lines, statistic_differences(store, campaign, results));
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
   return Check::holds(
-      fmt::format("of {} runs: every number and every budget", statistics.num_runs));
+      fmt::format("of {} runs: every number and every budget", results.statistics.num_runs));
 }
 
 // Without a summary nothing was ever stored but the budget before estimation.
 Check check_first(const Store& store, const Campaign& campaign) {
-  Lines lines = statistic_differences(store, campaign, {});
+  Lines lines = statistic_differences(store, campaign, ReadResults{});
   if (!lines.empty()) return Check::fails(std::string(unfit), std::move(lines));
   return Check::not_checked("none are stored: a coordinator has the file, or was killed");
 }
@@ -149,7 +149,7 @@ Check check_stored_statistics(const Store& store, const Campaign& campaign,
   if (!summary) return check_first(store, campaign);
   if (summary->num_finished == num_runs_in(scan.runs) && summary->digests == scan.digests &&
       scan.num_violations == 0) {
-    return check_current(store, campaign, *summary, read_results(store, campaign).statistics);
+    return check_current(store, campaign, *summary, read_results(store, campaign));
   }
   Lines lines;
   const std::uint64_t num_counted = summary->num_estimated + summary->num_not_converged +

@@ -194,8 +194,9 @@ void write_statistics(Store& store, const Campaign& campaign, const ReadResults&
 }
 
 std::vector<std::string> statistic_differences(const Store& store, const Campaign& campaign,
-                                               const CampaignStatistics& statistics) {
-  return store.statistic_differences(statistics, campaign.error_budget());
+                                               const ReadResults& results) {
+  return store.statistic_differences(results.statistics, campaign.error_budget(),
+                                     results.warnings.first);
 }
 
 }  // namespace proofmass::coordinator

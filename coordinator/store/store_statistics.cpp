@@ -57,13 +57,21 @@ std::vector<std::string> Store::parameter_differences(const Campaign& campaign) 
 constexpr double rounding = 1e-12;
 
 std::vector<std::string> Store::statistic_differences(
-    const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget) const {
+    const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget,
+    std::span<const RunWarning> warnings) const {
   constexpr std::array tables{
       ComparedTable{.name = "statistic", .row_name = "parameter", .tolerance = rounding},
-      ComparedTable{.name = "budget_entry", .row_name = "term", .tolerance = rounding}};
+      ComparedTable{.name = "budget_entry", .row_name = "term", .tolerance = rounding},
+      ComparedTable{.name = "run_warning",
+                    .row_name = "effect || ' on ' || parameter || ' in run ' || run_index",
+                    .tolerance = rounding}};
   return detail::table_differences(
-      impl_->database, [&](Database& expected) { replace_all(expected, statistics, budget); },
-      std::span(tables).first(has_own_budget(impl_->database) ? 2 : 1));
+      impl_->database,
+      [&](Database& expected) {
+        replace_all(expected, statistics, budget);
+        detail::replace_warnings(expected, warnings);
+      },
+      std::span(tables).first(has_own_budget(impl_->database) ? 3 : 1));
 }
 
 std::vector<std::string> Store::stop_check_differences(

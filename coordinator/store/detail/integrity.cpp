@@ -207,10 +207,11 @@ struct Row {
 struct Content {
   std::vector<std::string> columns;
   std::vector<Row> rows;
+  std::map<std::string, std::size_t> places;  ///< Of the rows, by name.
 
   [[nodiscard]] const Row* find(const std::string& name) const {
-    const auto found = std::ranges::find(rows, name, &Row::name);
-    return found == rows.end() ? nullptr : &*found;
+    const auto found = places.find(name);
+    return found == places.end() ? nullptr : &rows[found->second];
   }
 };
 
@@ -223,6 +224,7 @@ Content content_of(const Database& database, const ComparedTable& table) {
   }
   while (select.step()) {
     Row& row = content.rows.emplace_back(Row{.name = select.text(0), .cells = {}});
+    content.places.emplace(row.name, content.rows.size() - 1);
     for (int column = 1; column < select.num_columns(); ++column) {
       row.cells.push_back(select.shown(column));
     }

@@ -60,6 +60,13 @@ TEST_F(DerivedChecks, FindAStatisticThatDoesNotFollowFromTheResults) {
   EXPECT_DOUBLE_EQ(std::stod(of_k2d.substr(of_k2d.find("must be ") + 8)), std::stod(mean));
 }
 
+TEST_F(DerivedChecks, FindAWarningThatDoesNotFollowFromTheResults) {
+  EXPECT_THAT(failing_after("INSERT INTO run_warning VALUES (0, 'spin', 'k2d', 0.5)"),
+              ElementsAre("statistics"));
+  EXPECT_THAT(check("statistics").details,
+              ElementsAre("run_warning has a row too many: spin on k2d in run 0"));
+}
+
 TEST_F(DerivedChecks, FindABoundThatIsOffByItsLastBitOrMissing) {
   EXPECT_THAT(failing_after("UPDATE statistic SET skewness = skewness * (1 + 3e-16)"
                             " WHERE parameter = 'a_d12'"),
