@@ -273,8 +273,8 @@ DispersionSet read_dispersions(Document& document) {
 }  // namespace
 
 MicroscopeCampaign read_definition(Document& document) {
-  MicroscopeCampaign campaign = hardy2013_campaign();  // What is left out stays what `init` writes.
-  campaign.name.clear();
+  MicroscopeCampaign campaign;
+  campaign.scenario = hardy2013_campaign().scenario;  // What is left out stays what `init` writes.
   document.read("campaign.name", campaign.name);
   auto seed = static_cast<std::int64_t>(campaign.seed);
   auto num_runs = static_cast<std::int64_t>(campaign.num_runs);

@@ -32,7 +32,7 @@ TEST(OomKills, AreReadFromTheKernelsCounters) {
   EXPECT_EQ(oom_kills_in("nr_free_pages 1\n"), 0U);
 }
 
-// Version 2 of control groups, then version 1; a container sees the path of the host.
+// A container sees the path of the host.
 TEST(ProcessorQuota, IsTheSmallestOfAllControlGroupsAbove) {
   const test::ScratchDirectory root;
   const auto write = [&](const std::string& file, const std::string& text) {
