@@ -230,8 +230,8 @@ TEST(Comparison, OfTwoRunsFindsNoChange) {
     EXPECT_GT(parameter.adjusted_p_values.tail, 0.05);
   }
   EXPECT_THAT(text_of(comparison),
-              HasSubstr("\nfrom, to: 95 % interval of the change from A; p: larger of Welch's and\n"
-                        "  Smirnov's test\n"));
+              HasSubstr("\nfrom, to: 95 % interval of the change from A; p: larger of Welch's and "
+                        "Smirnov's\n  test\n"));
 }
 
 TEST(Comparison, OfOtherDrawsIsOfAllRuns) {

@@ -206,7 +206,7 @@ TEST(MarkdownRows, MakeATable) {
 TEST(MarkdownRows, HoldTextThatMarkdownWouldRead) {
   EXPECT_EQ(written(RowFormat::markdown, {"_a_"}, {{text("a|b\n<i> *x* `y` [z] \\ _c_d_")}}),
             "| \\_a\\_ |\n| --- |\n"
-            "| a\\|b\\\\n\\<i> \\*x\\* \\`y\\` \\[z\\] \\\\ \\_c_d\\_ |\n");
+            "| a\\|b\\\\n\\<i\\> \\*x\\* \\`y\\` \\[z\\] \\\\ \\_c_d\\_ |\n");
 }
 
 }  // namespace

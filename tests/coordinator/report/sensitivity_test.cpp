@@ -171,7 +171,7 @@ TEST(ExplanationText, ShowsTheRunsValuesOfWhatDrivesTheError) {
   const auto lines = test::lines_of(explanation_text(drawn, index(Parameter::k2c), {42}, 1));
   EXPECT_EQ(lines[0], "Run 42: error of K2c/K1c² 1.5 s²/m, rank 1 of 1000");
   EXPECT_THAT(lines[4], StartsWith(drawn_names()[7]));
-  EXPECT_THAT(lines[4], HasSubstr("      1.5       99.9"));
+  EXPECT_THAT(lines[4], HasSubstr("      1.5      99.9"));
 }
 
 // `-1.22e-08` is as wide as a value gets.
