@@ -24,7 +24,6 @@ from pathlib import Path
 SOURCE = Path(__file__).resolve().parents[2]
 INDENT = "  "
 END_OF_ERROR = "! "  # Before a line of standard error.
-TIME_MAX_S = 200
 
 # What the names in braces stand for. Other text in braces stands for itself.
 PATTERNS = {
@@ -106,7 +105,7 @@ class Session:
         }
         self._environment = environment
 
-    def run(self, steps):
+    def run(self, steps, time_max_s):
         """What each step printed, as (lines of output, lines of error, exit code); fewer if the
         shell ended before."""
         mark = f"proofmass-text-{os.getpid()}-end"
@@ -121,9 +120,9 @@ class Session:
                 ["sh", paths[0]], cwd=self.directory, env=self._environment, stdout=output,
                 stderr=error, stdin=subprocess.DEVNULL, start_new_session=True)
             try:
-                shell.wait(TIME_MAX_S)
+                shell.wait(time_max_s)
             except subprocess.TimeoutExpired:
-                print(f"not finished after {TIME_MAX_S} s")
+                print(f"not finished after {time_max_s} s")
             finally:
                 end_group(shell)
         texts = [path.read_text(encoding="utf-8", errors="replace") for path in paths[1:]]
@@ -225,7 +224,7 @@ def updated(lines, replacements):
     return lines
 
 
-def run_file(path, programs, is_update):
+def run_file(path, programs, is_update, time_max_s=200):
     """Whether all is as expected; null if the file needs what this machine lacks."""
     lines = path.read_text(encoding="utf-8").splitlines()
     steps, needed = read_steps(lines)
@@ -235,14 +234,13 @@ def run_file(path, programs, is_update):
         return None
     session = Session(programs)
     try:
-        results = session.run(steps)
+        results = session.run(steps, time_max_s)
     finally:
         session.close()
     different = []
     for step, (output, error, code) in zip(steps, results):
         printed = printed_lines(output, error, code)
-        expected = [line for line in step.expected]
-        if not is_as_expected(expected, printed):
+        if not is_as_expected(step.expected, printed):
             different.append((step, printed))
     if is_update:
         path.write_text("\n".join(updated(lines, different)) + "\n", encoding="utf-8")
@@ -259,10 +257,11 @@ def main():
     parser = argparse.ArgumentParser(description="Runs the sessions that text files show.")
     parser.add_argument("--programs", required=True, type=Path, help="directory of the programs")
     parser.add_argument("--update", action="store_true", help="write what was printed into FILE")
+    parser.add_argument("--timeout", type=float, default=200, help="seconds for a file; 200")
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
     options = parser.parse_args()
     try:
-        passed = [run_file(path, options.programs.resolve(), options.update)
+        passed = [run_file(path, options.programs.resolve(), options.update, options.timeout)
                   for path in options.files]
     except Mistake as mistake:
         print(f"run.py: error: {mistake}", file=sys.stderr)
