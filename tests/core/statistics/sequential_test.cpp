@@ -270,8 +270,19 @@ Report report_after(std::optional<std::uint64_t> num_fixed) {
 
 /// The first number of runs, from `num_runs` on, of which the value of this order is a bound.
 std::uint64_t num_runs_for(std::uint64_t order, std::uint64_t num_runs) {
-  while (wilks_order(tolerance_99_95, num_runs) < order) ++num_runs;
-  return num_runs;
+  const auto is_bound = [&](std::uint64_t count) {
+    return tolerance_99_95.is_shown(binomial_at_most(static_cast<double>(order) - 1.0,
+                                                     static_cast<double>(count),
+                                                     1.0 - tolerance_99_95.coverage));
+  };
+  if (is_bound(num_runs)) return num_runs;
+  std::uint64_t too_few = num_runs, enough = 2 * num_runs;
+  for (; !is_bound(enough); enough *= 2) too_few = enough;
+  while (enough - too_few > 1) {
+    const std::uint64_t middle = too_few + (enough - too_few) / 2;
+    (is_bound(middle) ? enough : too_few) = middle;
+  }
+  return enough;
 }
 
 /// What a verdict of a fixed number at each look says.
