@@ -121,7 +121,7 @@ void add_troubles(Store& store, const MicroscopeCampaign& campaign) {
 class NullWriter final : public RowWriter {
  public:
   void begin(std::span<const std::string>) override {}
-  [[nodiscard]] bool row(std::span<const Cell>) override { return true; }
+  [[nodiscard]] bool row(std::span<const Value>) override { return true; }
   void end() override {}
 };
 

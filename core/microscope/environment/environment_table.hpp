@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/campaign/definition.hpp"
+#include "core/campaign/run_result.hpp"
 
 namespace proofmass {
 

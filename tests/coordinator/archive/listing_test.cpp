@@ -67,7 +67,7 @@ TEST(ListingText, FitsATerminal) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) EXPECT_LE(display_width(line), 80U) << line;
   EXPECT_THAT(text, HasSubstr("… "));
-  EXPECT_THAT(text, HasSubstr(" cancelle… "));
+  EXPECT_THAT(text, HasSubstr(" cancell… "));
   EXPECT_THAT(text, HasSubstr(" 18446744073709551615 2024-02-29\n"));
 }
 
