@@ -35,8 +35,8 @@ inline constexpr std::uint64_t violations_named_max = 10;
 // read. All that is handed over is of one state of the file.
 
 /// Holds `statistic`, `budget_entry`, `run_warning` and `summary` against the results that the
-/// summary is of. A coordinator brings them up to date when a campaign ends or is stopped: in between they are of
-/// fewer results, and only what does not depend on results is checked.
+/// summary is of. A coordinator brings them up to date when a campaign ends or is stopped: in
+/// between they are of fewer results, and only what does not depend on results is checked.
 [[nodiscard]] Check check_stored_statistics(const Store& store, const Campaign& campaign,
                                             const ResultScan& scan);
 

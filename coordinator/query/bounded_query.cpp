@@ -79,7 +79,6 @@ class Watch {
   }
 
  private:
-
   void watch() {
     std::unique_lock lock(mutex_);
     while (!changed_.wait_for(lock, delay_max, [this] { return is_ending_; })) {

@@ -85,8 +85,8 @@ std::string driver_heading(std::span<const Sensitivity> rows, std::string_view o
 /// @param position  Of the run.
 Table driver_table(const DrawnRuns& drawn, std::span<const Sensitivity> rows,
                    std::string_view output, std::optional<std::size_t> position) {
-  Table table{.columns = {{driver_heading(rows, output), true, 39},
-                          {"% of variance (95 %)", false, 21}}};
+  Table table{
+      .columns = {{driver_heading(rows, output), true, 39}, {"% of variance (95 %)", false, 21}}};
   if (position) {
     table.columns.insert(table.columns.end(), {{"value", false, 10}, {"% below", false, 10}});
   } else {

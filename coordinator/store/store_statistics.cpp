@@ -56,9 +56,9 @@ std::vector<std::string> Store::parameter_differences(const Campaign& campaign) 
 // core/statistics/distribution.hpp.
 constexpr double rounding = 1e-12;
 
-std::vector<std::string> Store::statistic_differences(
-    const CampaignStatistics& statistics, const std::optional<ErrorBudget>& budget,
-    std::span<const RunWarning> warnings) const {
+std::vector<std::string> Store::statistic_differences(const CampaignStatistics& statistics,
+                                                      const std::optional<ErrorBudget>& budget,
+                                                      std::span<const RunWarning> warnings) const {
   constexpr std::array tables{
       ComparedTable{.name = "statistic", .row_name = "parameter", .tolerance = rounding},
       ComparedTable{.name = "budget_entry", .row_name = "term", .tolerance = rounding},
