@@ -103,6 +103,7 @@ GrowingDataset::GrowingDataset(const Hdf5File& file, hid_t group, const std::str
   const Hdf5Handle space = file.handle(H5Screate_simple(1, &none, &unlimited), H5Sclose);
   const Hdf5Handle properties = file.handle(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   file.check(H5Pset_chunk(properties, 1, &format.chunk_rows));
+  file.check(H5Pset_obj_track_times(properties, false));  // The same results are the same bytes.
   dataset_ = file.handle(
       H5Dcreate2(group, name.c_str(), format.stored, space, H5P_DEFAULT, properties, H5P_DEFAULT),
       H5Dclose);

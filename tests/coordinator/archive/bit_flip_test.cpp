@@ -74,7 +74,9 @@ class BitFlips : public test::StoreTest {
   [[nodiscard]] std::string comparison_of(const std::filesystem::path& path) const {
     return printed([&] {
       const std::vector<std::filesystem::path> files{path, file()};
-      return comparison_json(compare_several(files, test::never_stopped));
+      std::vector<ComparedMember> members = compare_several(files, test::never_stopped);
+      members.front().file = file();
+      return comparison_json(members);
     });
   }
 

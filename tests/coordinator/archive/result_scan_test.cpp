@@ -67,8 +67,8 @@ TEST_F(DerivedChecks, FindAWarningThatDoesNotFollowFromTheResults) {
               ElementsAre("run_warning has a row too many: spin on k2d in run 0"));
 }
 
-TEST_F(DerivedChecks, FindABoundThatIsOffByItsLastBitOrMissing) {
-  EXPECT_THAT(failing_after("UPDATE statistic SET skewness = skewness * (1 + 3e-16)"
+TEST_F(DerivedChecks, FindABoundThatIsOffByMoreThanRoundingOrMissing) {
+  EXPECT_THAT(failing_after("UPDATE statistic SET skewness = skewness * (1 + 2e-12)"
                             " WHERE parameter = 'a_d12'"),
               ElementsAre("statistics"));
   EXPECT_THAT(check("statistics").details, ElementsAre(StartsWith("statistic.skewness of a_d12")));
