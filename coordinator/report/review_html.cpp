@@ -113,9 +113,7 @@ std::string characteristics_markup(const Review& review) {
 std::string budget_markup(const Review& review) {
   const std::optional<BarChart> chart = budget_chart(review);
   if (!chart) return "";
-  return flow(
-      table_part(budget_table(review.budget, review.results.statistics, review.results.totals)) +
-      figure_of(*chart));
+  return flow(table_part(review_budget_table(review)) + figure_of(*chart));
 }
 
 std::string causes_markup(const Review& review) {

@@ -45,7 +45,7 @@ std::string review_markdown(const Review& review) {
       section("Accuracy", {accuracy_table(review.objectives, statistics),
                            interval_table(statistics, review.num_given_up),
                            error_table(statistics, review.num_given_up, review.interpretation)}) +
-      section("Budget", {budget_table(review.budget, statistics, review.results.totals)}) +
+      section("Budget", {review_budget_table(review)}) +
       section("Causes of the errors", {cause_table(review)}) +
       section("How it was run",
               {identity_table(review), execution_table(review), host_table(review)}) +

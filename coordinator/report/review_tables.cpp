@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <regex>
 
 #include "coordinator/charts/ticks.hpp"
 #include "coordinator/report/report_tables.hpp"
@@ -31,6 +32,18 @@ std::string digest_words(const Review& review) {
 
 std::string hours(double seconds) { return figure_text(seconds / 3600.0) + " h"; }
 
+/// `1.2×10⁻¹²` for each `1.2e-12` of a text.
+std::string with_powers_of_ten(const std::string& text) {
+  static const std::regex program_spelling("[0-9]+(\\.[0-9]+)?e[-+][0-9]+");
+  std::string result;
+  std::smatch found;
+  auto begin = text.begin();
+  for (; std::regex_search(begin, text.end(), found, program_spelling); begin = found[0].second) {
+    result += found.prefix().str() + figure_text(std::stod(found.str()));
+  }
+  return result + std::string(begin, text.end());
+}
+
 }  // namespace
 
 std::string quantity_text(double value, const Quantity& quantity) {
@@ -47,6 +60,12 @@ std::string name_in_symbols(std::string_view name) {
   const std::vector<Quantity>& quantities = model().results().quantities;
   const auto found = std::ranges::find(quantities, name, &Quantity::name);
   return std::string(found == quantities.end() ? name : found->symbol);
+}
+
+Table review_budget_table(const Review& review) {
+  Table table = budget_table(review.budget, review.results.statistics, review.results.totals);
+  for (std::string& note : table.notes) note = with_powers_of_ten(note);
+  return table;
 }
 
 Table cause_table(const Review& review) {
