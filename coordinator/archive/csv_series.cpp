@@ -81,7 +81,7 @@ class CsvSeries final : public SeriesOutput {
   std::filesystem::path directory_;
   RunIndex run_;
   const SignalSelection& selection_;
-  std::size_t session_ = 0;                              ///< That of the last file.
+  std::size_t session_ = 0;                              ///< The session of the last file.
   std::vector<std::unique_ptr<wire::DraftFile>> files_;  ///< One a session.
   fmt::memory_buffer text_;                              ///< What the last file does not have yet.
 };

@@ -64,7 +64,7 @@ struct MemberNames {
 /// A text of a key, for JSON.
 using KeyText = std::pair<std::string, std::string>;
 
-/// The same as JSON, complete and in SI units: of two campaigns one comparison, of several a list
+/// A comparison as JSON, complete and in SI units: of two campaigns one object, of several a list
 /// of campaigns, each with its comparison with the first.
 /// @param varied  Keys with their values for each campaign, which is in the list then, even of two;
 ///                empty if none was varied.

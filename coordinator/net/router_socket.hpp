@@ -81,8 +81,8 @@ class RouterSocket {
   std::mutex mutex_;                             ///< For the socket and its events.
   std::unique_ptr<zmq::socket_t> socket_;        ///< Null while it is closed.
   std::unique_ptr<wire::SocketEvents> events_;   ///< Of the socket: gone before it.
-  std::unique_ptr<wire::LinkFaults> sending_;    ///< Null unless something shall go wrong.
-  std::unique_ptr<wire::LinkFaults> receiving_;  ///< The same.
+  std::unique_ptr<wire::LinkFaults> sending_;    ///< Null unless faults are planned.
+  std::unique_ptr<wire::LinkFaults> receiving_;  ///< Null unless faults are planned.
   std::map<std::string, Address> addresses_;     ///< Of those whose messages are delayed.
 };
 

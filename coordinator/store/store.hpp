@@ -112,7 +112,7 @@ class Store {
   /// program began the campaign, or if it began with a stop rule.
   [[nodiscard]] std::optional<std::uint64_t> num_runs_fixed() const;
   [[nodiscard]] std::string definition() const;
-  [[nodiscard]] std::string model_version() const;  ///< That of the program that made the file.
+  [[nodiscard]] std::string model_version() const;  ///< Of the program that made the file.
   [[nodiscard]] std::string build() const;          ///< Of the program that made the file.
   [[nodiscard]] std::string created_utc() const;    ///< As in `2024-02-29T12:00:10Z`.
   /// Name of the key that submitted the campaign; empty without keys, or if it was not submitted.

@@ -8,10 +8,10 @@ namespace proofmass::coordinator {
 /// and below a thousandth `1.2e+06`, which is at most seven characters below 1e99.
 [[nodiscard]] std::string measured_figure(double value);
 
-/// The same of any number, with a minus sign if it is below 0.
+/// Any number in the spelling of measured_figure(), with a minus sign if it is below 0.
 [[nodiscard]] std::string signed_figure(double value);
 
-/// A number ≥ 0 given by somebody: the same without zeros that say nothing, `7.3`, `2000`.
+/// A number ≥ 0 that somebody gave, without zeros that say nothing: `7.3`, `2000`.
 [[nodiscard]] std::string given_figure(double value);
 
 /// For people: `42 s`, `3 min 20 s`, `5 h 10 min`, `12 d 4 h`.

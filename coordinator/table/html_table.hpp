@@ -11,7 +11,7 @@ namespace proofmass::coordinator {
 /// tell it.
 [[nodiscard]] std::string html_table(const Table& table);
 
-/// The same of a table that is left out if it has no rows.
+/// A table as html_table() writes it; empty if it has no rows.
 [[nodiscard]] std::string table_or_nothing(const Table& table);
 
 }  // namespace proofmass::coordinator

@@ -75,7 +75,7 @@ int open_and_lock(const std::filesystem::path& path) {
                   kind == "copy" ? "give it the name" : "put the file back"));
 }
 
-// That of Store::check_place(); empty if there is none.
+// A copy that Store::check_place() made of a file with this name; empty if there is none.
 std::filesystem::path recovered_copy_of(const std::filesystem::path& file) {
   const std::string beginning = file.stem().string() + ".recovered-";
   std::error_code error;
