@@ -39,6 +39,17 @@ PATTERNS = {
 }
 
 
+# Waits until a command succeeds.
+AWAIT = """await() {
+  await_until=$(($(date +%s) + 100))
+  until eval "$1"; do
+    [ $(date +%s) -lt $await_until ] || { echo "not within 100 s: $1"; return 1; }
+    sleep 0.02
+  done
+}
+"""
+
+
 class Mistake(Exception):
     """A file that is not written as README.md says."""
 
@@ -109,7 +120,7 @@ class Session:
         """What each step printed, as (lines of output, lines of error, exit code); fewer if the
         shell ended before."""
         mark = f"proofmass-text-{os.getpid()}-end"
-        script = "".join(
+        script = AWAIT + "".join(
             f"{step.command}\nprintf '\\n{mark} %d\\n' $?; printf '\\n{mark}\\n' >&2\n"
             for step in steps
         )
@@ -124,7 +135,8 @@ class Session:
             except subprocess.TimeoutExpired:
                 print(f"not finished after {time_max_s} s")
             finally:
-                end_group(shell)
+                self._end_all()
+                shell.wait()
         texts = [path.read_text(encoding="utf-8", errors="replace") for path in paths[1:]]
         outputs = re.split(rf"\n{mark} (\d+)\n", texts[0])
         errors = re.split(rf"\n{mark}\n", texts[1])
@@ -133,6 +145,26 @@ class Session:
         return [(self._lines(output), self._lines(error), code)
                 for output, error, code in zip(outputs[::2], errors, codes)]
 
+    def _end_all(self):
+        """Ends the shell and what it left in the background, which has the directory as its home."""
+        home = f"HOME={self.directory}".encode()
+        is_any = True
+        while is_any:
+            is_any = False
+            for path in Path("/proc").glob("[0-9]*/environ"):
+                try:
+                    if home in path.read_bytes().split(b"\0"):
+                        os.kill(int(path.parent.name), signal.SIGKILL)
+                        is_any = True
+                except OSError:
+                    pass  # It has ended, or is of somebody else.
+
+    def print_logs(self):
+        """The ends of the files that the steps wrote as logs."""
+        for path in sorted(Path(self.directory).glob("*log")):
+            text = path.read_text(encoding="utf-8", errors="replace")
+            print(f"{path.name}:", *text.splitlines()[-10:], sep="\n    ")
+
     def _lines(self, text):
         text = text.replace(self.directory, "{dir}").replace(str(SOURCE), "{source}")
         return [line.rstrip() for line in text.splitlines() if line.strip()]
@@ -140,15 +172,6 @@ class Session:
     def close(self):
         shutil.rmtree(self.directory, ignore_errors=True)
         shutil.rmtree(self._streams, ignore_errors=True)
-
-
-def end_group(shell):
-    """Ends the shell and what it left in the background."""
-    try:
-        os.killpg(shell.pid, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
-    shell.wait()
 
 
 def printed_lines(output, error, code):
@@ -224,7 +247,7 @@ def updated(lines, replacements):
     return lines
 
 
-def run_file(path, programs, is_update, time_max_s=200):
+def run_file(path, programs, is_update, time_max_s=400):
     """Whether all is as expected; null if the file needs what this machine lacks."""
     lines = path.read_text(encoding="utf-8").splitlines()
     steps, needed = read_steps(lines)
@@ -235,20 +258,25 @@ def run_file(path, programs, is_update, time_max_s=200):
     session = Session(programs)
     try:
         results = session.run(steps, time_max_s)
+        different = []
+        for step, (output, error, code) in zip(steps, results):
+            printed = printed_lines(output, error, code)
+            if not is_as_expected(step.expected, printed):
+                different.append((step, printed))
+        if not is_update and (different or len(results) < len(steps)):
+            session.print_logs()
     finally:
         session.close()
-    different = []
-    for step, (output, error, code) in zip(steps, results):
-        printed = printed_lines(output, error, code)
-        if not is_as_expected(step.expected, printed):
-            different.append((step, printed))
     if is_update:
         path.write_text("\n".join(updated(lines, different)) + "\n", encoding="utf-8")
     else:
         for step, printed in different:
             report(path, step, printed)
     if len(results) < len(steps):
-        print(f"{path}:{steps[len(results)].line}: the shell ended here", *session.rest, sep="\n")
+        for step, result in list(zip(steps, results))[-5:]:
+            print(f"{path}:{step.line}: {step.command}", *printed_lines(*result), sep="\n    ")
+        step = steps[len(results)]
+        print(f"{path}:{step.line}: the shell ended here: {step.command}", *session.rest, sep="\n")
         return False
     return not different
 
@@ -257,7 +285,7 @@ def main():
     parser = argparse.ArgumentParser(description="Runs the sessions that text files show.")
     parser.add_argument("--programs", required=True, type=Path, help="directory of the programs")
     parser.add_argument("--update", action="store_true", help="write what was printed into FILE")
-    parser.add_argument("--timeout", type=float, default=200, help="seconds for a file; 200")
+    parser.add_argument("--timeout", type=float, default=400, help="seconds for a file; 400")
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
     options = parser.parse_args()
     try:
