@@ -1,19 +1,11 @@
-// `proofmass run` whose surroundings fail: its file is removed or replaced, its disk is full, it is
-// killed.
+// `proofmass run` whose disk is full.
 
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sqlite3.h>
 #include <sys/mount.h>
 
-#include <array>
-#include <cerrno>
-#include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <memory>
-#include <regex>
 #include <string>
 
 #include "tests/skip_for_want.hpp"
@@ -24,153 +16,6 @@ namespace proofmass::test {
 namespace {
 
 namespace fs = std::filesystem;
-
-using RunFault = CampaignProcess;
-
-/// Changes a file as anybody with SQL can.
-void change_database(const fs::path& file, const char* sql) {
-  sqlite3* connection = nullptr;
-  EXPECT_EQ(sqlite3_open(file.c_str(), &connection), SQLITE_OK);
-  EXPECT_EQ(sqlite3_exec(connection, sql, nullptr, nullptr, nullptr), SQLITE_OK);
-  sqlite3_close(connection);
-}
-
-/// Removes a file and what SQLite keeps beside it.
-void remove_database(const fs::path& file) {
-  for (const char* const ending : {"", "-wal", "-shm"}) fs::remove(file.string() + ending);
-}
-
-class RunFaultOfItsFile : public RunFault {
- protected:
-  /// The run fails, without tables, and names a copy. The command that it names and the same
-  /// command as before go on from that.
-  void expect_copy(Process& run, const std::string& name) {
-    EXPECT_EQ(run.wait(), 1) << errors_of(name);
-    EXPECT_EQ(read_file(path(name + ".out")), "");
-    const std::string errors = errors_of(name);
-    EXPECT_TRUE(contains(errors, "proofmass: error: campaign database = " + name + ".db (was re"))
-        << errors;
-    std::smatch found;
-    ASSERT_TRUE(std::regex_search(errors, found, std::regex("`(mv --backup [^`]+)`"))) << errors;
-    ASSERT_EQ(std::system(found[1].str().c_str()), 0);
-    EXPECT_GE(num_stored(path(name + ".db")), 16U);
-    EXPECT_EQ(start(name, {"--workers", "1"}).wait(), 0) << errors_of(name);
-    EXPECT_TRUE(stored_runs(path(name + ".db")) == reference());
-  }
-};
-
-TEST_F(RunFaultOfItsFile, ARemovedDatabaseIsCopied) {
-  Process run = start("removed", {"--workers", "1"});
-  wait_for_runs("removed", 16);
-  remove_database(path("removed.db"));
-  expect_copy(run, "removed");
-}
-
-TEST_F(RunFaultOfItsFile, ADatabaseWithAnOlderCopyInItsPlaceIsCopied) {
-  ASSERT_EQ(start("copied", {"--workers", "1", "--runs", "16"}).wait(), 0);
-  fs::copy_file(path("copied.db"), path("copy"));
-  Process run = start("copied", {"--workers", "1"});
-  wait_for_runs("copied", 32);
-  fs::rename(path("copy"), path("copied.db"));
-  expect_copy(run, "copied");
-}
-
-TEST_F(RunFaultOfItsFile, ARemovedDatabaseIsCopiedForWhoInterrupts) {
-  Process run = start("removed", {"--workers", "1"});
-  wait_for_runs("removed", 16);
-  remove_database(path("removed.db"));
-  run.signal(SIGINT);
-  expect_copy(run, "removed");
-}
-
-/// Somebody in the middle of a table, who needs the state of the file as it is now.
-class OpenReader {
- public:
-  explicit OpenReader(const fs::path& file) {
-    sqlite3* connection = nullptr;
-    EXPECT_EQ(sqlite3_open_v2(file.c_str(), &connection, SQLITE_OPEN_READONLY, nullptr), SQLITE_OK);
-    connection_.reset(connection);
-    EXPECT_EQ(sqlite3_exec(connection, "BEGIN; SELECT count(*) FROM run_result", nullptr, nullptr,
-                           nullptr),
-              SQLITE_OK);
-  }
-
- private:
-  struct Close {
-    void operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }
-  };
-  std::unique_ptr<sqlite3, Close> connection_;
-};
-
-TEST_F(RunFault, OfAReaderThatIsThereAtTheEndIsTold) {
-  {
-    Process run = start("read", {"--workers", "1"});
-    wait_for_runs("read", 16);
-    const OpenReader reader(path("read.db"));
-    EXPECT_EQ(run.wait(), 0) << errors_of("read");
-    EXPECT_TRUE(
-        contains(errors_of("read"),
-                 "proofmass: warning: campaign database = read.db (somebody reads an old state "
-                 "of the file, and its log is still needed; copy read.db-wal with it, or "
-                 "make copies with `proofmass backup`)\n"))
-        << errors_of("read");
-    EXPECT_GT(fs::file_size(path("read.db-wal")), 0U);
-  }
-  // Whoever opens it next for writing folds the log in.
-  EXPECT_EQ(start("read", {"--workers", "1"}).wait(), 0);
-  EXPECT_FALSE(contains(errors_of("read"), "warning")) << errors_of("read");
-  EXPECT_FALSE(fs::exists(path("read.db-wal")));
-  EXPECT_TRUE(stored_runs(path("read.db")) == reference());
-}
-
-/// What faulty_calls.cpp maps: which calls fail, with what, from which on, to which; then counts.
-using FaultyOrders = std::array<std::uint32_t, 13>;
-
-FaultyOrders orders_in(const fs::path& file) {
-  FaultyOrders orders{};
-  std::ifstream(file, std::ios::binary).read(reinterpret_cast<char*>(orders.data()), sizeof orders);
-  return orders;
-}
-
-// Exit code 0 says that the file is whole, and then everybody can read it.
-TEST_F(RunFault, OfADiskThatFailsAtTheEndIsToldOrHarmless) {
-#if defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "ThreadSanitizer does not work behind a library that is preloaded";
-#endif
-  const fs::path disk = path("disk"), file = disk / "synced.db", orders_file = path("orders");
-  fs::create_directory(disk);
-  constexpr std::uint32_t syncs = 1U << 2;
-  // Starts the last of the runs with every sync from the n-th on failing.
-  const auto run_with = [&](std::uint32_t first) {
-    fs::copy_file(path("first.db"), file, fs::copy_options::overwrite_existing);
-    for (const char* const ending : {"-wal", "-shm", "-journal"}) {
-      fs::remove(file.string() + ending);
-    }
-    const FaultyOrders orders{syncs, EIO, first, 0xffffffff};
-    std::ofstream(orders_file, std::ios::binary)
-        .write(reinterpret_cast<const char*>(orders.data()), sizeof orders);
-    return std::make_unique<Process>(
-        directory / "", "synced", "/usr/bin/env",
-        Arguments{"LD_PRELOAD=" + programs + "/../tests/proofmass_faulty_calls.so",
-                  "PROOFMASS_FAULTY_DIRECTORY=" + disk.string(),
-                  "PROOFMASS_FAULTY_ORDERS=" + orders_file.string(), programs + "/proofmass", "run",
-                  "short.toml", "--db", file.string(), "--runs", "16", "--workers", "1"});
-  };
-  ASSERT_EQ(start("first", {"--workers", "1", "--runs", "16"}).wait(), 0);
-  change_database(path("first.db"), "DELETE FROM summary");  // So that there is something to write.
-  ASSERT_EQ(run_with(0xffffffff)->wait(), 0) << errors_of("synced");
-  const std::uint32_t num_syncs = orders_in(orders_file).at(4);
-  ASSERT_GE(num_syncs, 4U);
-  for (std::uint32_t first = 1; first <= num_syncs; ++first) {
-    const int exit_code = run_with(first)->wait();
-    EXPECT_TRUE(exit_code == 0 ||
-                contains(errors_of("synced"), "proofmass: error: campaign database"))
-        << first << ": " << exit_code << errors_of("synced");
-    if (exit_code != 0) continue;
-    Process report(directory / "", "report", programs + "/proofmass", {"report", file.string()});
-    EXPECT_EQ(report.wait(), 0) << first << ": " << errors_of("report");
-  }
-}
 
 /// The database is on a small file system of its own, on which something else takes what is left.
 class RunOnAFullDisk : public CampaignProcess {
@@ -228,31 +73,6 @@ TEST_F(RunOnAFullDisk, TellsWhatIsStoredWhenItIsInterrupted) {
   free_disk();
   EXPECT_EQ(start_on_disk("stopped").wait(), 0) << errors_of("stopped");
   EXPECT_TRUE(stored_runs(path("disk/stopped.db")) == reference());
-}
-
-std::size_t num_socket_directories(const fs::path& directory) {
-  std::size_t count = 0;
-  for (const auto& entry : fs::directory_iterator(directory)) {
-    count += entry.path().filename().string().starts_with("proofmass-") ? 1U : 0U;
-  }
-  return count;
-}
-
-TEST_F(RunFault, OfAKillLeavesNoSocketDirectoryBehindTheNextRun) {
-  const Process living = start("living", {"--workers", "1"});
-  wait_for_runs("living", 1);
-  {
-    Process killed = start("killed", {"--workers", "1"});
-    wait_for_runs("killed", 1);
-    killed.signal(SIGKILL);
-    EXPECT_EQ(killed.wait(), -SIGKILL);
-  }
-  EXPECT_EQ(num_socket_directories(directory / ""), 2U);
-  living.signal(SIGSTOP);  // Its directory is in use, however long nothing happens there.
-  EXPECT_EQ(start("killed", {"--workers", "1"}).wait(), 0) << errors_of("killed");
-  EXPECT_EQ(num_socket_directories(directory / ""), 1U);
-  living.signal(SIGCONT);
-  wait_for_runs("living", num_runs);
 }
 
 }  // namespace
