@@ -10,7 +10,6 @@
 #include "coordinator/report/read_results.hpp"
 #include "coordinator/report/run_spectra.hpp"
 #include "coordinator/report/verification_matrix.hpp"
-#include "coordinator/store/execution.hpp"
 #include "coordinator/store/records.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/campaign/campaign.hpp"

@@ -40,9 +40,13 @@ StopCheck check_with(const StopRule& rule, const Store& store, std::span<const d
 }
 
 /// The one with the most runs; empty without a rule.
-std::optional<StoredStopCheck> last_check(const Store& store, const StopPlan& plan) {
-  if (plan.stop_rule.empty()) return std::nullopt;
-  return store.last_stop_check(statistic_of(plan.stop_rule));
+std::optional<StopCheckRow> last_check(const Store& store, const StopPlan& plan) {
+  std::optional<StopCheckRow> last;
+  if (plan.stop_rule.empty()) return last;
+  for (const StopCheckRow& row : store.stop_checks()) {
+    if (row.statistic == statistic_of(plan.stop_rule)) last = row;
+  }
+  return last;
 }
 
 }  // namespace
@@ -162,13 +166,14 @@ void check_stop_checks(const Store& store, std::span<const double> objectives) {
 
 namespace {
 
-Verdict verdict_of(const StopRule& rule, const StoredStopCheck& check) {
+Verdict verdict_of(const StopRule& rule, const StopCheck& check) {
   if (!check.is_reached) return Verdict::undecided;
   const double allowed_rate = 1.0 - rule.requirement.tolerance.coverage;
   return check.estimate < allowed_rate ? Verdict::met : Verdict::not_met;
 }
 
-std::string verdict_text(const StopRule& rule, const StoredStopCheck& check) {
+std::string verdict_text(const StopRule& rule, const StopCheckRow& row) {
+  const StopCheck& check = row.check;
   const Tolerance& tolerance = rule.requirement.tolerance;
   Interval bounds = check.interval.value_or(Interval{.lower = 0.0, .upper = 1.0});
   bounds.confidence = tolerance.confidence;  // Stored with the rule and not with the bounds.
@@ -179,13 +184,14 @@ std::string verdict_text(const StopRule& rule, const StoredStopCheck& check) {
   const Interval holding{
       .lower = 1.0 - bounds.upper, .upper = 1.0 - bounds.lower, .confidence = bounds.confidence};
   return fmt::format("          {} after {} runs; {}: {:.0f}\n          {}\n", name_of(verdict),
-                     check.num_runs, is_joint ? "holding" : "exceeding",
-                     fraction * static_cast<double>(check.num_runs),
+                     row.num_runs, is_joint ? "holding" : "exceeding",
+                     fraction * static_cast<double>(row.num_runs),
                      is_joint ? success_text(holding, tolerance.coverage, verdict)
                               : bounds_text(bounds, 1.0 - tolerance.coverage, verdict));
 }
 
-std::string width_text(const StopRule& rule, const StoredStopCheck& check) {
+std::string width_text(const StopRule& rule, const StopCheckRow& row) {
+  const StopCheck& check = row.check;
   std::string text = check.relative_half_width
                          ? fmt::format("within {:.3g} %, half its 95 % interval",
                                        100.0 * *check.relative_half_width)
@@ -193,7 +199,7 @@ std::string width_text(const StopRule& rule, const StoredStopCheck& check) {
   if (rule.statistic != StopRule::Statistic::success || !check.interval) return text + "\n";
   return text +
          fmt::format("\n          in {:.0f} of {} runs, {} of all draws",
-                     check.estimate * static_cast<double>(check.num_runs), check.num_runs,
+                     check.estimate * static_cast<double>(row.num_runs), row.num_runs,
                      interval_percent(*check.interval)) +
          "\n";
 }
@@ -213,8 +219,8 @@ bool is_rule_missed(const Store& store) {
   const auto check = last_check(store, plan);
   if (!check) return false;
   const StopRule rule = parse_stop_rule(plan.stop_rule);
-  if (rule.statistic != StopRule::Statistic::verdict) return !check->is_reached;
-  return verdict_of(rule, *check) != Verdict::met;
+  if (rule.statistic != StopRule::Statistic::verdict) return !check->check.is_reached;
+  return verdict_of(rule, check->check) != Verdict::met;
 }
 
 std::string stop_text(const Store& store) {
@@ -227,7 +233,7 @@ std::string stop_text(const Store& store) {
   }
   return fmt::format("Stopping  {} {}          after {} runs; {}: {}\n",
                      statistic_of(plan.stop_rule), width_text(rule, *check), check->num_runs,
-                     plan.stop_rule, check->is_reached ? "reached" : "not reached");
+                     plan.stop_rule, check->check.is_reached ? "reached" : "not reached");
 }
 
 }  // namespace proofmass::coordinator

@@ -4,7 +4,7 @@
 
 #include <system_error>
 
-#include "coordinator/store/detail/control_rows.hpp"
+#include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/file_place.hpp"
 #include "coordinator/store/detail/schema.hpp"

@@ -11,7 +11,6 @@
 #include <string_view>
 #include <vector>
 
-#include "coordinator/store/execution.hpp"
 #include "coordinator/store/records.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/campaign/campaign.hpp"
@@ -82,7 +81,8 @@ class Store {
   /// date.
   /// @throws StoreError if the file is missing, foreign, newer than this program or damaged, or if
   ///         another coordinator has it; on a network file system; if it has another hard link.
-  ///         A file without the log that it needs is opened as it is; see has_lost_its_log().
+  ///         A file without the log that it needs is opened as it is: runs whose results were in
+  ///         it are missing, and are computed again. The event `log_lost` says so.
   static Store open(const std::filesystem::path& path);
 
   /// Opens a campaign database for reading, also while a coordinator writes to it. Of a file that
@@ -143,8 +143,7 @@ class Store {
   /// @param statistic  Of the rule: `std(gain)`.
   void record_stop_check(std::uint64_t num_runs, std::string_view statistic,
                          const StopCheck& check);
-  /// The one with the most runs.
-  [[nodiscard]] std::optional<StoredStopCheck> last_stop_check(std::string_view statistic) const;
+  /// By statistic, each by the number of its runs.
   [[nodiscard]] std::vector<StopCheckRow> stop_checks() const;
   /// Finished runs that are not completed.
   [[nodiscard]] std::uint64_t num_without_estimate() const;
@@ -201,13 +200,6 @@ class Store {
   void check_place();
   /// Whether nothing can be stored any more, as check_place() said, and nothing is left to try.
   [[nodiscard]] bool is_abandoned() const;
-
-  /// Whether the file is older than this program, and a copy is read.
-  [[nodiscard]] bool is_of_older_version() const;
-
-  /// Whether open() found that the file needs a log and that there was none: runs whose results
-  /// were in it are missing, and are computed again. The event `log_lost` says so.
-  [[nodiscard]] bool has_lost_its_log() const;
 
   /// Stores results like write().
   CommitSummary commit(std::span<const Delivery> deliveries);

@@ -270,22 +270,14 @@ void Database::go_on_with_private_copy() {
   if (off != SQLITE_OK) fail(off);
 }
 
-void Database::attach(const std::string& database, const std::string& name,
-                      const std::filesystem::path& file) {
+void Database::attach(const Database& other, const std::string& name) {
   try {
-    prepare("ATTACH ? AS ?").run(database, name);
+    prepare("ATTACH ? AS ?").run(other.is_private_copy_ ? std::string() : other.name_, name);
   } catch (const StoreError&) {
-    throw StoreError(fmt::format("campaign database = {} ({})", file.string(),
+    throw StoreError(fmt::format("campaign database = {} ({})", other.path_.string(),
                                  sqlite3_errmsg(connection_.get())));
   }
-}
-
-void Database::attach_read_only(const Database& other, const std::string& name) {
-  attach(other.name_, name, other.path_);
-}
-
-void Database::attach_copy_of(const Database& other, const std::string& name) {
-  attach("", name, other.path_);
+  if (!other.is_private_copy_) return;
   const int code = copy_all(other.connection_.get(), connection_.get(), name.c_str());
   if (code != SQLITE_OK) other.refuse_copy(code);
 }
@@ -306,12 +298,9 @@ bool Database::fold_log(Fold fold) {
   return row.integer(0) == 0 && row.integer(1) == row.integer(2);
 }
 
-void Database::leave_files_alone() {
-  sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-}
-
-void Database::fold_log_at_close() {
-  sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
+void Database::fold_log_at_close(bool is_folded) {
+  sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, is_folded ? 0 : 1,
+                    nullptr);
 }
 
 void Database::refuse(std::string_view what) const {

@@ -2,14 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <ctime>
 #include <limits>
-#include <system_error>
 #include <utility>
 #include <variant>
 
-#include "coordinator/store/detail/control_rows.hpp"
+#include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/store_error.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -39,14 +37,6 @@ constexpr std::string_view insert_failure_sql =
 std::int64_t storable(std::uint64_t value) {
   constexpr auto max = std::numeric_limits<std::int64_t>::max();
   return value > static_cast<std::uint64_t>(max) ? max : static_cast<std::int64_t>(value);
-}
-
-wire::SessionId session_of(const std::string& digits) {
-  wire::SessionId session;
-  const char* const end = digits.data() + digits.size();
-  const auto [stop, error] = std::from_chars(digits.data(), end, session.value, 16);
-  if (error == std::errc() && stop == end) return session;
-  throw StoreError(fmt::format("worker.session = {} (must be hexadecimal)", digits));
 }
 
 }  // namespace
@@ -171,15 +161,6 @@ void WorkerRows::write_counts(std::int64_t now_unix_s) {
     update.run(count.num_results, count.compute_s, now_unix_s, worker);
   }
   counts_.clear();
-}
-
-std::vector<wire::SessionId> read_attached_sessions(const Database& database) {
-  Statement select = database.prepare(
-      "SELECT session FROM worker WHERE session IS NOT NULL AND ended_utc IS NULL ORDER BY "
-      "session");
-  std::vector<wire::SessionId> sessions;
-  while (select.step()) sessions.push_back(session_of(select.text(0)));
-  return sessions;
 }
 
 EntryRows::EntryRows(const Database& database)

@@ -67,9 +67,6 @@ class WorkerRows {
   std::map<std::int64_t, Count> counts_;
 };
 
-/// Sessions of the workers without an end.
-[[nodiscard]] std::vector<wire::SessionId> read_attached_sessions(const Database& database);
-
 /// Rows of `attempt` that are kept.
 inline constexpr std::int64_t num_attempts_max = 1'000'000;
 

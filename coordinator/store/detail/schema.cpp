@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/store/detail/result_sql.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/model.hpp"
 #include "proto/link/faults.hpp"

@@ -115,18 +115,6 @@ void replace_summary(const Database& database, const CampaignStatistics& statist
            share ? std::optional(share->upper) : std::nullopt, digests.results, digests.health);
 }
 
-namespace {
-
-/// Bounds in a column and the next one.
-std::optional<Interval> read_interval(const Statement& row, int column) {
-  const std::optional<double> lower = row.optional_real(column);
-  const std::optional<double> upper = row.optional_real(column + 1);
-  if (!lower || !upper) return std::nullopt;
-  return Interval{.lower = *lower, .upper = *upper, .confidence = default_confidence};
-}
-
-}  // namespace
-
 std::optional<Summary> read_summary(const Database& database) {
   Statement select = database.prepare(
       "SELECT num_finished, num_estimated, num_not_converged, num_not_finite, num_no_draw,"
@@ -141,7 +129,7 @@ std::optional<Summary> read_summary(const Database& database) {
                  .num_lost = select.count(8),
                  .num_given_up = select.count(5),
                  .num_within_objectives = select.count(10),
-                 .within_objectives = read_interval(select, 11),
+                 .within_objectives = select.interval(11),
                  .digests = {.results = select.text(6), .health = select.text(9)},
                  .computed_utc = select.text(7)};
 }

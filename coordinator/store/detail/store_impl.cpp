@@ -119,7 +119,7 @@ Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::Sto
       place(std::make_unique<detail::FilePlace>(file)),
       database(file, Access::read_write) {
   // The log may be that of another file: until all is checked, nothing of it may reach this one.
-  database.leave_files_alone();
+  database.fold_log_at_close(false);
   detail::configure(database);
   detail::check_campaign_file(database, file);
   // Before anything is changed: a file that cannot be served is left as it is.
@@ -139,7 +139,7 @@ Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::Sto
   is_log_lost = is_perhaps_marked_ && !has_log;
   place->remember_log();
   check_place();
-  database.fold_log_at_close();
+  database.fold_log_at_close(true);
 }
 
 // Readers cannot open a file in WAL mode on read-only media, so that a closed one is in the other.
@@ -159,7 +159,7 @@ Store::Impl::~Impl() {
   }
   // The file says that it needs its log, of which SQLite may think that all is in the file. Or what
   // has the name now, and the log beside it, are not ours.
-  if (is_perhaps_marked_ || place->is_lost()) database.leave_files_alone();
+  if (is_perhaps_marked_ || place->is_lost()) database.fold_log_at_close(false);
 }
 
 void Store::Impl::check_place() {

@@ -9,7 +9,6 @@
 #include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/file_place.hpp"
-#include "coordinator/store/detail/file_system.hpp"
 #include "coordinator/store/store.hpp"
 
 namespace proofmass::coordinator {

@@ -123,7 +123,6 @@ TEST_F(StoreMigration, OfAFileThatIsReadLeavesItAsItIs) {
   const std::string before = test::content_of(file());
   {
     Store store = Store::open_read_only(file());
-    EXPECT_TRUE(store.is_of_older_version());
     EXPECT_EQ(store.name(), "old");
     EXPECT_EQ(store.num_runs(), 5u);
     EXPECT_EQ(test::results_in(store).size(), 3u);

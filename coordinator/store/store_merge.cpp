@@ -1,17 +1,30 @@
-#include "coordinator/store/detail/merge_rows.hpp"
+// Several campaign databases of one campaign become one.
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 
-#include "coordinator/store/detail/control_rows.hpp"
+#include "coordinator/store/detail/campaign_rows.hpp"
+#include "coordinator/store/detail/database.hpp"
 #include "coordinator/store/detail/entry_rows.hpp"
 #include "coordinator/store/detail/integrity.hpp"
-#include "coordinator/store/store_error.hpp"
+#include "coordinator/store/detail/result_rows.hpp"
+#include "coordinator/store/detail/statistic_rows.hpp"
+#include "coordinator/store/detail/store_impl.hpp"
+#include "coordinator/store/store.hpp"
 
-namespace proofmass::coordinator::detail {
+namespace proofmass::coordinator {
+
+using detail::Database;
+using detail::LargestErrorRows;
+using detail::ResultRows;
+using detail::Statement;
+
 namespace {
 
 // A worker that is still there, as far as its part knows, is nobody that the whole waits for.
@@ -37,19 +50,72 @@ constexpr std::string_view delete_old_losses_sql =
     "DELETE FROM attempt WHERE attempt_id NOT IN"
     " (SELECT attempt_id FROM attempt ORDER BY attempt_id DESC LIMIT ?)";
 
-constexpr std::string_view merged_failure_sql =
-    "INSERT INTO run_failure (run_index, reason, num_attempts, given_up_utc) VALUES (?, ?, ?, ?)"
-    " ON CONFLICT DO NOTHING";
+/// A table whose rows go into the whole as they are, but for the key of their worker.
+struct MergedTable {
+  std::string_view name;
+  std::string_view columns;  ///< The first is worker_key, if the table has one.
+  bool has_worker;
+  std::string_view order;
+};
+
+constexpr std::array merged_tables{
+    MergedTable{"attempt",
+                "worker_key, first_run, num_runs, attempt, reason, is_blamed, lost_unix_s", true,
+                "ORDER BY attempt_id"},
+    MergedTable{"run_failure", "run_index, reason, num_attempts, given_up_utc", false, ""},
+    MergedTable{"audit",
+                "worker_key, run_index, is_equal, stored_digest, second_digest, compared_unix_s",
+                true, ""}};
+
+using WorkerKeys = std::map<std::int64_t, std::int64_t>;  // In the part → in the whole.
 
 /// The key in the whole of a worker that a row of the part refers to.
-std::int64_t key_of(const std::map<std::int64_t, std::int64_t>& workers, const Statement& row,
-                    int column) {
+std::int64_t key_of(const WorkerKeys& workers, const Statement& row, int column) {
   const auto found = workers.find(row.integer(column));
   if (found != workers.end()) return found->second;
   row.refuse_as_damaged(fmt::format("worker lacks worker_key = {}", row.integer(column)));
 }
 
-}  // namespace
+void copy_rows(const Database& part, const Database& whole, const MergedTable& table,
+               const WorkerKeys& workers) {
+  Statement row =
+      part.prepare(fmt::format("SELECT {} FROM {} {}", table.columns, table.name, table.order));
+  Statement insert =
+      whole.prepare(fmt::format("INSERT INTO {} ({}) VALUES ({}) ON CONFLICT DO NOTHING",
+                                table.name, table.columns, detail::places(row.num_columns())));
+  while (row.step()) {
+    for (int i = 0; i < row.num_columns(); ++i) insert.bind_cell(i + 1, row, i);
+    if (table.has_worker) insert.bind(1, key_of(workers, row, 0));
+    insert.finish();
+  }
+}
+
+/// Joins what several campaign databases hold of the runs of one campaign: results with the
+/// delivery that was kept, workers, losses, runs that were given up, comparisons. The first part
+/// that has a run gives its delivery.
+class MergeRows {
+ public:
+  /// @param whole  A new file of the campaign; outlives this object.
+  explicit MergeRows(Database& whole);
+
+  /// @pre Inside a transaction; the part has been checked.
+  /// @throws StoreError naming the run, if it has another result in a part before this one, or if
+  ///         a result breaks the rules of Store::write().
+  [[nodiscard]] MergedPart add(const Database& part);
+
+  /// Writes what follows from the rows, and whether the campaign is finished. Called once, after
+  /// the last part.
+  void finish();
+
+ private:
+  [[nodiscard]] WorkerKeys add_workers(const Database& part);
+  [[nodiscard]] MergedPart add_results(const Database& part, const WorkerKeys& workers);
+
+  Database& whole_;
+  std::uint64_t num_runs_;
+  ResultRows results_;
+  LargestErrorRows largest_errors_;
+};
 
 MergeRows::MergeRows(Database& whole)
     : whole_(whole),
@@ -60,12 +126,10 @@ MergeRows::MergeRows(Database& whole)
 MergedPart MergeRows::add(const Database& part) {
   const WorkerKeys workers = add_workers(part);
   const MergedPart merged = add_results(part, workers);
-  add_losses(part, workers);
-  add_failures(part);
-  add_comparisons(part, workers);
+  for (const MergedTable& table : merged_tables) copy_rows(part, whole_, table, workers);
   // min() of a NULL is NULL: what one part does not know, the whole does not.
   whole_.prepare("UPDATE campaign SET num_runs_fixed = min(num_runs_fixed, ?)")
-      .run(read_num_runs_fixed(part));
+      .run(detail::read_num_runs_fixed(part));
   return merged;
 }
 
@@ -74,15 +138,15 @@ void MergeRows::finish() {
   whole_.prepare("DELETE FROM run_failure WHERE run_index IN (SELECT run_index FROM run_result)")
       .run();
   whole_.prepare(delete_repeated_losses_sql).run();
-  whole_.prepare(delete_old_losses_sql).run(num_attempts_max);
-  CampaignControl control = read_control(whole_);
+  whole_.prepare(delete_old_losses_sql).run(detail::num_attempts_max);
+  CampaignControl control = detail::read_control(whole_);
   const bool is_finished = whole_.count("SELECT count(*) FROM delivery") == num_runs_;
   control.phase = is_finished ? wire::CampaignPhase::finished : wire::CampaignPhase::active;
-  write_control(whole_, control);
-  write_table_digest(whole_);
+  detail::write_control(whole_, control);
+  detail::write_table_digest(whole_);
 }
 
-MergeRows::WorkerKeys MergeRows::add_workers(const Database& part) {
+WorkerKeys MergeRows::add_workers(const Database& part) {
   WorkerKeys keys;
   Statement select = part.prepare(
       "SELECT worker_key, ifnull(session, ''), worker, host, process_id, num_slots, first_seen_utc,"
@@ -105,19 +169,19 @@ MergeRows::WorkerKeys MergeRows::add_workers(const Database& part) {
 
 MergedPart MergeRows::add_results(const Database& part, const WorkerKeys& workers) {
   MergedPart merged;
-  Statement result_row = select_results(part);
+  Statement result_row = detail::select_results(part);
   Statement delivery = part.prepare(
       "SELECT run_index, worker_key, attempt, compute_s, received_unix_s FROM delivery"
       " ORDER BY run_index");
   Statement insert = whole_.prepare("INSERT INTO delivery VALUES (?, ?, ?, ?, ?)");
   while (result_row.step()) {
-    const RunResult result = read_result(result_row);
+    const RunResult result = detail::read_result(result_row);
     if (!delivery.step() || delivery.count(0) != result.run.value) {
       part.refuse_as_damaged(
           fmt::format("delivery lacks run {}, which has a result", result.run.value));
     }
-    check_delivery({.result = result, .worker = {}, .attempt = {}, .compute_s = delivery.real(3)},
-                   num_runs_);
+    detail::check_delivery(
+        {.result = result, .worker = {}, .attempt = {}, .compute_s = delivery.real(3)}, num_runs_);
     if (results_.insert(result)) {
       insert.run(result.run.value, key_of(workers, delivery, 1), delivery.count(2),
                  delivery.real(3), delivery.integer(4));
@@ -126,7 +190,7 @@ MergedPart MergeRows::add_results(const Database& part, const WorkerKeys& worker
       continue;
     }
     ++merged.num_again;
-    if (are_equal(result, results_.read(result.run))) continue;
+    if (detail::are_equal(result, results_.read(result.run))) continue;
     part.refuse(
         fmt::format("has another result of run {} than a part before it; one of them was "
                     "computed wrongly or changed, and `proofmass verify` with --fraction "
@@ -136,38 +200,19 @@ MergedPart MergeRows::add_results(const Database& part, const WorkerKeys& worker
   return merged;
 }
 
-void MergeRows::add_losses(const Database& part, const WorkerKeys& workers) {
-  Statement select = part.prepare(
-      "SELECT first_run, num_runs, attempt, worker_key, reason, is_blamed, lost_unix_s FROM attempt"
-      " ORDER BY attempt_id");
-  Statement insert = whole_.prepare(
-      "INSERT INTO attempt (first_run, num_runs, attempt, worker_key, reason, is_blamed,"
-      " lost_unix_s) VALUES (?, ?, ?, ?, ?, ?, ?)");
-  while (select.step()) {
-    insert.run(select.integer(0), select.integer(1), select.integer(2), key_of(workers, select, 3),
-               select.text(4), select.integer(5), select.integer(6));
-  }
+}  // namespace
+
+Store Store::merge(const std::filesystem::path& path, const Campaign& campaign,
+                   std::string_view definition, std::span<const std::filesystem::path> parts,
+                   const std::function<void(const MergedPart&)>& on_part) {
+  return create_filled(path, campaign, definition, [&](Database& whole) {
+    MergeRows rows(whole);
+    for (const std::filesystem::path& file : parts) {
+      const Store part = open_read_only(file);
+      part.read_one_state([&] { on_part(rows.add(part.impl_->database)); });
+    }
+    rows.finish();
+  });
 }
 
-void MergeRows::add_failures(const Database& part) {
-  Statement select =
-      part.prepare("SELECT run_index, reason, num_attempts, given_up_utc FROM run_failure");
-  Statement insert = whole_.prepare(merged_failure_sql);
-  while (select.step()) {
-    insert.run(select.integer(0), select.text(1), select.integer(2), select.text(3));
-  }
-}
-
-void MergeRows::add_comparisons(const Database& part, const WorkerKeys& workers) {
-  Statement select = part.prepare(
-      "SELECT run_index, worker_key, is_equal, stored_digest, second_digest, compared_unix_s"
-      " FROM audit");
-  Statement insert =
-      whole_.prepare("INSERT INTO audit VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING");
-  while (select.step()) {
-    insert.run(select.integer(0), key_of(workers, select, 1), select.integer(2), select.text(3),
-               select.text(4), select.integer(5));
-  }
-}
-
-}  // namespace proofmass::coordinator::detail
+}  // namespace proofmass::coordinator

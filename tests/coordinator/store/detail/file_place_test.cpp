@@ -1,4 +1,4 @@
-#include "coordinator/store/detail/file_system.hpp"
+#include "coordinator/store/detail/file_place.hpp"
 
 #include <gmock/gmock.h>
 
