@@ -156,7 +156,7 @@ class ColumnChange : public test::VerificationTest {
     (void)verify(
         file(), {.model_version = "none"},
         [&](const Check& check) { checks_.emplace(check.name, check); }, test::never_stopped);
-    std::vector<std::string> failing = names(Verdict::fails);
+    std::vector<std::string> failing = names(CheckOutcome::fails);
     std::erase(failing, "model");
     return failing;
   }
