@@ -336,11 +336,11 @@ TEST_F(DerivedStopChecks, HoldIfARunHadBeenGivenUp) {
   make_file_with_rule("std(a_c13) within 50%");
   {
     Store store = Store::open(file());
-    const std::vector<Entry> entries{LostRuns{.runs = {RunIndex{17}, 1},
-                                              .attempt = {1},
-                                              .worker = test::session_1,
-                                              .reason = wire::LossReason::crashed,
-                                              .is_blamed = true},
+    const std::vector<Entry> entries{ReturnedRuns{.runs = {RunIndex{17}, 1},
+                                                  .attempt = {1},
+                                                  .worker = test::session_1,
+                                                  .reason = wire::LossReason::crashed,
+                                                  .is_blamed = true},
                                      GivenUpRun{.run = RunIndex{17}}};
     (void)store.write(entries);
   }
