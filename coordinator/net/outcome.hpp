@@ -2,6 +2,7 @@
 
 #include <exception>
 #include <functional>
+#include <string>
 
 #include "proto/wire/client_messages.hpp"
 
@@ -16,6 +17,16 @@ namespace proofmass::coordinator {
     return action();
   } catch (const std::exception& error) {
     return wire::ErrorReply{error.what()};
+  }
+}
+
+/// Why an action throws; empty if it does not.
+[[nodiscard]] inline std::string failure_of(const std::function<void()>& action) {
+  try {
+    action();
+    return {};
+  } catch (const std::exception& error) {
+    return error.what();
   }
 }
 
