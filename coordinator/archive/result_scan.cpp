@@ -13,10 +13,10 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/archive/result_columns.hpp"
 #include "coordinator/report/digest.hpp"
 #include "coordinator/report/report.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "coordinator/store/result_columns.hpp"
 #include "core/model.hpp"
 #include "core/runs.hpp"
 
