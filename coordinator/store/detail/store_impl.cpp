@@ -98,7 +98,7 @@ void copy_whole(const Database& database, const std::filesystem::path& file,
 
 void prepare_reader(Database& database, const std::filesystem::path& file) {
   configure(database);
-  check_campaign_file(database, file);
+  check_campaign_file(database);
   if (is_older(database)) {
     migrate_privately(database);
   } else {
@@ -121,7 +121,7 @@ Store::Impl::Impl(const std::filesystem::path& file, std::unique_ptr<detail::Sto
   // The log may be that of another file: until all is checked, nothing of it may reach this one.
   database.fold_log_at_close(false);
   detail::configure(database);
-  detail::check_campaign_file(database, file);
+  detail::check_campaign_file(database);
   // Before anything is changed: a file that cannot be served is left as it is.
   const detail::RowCounts counts = detail::check_all_pages(database);
   detail::check_after_unclean_end(database);
