@@ -44,7 +44,7 @@ class Rules {
   }
 
   void violate(RunIndex run, const std::string& what) {
-    if (scan_.num_violations++ >= violations_named_max) return;
+    if (scan_.num_violations++ >= details_named_max) return;
     scan_.violations.push_back(fmt::format("run {}: {}", run.value, what));
   }
 
