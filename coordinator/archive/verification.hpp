@@ -32,9 +32,9 @@ struct Check {
 
   // Checks without a name yet.
   [[nodiscard]] static Check holds(std::string finding);
-  [[nodiscard]] static Check fails(std::string finding);
-  /// Names the first ten of the details and counts the others.
-  [[nodiscard]] static Check fails(std::string finding, std::vector<std::string> details);
+  /// Names the first ten of the details and counts the others, and those that are not among them.
+  [[nodiscard]] static Check fails(std::string finding, std::vector<std::string> details = {},
+                                   std::uint64_t num_further = 0);
   [[nodiscard]] static Check not_checked(std::string finding);
 };
 

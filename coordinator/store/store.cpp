@@ -36,16 +36,14 @@ void check_that_name_is_the_only_one(const std::filesystem::path& path) {
   std::error_code ignored;
   const std::uintmax_t num_names = std::filesystem::hard_link_count(path, ignored);
   if (num_names == 1) return;
-  throw StoreError(
-      fmt::format("campaign database = {} (has {} names (hard links), must have one; make copies "
-                  "instead)",
-                  path.string(), num_names));
+  detail::refuse_file(path, fmt::format("has {} names (hard links), must have one; make copies "
+                                        "instead",
+                                        num_names));
 }
 
 // Lock and draft are named after the file, and would be made in a directory without it.
 void check_name(const std::filesystem::path& path) {
-  if (path.has_filename()) return;
-  throw StoreError(fmt::format("campaign database = {} (names no file)", path.string()));
+  if (!path.has_filename()) detail::refuse_file(path, "names no file");
 }
 
 /// @param fill  Writes what a new campaign does not have.

@@ -30,11 +30,10 @@ namespace proofmass::coordinator {
 /// made it outlives it.
 class ResultReader {
  public:
-  /// Reads all results.
-  explicit ResultReader(const detail::Database& database);
-  /// Reads those of a range of runs. Where a damaged file has them in another order, some are
-  /// missed.
-  ResultReader(const detail::Database& database, RunRange runs);
+  /// @param runs  Whose results are read; all if empty. Where a damaged file has them in another
+  ///              order, some of a range are missed.
+  explicit ResultReader(const detail::Database& database,
+                        std::optional<RunRange> runs = std::nullopt);
   ~ResultReader();
   ResultReader(ResultReader&&) noexcept;
   ResultReader& operator=(ResultReader&&) noexcept;

@@ -169,13 +169,13 @@ WorkerKeys MergeRows::add_workers(const Database& part) {
 
 MergedPart MergeRows::add_results(const Database& part, const WorkerKeys& workers) {
   MergedPart merged;
-  Statement result_row = detail::select_results(part);
+  ResultReader results(part);
   Statement delivery = part.prepare(
       "SELECT run_index, worker_key, attempt, compute_s, received_unix_s FROM delivery"
       " ORDER BY run_index");
   Statement insert = whole_.prepare("INSERT INTO delivery VALUES (?, ?, ?, ?, ?)");
-  while (result_row.step()) {
-    const RunResult result = detail::read_result(result_row);
+  while (const std::optional<RunResult> next = results.next()) {
+    const RunResult& result = *next;
     if (!delivery.step() || delivery.count(0) != result.run.value) {
       part.refuse_as_damaged(
           fmt::format("delivery lacks run {}, which has a result", result.run.value));

@@ -13,7 +13,6 @@
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/listing.hpp"
-#include "coordinator/archive/several_comparison.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/net/service.hpp"

@@ -5,7 +5,6 @@
 #include <map>
 #include <string>
 
-#include "coordinator/archive/result_columns.hpp"
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output_file.hpp"
 #include "coordinator/cli/stop_signals.hpp"

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/archive/several_comparison.hpp"
+#include "coordinator/archive/comparison.hpp"
 #include "coordinator/campaign_file/campaign_file.hpp"
 #include "coordinator/cli/campaign_databases.hpp"
 #include "coordinator/cli/commands/commands.hpp"

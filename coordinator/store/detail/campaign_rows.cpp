@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -17,24 +16,20 @@
 #include "coordinator/store/store_error.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
 
 constexpr std::int64_t campaign_uid_max = std::numeric_limits<std::int64_t>::max();
 
-// By the value of CampaignPhase, from 1.
-constexpr std::array<std::string_view, 4> phase_names{"active", "paused", "finished", "cancelled"};
-
-std::string_view name_of(wire::CampaignPhase phase) {
-  return phase_names.at(static_cast<std::size_t>(phase) - 1);
-}
-
 // The schema allows no other names, but a file from elsewhere may have another one.
 wire::CampaignPhase read_phase(const Database& database, std::string_view name) {
-  const auto found = std::find(phase_names.begin(), phase_names.end(), name);
-  if (found == phase_names.end()) database.refuse_as_damaged(fmt::format("phase = {}", name));
-  return static_cast<wire::CampaignPhase>(found - phase_names.begin() + 1);
+  using enum wire::CampaignPhase;
+  for (const wire::CampaignPhase phase : {active, paused, finished, cancelled}) {
+    if (wire::name_of(phase) == name) return phase;
+  }
+  database.refuse_as_damaged(fmt::format("phase = {}", name));
 }
 
 std::uint64_t stored_num_runs(const Database& database) {
@@ -255,7 +250,7 @@ CampaignControl read_control(const Database& database) {
 
 void write_control(const Database& database, const CampaignControl& control) {
   database.prepare("UPDATE campaign SET phase = ?, priority = ?, audit_fraction = ?")
-      .run(name_of(control.phase), std::int64_t{control.priority}, control.audit_fraction);
+      .run(wire::name_of(control.phase), std::int64_t{control.priority}, control.audit_fraction);
 }
 
 std::optional<std::uint64_t> read_num_runs_fixed(const Database& database) {

@@ -46,10 +46,10 @@ std::string checked_path(const std::filesystem::path& path) {
   std::error_code ignored;
   const std::size_t size = std::filesystem::weakly_canonical(absolute, ignored).native().size();
   if (size <= size_max) return absolute.string();
-  throw StoreError(fmt::format(
-      "campaign database = {} (has a path of {} bytes, and SQLite opens none of more than {}: use "
-      "directories with shorter names)",
-      path.string(), size, size_max));
+  refuse_file(path,
+              fmt::format("has a path of {} bytes, and SQLite opens none of more than {}: use "
+                          "directories with shorter names",
+                          size, size_max));
 }
 
 std::string name_of(const std::filesystem::path& path, Access access) {
@@ -153,6 +153,10 @@ int copy_all(sqlite3* from, sqlite3* to, const char* name = "main") {
 
 }  // namespace
 
+void refuse_file(const std::filesystem::path& file, std::string_view what) {
+  throw StoreError(fmt::format("campaign database = {} ({})", file.string(), what));
+}
+
 std::string file_uri(const std::filesystem::path& file, std::string_view parameter) {
   std::string uri = "file://";
   for (const char character : checked_path(file)) {
@@ -183,7 +187,7 @@ Database::Database(const std::filesystem::path& path, Access access)
   sqlite3_limit(connection, SQLITE_LIMIT_SQL_LENGTH, sql_size_max);
   const bool is_reader = access == Access::read_only || access == Access::immutable;
   if (!is_reader && sqlite3_db_readonly(connection, "main") != 0) {
-    throw StoreError(fmt::format("campaign database = {} (is not writable)", path_.string()));
+    refuse("is not writable");
   }
 }
 
@@ -220,23 +224,17 @@ Statement Database::prepare(std::string_view sql) const {
   return {*this, statement};
 }
 
-std::int64_t Database::integer(std::string_view sql) const {
+Statement Database::first_row(std::string_view sql) const {
   Statement statement = prepare(sql);
   if (!statement.step()) refuse_as_damaged(fmt::format("no row for {}", sql));
-  return statement.integer(0);
+  return statement;
 }
 
-std::string Database::text(std::string_view sql) const {
-  Statement statement = prepare(sql);
-  if (!statement.step()) refuse_as_damaged(fmt::format("no row for {}", sql));
-  return statement.text(0);
-}
+std::int64_t Database::integer(std::string_view sql) const { return first_row(sql).integer(0); }
 
-std::uint64_t Database::count(std::string_view sql) const {
-  Statement statement = prepare(sql);
-  if (!statement.step()) refuse_as_damaged(fmt::format("no row for {}", sql));
-  return statement.count(0);
-}
+std::string Database::text(std::string_view sql) const { return first_row(sql).text(0); }
+
+std::uint64_t Database::count(std::string_view sql) const { return first_row(sql).count(0); }
 
 std::int64_t Database::num_changes() const { return sqlite3_changes64(connection_.get()); }
 
@@ -274,8 +272,7 @@ void Database::attach(const Database& other, const std::string& name) {
   try {
     prepare("ATTACH ? AS ?").run(other.is_private_copy_ ? std::string() : other.name_, name);
   } catch (const StoreError&) {
-    throw StoreError(fmt::format("campaign database = {} ({})", other.path_.string(),
-                                 sqlite3_errmsg(connection_.get())));
+    refuse_file(other.path_, sqlite3_errmsg(connection_.get()));
   }
   if (!other.is_private_copy_) return;
   const int code = copy_all(other.connection_.get(), connection_.get(), name.c_str());
@@ -305,8 +302,7 @@ void Database::fold_log_at_close(bool is_folded) {
 
 void Database::refuse(std::string_view what) const {
   // It may quote the file.
-  throw StoreError(
-      fmt::format("campaign database = {} ({})", path_.string(), wire::visible_text(what)));
+  refuse_file(path_, wire::visible_text(what));
 }
 
 void Database::refuse_as_damaged(std::string_view what) const { refuse(damage(path_, what)); }

@@ -25,6 +25,9 @@ inline constexpr int busy_timeout_ms = 5000;
 /// What of a write-ahead log goes into its file.
 enum class Fold { what_no_reader_needs, all_and_empty_it };
 
+/// @throws StoreError `campaign database = path (what)`.
+[[noreturn]] void refuse_file(const std::filesystem::path& file, std::string_view what);
+
 /// The URI of a database file with a parameter of SQLite's: `file:///a/b.db?mode=ro`.
 /// @throws StoreError if the path is longer than SQLite takes.
 [[nodiscard]] std::string file_uri(const std::filesystem::path& file, std::string_view parameter);
@@ -185,6 +188,8 @@ class Database {
   };
 
   void open(Access access);
+  /// A query at its first row, which there must be.
+  [[nodiscard]] Statement first_row(std::string_view sql) const;
   [[noreturn]] void refuse_copy(int code) const;
 
   std::filesystem::path path_;

@@ -9,6 +9,7 @@
 
 #include "coordinator/store/detail/campaign_rows.hpp"
 #include "coordinator/store/store_error.hpp"
+#include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {
 namespace {
@@ -43,34 +44,6 @@ std::int64_t storable(std::uint64_t value) {
 
 std::string hexadecimal(std::uint64_t value) { return fmt::format("{:016x}", value); }
 
-std::string_view stored_name(wire::LossReason reason) {
-  switch (reason) {
-    case wire::LossReason::silent:
-      return "silent";
-    case wire::LossReason::crashed:
-      return "crashed";
-    case wire::LossReason::out_of_memory:
-      return "out_of_memory";
-    case wire::LossReason::hung:
-      return "hung";
-    case wire::LossReason::drained:
-      return "drained";
-    case wire::LossReason::walltime:
-      return "walltime";
-    case wire::LossReason::preempted:
-      return "preempted";
-    case wire::LossReason::retracted:
-      return "retracted";
-    case wire::LossReason::never_arrived:
-      return "never_arrived";
-    case wire::LossReason::protocol:
-      return "protocol";
-    case wire::LossReason::failed:
-      return "failed";
-  }
-  return "unknown";
-}
-
 WorkerRows::WorkerRows(const Database& database)
     : database_(database),
       select_key_(database.prepare("SELECT worker_key FROM worker WHERE session = ?")) {}
@@ -96,7 +69,7 @@ void WorkerRows::write(const WorkerEnded& ended) {
       .prepare(
           "UPDATE worker SET end_reason = ?, ended_utc = strftime('%Y-%m-%dT%H:%M:%SZ', 'now') "
           "WHERE session = ?")
-      .run(stored_name(ended.reason), hexadecimal(ended.session.value));
+      .run(wire::name_of(ended.reason), hexadecimal(ended.session.value));
 }
 
 std::optional<std::int64_t> WorkerRows::stored_key(wire::SessionId session) {
@@ -269,7 +242,7 @@ void EntryRows::report_contradiction(const Delivery& delivery) {
 
 void EntryRows::write_entry(const ReturnedRuns& lost) {
   insert_attempt_.run(lost.runs.first.value, lost.runs.count, lost.attempt.value,
-                      workers_.key_of(lost.worker), stored_name(lost.reason),
+                      workers_.key_of(lost.worker), wire::name_of(lost.reason),
                       std::int64_t{lost.is_blamed}, now_unix_s_);
   trim_attempts_.run(num_attempts_max);
   if (database_.last_row() != num_attempts_max + 1) return;

@@ -19,9 +19,6 @@ namespace proofmass::coordinator::detail {
 /// 16 hexadecimal digits: SQLite's integers have a sign.
 [[nodiscard]] std::string hexadecimal(std::uint64_t value);
 
-/// How a reason stands in the database: `out_of_memory`.
-[[nodiscard]] std::string_view stored_name(wire::LossReason reason);
-
 /// Rows of `worker` that are one worker's. All further workers share one more.
 inline constexpr std::int64_t num_workers_max = 100'000;
 

@@ -121,28 +121,24 @@ int open_and_lock(const std::filesystem::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
   if (descriptor < 0) {
     const int error = errno;
-    throw StoreError(fmt::format("campaign database = {} ({})", path.string(),
-                                 error == EACCES || error == EROFS
-                                     ? std::string("is not writable")
-                                     : fmt::format("cannot be opened: {}", std::strerror(error))));
+    if (error == EACCES || error == EROFS) refuse_file(path, "is not writable");
+    refuse_file(path, fmt::format("cannot be opened: {}", std::strerror(error)));
   }
   const wire::Locked locked = wire::lock_file(descriptor);
   if (locked == wire::Locked::yes) return descriptor;
   ::close(descriptor);
-  throw StoreError(
-      fmt::format("campaign database = {} ({})", path.string(),
-                  locked == wire::Locked::impossible
-                      ? wire::no_locks_remedy
-                      : "another coordinator has it; a campaign has one coordinator at a time"));
+  refuse_file(path, locked == wire::Locked::impossible
+                        ? wire::no_locks_remedy
+                        : "another coordinator has it; a campaign has one coordinator at a time");
 }
 
 [[noreturn]] void refuse_to_make(const std::filesystem::path& file, std::string_view kind,
-                                 const std::filesystem::path& beside) {
-  throw StoreError(
-      fmt::format("campaign database = {0} (is gone, but its {1} {2} is there: {3}, or move {2} "
-                  "away and begin anew)",
-                  file.string(), kind, beside.filename().string(),
-                  kind == "copy" ? "give it the name" : "put the file back"));
+                                 const std::filesystem::path& other) {
+  refuse_file(file,
+              fmt::format("is gone, but its {0} {1} is there: {2}, or move {1} away and begin "
+                          "anew",
+                          kind, other.filename().string(),
+                          kind == "copy" ? "give it the name" : "put the file back"));
 }
 
 // A copy that Store::check_place() made of a file with this name; empty if there is none.
@@ -217,13 +213,10 @@ void check_presence(const std::filesystem::path& path) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
   if (std::filesystem::is_regular_file(status)) return;
-  const auto refuse = [&](std::string_view why) {
-    throw StoreError(fmt::format("campaign database = {} ({})", path.string(), why));
-  };
   if (!std::filesystem::status_known(status)) {
-    refuse(fmt::format("cannot be reached: {}", std::strerror(error.value())));
+    refuse_file(path, fmt::format("cannot be reached: {}", std::strerror(error.value())));
   }
-  refuse(std::filesystem::exists(status) ? "is no file" : "does not exist");
+  refuse_file(path, std::filesystem::exists(status) ? "is no file" : "does not exist");
 }
 
 void appear_complete(const std::filesystem::path& path, wire::IfThere if_there,
@@ -276,9 +269,7 @@ bool is_sound_without_log(const std::filesystem::path& file) {
 
 void check_absence(const std::filesystem::path& file) {
   std::error_code ignored;
-  if (std::filesystem::exists(file, ignored)) {
-    throw StoreError(fmt::format("campaign database = {} (exists already)", file.string()));
-  }
+  if (std::filesystem::exists(file, ignored)) refuse_file(file, "exists already");
   if (has_log(file)) refuse_to_make(file, "log", log_path(file));
   const std::uintmax_t journal_size = std::filesystem::file_size(journal_path(file), ignored);
   if (!ignored && journal_size > 0) refuse_to_make(file, "journal", journal_path(file));
@@ -310,8 +301,7 @@ FilePlace::Identity FilePlace::identity_at(const std::filesystem::path& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) == 0) return {status.st_dev, status.st_ino};
   if (errno == ENOENT || errno == ENOTDIR) return {};
-  throw StoreError(fmt::format("campaign database = {} (cannot be reached: {})", path.string(),
-                               std::strerror(errno)));
+  refuse_file(path, fmt::format("cannot be reached: {}", std::strerror(errno)));
 }
 
 void FilePlace::remember_log() {

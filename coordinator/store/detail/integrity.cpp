@@ -18,6 +18,7 @@
 #include "coordinator/store/detail/schema.hpp"
 #include "coordinator/store/detail/statistic_rows.hpp"
 #include "coordinator/store/sha256.hpp"
+#include "coordinator/store/store.hpp"
 #include "core/model.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -90,17 +91,16 @@ void check_largest_errors(const Database& database) {
   WorstRunTable worst(quantities.size());
   Statement overrun =
       database.prepare("SELECT run_index, parameters FROM overrun ORDER BY run_index");
-  Statement row = select_results(database);
-  while (row.step()) {
-    const RunResult result = read_result(row);
-    const std::uint64_t exceeded = exceeded_objectives(result, objectives);
-    if (exceeded != 0 && !has_row(overrun, result.run, exceeded)) {
+  ResultReader results(database);
+  while (const std::optional<RunResult> result = results.next()) {
+    const std::uint64_t exceeded = exceeded_objectives(*result, objectives);
+    if (exceeded != 0 && !has_row(overrun, result->run, exceeded)) {
       database.refuse(fmt::format("is damaged: overrun does not follow from the result of run {}",
-                                  result.run.value));
+                                  result->run.value));
     }
-    if (!result.is_completed()) continue;
+    if (!result->is_completed()) continue;
     for (std::size_t i = 0; i < worst.size(); ++i) {
-      worst[i].offer({.magnitude = std::abs(result.error(i)), .run = result.run});
+      worst[i].offer({.magnitude = std::abs(result->error(i)), .run = result->run});
     }
   }
   if (overrun.step()) database.refuse("is damaged: overrun has a run too many");

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <map>
 #include <span>
 #include <string>
@@ -50,16 +49,14 @@ inline constexpr std::int64_t oldest_schema_version = 8;
 /// Checks that a database is a campaign database, of a version that this program reads, and that
 /// its tables, views and indexes are those of its version and that there is nothing else. Nothing
 /// that the file defines is evaluated before its definition has been compared.
-/// @param path  For the message.
 /// @throws StoreError otherwise.
-void check_kind(Database& database, const std::filesystem::path& path);
+void check_kind(Database& database);
 
 /// As check_kind(), and that the file is as long as it says, that there is one campaign, and that
 /// each page of the tables that do not grow with the runs is what it should be, and the first pages
 /// of the others. Takes the same time for any number of runs.
-/// @param path  For the message.
 /// @throws StoreError otherwise.
-void check_campaign_file(Database& database, const std::filesystem::path& path);
+void check_campaign_file(Database& database);
 
 /// Rows of each table, by its name.
 using RowCounts = std::map<std::string, std::uint64_t>;

@@ -11,7 +11,6 @@
 #include "coordinator/archive/comparison.hpp"
 #include "coordinator/archive/export.hpp"
 #include "coordinator/archive/listing.hpp"
-#include "coordinator/archive/several_comparison.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/report/summarise.hpp"

@@ -1,10 +1,9 @@
-#include "coordinator/archive/result_columns.hpp"
+#include "coordinator/store/result_columns.hpp"
 
 #include <fmt/format.h>
 
 #include <span>
 
-#include "coordinator/archive/stored_campaign.hpp"
 #include "core/error.hpp"
 #include "core/model.hpp"
 
@@ -85,16 +84,6 @@ std::optional<double> ValueColumn::value_in(const RunResult& result) const {
 const std::vector<ValueColumn>& value_columns() {
   static const std::vector<ValueColumn> columns = make_columns(model().results());
   return columns;
-}
-
-DrawnColumns::DrawnColumns(const Store& store, DrawColumns columns) {
-  if (columns == DrawColumns::included) campaign_ = stored_campaign_unchecked(store);
-}
-
-std::size_t DrawnColumns::count() const { return campaign_ ? model().drawn().size() : 0; }
-
-std::vector<double> DrawnColumns::values_of(RunIndex run) const {
-  return campaign_ ? campaign_->draw(run).values : std::vector<double>();
 }
 
 }  // namespace proofmass::coordinator
