@@ -4,6 +4,11 @@
 
 #include <benchmark/benchmark.h>
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/math/instruction_set.hpp"
 #include "core/microscope/campaign/microscope_campaign.hpp"
 #include "core/microscope/control/control_loops.hpp"
 #include "core/microscope/environment/environment.hpp"
@@ -11,6 +16,7 @@
 #include "core/microscope/orbit/kepler_orbit.hpp"
 #include "core/microscope/simulation/run.hpp"
 #include "core/microscope/simulation/session_record.hpp"
+#include "core/model.hpp"
 #include "core/random/normal.hpp"
 #include "core/signal/line_weights.hpp"
 #include "tests/support/microscope_results.hpp"
@@ -41,6 +47,37 @@ void whole_run(benchmark::State& state) {
   count_steps(state, num_steps(campaign));
 }
 BENCHMARK(whole_run)->Unit(benchmark::kMillisecond);
+
+/// Batches of one run and of as many as there are lanes, with an instruction set of this machine.
+void runs_of_a_batch(benchmark::State& state, InstructionSet set) {
+  const MicroscopeCampaign campaign;
+  const RunPlan plan(campaign);
+  std::vector<RunRequest> requests;
+  for (std::int64_t run = 0; run < state.range(0); ++run) {
+    requests.push_back({.run = {static_cast<std::uint64_t>(run)}, .table_values = {}});
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(plan.simulate_batch(requests, set));
+  count_steps(state, num_steps(campaign) * static_cast<double>(state.range(0)));
+}
+
+[[maybe_unused]] const bool are_batches_registered = [] {
+  for (const InstructionSet set : available_instruction_sets()) {
+    if (set == InstructionSet::scalar) continue;
+    benchmark::RegisterBenchmark(("runs_of_a_batch/" + std::string(name_of(set))).c_str(),
+                                 runs_of_a_batch, set)
+        ->Arg(1)
+        ->Arg(batch_lanes)
+        ->Unit(benchmark::kMillisecond);
+  }
+  return true;
+}();
+
+void reference_digest_of_the_model(benchmark::State& state) {
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(model().reference_digest(best_instruction_set()));
+  }
+}
+BENCHMARK(reference_digest_of_the_model)->Unit(benchmark::kMillisecond);
 
 void plan_of_a_campaign(benchmark::State& state) {
   const MicroscopeCampaign campaign;

@@ -44,47 +44,6 @@ class RandomFaults : public FaultTest, public testing::WithParamInterface<unsign
   int num_workers_ = 0;
 };
 
-// The workers outlive it with all that they hold: not a run is lent twice.
-TEST_P(RandomFaults, KillTheCoordinator) {
-  constexpr int num_kills = 6;
-  Processes workers;
-  for (int i = 0; i < 3; ++i) workers.push_back(next_worker());
-  for (int i = 0; i < num_kills; ++i) {
-    Process coordinator = null_coordinator(i);
-    go_on();
-    coordinator.signal(SIGKILL);
-    ASSERT_EQ(coordinator.wait(), -SIGKILL) << errors_of("coordinator-" + std::to_string(i));
-  }
-  // However far it came, there are runs to go on with.
-  write_null_campaign(num_null_runs + 1000);
-  Process coordinator = null_coordinator(num_kills);
-  end_when_done(coordinator, "coordinator-" + std::to_string(num_kills), workers.size());
-  for (const auto& worker : workers) EXPECT_EQ(worker->wait(), 0);
-  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
-  const auto file = file_of("null");
-  EXPECT_EQ(stored_text(file, "SELECT count(*) FROM attempt WHERE reason <> 'retracted'"), "0");
-  EXPECT_EQ(stored_text(file, "SELECT count(*) FROM coordinator_start WHERE ended_utc IS NULL"),
-            std::to_string(num_kills));
-}
-
-TEST_P(RandomFaults, KillWorkers) {
-  Process coordinator = null_coordinator(0, {"--time-scale", "0.02"});
-  Processes workers;
-  for (int i = 0; i < 3; ++i) workers.push_back(next_worker());
-  for (int i = 0; i < 8; ++i) {
-    go_on();
-    const std::size_t victim = draw(workers.size());
-    workers[victim]->signal(SIGKILL);
-    EXPECT_EQ(workers[victim]->wait(), -SIGKILL);
-    workers[victim] = next_worker();
-  }
-  wait_for_log("coordinator-0", "reason=silent");
-  wait_for_done("null", num_null_runs);
-  coordinator.signal(SIGTERM);
-  EXPECT_EQ(coordinator.wait(), 0) << errors_of("coordinator-0");
-  EXPECT_EQ(digest("null"), undisturbed_digest("null"));
-}
-
 TEST_P(RandomFaults, KillEverything) {
   constexpr int num_kills = 4;
   Processes workers;

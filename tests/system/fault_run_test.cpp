@@ -1,5 +1,4 @@
-// `proofmass run` whose surroundings fail: its file is removed or replaced, its disk is full, it is
-// killed.
+// `proofmass run` whose disk is full or fails.
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -9,11 +8,9 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <regex>
 #include <string>
 
 #include "tests/skip_for_want.hpp"
@@ -33,94 +30,6 @@ void change_database(const fs::path& file, const char* sql) {
   EXPECT_EQ(sqlite3_open(file.c_str(), &connection), SQLITE_OK);
   EXPECT_EQ(sqlite3_exec(connection, sql, nullptr, nullptr, nullptr), SQLITE_OK);
   sqlite3_close(connection);
-}
-
-/// Removes a file and what SQLite keeps beside it.
-void remove_database(const fs::path& file) {
-  for (const char* const ending : {"", "-wal", "-shm"}) fs::remove(file.string() + ending);
-}
-
-class RunFaultOfItsFile : public RunFault {
- protected:
-  /// The run fails, without tables, and names a copy. The command that it names and the same
-  /// command as before go on from that.
-  void expect_copy(Process& run, const std::string& name) {
-    EXPECT_EQ(run.wait(), 1) << errors_of(name);
-    EXPECT_EQ(read_file(path(name + ".out")), "");
-    const std::string errors = errors_of(name);
-    EXPECT_TRUE(contains(errors, "proofmass: error: campaign database = " + name + ".db (was re"))
-        << errors;
-    std::smatch found;
-    ASSERT_TRUE(std::regex_search(errors, found, std::regex("`(mv --backup [^`]+)`"))) << errors;
-    ASSERT_EQ(std::system(found[1].str().c_str()), 0);
-    EXPECT_GE(num_stored(path(name + ".db")), 16U);
-    EXPECT_EQ(start(name, {"--workers", "1"}).wait(), 0) << errors_of(name);
-    EXPECT_TRUE(stored_runs(path(name + ".db")) == reference());
-  }
-};
-
-TEST_F(RunFaultOfItsFile, ARemovedDatabaseIsCopied) {
-  Process run = start("removed", {"--workers", "1"});
-  wait_for_runs("removed", 16);
-  remove_database(path("removed.db"));
-  expect_copy(run, "removed");
-}
-
-TEST_F(RunFaultOfItsFile, ADatabaseWithAnOlderCopyInItsPlaceIsCopied) {
-  ASSERT_EQ(start("copied", {"--workers", "1", "--runs", "16"}).wait(), 0);
-  fs::copy_file(path("copied.db"), path("copy"));
-  Process run = start("copied", {"--workers", "1"});
-  wait_for_runs("copied", 32);
-  fs::rename(path("copy"), path("copied.db"));
-  expect_copy(run, "copied");
-}
-
-TEST_F(RunFaultOfItsFile, ARemovedDatabaseIsCopiedForWhoInterrupts) {
-  Process run = start("removed", {"--workers", "1"});
-  wait_for_runs("removed", 16);
-  remove_database(path("removed.db"));
-  run.signal(SIGINT);
-  expect_copy(run, "removed");
-}
-
-/// Somebody in the middle of a table, who needs the state of the file as it is now.
-class OpenReader {
- public:
-  explicit OpenReader(const fs::path& file) {
-    sqlite3* connection = nullptr;
-    EXPECT_EQ(sqlite3_open_v2(file.c_str(), &connection, SQLITE_OPEN_READONLY, nullptr), SQLITE_OK);
-    connection_.reset(connection);
-    EXPECT_EQ(sqlite3_exec(connection, "BEGIN; SELECT count(*) FROM run_result", nullptr, nullptr,
-                           nullptr),
-              SQLITE_OK);
-  }
-
- private:
-  struct Close {
-    void operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }
-  };
-  std::unique_ptr<sqlite3, Close> connection_;
-};
-
-TEST_F(RunFault, OfAReaderThatIsThereAtTheEndIsTold) {
-  {
-    Process run = start("read", {"--workers", "1"});
-    wait_for_runs("read", 16);
-    const OpenReader reader(path("read.db"));
-    EXPECT_EQ(run.wait(), 0) << errors_of("read");
-    EXPECT_TRUE(
-        contains(errors_of("read"),
-                 "proofmass: warning: campaign database = read.db (somebody reads an old state "
-                 "of the file, and its log is still needed; copy read.db-wal with it, or "
-                 "make copies with `proofmass backup`)\n"))
-        << errors_of("read");
-    EXPECT_GT(fs::file_size(path("read.db-wal")), 0U);
-  }
-  // Whoever opens it next for writing folds the log in.
-  EXPECT_EQ(start("read", {"--workers", "1"}).wait(), 0);
-  EXPECT_FALSE(contains(errors_of("read"), "warning")) << errors_of("read");
-  EXPECT_FALSE(fs::exists(path("read.db-wal")));
-  EXPECT_TRUE(stored_runs(path("read.db")) == reference());
 }
 
 /// What faulty_calls.cpp maps: which calls fail, with what, from which on, to which; then counts.
@@ -228,31 +137,6 @@ TEST_F(RunOnAFullDisk, TellsWhatIsStoredWhenItIsInterrupted) {
   free_disk();
   EXPECT_EQ(start_on_disk("stopped").wait(), 0) << errors_of("stopped");
   EXPECT_TRUE(stored_runs(path("disk/stopped.db")) == reference());
-}
-
-std::size_t num_socket_directories(const fs::path& directory) {
-  std::size_t count = 0;
-  for (const auto& entry : fs::directory_iterator(directory)) {
-    count += entry.path().filename().string().starts_with("proofmass-") ? 1U : 0U;
-  }
-  return count;
-}
-
-TEST_F(RunFault, OfAKillLeavesNoSocketDirectoryBehindTheNextRun) {
-  const Process living = start("living", {"--workers", "1"});
-  wait_for_runs("living", 1);
-  {
-    Process killed = start("killed", {"--workers", "1"});
-    wait_for_runs("killed", 1);
-    killed.signal(SIGKILL);
-    EXPECT_EQ(killed.wait(), -SIGKILL);
-  }
-  EXPECT_EQ(num_socket_directories(directory / ""), 2U);
-  living.signal(SIGSTOP);  // Its directory is in use, however long nothing happens there.
-  EXPECT_EQ(start("killed", {"--workers", "1"}).wait(), 0) << errors_of("killed");
-  EXPECT_EQ(num_socket_directories(directory / ""), 1U);
-  living.signal(SIGCONT);
-  wait_for_runs("living", num_runs);
 }
 
 }  // namespace
