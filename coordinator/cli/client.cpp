@@ -9,6 +9,7 @@
 
 #include "coordinator/cli/program.hpp"
 #include "core/campaign/name.hpp"
+#include "core/error.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/wire/endpoint.hpp"
@@ -67,15 +68,27 @@ void warn_if_plain(const ClientOptions& options) {
 int with_connection(const ClientOptions& options, const std::function<int(const Ask&)>& work) {
   ClientConnection connection(options.connection);
   warn_if_plain(options);
-  return work([&](const wire::ClientRequest& request) { return connection.ask(request); });
+  return work([&](const proto::RequestEnvelope& request) { return connection.ask(request); });
+}
+
+proto::ReplyEnvelope reply_of(const Ask& ask, const proto::RequestEnvelope& request,
+                              proto::ReplyEnvelope::ReplyCase kind) {
+  proto::ReplyEnvelope reply = ask(request);
+  if (reply.has_error()) throw Error(reply.error().text());
+  if (reply.reply_case() == kind) return reply;
+  throw Error("reply = of another kind (must be that of the request)");
 }
 
 // Campaigns are only ever added to the end of a coordinator's list.
 wire::StatusReply whole_status(const Ask& ask) {
-  auto status = reply_of<wire::StatusReply>(ask, wire::StatusRequest{});
+  const auto page_from = [&](std::uint64_t first_campaign) {
+    proto::RequestEnvelope request;
+    request.mutable_status()->set_first_campaign(first_campaign);
+    return wire::read(reply_of(ask, request, proto::ReplyEnvelope::kStatus).status());
+  };
+  wire::StatusReply status = page_from(0);
   while (status.campaigns.size() < status.num_campaigns) {
-    auto page = reply_of<wire::StatusReply>(
-        ask, wire::StatusRequest{.first_campaign = status.campaigns.size()});
+    wire::StatusReply page = page_from(status.campaigns.size());
     if (page.campaigns.empty()) break;  // It has fewer now: it was started again.
     append(status.campaigns, page.campaigns);
   }
@@ -83,11 +96,15 @@ wire::StatusReply whole_status(const Ask& ask) {
 }
 
 wire::WorkersReply all_workers(const Ask& ask) {
-  auto workers = reply_of<wire::WorkersReply>(ask, wire::WorkersRequest{});
+  const auto page_after = [&](std::uint64_t worker_id) {
+    proto::RequestEnvelope request;
+    request.mutable_workers()->set_after_worker_id(worker_id);
+    return wire::read(reply_of(ask, request, proto::ReplyEnvelope::kWorkers).workers());
+  };
+  wire::WorkersReply workers = page_after(0);
   bool is_more = workers.workers.size() < workers.num_workers && !workers.workers.empty();
   while (is_more) {
-    auto page = reply_of<wire::WorkersReply>(
-        ask, wire::WorkersRequest{.after_worker_id = workers.workers.back().id.value});
+    wire::WorkersReply page = page_after(workers.workers.back().id.value);
     is_more = !page.workers.empty();
     append(workers.workers, page.workers);
   }

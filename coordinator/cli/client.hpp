@@ -2,13 +2,10 @@
 
 #include <functional>
 #include <string>
-#include <utility>
-#include <variant>
 
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/net/client_connection.hpp"
-#include "core/error.hpp"
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
 
@@ -30,17 +27,12 @@ void add_client_options(CLI::App& command, ClientOptions& options);
 void warn_if_plain(const ClientOptions& options);
 
 /// How a command asks; a ClientConnection, or a test.
-using Ask = std::function<wire::ClientReply(const wire::ClientRequest&)>;
+using Ask = std::function<proto::ReplyEnvelope(const proto::RequestEnvelope&)>;
 
-/// The reply of the kind that the request has.
+/// The reply, which is of this kind.
 /// @throws Error with the coordinator's words if it refuses the request.
-template <typename Reply>
-[[nodiscard]] Reply reply_of(const Ask& ask, const wire::ClientRequest& request) {
-  wire::ClientReply reply = ask(request);
-  if (const auto* const refusal = std::get_if<wire::ErrorReply>(&reply)) throw Error(refusal->text);
-  if (auto* const wanted = std::get_if<Reply>(&reply)) return std::move(*wanted);
-  throw Error("reply = of another kind (must be that of the request)");
-}
+[[nodiscard]] proto::ReplyEnvelope reply_of(const Ask& ask, const proto::RequestEnvelope& request,
+                                            proto::ReplyEnvelope::ReplyCase kind);
 
 /// Connects, and lets `work` ask.
 /// @return What `work` returns.

@@ -17,38 +17,50 @@ void add_optional_connection(CLI::App& command, ClientConnectionConfig& connecti
   add_key_options(command, connection);
 }
 
-void read_answer(const Ask& ask, const wire::AnswerReply& answer,
+proto::RequestEnvelope question_about(const std::string& campaign, proto::Question question) {
+  proto::RequestEnvelope request;
+  request.mutable_answer()->set_campaign(checked_campaign_name(campaign));
+  request.mutable_answer()->set_question(question);
+  return request;
+}
+
+void read_answer(const Ask& ask, const proto::AnswerReply& answer,
                  const std::function<void(std::string_view)>& take) {
-  wire::AnswerPartRequest request{.answer_id = answer.answer_id, .offset = answer.offset};
-  while (request.offset < answer.size) {
-    const auto part = reply_of<wire::AnswerPartReply>(ask, request);
-    if (part.content.empty()) return;
-    take(part.content);
-    request.offset += part.content.size();
+  proto::RequestEnvelope request;
+  proto::AnswerPartRequest& wanted = *request.mutable_answer_part();
+  wanted.set_answer_id(answer.answer_id());
+  wanted.set_offset(answer.offset());
+  while (wanted.offset() < answer.size()) {
+    const proto::ReplyEnvelope reply = reply_of(ask, request, proto::ReplyEnvelope::kAnswerPart);
+    const std::string& content = reply.answer_part().content();
+    if (content.empty()) return;
+    take(content);
+    wanted.set_offset(wanted.offset() + content.size());
   }
-  if (request.offset > answer.size)
+  if (wanted.offset() > answer.size())
     throw Error("the answer became shorter while it was read; ask again");
 }
 
-int print_answer(const ClientConnectionConfig& connection, const wire::AnswerRequest& question,
+int print_answer(const ClientConnectionConfig& connection, const proto::RequestEnvelope& question,
                  AnswerText text) {
   return with_connection({.connection = connection}, [&](const Ask& ask) {
-    const auto answer = reply_of<wire::AnswerReply>(ask, question);
-    if (answer.size > Answers::size_max) {  // It would have to be held in memory.
+    const proto::ReplyEnvelope reply = reply_of(ask, question, proto::ReplyEnvelope::kAnswer);
+    const proto::AnswerReply& answer = reply.answer();
+    if (answer.size() > Answers::size_max) {  // It would have to be held in memory.
       throw Error(
-          fmt::format("answer = {} bytes (must be at most {})", answer.size, Answers::size_max));
+          fmt::format("answer = {} bytes (must be at most {})", answer.size(), Answers::size_max));
     }
     std::string bytes;
     read_answer(ask, answer, [&](std::string_view part) { bytes += part; });
     Sha256 hash;
     hash.add_bytes(bytes);
-    if (hash.finish() != answer.sha256)
+    if (hash.finish() != answer.sha256())
       throw Error("the answer is not the one that was announced; ask again");
     if (text == AnswerText::lines) print_lines(bytes);
     if (text == AnswerText::bytes) write_standard_output(bytes);
     flush_standard_output();
-    if (!answer.error_text.empty()) wire::say(wire::visible_lines(answer.error_text));
-    return answer.exit_code;
+    if (!answer.error_text().empty()) wire::say(wire::visible_lines(answer.error_text()));
+    return static_cast<int>(answer.exit_code());
   });
 }
 

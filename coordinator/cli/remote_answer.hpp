@@ -6,7 +6,6 @@
 #include <string_view>
 
 #include "coordinator/cli/client.hpp"
-#include "proto/wire/client_messages.hpp"
 
 namespace CLI {
 class App;
@@ -25,10 +24,15 @@ void add_optional_connection(CLI::App& command, ClientConnectionConfig& connecti
   return !connection.endpoint.empty();
 }
 
+/// An AnswerRequest, without options.
+/// @throws UsageError unless a campaign may have this name.
+[[nodiscard]] proto::RequestEnvelope question_about(const std::string& campaign,
+                                                    proto::Question question);
+
 /// Reads an answer from its offset on, part by part, and asks for nothing beyond its size.
 /// @param take  Called with each part.
 /// @throws Error if the coordinator does not keep it any more; what `take` throws.
-void read_answer(const Ask& ask, const wire::AnswerReply& answer,
+void read_answer(const Ask& ask, const proto::AnswerReply& answer,
                  const std::function<void(std::string_view)>& take);
 
 /// How the answer to a question is printed.
@@ -41,6 +45,6 @@ enum class AnswerText : std::uint8_t {
 /// @return The exit code of that command.
 /// @throws As reply_of() and with_connection() do; Error if the answer arrived damaged.
 [[nodiscard]] int print_answer(const ClientConnectionConfig& connection,
-                               const wire::AnswerRequest& question, AnswerText text);
+                               const proto::RequestEnvelope& question, AnswerText text);
 
 }  // namespace proofmass::coordinator

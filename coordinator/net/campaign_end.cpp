@@ -154,8 +154,7 @@ void CampaignService::close_ended(CampaignId id) {
   });
 }
 
-void CampaignService::archive(CampaignId id,
-                              const std::function<void(wire::ClientReply)>& respond) {
+void CampaignService::archive(CampaignId id, const Respond& respond) {
   if (context_.config.directory == nullptr) {
     throw Error(
         "this coordinator has no directory, which archived campaigns need; start it with "
@@ -169,13 +168,12 @@ void CampaignService::archive(CampaignId id,
   }
   begin_closing(id, [this, id, respond, name = found->second.name](bool is_closing) {
     if (is_closing) return move_to_archive(id, respond);
-    respond(wire::ErrorReply{not_at_rest(name)});
+    respond(wire::error_reply(not_at_rest(name)));
   });
 }
 
 // What closes the file was posted before.
-void CampaignService::move_to_archive(CampaignId id,
-                                      const std::function<void(wire::ClientReply)>& respond) {
+void CampaignService::move_to_archive(CampaignId id, const Respond& respond) {
   const EndedCampaign& campaign = ended_.at(id);
   context_.background.post_next([this, id, respond, file = campaign.file,
                                  name = campaign.status.name]() -> Background::Finish {
@@ -189,11 +187,11 @@ void CampaignService::move_to_archive(CampaignId id,
       failure = error.what();
     }
     return [this, id, respond, place, failure, name] {
-      if (!failure.empty()) return respond(wire::ErrorReply{failure});
-      respond(outcome_of([&]() -> wire::ClientReply {
+      if (!failure.empty()) return respond(wire::error_reply(failure));
+      respond(outcome_of([&] {
         note_archived(id, name, place);
-        return wire::DoneReply{
-            fmt::format("campaign {}: its database is {} now", name, place.string())};
+        return wire::done_reply(
+            fmt::format("campaign {}: its database is {} now", name, place.string()));
       }));
     };
   });

@@ -170,9 +170,10 @@ void CampaignService::resume(CampaignId id) {
   on_resume(state_, id, context_.now(), outbox_);
 }
 
-wire::ClientReply CampaignService::control(CampaignId id, const wire::ControlRequest& request) {
+proto::ReplyEnvelope CampaignService::control(CampaignId id, wire::ControlAction action,
+                                              int priority) {
   const CampaignState& campaign = state_.campaigns.at(id);
-  switch (request.action) {
+  switch (action) {
     case wire::ControlAction::pause:
       on_pause(state_, id, outbox_);
       break;
@@ -183,7 +184,7 @@ wire::ClientReply CampaignService::control(CampaignId id, const wire::ControlReq
       on_cancel(state_, id, outbox_);
       break;
     case wire::ControlAction::set_priority:
-      on_control(state_, id, request.priority, campaign.audit_fraction);
+      on_control(state_, id, priority, campaign.audit_fraction);
       break;
     case wire::ControlAction::archive:
       PROOFMASS_EXPECT(false);  // See archive().
@@ -397,10 +398,10 @@ void CampaignService::begin_summary(CampaignId id, Served& served) {
       });
 }
 
-wire::DoneReply CampaignService::done_reply(CampaignId id) const {
+proto::ReplyEnvelope CampaignService::done_reply(CampaignId id) const {
   const wire::CampaignStatus status = status_of(id);
-  return {.text = fmt::format("campaign {}: {}, {} runs, {} of them done", status.name,
-                              wire::phase_name(status), status.num_runs, status.num_done)};
+  return wire::done_reply(fmt::format("campaign {}: {}, {} runs, {} of them done", status.name,
+                                      wire::phase_name(status), status.num_runs, status.num_done));
 }
 
 }  // namespace proofmass::coordinator

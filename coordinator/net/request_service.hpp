@@ -16,8 +16,8 @@
 #include "coordinator/net/directory_service.hpp"
 #include "coordinator/net/factory_reports.hpp"
 #include "coordinator/net/prepared_campaign.hpp"
+#include "coordinator/net/server_paths.hpp"
 #include "coordinator/net/service_context.hpp"
-#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
@@ -43,7 +43,7 @@ class RequestService {
   void review();
 
  private:
-  using Submitted = std::shared_ptr<const Submission>;
+  using Submitted = std::shared_ptr<const Request>;
 
   using Holdings = CampaignService::Holdings;
 
@@ -60,17 +60,18 @@ class RequestService {
     Respond respond;
   };
 
-  /// Has a specialisation for each kind of Request.
-  template <typename Content>
-  void take(Content&& request, const Asker& asker, const Respond& respond) = delete;
-  void control_ended(const CampaignService::Entry& campaign, wire::ControlAction action,
-                     const Respond& respond);
+  void control(const proto::ControlRequest& request, const Asker& asker, const Respond& respond);
+  [[nodiscard]] proto::ReplyEnvelope status(const proto::StatusRequest& request) const;
+  [[nodiscard]] proto::ReplyEnvelope workers(const proto::WorkersRequest& request) const;
+  [[nodiscard]] proto::ReplyEnvelope release_host(const std::string& host);
+  void ask(const proto::AnswerRequest& request, const Asker& asker, const Respond& respond);
+  [[nodiscard]] proto::ReplyEnvelope take(const wire::FactoryReport& report, const Asker& asker);
 
   void submit(const Submitted& request, const Asker& asker, Respond respond);
   [[nodiscard]] bool is_busy(const std::string& name) const;
   /// What a submission adds to the unfinished campaigns of an owner.
   /// @param entry  The campaign, if it is known.
-  [[nodiscard]] Holdings added_by(const Submission& request,
+  [[nodiscard]] Holdings added_by(const Request& request,
                                   const std::optional<CampaignService::Entry>& entry) const;
   /// To be asked wherever a request makes a campaign active or larger.
   /// @throws Error if its owner would have more than SubmissionLimits allow.
@@ -95,13 +96,14 @@ class RequestService {
   void serve_opened(const std::string& name, UnderWay under_way,
                     std::function<ServedCampaign()> open, std::function<void(Store&)> activate,
                     Respond respond);
-  [[nodiscard]] wire::DoneReply serve(PreparedCampaign prepared);
+  [[nodiscard]] proto::ReplyEnvelope serve(PreparedCampaign prepared);
 
   const ServiceContext& context_;
   CampaignService& campaigns_;
   const DirectoryService& directory_;
   FactoryReports factories_;
   TimePoint began_at_;
+  ServerPaths paths_;
   std::map<std::string, UnderWay> under_way_;  ///< By the campaign's name.
   std::vector<Deferred> deferred_;
   Answers answers_;

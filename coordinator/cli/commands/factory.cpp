@@ -10,7 +10,6 @@
 #include <string>
 #include <thread>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "coordinator/cli/client.hpp"
@@ -148,7 +147,9 @@ class FactoryLoop {
   bool advance() {
     try {
       ClientConnection connection(options_.client.connection);
-      const Ask ask = [&](const wire::ClientRequest& request) { return connection.ask(request); };
+      const Ask ask = [&](const proto::RequestEnvelope& request) {
+        return connection.ask(request);
+      };
       const wire::StatusReply status = whole_status(ask);
       const bool has_looked = look_at_queue(view_of(status, all_workers(ask)));
       report(ask);
@@ -210,9 +211,9 @@ class FactoryLoop {
 
   /// Nothing depends on the report, which an older coordinator does not know.
   void report(const Ask& ask) {
-    const wire::ClientReply reply = ask(report_);
-    const auto* const refusal = std::get_if<wire::ErrorReply>(&reply);
-    const std::string reason = refusal == nullptr ? "" : refusal->text;
+    proto::RequestEnvelope request;
+    wire::write(report_, *request.mutable_factory_report());
+    const std::string reason = ask(request).error().text();
     if (!reason.empty() && reason != refused_because_) {
       log_({.severity = wire::Severity::warning,
             .kind = "report_refused",

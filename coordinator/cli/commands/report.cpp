@@ -79,12 +79,11 @@ int print_remote_report(const ReportOptions& options) {
                      " (must not be given with --html, --markdown and --requirements; fetch the "
                      "database first)");
   }
-  wire::AnswerRequest question{.campaign = checked_campaign_name(options.database),
-                               .question = wire::Question::report};
+  proto::RequestEnvelope question = question_about(options.database, proto::QUESTION_REPORT);
   for (const std::string& requirement : options.requirements) {
-    question.options.push_back("--requirement=" + requirement);
+    question.mutable_answer()->add_options("--requirement=" + requirement);
   }
-  if (options.format == OutputFormat::json) question.options.emplace_back("--json");
+  if (options.format == OutputFormat::json) question.mutable_answer()->add_options("--json");
   return print_answer(options.connection, question, AnswerText::lines);
 }
 

@@ -11,7 +11,6 @@
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/standard_output.hpp"
-#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
