@@ -5,7 +5,7 @@
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/client_text.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "core/campaign/name.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/wire/client_codec.hpp"

@@ -15,9 +15,7 @@
 
 #include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output_file.hpp"
-#include "coordinator/cli/remote_answer.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/report/digest.hpp"
 #include "coordinator/store/sha256.hpp"
 #include "coordinator/store/store.hpp"

@@ -20,9 +20,9 @@
 #include <vector>
 
 #include "coordinator/archive/stored_campaign.hpp"
+#include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/remote_answer.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/query/bounded_query.hpp"
 #include "coordinator/query/row_writer.hpp"

@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "coordinator/cli/client.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 
 namespace proofmass::coordinator {
 

@@ -1,8 +1,6 @@
 // Questions about results that a coordinator answers. A script takes the place of the program that
 // it asks: what that program answers is tested in tests/system/remote_results_test.cpp.
 
-#include "coordinator/cli/remote_answer.hpp"
-
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/file.h>
@@ -16,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/cli/client.hpp"
 #include "coordinator/net/answers.hpp"
 #include "proto/wire/client_codec.hpp"
 #include "tests/coordinator/cli/program.hpp"
@@ -160,12 +159,6 @@ TEST_F(Answering, SaysThatItsOutputHasNoPlace) {
   EXPECT_THAT(client->error(question()), HasSubstr("answers: No such file or directory"));
 }
 
-TEST_F(Answering, EndsAnOutputThatIsTooLarge) {
-  start_with("exec head -c 70000000 /dev/zero");
-  EXPECT_EQ(client->error(question()),
-            "the answer has more than 67108864 bytes; ask for less, or fetch the database");
-}
-
 TEST_F(Answering, EndsAProgramThatTakesTooLong) {
   config.answer_duration_max = std::chrono::milliseconds(300);
   start_with("exec sleep 1000");
@@ -177,20 +170,7 @@ TEST_F(Answering, SaysThatAProgramCrashed) {
   EXPECT_EQ(client->error(question()), "answer: the process was killed by signal 15 (Terminated)");
 }
 
-// The programs wait until the service ends, which ends them.
-TEST_F(Answering, AnswersSoManyQuestionsAtATime) {
-  start_with("exec sleep 1000");
-  for (std::size_t i = 0; i < Answers::num_computing_max; ++i) {
-    client->send(100 + i, question(proto::QUESTION_SENSITIVITY, {"--run=" + std::to_string(i)}));
-  }
-  client->send(200, question());
-  const proto::ReplyEnvelope reply = client->receive_final();
-  EXPECT_EQ(reply.request_id(), 200U);
-  EXPECT_EQ(reply.error().text(),
-            "4 questions are being answered, which is the limit; try again later");
-}
-
-// Others do not wait for one that takes long.
+// Others do not wait for one that takes long, and which the end of the service ends.
 TEST_F(Answering, LeavesTheServiceToOthers) {
   start_with("exec sleep 1000");
   client->send(1, question());

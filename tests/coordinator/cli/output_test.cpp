@@ -1,11 +1,10 @@
-#include "coordinator/cli/standard_output.hpp"
-
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
