@@ -1,10 +1,11 @@
+#include "coordinator/cli/output.hpp"
+
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/program.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
