@@ -62,7 +62,7 @@ class Verification {
       check = Check::fails(error.what());
     }
     check.name = name;
-    holds_ = holds_ && check.verdict != Verdict::fails;
+    holds_ = holds_ && check.verdict != CheckOutcome::fails;
     report_(check);
   }
 
@@ -278,7 +278,7 @@ bool verify(const std::filesystem::path& file, const VerifyOptions& options,
 }
 
 Check Check::holds(std::string finding) {
-  return {.name = {}, .verdict = Verdict::holds, .finding = std::move(finding), .details = {}};
+  return {.name = {}, .verdict = CheckOutcome::holds, .finding = std::move(finding), .details = {}};
 }
 
 Check Check::fails(std::string finding) { return fails(std::move(finding), {}); }
@@ -290,17 +290,19 @@ Check Check::fails(std::string finding, std::vector<std::string> details) {
     details.push_back(fmt::format("and {} more", num_more));
   }
   return {.name = {},
-          .verdict = Verdict::fails,
+          .verdict = CheckOutcome::fails,
           .finding = std::move(finding),
           .details = std::move(details)};
 }
 
 Check Check::not_checked(std::string finding) {
-  return {
-      .name = {}, .verdict = Verdict::not_checked, .finding = std::move(finding), .details = {}};
+  return {.name = {},
+          .verdict = CheckOutcome::not_checked,
+          .finding = std::move(finding),
+          .details = {}};
 }
 
-std::string_view word_for(Verdict verdict) {
+std::string_view word_for(CheckOutcome verdict) {
   constexpr std::array<std::string_view, 3> words{"ok", "FAILS", "not checked"};
   return words[static_cast<std::size_t>(verdict)];
 }

@@ -14,7 +14,7 @@
 
 namespace proofmass::coordinator {
 
-enum class Verdict : std::uint8_t {
+enum class CheckOutcome : std::uint8_t {
   holds,
   fails,
   not_checked,  ///< Another check failed that it needs, or the file does not tell.
@@ -26,7 +26,7 @@ inline constexpr std::size_t details_named_max = 10;
 /// One thing that a campaign database was checked for.
 struct Check {
   std::string_view name;  ///< `integrity`, `digest` ...
-  Verdict verdict = Verdict::holds;
+  CheckOutcome verdict = CheckOutcome::holds;
   std::string finding;               ///< What was found, in a line.
   std::vector<std::string> details;  ///< Further lines.
 
@@ -60,7 +60,7 @@ struct VerifyOptions {
                           const IsStopped& is_stopped);
 
 /// `ok`, `FAILS` or `not checked`.
-[[nodiscard]] std::string_view word_for(Verdict verdict);
+[[nodiscard]] std::string_view word_for(CheckOutcome verdict);
 
 /// A check as text: a line, then one for each detail; at most 80 characters each unless a detail
 /// has no place to break.

@@ -23,10 +23,6 @@ using wire::CampaignPhase;
 using wire::CampaignStatus;
 using wire::WorkerStatus;
 
-std::uint64_t percent_done(const CampaignStatus& campaign) {
-  return campaign.num_done * 100 / std::max<std::uint64_t>(1, campaign.num_runs);
-}
-
 std::string time_left(const CampaignStatus& campaign) {
   const bool is_known = campaign.remaining_s && !is_over(campaign);
   return is_known ? duration_text(*campaign.remaining_s) : "-";

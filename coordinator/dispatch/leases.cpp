@@ -72,13 +72,13 @@ RunSet promote_copies(State& state, CampaignId id, RunSet runs, Outbox& outbox) 
   return runs;
 }
 
-void record_losses(const Lease& lease, const RunSet& runs, LossReason reason, bool is_blamed,
-                   Outbox& outbox) {
+void record_losses(const State& state, const Lease& lease, const RunSet& runs, LossReason reason,
+                   bool is_blamed, Outbox& outbox) {
   for (const RunRange& range : runs.ranges()) {
-    outbox.record({.campaign = lease.campaign,
-                   .runs = range,
+    outbox.record(lease.campaign, lease.worker,
+                  {.runs = range,
                    .attempt = lease.attempt,
-                   .worker = lease.worker,
+                   .worker = state.workers.at(lease.worker).session,
                    .reason = reason,
                    .is_blamed = is_blamed});
   }
@@ -218,8 +218,8 @@ void lose(State& state, LeaseId id, const RunSet& runs, LossReason reason, const
   const RunSet guilty = runs.overlap(blamed);
   RunSet others = runs;
   others.remove(guilty);
-  record_losses(lease, guilty, reason, true, outbox);
-  record_losses(lease, others, reason, false, outbox);
+  record_losses(state, lease, guilty, reason, true, outbox);
+  record_losses(state, lease, others, reason, false, outbox);
   log_loss(lease, runs, reason, guilty, outbox);
   for (const RunRange& range : runs.ranges()) take_off(state, id, range);
   state.hungry.insert(lease.worker);  // It has room for others now.

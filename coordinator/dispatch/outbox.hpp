@@ -4,6 +4,7 @@
 #include <memory>
 #include <utility>
 
+#include "coordinator/store/records.hpp"
 #include "core/campaign/campaign.hpp"
 #include "core/runs.hpp"
 #include "proto/text/event.hpp"
@@ -15,16 +16,6 @@ using wire::Event;
 using wire::Field;
 using wire::Log;
 using wire::Severity;
-
-/// Runs that came back without a result.
-struct Loss {
-  wire::CampaignId campaign;
-  RunRange runs;
-  wire::Attempt attempt;
-  wire::WorkerId worker;
-  wire::LossReason reason = wire::LossReason::silent;
-  bool is_blamed = false;  ///< It counts against these runs.
-};
 
 /// What the dispatch wants done. The service carries it out; tests record it.
 class Outbox {
@@ -43,8 +34,10 @@ class Outbox {
   /// Must lead to on_compared() with the run once the result has been compared with the stored one.
   /// Called for runs that were handed to store() before, or committed.
   virtual void compare(wire::WorkerId worker, wire::LeasedResult result) = 0;
-  /// Keeps a loss for the history of attempts. It need not be durable at once.
-  virtual void record(const Loss& loss) = 0;
+  /// Keeps for the history of attempts that runs came back. It need not be durable at once.
+  /// @param worker  Which held them, in the session that is named.
+  virtual void record(wire::CampaignId campaign, wire::WorkerId worker,
+                      const ReturnedRuns& returned) = 0;
   /// The run crashed too many workers: keeps it as given up, so that the campaign can end.
   virtual void give_up(wire::CampaignId campaign, RunIndex run) = 0;
   virtual void log(Event event, wire::CampaignId campaign) = 0;

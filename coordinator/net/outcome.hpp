@@ -2,6 +2,7 @@
 
 #include <exception>
 #include <functional>
+#include <string>
 
 #include "proto/wire/client_codec.hpp"
 
@@ -19,6 +20,16 @@ using Respond = std::function<void(proto::ReplyEnvelope)>;
     return action();
   } catch (const std::exception& error) {
     return wire::error_reply(error.what());
+  }
+}
+
+/// Why an action throws; empty if it does not.
+[[nodiscard]] inline std::string failure_of(const std::function<void()>& action) {
+  try {
+    action();
+    return {};
+  } catch (const std::exception& error) {
+    return error.what();
   }
 }
 

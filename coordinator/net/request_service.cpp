@@ -59,7 +59,7 @@ void write(Store& store, const Entry& entry) { (void)store.write({&entry, 1}); }
 
 /// What cannot be read at all is left to the command that answers, which says why.
 /// @throws Error if another campaign's file has taken the place of this one's.
-void require_own_file(const CampaignService::Entry& campaign) {
+void require_own_file(const CampaignRecord& campaign) {
   try {
     if (peek_campaign(campaign.file).id == campaign.id) return;
   } catch (const StoreError&) {
@@ -83,11 +83,9 @@ void require_own_file(const CampaignService::Entry& campaign) {
 
 }  // namespace
 
-RequestService::RequestService(const ServiceContext& context, CampaignService& campaigns,
-                               const DirectoryService& directory)
+RequestService::RequestService(const ServiceContext& context, CampaignService& campaigns)
     : context_(context),
       campaigns_(campaigns),
-      directory_(directory),
       began_at_(context.now()),
       paths_(context.config.answer_directory.parent_path()),
       answers_(context) {}
@@ -102,8 +100,8 @@ wire::StatusReply RequestService::service_status() const {
                           .num_slots = state.num_slots,
                           .campaigns = {},
                           .num_campaigns = campaigns_.num_campaigns(),
-                          .unserved_files = directory_.unserved(wire::unserved_files_per_reply_max),
-                          .num_unserved_files = directory_.num_unserved(),
+                          .unserved_files = campaigns_.unserved(wire::unserved_files_per_reply_max),
+                          .num_unserved_files = campaigns_.num_unserved(),
                           .factories = factories_.current(now)};
   const std::set<std::string> hosts = quarantined_hosts(state);
   reply.num_quarantined_hosts = hosts.size();
@@ -123,8 +121,8 @@ void RequestService::control(const proto::ControlRequest& request, const Asker& 
     require_right(asker, Right::submit);
     throw Error(fmt::format("campaign = {} (is not served)", name));
   }
-  require_control(asker, name, campaign->owner);
-  require_possible(campaigns_.status_of(campaign->id), action);
+  require_control(asker, name, campaign->status.owner);
+  require_possible(campaign->status, action);
   if (action == wire::ControlAction::archive) {
     if (under_way_.contains(name)) refuse_as_under_way(name);
     return campaigns_.archive(campaign->id, respond);
@@ -141,7 +139,10 @@ void RequestService::control(const proto::ControlRequest& request, const Asker& 
 
 proto::ReplyEnvelope RequestService::status(const proto::StatusRequest& request) const {
   wire::StatusReply status = service_status();
-  status.campaigns = campaigns_.statuses(request.first_campaign(), wire::campaigns_per_reply_max);
+  for (CampaignRecord& campaign :
+       campaigns_.records(request.first_campaign(), wire::campaigns_per_reply_max)) {
+    status.campaigns.push_back(std::move(campaign.status));
+  }
   paths_.hide_in(status);
   proto::ReplyEnvelope reply;
   wire::write(status, *reply.mutable_status());
@@ -156,7 +157,7 @@ proto::ReplyEnvelope RequestService::workers(const proto::WorkersRequest& reques
        item != state.workers.end() && workers.workers.size() < wire::workers_per_reply_max;
        ++item) {
     const auto& [id, worker] = *item;
-    workers.workers.push_back(status_of(state, id, worker, now));
+    workers.workers.push_back(record_of(state, id, worker, now).status);
   }
   proto::ReplyEnvelope reply;
   wire::write(workers, *reply.mutable_workers());
@@ -228,9 +229,9 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
                     "start one with --directory",
                     name));
   }
-  const std::optional<CampaignService::Entry> entry = campaigns_.find(name);
+  const std::optional<CampaignRecord> entry = campaigns_.find(name);
   if (entry) {
-    require_control(asker, name, entry->owner);
+    require_control(asker, name, entry->status.owner);
   } else {
     require_right(asker, Right::submit);
   }
@@ -239,7 +240,7 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
     deferred_.push_back({.request = request, .asker = asker, .respond = std::move(respond)});
     return;
   }
-  UnderWay under_way{.owner = entry ? entry->owner : asker.name,
+  UnderWay under_way{.owner = entry ? entry->status.owner : asker.name,
                      .added = added_by(*request, entry)};
   check_limits(name, under_way.owner, under_way.added);
   if (entry && !entry->is_closed) {
@@ -251,7 +252,7 @@ void RequestService::submit(const Submitted& request, const Asker& asker, Respon
 
 bool RequestService::is_busy(const std::string& name) const {
   if (under_way_.contains(name)) return true;
-  const std::optional<CampaignService::Entry> entry = campaigns_.find(name);
+  const std::optional<CampaignRecord> entry = campaigns_.find(name);
   return entry && !entry->is_closed && campaigns_.is_held(entry->id);
 }
 
@@ -269,7 +270,7 @@ void RequestService::review() {
 // More runs of an unfinished campaign may make its tables larger. One that has ended begins again
 // if it was cancelled, gets more runs, or has a stop rule that was not checked yet.
 RequestService::Holdings RequestService::added_by(
-    const Request& request, const std::optional<CampaignService::Entry>& entry) const {
+    const Request& request, const std::optional<CampaignRecord>& entry) const {
   const Holdings wanted{.num_campaigns = 1, .size = definition_size(*request.campaign)};
   if (!entry || entry->is_closed) return wanted;
   const CampaignId id = entry->id;
@@ -281,16 +282,17 @@ RequestService::Holdings RequestService::added_by(
   const std::uint64_t num_runs_now = campaigns_.num_runs_of(id);
   const bool has_more = horizon_of(plan, request.campaign->num_runs, num_runs_now) > num_runs_now;
   const bool has_new_rule = !plan.stop_rule.empty() && plan != campaigns_.plan_of(id);
-  const bool is_cancelled = campaigns_.status_of(id).phase == Phase::cancelled;
+  const bool is_cancelled = entry->status.phase == Phase::cancelled;
   return has_more || has_new_rule || is_cancelled ? wanted : Holdings{};
 }
 
-void RequestService::check_limits(const std::string& campaign, const CampaignService::Entry& entry,
+void RequestService::check_limits(const std::string& campaign, const CampaignRecord& entry,
                                   wire::ControlAction action) const {
   const bool begins = action == wire::ControlAction::resume || action == wire::ControlAction::retry;
   if (!begins || campaigns_.holdings_of(entry.id).num_campaigns > 0) return;
   const Campaign& definition = *context_.state.campaigns.at(entry.id).definition;
-  check_limits(campaign, entry.owner, {.num_campaigns = 1, .size = definition_size(definition)});
+  check_limits(campaign, entry.status.owner,
+               {.num_campaigns = 1, .size = definition_size(definition)});
 }
 
 // Files without an owner, and all files of a coordinator without keys, are not limited: a client
@@ -320,8 +322,8 @@ void RequestService::check_limits(const std::string& campaign, const std::string
 }
 
 void RequestService::open_file(const Submitted& request, const Asker& asker,
-                               const std::optional<CampaignService::Entry>& closed,
-                               UnderWay under_way, Respond respond) {
+                               const std::optional<CampaignRecord>& closed, UnderWay under_way,
+                               Respond respond) {
   CampaignFiles& files = *context_.config.files;
   serve_opened(
       request->campaign->name, std::move(under_way),
@@ -341,25 +343,21 @@ void RequestService::open_file(const Submitted& request, const Asker& asker,
       std::move(respond));
 }
 
-void RequestService::reopen(const CampaignService::Entry& campaign, wire::ControlAction action,
+void RequestService::reopen(const CampaignRecord& campaign, wire::ControlAction action,
                             Respond respond) {
-  const wire::CampaignStatus status = campaigns_.status_of(campaign.id);
+  const wire::CampaignStatus& status = campaign.status;
   if (under_way_.contains(status.name)) refuse_as_under_way(status.name);
-  if (campaign.owner.empty()) {
+  if (campaign.status.owner.empty()) {
     return reopen_measured(status.name, campaign, action, 0, std::move(respond));
   }
-  check_limits(status.name, campaign.owner, {.num_campaigns = 1, .size = 0});
+  check_limits(status.name, campaign.status.owner, {.num_campaigns = 1, .size = 0});
   // What its definition takes is known when the file is read, which must not change if that is too
   // much: so it is opened twice.
   const auto work = [this, &directory = *context_.config.directory, name = status.name, campaign,
                      action, respond]() -> Background::Finish {
     std::uint64_t size = 0;
-    std::string failure;
-    try {
-      size = definition_size(*directory.load(campaign.file).definition);
-    } catch (const std::exception& error) {
-      failure = error.what();
-    }
+    const std::string failure =
+        failure_of([&] { size = definition_size(*directory.load(campaign.file).definition); });
     return [this, name, campaign, action, size, failure, respond] {
       under_way_.erase(name);
       if (!failure.empty()) return respond(wire::error_reply(failure));
@@ -371,14 +369,14 @@ void RequestService::reopen(const CampaignService::Entry& campaign, wire::Contro
     };
   };
   if (!context_.background.post(work)) refuse_as_too_many();
-  under_way_.emplace(status.name, UnderWay{.owner = campaign.owner, .added = {.num_campaigns = 1}});
+  under_way_.emplace(status.name,
+                     UnderWay{.owner = campaign.status.owner, .added = {.num_campaigns = 1}});
 }
 
-void RequestService::reopen_measured(const std::string& name,
-                                     const CampaignService::Entry& campaign,
+void RequestService::reopen_measured(const std::string& name, const CampaignRecord& campaign,
                                      wire::ControlAction action, std::uint64_t size,
                                      Respond respond) {
-  UnderWay under_way{.owner = campaign.owner, .added = {.num_campaigns = 1, .size = size}};
+  UnderWay under_way{.owner = campaign.status.owner, .added = {.num_campaigns = 1, .size = size}};
   check_limits(name, under_way.owner, under_way.added);
   const CampaignDirectory& directory = *context_.config.directory;
   serve_opened(
@@ -399,23 +397,20 @@ void RequestService::serve_opened(const std::string& name, UnderWay under_way,
   const auto work = [this, name, open = std::move(open), activate = std::move(activate),
                      respond]() -> Background::Finish {
     // Copyable, as the function is.
-    const auto prepared = std::make_shared<std::optional<PreparedCampaign>>();
+    const auto look = std::make_shared<FileLook>();
     std::filesystem::path made;
-    std::string failure;
-    try {
+    const std::string failure = failure_of([&] {
       ServedCampaign campaign = open();
       if (campaign.is_new) made = campaign.file;
       activate(campaign.store);
-      *prepared = prepare(std::move(campaign), GivenUpRuns::keep, context_.start);
-    } catch (const std::exception& error) {
-      failure = error.what();
-      if (!made.empty()) remove_made(made);
-    }
-    return [this, name, prepared, failure, respond] {
+      *look = prepare(std::move(campaign), GivenUpRuns::keep, context_.start);
+    });
+    if (!failure.empty() && !made.empty()) remove_made(made);
+    return [this, name, look, made, failure, respond] {
       under_way_.erase(name);
       respond(outcome_of([&] {
-        if (!*prepared) return wire::error_reply(failure);
-        return serve(std::move(**prepared));
+        if (!failure.empty()) return wire::error_reply(failure);
+        return serve(std::move(*look), made);
       }));
     };
   };
@@ -424,14 +419,12 @@ void RequestService::serve_opened(const std::string& name, UnderWay under_way,
 }
 
 // A campaign of that name may have come into the directory while the file was made.
-proto::ReplyEnvelope RequestService::serve(PreparedCampaign prepared) {
-  const CampaignId id = prepared.campaign.store.id();
-  const bool is_new = prepared.campaign.is_new;
-  const std::filesystem::path file = prepared.campaign.file;
+proto::ReplyEnvelope RequestService::serve(FileLook look, const std::filesystem::path& made) {
+  const CampaignId id = look.record.id;
   try {
-    campaigns_.serve(std::move(prepared));
+    campaigns_.add(std::move(look));
   } catch (const std::exception&) {
-    if (is_new && !campaigns_.is_served(id)) remove_made(file);
+    if (!made.empty() && !campaigns_.is_served(id)) remove_made(made);
     throw;
   }
   campaigns_.review();
@@ -446,13 +439,12 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Unde
   const bool has_new_plan = plan != campaigns_.plan_of(id);
   campaigns_.take_hold(id);
   const auto work = [this, id, request, plan, num_runs, has_new_plan, respond,
-                     file = campaigns_.file_of(id)]() -> Background::Finish {
+                     file = campaigns_.record_of(id).file]() -> Background::Finish {
     const proto::SubmitRequest& sent = request->message.submit();
     CampaignService::Change change{.definition = nullptr, .plan = plan};
     if (sent.has_priority()) change.priority = sent.priority();
     if (sent.has_audit_fraction()) change.audit_fraction = sent.audit_fraction();
-    std::string failure;
-    try {
+    const std::string failure = failure_of([&] {
       const std::unique_ptr<Campaign> wanted = request->campaign->clone();
       wanted->num_runs = num_runs;
       context_.config.files->require_same(file, *wanted);
@@ -460,9 +452,7 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Unde
         change.definition = context_.config.files->extend(store, *wanted);
         if (has_new_plan) store.set_stop_plan(plan);
       });
-    } catch (const std::exception& error) {
-      failure = error.what();
-    }
+    });
     return [this, id, name = request->campaign->name, change, failure, respond] {
       under_way_.erase(name);
       if (!failure.empty()) {

@@ -32,7 +32,7 @@ struct SecondDelivery {
 };
 
 /// Runs that came back without a result.
-struct LostRuns {
+struct ReturnedRuns {
   RunRange runs;
   wire::Attempt attempt;
   wire::SessionId worker;
@@ -83,8 +83,8 @@ struct CampaignControl {
 struct RetriedRuns {};
 
 /// One thing to be written to a campaign database.
-using Entry = std::variant<Delivery, SecondDelivery, LostRuns, GivenUpRun, RetriedRuns, EventEntry,
-                           WorkerJoined, WorkerEnded, CampaignControl>;
+using Entry = std::variant<Delivery, SecondDelivery, ReturnedRuns, GivenUpRun, RetriedRuns,
+                           EventEntry, WorkerJoined, WorkerEnded, CampaignControl>;
 
 /// A coordinator process that begins to serve a campaign.
 struct CoordinatorStart {

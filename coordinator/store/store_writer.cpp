@@ -372,7 +372,7 @@ void StoreWriter::compare(wire::CampaignId campaign, Delivery delivery) {
   impl_->add(campaign, SecondDelivery{.delivery = std::move(delivery)});
 }
 
-void StoreWriter::record_loss(wire::CampaignId campaign, const LostRuns& lost) {
+void StoreWriter::record_loss(wire::CampaignId campaign, const ReturnedRuns& lost) {
   impl_->add(campaign, lost);
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.hpp"
+#include "proto/wire/checks.hpp"
 #include "proto/wire/definition_codec.hpp"
 #include "proto/wire/names.hpp"
 
@@ -52,16 +53,16 @@ void write_campaign(const CampaignStatus& campaign, proto::CampaignStatus& messa
   message.set_name(name_from(campaign.name));
   message.set_phase(static_cast<proto::CampaignPhase>(campaign.phase));
   message.set_priority(std::clamp(campaign.priority, -priority_max, priority_max));
+  for (const CampaignCounter& counter : campaign_counters) {
+    message.GetReflection()->SetUInt64(
+        &message, detail::field_of(proto::CampaignStatus::descriptor(), counter.name),
+        campaign.*counter.count);
+  }
   const std::uint64_t num_runs = std::clamp<std::uint64_t>(campaign.num_runs, 1, num_runs_max);
   const std::uint64_t num_given_up = std::min(campaign.num_given_up, num_runs);
   message.set_num_runs(num_runs);
-  message.set_num_done(std::min(campaign.num_done, num_runs - num_given_up));
-  message.set_num_without_estimate(campaign.num_without_estimate);
   message.set_num_given_up(num_given_up);
-  message.set_num_lent(campaign.num_lent);
-  message.set_num_duplicates(campaign.num_duplicates);
-  message.set_num_audited(campaign.num_audited);
-  message.set_num_mismatches(campaign.num_mismatches);
+  message.set_num_done(std::min(campaign.num_done, num_runs - num_given_up));
   message.set_rate_hz(sendable(campaign.rate_hz));
   if (campaign.remaining_s) message.set_remaining_s(sendable(*campaign.remaining_s));
   message.set_storage_failure(sendable(campaign.storage_failure));

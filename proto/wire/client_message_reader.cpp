@@ -136,22 +136,20 @@ CampaignStatus read_campaign(const proto::CampaignStatus& message) {
   require_in(message.num_runs(), 1, num_runs_max, "num_runs");
   require_in(message.num_given_up(), 0, message.num_runs(), "num_given_up");
   require_in(message.num_done(), 0, message.num_runs() - message.num_given_up(), "num_done");
-  return {.name = checked_name(message.name(), "name"),
-          .phase = static_cast<CampaignPhase>(
-              checked_enumerator(message.phase(), proto::CampaignPhase_MAX, "phase")),
-          .priority = checked_priority(message.priority()),
-          .num_runs = message.num_runs(),
-          .num_done = message.num_done(),
-          .num_without_estimate = message.num_without_estimate(),
-          .num_given_up = message.num_given_up(),
-          .num_lent = message.num_lent(),
-          .num_duplicates = message.num_duplicates(),
-          .num_audited = message.num_audited(),
-          .num_mismatches = message.num_mismatches(),
-          .rate_hz = checked_magnitude(message.rate_hz(), "rate_hz"),
-          .remaining_s = remaining_time(message),
-          .storage_failure = checked_text(message.storage_failure(), "storage_failure"),
-          .owner = checked_owner(message.owner())};
+  CampaignStatus campaign{
+      .name = checked_name(message.name(), "name"),
+      .phase = static_cast<CampaignPhase>(
+          checked_enumerator(message.phase(), proto::CampaignPhase_MAX, "phase")),
+      .priority = checked_priority(message.priority()),
+      .rate_hz = checked_magnitude(message.rate_hz(), "rate_hz"),
+      .remaining_s = remaining_time(message),
+      .storage_failure = checked_text(message.storage_failure(), "storage_failure"),
+      .owner = checked_owner(message.owner())};
+  for (const CampaignCounter& counter : campaign_counters) {
+    campaign.*counter.count = message.GetReflection()->GetUInt64(
+        message, detail::field_of(proto::CampaignStatus::descriptor(), counter.name));
+  }
+  return campaign;
 }
 
 void read_lists(const proto::StatusReply& message, StatusReply& status) {

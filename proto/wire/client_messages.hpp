@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "proto/wire/messages.hpp"
@@ -60,11 +62,43 @@ struct CampaignStatus {
   std::uint64_t num_lent = 0;
   std::uint64_t num_duplicates = 0;  ///< Results that were there already.
   std::uint64_t num_audited = 0;
-  std::uint64_t num_mismatches = 0;   ///< Of the audited and duplicate ones; must be 0.
-  double rate_hz = 0.0;               ///< Runs stored per second, recently.
-  std::optional<double> remaining_s;  ///< At that rate.
-  std::string storage_failure;        ///< Why nothing can be stored; empty if all is well.
-  std::string owner = {};             ///< Name of the key that submitted it; empty if not known.
+  std::uint64_t num_mismatches = 0;        ///< Of the audited and duplicate ones; must be 0.
+  double rate_hz = 0.0;                    ///< Runs stored per second, recently.
+  std::optional<double> remaining_s = {};  ///< At that rate.
+  std::string storage_failure = {};        ///< Why nothing can be stored; empty if all is well.
+  std::string owner = {};  ///< Name of the key that submitted it; empty if not known.
+};
+
+/// A number of runs or results in CampaignStatus.
+struct CampaignCounter {
+  std::string_view name;  ///< Of the field of the message, and of the key in JSON.
+  std::uint64_t CampaignStatus::*count;
+  std::string_view metric;  ///< Name in `/metrics`: a counter if it ends in `_total`.
+  std::string_view help;    ///< What `/metrics` says of it.
+};
+
+/// All of them: messages, JSON and metrics have what stands here. A new one needs its field in
+/// client.proto and above, a row here, its count in CampaignState, and
+/// CampaignService::record_of().
+inline constexpr std::array campaign_counters{
+    CampaignCounter{"num_runs", &CampaignStatus::num_runs, "proofmass_runs_wanted",
+                    "Runs that the campaign is to have."},
+    CampaignCounter{"num_done", &CampaignStatus::num_done, "proofmass_runs_finished_total",
+                    "Runs whose results are on disk."},
+    CampaignCounter{"num_without_estimate", &CampaignStatus::num_without_estimate,
+                    "proofmass_runs_without_estimate_total",
+                    "Runs that ended without an estimate since the coordinator started."},
+    CampaignCounter{"num_given_up", &CampaignStatus::num_given_up, "proofmass_runs_given_up",
+                    "Runs that crashed too many workers."},
+    CampaignCounter{"num_lent", &CampaignStatus::num_lent, "proofmass_runs_lent",
+                    "Runs that workers hold."},
+    CampaignCounter{"num_duplicates", &CampaignStatus::num_duplicates,
+                    "proofmass_results_duplicate_total", "Results that were there already."},
+    CampaignCounter{"num_audited", &CampaignStatus::num_audited, "proofmass_results_compared_total",
+                    "Results that were compared with a second computation."},
+    CampaignCounter{"num_mismatches", &CampaignStatus::num_mismatches,
+                    "proofmass_results_different_total",
+                    "Compared results that differ; must be 0."},
 };
 
 /// A file that should be served and cannot be for now. It is tried again every few seconds.

@@ -97,11 +97,11 @@ void add_troubles(Store& store, const MicroscopeCampaign& campaign) {
   const RunRange lost{.first = RunIndex{16}, .count = 3};
   for (const bool is_blamed : {false, true, true, true}) {
     entries.emplace_back(
-        LostRuns{.runs = lost,
-                 .attempt = {1},
-                 .worker = session,
-                 .reason = is_blamed ? wire::LossReason::crashed : wire::LossReason::silent,
-                 .is_blamed = is_blamed});
+        ReturnedRuns{.runs = lost,
+                     .attempt = {1},
+                     .worker = session,
+                     .reason = is_blamed ? wire::LossReason::crashed : wire::LossReason::silent,
+                     .is_blamed = is_blamed});
   }
   entries.emplace_back(GivenUpRun{RunIndex{17}});
   entries.emplace_back(EventEntry{.kind = "audit_mismatch", .text = "run=3"});

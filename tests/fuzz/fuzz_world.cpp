@@ -44,7 +44,7 @@ coordinator::StoredCampaign stored(bool has_table) {
   static const auto table_definition = make_campaign(true);
   coordinator::StoredCampaign campaign;
   campaign.definition = has_table ? table_definition : plain_definition;
-  campaign.audit_fraction = has_table ? 0.5 : 0.0;
+  campaign.control.audit_fraction = has_table ? 0.5 : 0.0;
   if (has_table) campaign.finished = {{.first = {2}, .count = 3}};
   return campaign;
 }
@@ -89,9 +89,9 @@ class World final : public coordinator::Outbox {
   void compare(wire::WorkerId worker, wire::LeasedResult result) override {
     to_compare_.emplace_back(worker, std::move(result));
   }
-  void record(const coordinator::Loss& loss) override {
-    PROOFMASS_EXPECT(loss.runs.count > 0 && loss.runs.end() <= fuzz_num_runs);
-    summary_.num_lost += loss.runs.count;
+  void record(CampaignId, wire::WorkerId, const coordinator::ReturnedRuns& returned) override {
+    PROOFMASS_EXPECT(returned.runs.count > 0 && returned.runs.end() <= fuzz_num_runs);
+    summary_.num_lost += returned.runs.count;
   }
   void give_up(CampaignId, RunIndex run) override {
     PROOFMASS_EXPECT(run.value < fuzz_num_runs);

@@ -42,7 +42,7 @@ std::vector<RunRange> ranges_of(const Runs& runs) {
 /// What a coordinator finds when it starts.
 coordinator::StoredCampaign found_in(const PlayedFile& file) {
   coordinator::StoredCampaign stored = file.stored;
-  stored.phase = file.phase;
+  stored.control.phase = file.phase;
   std::vector<RunIndex> committed;
   for (const auto& [run, count] : file.num_commits) committed.push_back(run);
   stored.finished = ranges_of(committed);
@@ -358,13 +358,14 @@ void PlayedCoordinator::compare(wire::WorkerId worker, wire::LeasedResult result
   });
 }
 
-void PlayedCoordinator::record(const coordinator::Loss& loss) {
+void PlayedCoordinator::record(wire::CampaignId campaign, wire::WorkerId worker,
+                               const coordinator::ReturnedRuns& loss) {
   ++num_events_[std::string(wire::name_of(loss.reason))];
   const bool is_of_a_crash = coordinator::is_blamed(loss.reason);
-  const bool is_honest = life_->peers.at(loss.worker).is_honest;
+  const bool is_honest = life_->peers.at(worker).is_honest;
   EXPECT_TRUE(may_crash_ || !is_of_a_crash || !is_honest) << "a liar has ended an honest worker";
   if (!loss.is_blamed) return;
-  write_later(loss.campaign, [loss](PlayedFile& file) {
+  write_later(campaign, [loss](PlayedFile& file) {
     for (RunIndex run = loss.runs.first; run.value < loss.runs.end(); ++run.value) {
       auto& blamed = file.blamed[run];
       blamed.run = run;

@@ -29,7 +29,7 @@ struct PlayedFile {
   std::set<RunIndex> given_up;
   std::set<RunIndex> compared;
   std::set<RunIndex> audits_given_up;
-  std::map<RunIndex, coordinator::StoredCampaign::Blamed> blamed;
+  std::map<RunIndex, coordinator::BlamedRun> blamed;
   bool is_failing = false;  ///< Nothing can be stored for now.
   /// It has lost its name: if the coordinator ends before that is mended, what is left is the copy.
   bool is_nameless = false;
@@ -109,7 +109,8 @@ class PlayedCoordinator final : public coordinator::Outbox {
                        const std::shared_ptr<const Campaign>& definition) override;
   void store(wire::WorkerId, wire::LeasedResult result) override;
   void compare(wire::WorkerId worker, wire::LeasedResult result) override;
-  void record(const coordinator::Loss& loss) override;
+  void record(wire::CampaignId campaign, wire::WorkerId worker,
+              const coordinator::ReturnedRuns& returned) override;
   void give_up(wire::CampaignId campaign, RunIndex run) override;
   void log(coordinator::Event event, wire::CampaignId campaign) override;
 

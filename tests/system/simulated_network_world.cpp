@@ -73,12 +73,9 @@ void World::add_campaigns() {
     campaign.seed = random_.number();
     coordinator::StoredCampaign stored{
         .definition = std::make_shared<const MicroscopeCampaign>(campaign),
-        .priority = priority,
-        .finished = {},
-        .given_up = {},
-        .blamed = {}};
+        .control = {.priority = priority}};
     constexpr std::array fractions{0.0, 0.0, 0.3, 1.0};
-    stored.audit_fraction = fractions.at(random_.below(fractions.size()));
+    stored.control.audit_fraction = fractions.at(random_.below(fractions.size()));
     coordinator_.add_file(id, stored);
     num_runs_wanted_[id] = weather_.extension_s < never_s ? num_runs + 12 : num_runs;
     campaign.num_runs = num_runs_wanted_[id];
@@ -176,7 +173,7 @@ void World::check_end() {
       }
       EXPECT_EQ(commits->second, 1) << "campaign " << id.value << " run " << run.value;
       const bool is_to_be_audited =
-          coordinator::is_audited(campaign.seed, run, file.stored.audit_fraction);
+          coordinator::is_audited(campaign.seed, run, file.stored.control.audit_fraction);
       EXPECT_TRUE(!is_to_be_audited || file.compared.contains(run) ||
                   file.audits_given_up.contains(run))
           << "not audited: campaign " << id.value << " run " << run.value;

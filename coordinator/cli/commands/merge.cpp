@@ -67,7 +67,7 @@ void require_sound(const std::filesystem::path& part, const MergeOptions& option
   const VerifyOptions how{.fraction = options.fraction, .num_threads = wire::num_processors()};
   std::string failing;
   const auto collect = [&](const Check& check) {
-    if (check.verdict == Verdict::fails) failing += "\n" + check_text(check);
+    if (check.verdict == CheckOutcome::fails) failing += "\n" + check_text(check);
   };
   if (verify(part, how, collect, is_stopped)) return;
   while (failing.ends_with('\n')) failing.pop_back();

@@ -44,7 +44,7 @@ int verify_database(const VerifyCommandOptions& options) {
     Json checks = Json::array();
     const auto report = [&](const Check& check) {
       ++num_checks;
-      if (check.verdict == Verdict::fails) ++num_failing;
+      if (check.verdict == CheckOutcome::fails) ++num_failing;
       if (is_json) {
         checks.push_back(json_of_check(check));
         return;

@@ -286,7 +286,7 @@ void EntryRows::report_contradiction(const Delivery& delivery) {
                                    {"attempt", delivery.attempt.value}}}));
 }
 
-void EntryRows::write_entry(const LostRuns& lost) {
+void EntryRows::write_entry(const ReturnedRuns& lost) {
   insert_attempt_.run(lost.runs.first.value, lost.runs.count, lost.attempt.value,
                       workers_.key_of(lost.worker), stored_name(lost.reason),
                       std::int64_t{lost.is_blamed}, now_unix_s_);

@@ -89,7 +89,7 @@ class EntryRows {
  private:
   void write_entry(const Delivery& delivery);
   void write_entry(const SecondDelivery& second);
-  void write_entry(const LostRuns& lost);
+  void write_entry(const ReturnedRuns& lost);
   void write_entry(const GivenUpRun& given_up);
   void write_entry(const RetriedRuns& retried);
   void write_entry(const EventEntry& event);

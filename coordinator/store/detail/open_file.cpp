@@ -16,7 +16,7 @@ bool is_urgent(const Entry& entry) {
 
 // What the history of a campaign can do without.
 bool is_record(const Entry& entry) {
-  return std::holds_alternative<LostRuns>(entry) || std::holds_alternative<EventEntry>(entry);
+  return std::holds_alternative<ReturnedRuns>(entry) || std::holds_alternative<EventEntry>(entry);
 }
 
 }  // namespace

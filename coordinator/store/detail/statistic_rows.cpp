@@ -78,7 +78,7 @@ class StatisticRow {
   int position_ = 0;
 };
 
-bool is_worse(const WorstRun& left, const WorstRun& right) {
+bool is_worse(const RankedRun& left, const RankedRun& right) {
   if (left.magnitude != right.magnitude) return left.magnitude > right.magnitude;
   return left.run < right.run;
 }
@@ -171,7 +171,7 @@ void replace_budgets(Database& database, const std::optional<ErrorBudget>& budge
   }
 }
 
-WorstRuns::Change WorstRuns::offer(const WorstRun& offered) {
+WorstRuns::Change WorstRuns::offer(const RankedRun& offered) {
   const bool is_full = runs_.size() == num_worst_runs;
   if (is_full && !is_worse(offered, runs_.back())) return {};
   Change change{.is_taken = true, .dropped = std::nullopt};

@@ -31,11 +31,11 @@ class BitFlips : public test::StoreTest {
     std::vector<RunResult> results = test::results_of_each_status(20);
     results.pop_back();
     Store store = test::store_of(file(), test::campaign_of(20), results);
-    const std::vector<Entry> entries{LostRuns{.runs = {RunIndex{19}, 1},
-                                              .attempt = {1},
-                                              .worker = test::session_1,
-                                              .reason = wire::LossReason::crashed,
-                                              .is_blamed = true},
+    const std::vector<Entry> entries{ReturnedRuns{.runs = {RunIndex{19}, 1},
+                                                  .attempt = {1},
+                                                  .worker = test::session_1,
+                                                  .reason = wire::LossReason::crashed,
+                                                  .is_blamed = true},
                                      GivenUpRun{.run = RunIndex{19}}};
     (void)store.write(entries);
     store.set_stop_plan(

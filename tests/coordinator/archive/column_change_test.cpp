@@ -86,11 +86,11 @@ class ColumnChange : public test::VerificationTest {
     store.record_event("kind", "text");
     const Delivery again{.result = results_[5], .worker = test::session_1, .attempt = {2}};
     const std::vector<Entry> entries{SecondDelivery{again},
-                                     LostRuns{.runs = {RunIndex{17}, 1},
-                                              .attempt = {1},
-                                              .worker = test::session_1,
-                                              .reason = wire::LossReason::crashed,
-                                              .is_blamed = true},
+                                     ReturnedRuns{.runs = {RunIndex{17}, 1},
+                                                  .attempt = {1},
+                                                  .worker = test::session_1,
+                                                  .reason = wire::LossReason::crashed,
+                                                  .is_blamed = true},
                                      GivenUpRun{.run = RunIndex{17}},
                                      WorkerEnded{.session = test::session_1}};
     (void)store.write(entries);
@@ -156,7 +156,7 @@ class ColumnChange : public test::VerificationTest {
     (void)verify(
         file(), {.model_version = "none"},
         [&](const Check& check) { checks_.emplace(check.name, check); }, test::never_stopped);
-    std::vector<std::string> failing = names(Verdict::fails);
+    std::vector<std::string> failing = names(CheckOutcome::fails);
     std::erase(failing, "model");
     return failing;
   }

@@ -26,7 +26,7 @@ class DerivedChecks : public test::VerificationTest {
     if (!std::filesystem::exists(file())) make_file();
     test::change(file(), sql);
     const bool holds = verify_all(0.0);
-    const std::vector<std::string> failing = names(Verdict::fails);
+    const std::vector<std::string> failing = names(CheckOutcome::fails);
     EXPECT_EQ(holds, failing.empty());
     return failing;
   }
@@ -126,7 +126,7 @@ TEST_F(DerivedChecks, HoldOlderStatisticsAgainstWhatIsKnownOfThem) {
   EXPECT_THAT(check("statistics").details,
               ElementsAre("summary.num_finished = 17 (must be 18, the sum of its kinds)"));
   EXPECT_THAT(failing_after("UPDATE summary SET num_estimated = 17"), IsEmpty());
-  EXPECT_EQ(check("statistics").verdict, Verdict::not_checked);
+  EXPECT_EQ(check("statistics").verdict, CheckOutcome::not_checked);
   EXPECT_EQ(check("statistics").finding, "they are not of the results that are in the file");
 }
 
@@ -159,7 +159,7 @@ TEST_F(DerivedChecks, HoldForRunsThatFailed) {
   results_[1].num_rounds = 0;
   make_file();
   EXPECT_TRUE(verify_all(0.0)) << "simulates run 9";
-  EXPECT_THAT(names(Verdict::not_checked), IsEmpty());
+  EXPECT_THAT(names(CheckOutcome::not_checked), IsEmpty());
   EXPECT_THAT(failing_after("UPDATE summary SET num_not_finite = 0"), ElementsAre("statistics"));
 }
 
@@ -168,7 +168,7 @@ TEST_F(DerivedChecks, HoldIfEveryRunFailed) {
   results_ = test::simulated(campaign_);
   make_file();
   EXPECT_TRUE(verify_all());
-  EXPECT_THAT(names(Verdict::not_checked), IsEmpty());
+  EXPECT_THAT(names(CheckOutcome::not_checked), IsEmpty());
   EXPECT_EQ(stored("SELECT num_no_draw || ' ' || num_estimated FROM summary"), "18 0");
   EXPECT_THAT(failing_after("UPDATE budget_entry SET after_worst = 1 WHERE term = 'total'"),
               ElementsAre("statistics"));
@@ -186,7 +186,7 @@ TEST_F(DerivedChecks, HoldIfARunIsGivenUpLater) {
     (void)store.write({&given_up, 1});
   }
   EXPECT_TRUE(verify_all());
-  EXPECT_EQ(check("statistics").verdict, Verdict::holds);
+  EXPECT_EQ(check("statistics").verdict, CheckOutcome::holds);
 }
 
 // A campaign that ends between two checks.
@@ -209,7 +209,7 @@ TEST_F(DerivedChecks, ComputeNoStatisticsOfAnEstimateThatNoSimulationYields) {
               Contains("results"));
   EXPECT_THAT(check("results").details,
               ElementsAre("run 3: estimate_k2d_s2_m = 1e+200 (must be in [-1e+90, 1e+90])"));
-  EXPECT_EQ(check("stop_checks").verdict, Verdict::not_checked);
+  EXPECT_EQ(check("stop_checks").verdict, CheckOutcome::not_checked);
 }
 
 TEST_F(DerivedChecks, HoldWorkersAgainstTheirDeliveries) {
@@ -240,7 +240,7 @@ TEST_F(DerivedChecks, FindResultsThatContradictEachOther) {
     (void)store.write(entries);
   }
   EXPECT_FALSE(verify_all());
-  EXPECT_THAT(names(Verdict::fails), ElementsAre("audit"));
+  EXPECT_THAT(names(CheckOutcome::fails), ElementsAre("audit"));
   EXPECT_EQ(check("audit").finding,
             "1 of 1 second results is not the stored one: a worker computes wrongly");
   EXPECT_THAT(check("audit").details,
@@ -336,11 +336,11 @@ TEST_F(DerivedStopChecks, HoldIfARunHadBeenGivenUp) {
   make_file_with_rule("std(a_c13) within 50%");
   {
     Store store = Store::open(file());
-    const std::vector<Entry> entries{LostRuns{.runs = {RunIndex{17}, 1},
-                                              .attempt = {1},
-                                              .worker = test::session_1,
-                                              .reason = wire::LossReason::crashed,
-                                              .is_blamed = true},
+    const std::vector<Entry> entries{ReturnedRuns{.runs = {RunIndex{17}, 1},
+                                                  .attempt = {1},
+                                                  .worker = test::session_1,
+                                                  .reason = wire::LossReason::crashed,
+                                                  .is_blamed = true},
                                      GivenUpRun{.run = RunIndex{17}}};
     (void)store.write(entries);
   }

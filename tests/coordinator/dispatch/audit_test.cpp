@@ -12,7 +12,6 @@ using coordinator::is_audited;
 class AuditTest : public DispatchFixture {
  protected:
   void SetUp() override {
-    begin();
     add_campaign(one, 1, 0, 1.0);
     add_worker(first);
     outbox.forget();
@@ -77,13 +76,14 @@ TEST_F(AuditTest, IsNotDoneByAFirstWorkerThatRepeatsItself) {
   outbox.forget();
 }
 
-TEST_F(AuditTest, CountsWhatDiffersAmongWhatItCompared) {
+TEST_F(AuditTest, ReportsAndCountsWhatDiffersAmongWhatItCompared) {
   add_worker(second);
   deliver(first, one, {0});
   commit(one);
   deliver(second, one, {0}, 2);
   outbox.forget();
   on_compared(state, one, {0}, second, false, now, outbox);
+  EXPECT_EQ(outbox.take_events().at(0), "result_mismatch run=0 worker=2");
   EXPECT_EQ(campaign(one).num_audited, 1U);
   EXPECT_EQ(campaign(one).num_mismatches, 1U);
   EXPECT_EQ(campaign(one).phase, coordinator::Phase::finished);
@@ -141,7 +141,7 @@ TEST_F(AuditTest, ThatCrashesEveryWorkerIsGivenUp) {
 
 TEST_F(AuditTest, OfWhatWasStoredBeforeTheRestartIsDoneByAnybody) {
   StoredCampaign stored = stored_campaign(3);
-  stored.audit_fraction = 1.0;
+  stored.control.audit_fraction = 1.0;
   stored.finished = {{{0}, 3}};
   stored.compared = {{{1}, 1}};
   on_campaign(state, two, stored, now, outbox);
@@ -152,8 +152,8 @@ TEST_F(AuditTest, OfWhatWasStoredBeforeTheRestartIsDoneByAnybody) {
 
 TEST_F(AuditTest, OfAFinishedCampaignIsNotDoneAgain) {
   StoredCampaign stored = stored_campaign(3);
-  stored.audit_fraction = 1.0;
-  stored.phase = coordinator::Phase::finished;
+  stored.control.audit_fraction = 1.0;
+  stored.control.phase = coordinator::Phase::finished;
   stored.finished = {{{0}, 3}};
   on_campaign(state, two, stored, now, outbox);
   EXPECT_TRUE(is_finished(campaign(two)));

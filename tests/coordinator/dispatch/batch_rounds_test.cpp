@@ -156,7 +156,9 @@ class PlayedFleet final : public Outbox {
   void compare(WorkerId, wire::LeasedResult) override {
     ADD_FAILURE() << "a run was computed twice";
   }
-  void record(const Loss&) override { ADD_FAILURE() << "runs were lost"; }
+  void record(CampaignId, WorkerId, const ReturnedRuns&) override {
+    ADD_FAILURE() << "runs were lost";
+  }
   void give_up(CampaignId, RunIndex) override { ADD_FAILURE() << "a run was given up"; }
   void log(Event, CampaignId) override {}
 
@@ -166,9 +168,7 @@ class PlayedFleet final : public Outbox {
     campaign.num_runs = num_runs;
     on_campaign(state_, id_,
                 {.definition = std::make_shared<const MicroscopeCampaign>(campaign),
-                 .finished = std::move(finished),
-                 .given_up = {},
-                 .blamed = {}},
+                 .finished = std::move(finished)},
                 {}, *this);
   }
 

@@ -9,8 +9,6 @@ using namespace std::chrono_literals;
 
 class BlameTest : public DispatchFixture {
  protected:
-  void SetUp() override { begin(); }
-
   std::vector<RunIndex> suspects() {
     std::vector<RunIndex> runs;
     for (const auto& [run, suspicion] : campaign(one).suspects) runs.push_back(run);
@@ -386,31 +384,22 @@ TEST_F(BlameTest, AProcessThatWasStoppedForAWhileIsNotHung) {
   outbox.forget();
 }
 
-TEST_F(BlameTest, OfAWorkerThatIsSilentNothingIsKnown) {
-  add_campaign(one, 10);
-  add_worker(first);
-  state.hosts.at({"", "host"}).step_time_s[one] = 0.1;
-  for (int i = 0; i < 10; ++i, now += 5s) {
-    heartbeat(first, {held(one, {{0}, 1})}, {batch({{0}, 1}, 5)});
+// Whether it is silent or only its heartbeats do not arrive.
+TEST_F(BlameTest, OfAWorkerWithoutHeartbeatsNothingIsKnown) {
+  for (const bool delivers : {false, true}) {
+    begin();
+    add_campaign(one, 10);
+    add_worker(first, 2);
+    state.hosts.at({"", "host"}).step_time_s[one] = 0.1;
+    for (int i = 0; i < 10; ++i, now += 5s) {
+      heartbeat(first, {held(one, {{0}, 2})}, {batch({{0}, 1}, 5)});
+    }
+    now += 20s;
+    if (delivers) deliver(first, one, {1});
+    on_tick(state, now, outbox);
+    EXPECT_TRUE(state.workers.contains(first)) << delivers;
+    outbox.forget();
   }
-  now += 20s;
-  on_tick(state, now, outbox);
-  EXPECT_TRUE(state.workers.contains(first));
-  outbox.forget();
-}
-
-TEST_F(BlameTest, OfAWorkerWhoseHeartbeatsDoNotArriveNothingIsKnown) {
-  add_campaign(one, 10);
-  add_worker(first, 2);
-  state.hosts.at({"", "host"}).step_time_s[one] = 0.1;
-  for (int i = 0; i < 10; ++i, now += 5s) {
-    heartbeat(first, {held(one, {{0}, 2})}, {batch({{0}, 1}, 5)});
-  }
-  now += 20s;
-  deliver(first, one, {1});
-  on_tick(state, now, outbox);
-  EXPECT_TRUE(state.workers.contains(first));
-  outbox.forget();
 }
 
 TEST_F(BlameTest, TheTimeOfAStepIsLearnedFromHeartbeats) {

@@ -8,10 +8,7 @@ namespace {
 using coordinator::Phase;
 using Ranges = std::vector<RunRange>;
 
-class CampaignTest : public DispatchFixture {
- protected:
-  void SetUp() override { begin(); }
-};
+class CampaignTest : public DispatchFixture {};
 
 TEST_F(CampaignTest, OfHigherPriorityIsLentFirst) {
   add_campaign(one, 1);

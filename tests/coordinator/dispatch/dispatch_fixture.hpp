@@ -42,9 +42,13 @@ class DispatchFixture : public testing::Test {
   static constexpr CampaignId two{102};
 
   /// The run times of computed() are believed.
-  DispatchFixture() { config.lease_duration_max = std::chrono::hours(1); }
+  DispatchFixture() {
+    config.lease_duration_max = std::chrono::hours(1);
+    begin();
+  }
 
-  /// The coordinator before this one has lent runs to all of them.
+  /// To be called again by a test that changes `config`. The coordinator before this one has lent
+  /// runs to all workers.
   void begin(std::set<SessionId> awaited = {}) {
     state = coordinator::initial_state(config, std::move(awaited), now);
     state.attached = {session_of(first), session_of(second), session_of(third)};
@@ -53,18 +57,15 @@ class DispatchFixture : public testing::Test {
   static StoredCampaign stored_campaign(std::uint64_t num_runs) {
     MicroscopeCampaign campaign;
     campaign.num_runs = num_runs;
-    return {.definition = std::make_shared<const MicroscopeCampaign>(campaign),
-            .finished = {},
-            .given_up = {},
-            .blamed = {}};
+    return {.definition = std::make_shared<const MicroscopeCampaign>(campaign)};
   }
 
   /// A campaign of which nothing is known yet.
   void add_campaign(CampaignId id, std::uint64_t num_runs, int priority = 0,
                     double audit_fraction = 0.0) {
     StoredCampaign stored = stored_campaign(num_runs);
-    stored.priority = priority;
-    stored.audit_fraction = audit_fraction;
+    stored.control.priority = priority;
+    stored.control.audit_fraction = audit_fraction;
     on_campaign(state, id, stored, now, outbox);
   }
 

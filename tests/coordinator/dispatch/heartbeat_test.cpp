@@ -12,7 +12,6 @@ class HeartbeatTest : public DispatchFixture {
  protected:
   /// The first worker has been lent run 0 of three.
   void lend_one() {
-    begin();
     add_campaign(one, 3);
     add_worker(first);
     outbox.forget();
@@ -83,7 +82,6 @@ TEST_F(HeartbeatTest, AnAdoptedRunIsGivenBackUnderTheAttemptThatTheWorkerKnows) 
 }
 
 TEST_F(HeartbeatTest, NobodyIsLentMoreThanAWorkerCanHoldBecauseItSaysSo) {
-  begin();
   add_campaign(one, 1'000'000);
   add_worker(first);
   outbox.forget();

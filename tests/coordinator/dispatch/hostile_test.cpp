@@ -14,8 +14,6 @@ constexpr std::uint32_t attempt_max = std::numeric_limits<std::uint32_t>::max();
 
 class HostileTest : public DispatchFixture {
  protected:
-  HostileTest() { begin(); }
-
   void TearDown() override {
     outbox.forget();
     DispatchFixture::TearDown();

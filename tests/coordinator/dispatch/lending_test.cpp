@@ -8,11 +8,11 @@ namespace {
 
 class LendingTest : public DispatchFixture {
  protected:
-  void SetUp() override { begin(); }
-
   /// Runs that a worker holds after it delivered the first run.
   std::string lent_after_first_run(std::uint64_t num_runs, double run_time_s,
                                    std::uint32_t num_runs_max = 4096) {
+    begin();
+    state.config.uncommitted_max = uncommitted_max;
     add_campaign(one, num_runs);
     add_worker(first);
     EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).runs, (RunRange{{0}, 1}))
@@ -22,36 +22,21 @@ class LendingTest : public DispatchFixture {
     result.elapsed_s = run_time_s;
     on_results(state, first, {.campaign = one, .attempt = {1}, .results = {result}}, now, outbox);
     outbox.forget();
+    check_invariants(state);
     return runs_held_text(state, first);
   }
+
+  std::uint64_t uncommitted_max = config.uncommitted_max;
 };
 
-TEST_F(LendingTest, GivesASecondAndAHalfOfWork) {
+TEST_F(LendingTest, GivesASecondAndAHalfOfWorkWithinItsLimits) {
   EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), "1..150");
-}
-
-TEST_F(LendingTest, GivesOneRunToComputeAndOneToWaitIfRunsAreLong) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 60.0), "1..2");
-}
-
-TEST_F(LendingTest, GivesNoMoreThanALeaseMayHave) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 0.0), "1..4096");
-}
-
-TEST_F(LendingTest, GivesNoMoreThanTheCredit) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01, 20), "1..20");
-}
-
-TEST_F(LendingTest, GivesNothingWithoutCredit) {
-  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01, 0), "none");
-}
-
-TEST_F(LendingTest, GivesHalfOfAFairShareNearTheEnd) {
-  EXPECT_EQ(lent_after_first_run(101, 0.001), "1..50");
-}
-
-TEST_F(LendingTest, GivesLessWhenMuchIsNotStoredYet) {
-  state.config.uncommitted_max = 200;
+  EXPECT_EQ(lent_after_first_run(1'000'000, 60.0), "1..2") << "one to compute and one to wait";
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.0), "1..4096") << "what a lease may have";
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01, 20), "1..20") << "the credit";
+  EXPECT_EQ(lent_after_first_run(1'000'000, 0.01, 0), "none") << "no credit";
+  EXPECT_EQ(lent_after_first_run(101, 0.001), "1..50") << "half of a fair share near the end";
+  uncommitted_max = 200;
   EXPECT_EQ(lent_after_first_run(1'000'000, 0.01), "1..99") << "half of the room, after one result";
 }
 

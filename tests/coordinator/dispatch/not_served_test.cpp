@@ -11,8 +11,6 @@ using Ranges = std::vector<RunRange>;
 
 class NotServedTest : public DispatchFixture {
  protected:
-  NotServedTest() { begin(); }
-
   /// The acknowledgement is taken; what else follows is not.
   void heartbeat_with_set_aside(WorkerId id, std::vector<wire::HeldRuns> set_aside,
                                 std::vector<wire::HeldRuns> held_runs = {}) {
@@ -140,9 +138,9 @@ TEST_F(NotServedTest, ALateResultOfARunThatWasGivenUpReopensAFinishedCampaign) {
   StoredCampaign stored = stored_campaign(2);
   stored.finished = {{{1}, 1}};
   stored.given_up = {{{0}, 1}};
-  stored.audit_fraction = 1.0;
+  stored.control.audit_fraction = 1.0;
   stored.compared = {{{1}, 1}};
-  stored.phase = Phase::finished;
+  stored.control.phase = Phase::finished;
   on_campaign(state, one, stored, now, outbox);
   add_worker(first);
   outbox.forget();

@@ -21,6 +21,12 @@ struct RecordedResult : wire::LeasedResult {
   wire::WorkerId worker;
 };
 
+/// Runs that came back without a result.
+struct RecordedLoss : coordinator::ReturnedRuns {
+  wire::CampaignId campaign;
+  wire::WorkerId by;
+};
+
 /// Writes down what the dispatch does. Everything must be taken before the next event: what nobody
 /// expected is found by expect_nothing_more().
 class RecordingOutbox final : public coordinator::Outbox {
@@ -38,7 +44,10 @@ class RecordingOutbox final : public coordinator::Outbox {
   void compare(wire::WorkerId worker, wire::LeasedResult result) override {
     compared_.push_back({std::move(result), worker});
   }
-  void record(const coordinator::Loss& loss) override { losses_.push_back(loss); }
+  void record(wire::CampaignId campaign, wire::WorkerId worker,
+              const coordinator::ReturnedRuns& returned) override {
+    losses_.push_back({returned, campaign, worker});
+  }
   void give_up(wire::CampaignId, RunIndex run) override { given_up_.push_back(run); }
   void log(coordinator::Event event, wire::CampaignId) override {
     events_.push_back(to_text(event));
@@ -81,7 +90,7 @@ class RecordingOutbox final : public coordinator::Outbox {
   std::vector<RunIndex> take_stored() { return runs_of(std::exchange(stored_, {})); }
   /// Runs handed over to be compared since the last call.
   std::vector<RunIndex> take_compared() { return runs_of(std::exchange(compared_, {})); }
-  std::vector<coordinator::Loss> take_losses() { return std::exchange(losses_, {}); }
+  std::vector<RecordedLoss> take_losses() { return std::exchange(losses_, {}); }
   std::vector<RunIndex> take_given_up() { return std::exchange(given_up_, {}); }
   std::vector<std::string> take_events() { return std::exchange(events_, {}); }
 
@@ -124,7 +133,7 @@ class RecordingOutbox final : public coordinator::Outbox {
   std::vector<SentDefinition> definitions_;
   std::vector<RecordedResult> stored_;
   std::vector<RecordedResult> compared_;
-  std::vector<coordinator::Loss> losses_;
+  std::vector<RecordedLoss> losses_;
   std::vector<RunIndex> given_up_;
   std::vector<std::string> events_;
 };

@@ -10,7 +10,6 @@ using namespace std::chrono_literals;
 class ResultTest : public DispatchFixture {
  protected:
   void SetUp() override {
-    begin();
     add_campaign(one, 10);
     add_worker(first);
     outbox.forget();
@@ -91,15 +90,6 @@ TEST_F(ResultTest, OfAnotherWorkerWaitsForTheSameCommitAndIsCompared) {
   on_committed(state, one, Runs{{0}}, now, outbox);
   EXPECT_EQ(outbox.take_sent<wire::ResultAck>(first).runs, Runs{{0}});
   EXPECT_EQ(outbox.take_sent<wire::ResultAck>(second).runs, Runs{{0}});
-}
-
-TEST_F(ResultTest, ThatDiffersFromTheStoredOneIsReported) {
-  complete(first, one, {0});
-  deliver(first, one, {0});
-  outbox.forget();
-  on_compared(state, one, {0}, first, false, now, outbox);
-  EXPECT_EQ(campaign(one).num_mismatches, 1U);
-  EXPECT_EQ(outbox.take_events(), Strings{"result_mismatch run=0 worker=1"});
 }
 
 TEST_F(ResultTest, OfARunThatIsLentToAnotherIsTakenAndTheOtherOneAskedBack) {

@@ -12,7 +12,6 @@ class TailTest : public DispatchFixture {
  protected:
   /// The first worker has all runs that are left, 1 to 4; two of them wait. The second is idle.
   void begin_tail() {
-    begin();
     add_campaign(one, 5);
     add_worker(first, 2);
     complete(first, one, {0});

@@ -20,7 +20,6 @@ class WorkerTest : public DispatchFixture {
 };
 
 TEST_F(WorkerTest, IsWelcomed) {
-  begin();
   say_hello(first, hello(3));
   const auto welcome = outbox.take_sent<wire::Welcome>(first);
   EXPECT_EQ(welcome.worker, first);
@@ -31,7 +30,6 @@ TEST_F(WorkerTest, IsWelcomed) {
 }
 
 TEST_F(WorkerTest, IsAnsweredAgainAndKeepsItsLeases) {
-  begin();
   add_campaign(one, 10);
   add_worker(first);
   (void)outbox.take_sent<wire::RunLease>(first);
@@ -42,7 +40,6 @@ TEST_F(WorkerTest, IsAnsweredAgainAndKeepsItsLeases) {
 }
 
 TEST_F(WorkerTest, IsRefusedWithAnotherModel) {
-  begin();
   wire::Hello other = hello();
   other.model_version = "older";
   refuse(other, wire::RejectReason::incompatible,
@@ -79,7 +76,6 @@ TEST_F(WorkerTest, IsNotAnsweredIfTooManySayHello) {
 }
 
 TEST_F(WorkerTest, IsToldToRegisterIfItIsAStranger) {
-  begin();
   add_campaign(one, 1);
   const auto expect_reject = [&] {
     const auto reject = outbox.take_sent<wire::Reject>(first);
@@ -102,7 +98,6 @@ TEST_F(WorkerTest, IsToldToRegisterIfItIsAStranger) {
 }
 
 TEST_F(WorkerTest, IsGivenTheDefinitionsThatItAsksFor) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   outbox.forget();
@@ -115,7 +110,6 @@ TEST_F(WorkerTest, IsGivenTheDefinitionsThatItAsksFor) {
 }
 
 TEST_F(WorkerTest, IsToldWhichCampaignsAreNotServed) {
-  begin();
   add_worker(first);
   on_campaign_request(state, first, {.campaign = one}, now, outbox);
   EXPECT_EQ(outbox.take_sent<wire::NotServed>(first).campaign, one);
@@ -125,7 +119,6 @@ TEST_F(WorkerTest, IsToldWhichCampaignsAreNotServed) {
 }
 
 TEST_F(WorkerTest, IsLentNothingBeforeItHasSaidWhatItHolds) {
-  begin();
   add_campaign(one, 1);
   say_hello(first, hello());
   (void)outbox.take_sent<wire::Welcome>(first);
@@ -137,7 +130,6 @@ TEST_F(WorkerTest, IsLentNothingBeforeItHasSaidWhatItHolds) {
 }
 
 TEST_F(WorkerTest, AnOlderHeartbeatChangesNothing) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   outbox.forget();
@@ -150,7 +142,6 @@ TEST_F(WorkerTest, AnOlderHeartbeatChangesNothing) {
 }
 
 TEST_F(WorkerTest, ThatIsSilentLosesItsRunsWhichAreLentAgainUnderAHigherAttempt) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   (void)outbox.take_sent<wire::RunLease>(first);
@@ -169,7 +160,6 @@ TEST_F(WorkerTest, ThatIsSilentLosesItsRunsWhichAreLentAgainUnderAHigherAttempt)
 }
 
 TEST_F(WorkerTest, ThatSeemsSilentMayWaitToBeHeard) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   (void)outbox.take_sent<wire::RunLease>(first);
@@ -184,7 +174,6 @@ TEST_F(WorkerTest, ThatSeemsSilentMayWaitToBeHeard) {
 }
 
 TEST_F(WorkerTest, ThatSeemsSilentIsLostOnceAllIsHeard) {
-  begin();
   add_worker(first);
   state.is_behind = true;
   now += 60s;
@@ -197,7 +186,6 @@ TEST_F(WorkerTest, ThatSeemsSilentIsLostOnceAllIsHeard) {
 }
 
 TEST_F(WorkerTest, ALossIsRecordedAndLogged) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   outbox.forget();
@@ -210,13 +198,13 @@ TEST_F(WorkerTest, ALossIsRecordedAndLogged) {
   EXPECT_EQ(losses[0].campaign, one);
   EXPECT_EQ(losses[0].runs, (RunRange{{0}, 1}));
   EXPECT_EQ(losses[0].attempt, Attempt{1});
-  EXPECT_EQ(losses[0].worker, first);
+  EXPECT_EQ(losses[0].by, first);
+  EXPECT_EQ(losses[0].worker, session_of(first));
   EXPECT_EQ(losses[0].reason, LossReason::silent);
   EXPECT_FALSE(losses[0].is_blamed);
 }
 
 TEST_F(WorkerTest, AnyMessageIsASignOfLife) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   outbox.forget();
@@ -229,7 +217,6 @@ TEST_F(WorkerTest, AnyMessageIsASignOfLife) {
 }
 
 TEST_F(WorkerTest, ThatIsSuspectIsLentNothing) {
-  begin();
   add_worker(first);
   now += 15s;
   add_campaign(one, 1);
@@ -240,7 +227,6 @@ TEST_F(WorkerTest, ThatIsSuspectIsLentNothing) {
 }
 
 TEST_F(WorkerTest, ThatLeavesHasItsRunsLentToOthers) {
-  begin();
   add_campaign(one, 1);
   add_worker(first);
   outbox.forget();
@@ -253,7 +239,6 @@ TEST_F(WorkerTest, ThatLeavesHasItsRunsLentToOthers) {
 }
 
 TEST_F(WorkerTest, WhatADeadProcessHeldIsKnown) {
-  begin();
   add_campaign(one, 3);
   add_worker(first, 2);
   outbox.forget();
@@ -267,7 +252,6 @@ TEST_F(WorkerTest, WhatADeadProcessHeldIsKnown) {
 }
 
 TEST_F(WorkerTest, DrainsUntilWhatItHoldsIsStored) {
-  begin();
   add_campaign(one, 5);
   add_worker(first);
   outbox.forget();
@@ -285,7 +269,6 @@ TEST_F(WorkerTest, DrainsUntilWhatItHoldsIsStored) {
 }
 
 TEST_F(WorkerTest, MayRegisterToDeliverWhileTheServiceDrains) {
-  begin();
   add_campaign(one, 5);
   on_drain(state, outbox);
   say_hello(first, hello());
@@ -297,7 +280,6 @@ TEST_F(WorkerTest, MayRegisterToDeliverWhileTheServiceDrains) {
 }
 
 TEST_F(WorkerTest, IsToldToStopAgainAndAgain) {
-  begin();
   add_campaign(one, 5);
   add_worker(first);
   outbox.forget();

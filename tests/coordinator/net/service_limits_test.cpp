@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "coordinator/net/prepared_campaign.hpp"
+#include "coordinator/net/directory_look.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
 #include "proto/link/keys.hpp"
 #include "tests/coordinator/net/plain_directory.hpp"

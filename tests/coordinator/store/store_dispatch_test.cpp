@@ -43,8 +43,8 @@ CommitSummary write(Store& store, const std::vector<Entry>& entries) {
   return store.write(entries);
 }
 
-LostRuns lost(std::uint64_t first, std::uint64_t count, std::uint32_t attempt,
-              wire::LossReason reason) {
+ReturnedRuns lost(std::uint64_t first, std::uint64_t count, std::uint32_t attempt,
+                  wire::LossReason reason) {
   return {.runs = {RunIndex{first}, count},
           .attempt = {attempt},
           .worker = session_1,
@@ -298,7 +298,7 @@ TEST_F(StoreDispatch, NamesEveryReason) {
 
 TEST_F(StoreDispatch, KeepsRunsThatAreGivenUpWithTheLastReason) {
   Store store = create();
-  LostRuns last = lost(5, 2, 3, wire::LossReason::crashed);
+  ReturnedRuns last = lost(5, 2, 3, wire::LossReason::crashed);
   last.reason = wire::LossReason::out_of_memory;
   write(store, {lost(4, 3, 1, wire::LossReason::crashed), lost(5, 1, 2, wire::LossReason::silent),
                 last, GivenUpRun{RunIndex{5}}, GivenUpRun{RunIndex{6}}, GivenUpRun{RunIndex{9}}});

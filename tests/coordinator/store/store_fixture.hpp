@@ -103,8 +103,8 @@ inline coordinator::Delivery wrong_delivery_of(std::uint64_t run) {
 }
 
 /// Runs that worker_1() lost at their first attempt.
-inline coordinator::LostRuns lost_runs(std::uint64_t first, std::uint64_t count,
-                                       wire::LossReason reason, bool is_blamed) {
+inline coordinator::ReturnedRuns lost_runs(std::uint64_t first, std::uint64_t count,
+                                           wire::LossReason reason, bool is_blamed) {
   return {.runs = {{first}, count},
           .attempt = {1},
           .worker = session_1,

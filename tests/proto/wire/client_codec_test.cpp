@@ -231,14 +231,9 @@ TEST(StatusReply, KeepsACampaign) {
   EXPECT_EQ(campaign.name, sent.name);
   EXPECT_EQ(campaign.phase, sent.phase);
   EXPECT_EQ(campaign.priority, sent.priority);
-  EXPECT_EQ(campaign.num_runs, sent.num_runs);
-  EXPECT_EQ(campaign.num_done, sent.num_done);
-  EXPECT_EQ(campaign.num_without_estimate, sent.num_without_estimate);
-  EXPECT_EQ(campaign.num_given_up, sent.num_given_up);
-  EXPECT_EQ(campaign.num_lent, sent.num_lent);
-  EXPECT_EQ(campaign.num_duplicates, sent.num_duplicates);
-  EXPECT_EQ(campaign.num_audited, sent.num_audited);
-  EXPECT_EQ(campaign.num_mismatches, sent.num_mismatches);
+  for (const CampaignCounter& counter : campaign_counters) {
+    EXPECT_EQ(campaign.*counter.count, sent.*counter.count) << counter.name;
+  }
   EXPECT_EQ(campaign.rate_hz, sent.rate_hz);
   EXPECT_EQ(campaign.remaining_s, sent.remaining_s);
   EXPECT_EQ(campaign.storage_failure, sent.storage_failure);

@@ -23,8 +23,8 @@ TEST(WorstRuns, TakeWhatIsLargerThanTheSmallest) {
   EXPECT_TRUE(change.is_taken);
   EXPECT_EQ(change.dropped, RunIndex{0});
   EXPECT_THAT(worst.runs(), SizeIs(num_worst_runs));
-  EXPECT_EQ(worst.runs().front(), (WorstRun{9.0, RunIndex{9}}));
-  EXPECT_EQ(worst.runs().back(), (WorstRun{0.5, RunIndex{20}}));
+  EXPECT_EQ(worst.runs().front(), (RankedRun{9.0, RunIndex{9}}));
+  EXPECT_EQ(worst.runs().back(), (RankedRun{0.5, RunIndex{20}}));
 }
 
 TEST(WorstRuns, PreferTheFirstOfEqualOnes) {

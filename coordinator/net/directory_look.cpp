@@ -1,4 +1,4 @@
-#include "coordinator/net/prepared_campaign.hpp"
+#include "coordinator/net/directory_look.hpp"
 
 #include <fmt/format.h>
 #include <sys/random.h>
@@ -11,11 +11,11 @@
 #include <cstring>
 #include <exception>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <string>
 #include <utility>
-#include <variant>
 
 #include "coordinator/store/campaign_peek.hpp"
 #include "coordinator/store/store_error.hpp"
@@ -31,46 +31,42 @@ namespace {
 
 StoredCampaign stored_campaign_of(const ServedCampaign& campaign, GivenUpRuns given_up) {
   const Store& store = campaign.store;
-  const CampaignControl control = store.control();
   StoredCampaign stored{.definition = campaign.definition,
-                        .phase = control.phase,
-                        .priority = control.priority,
-                        .audit_fraction = control.audit_fraction,
+                        .control = store.control(),
                         .finished = store.finished_runs(),
-                        .given_up = {},
                         .elsewhere = campaign.elsewhere,
-                        .compared = store.compared_runs(),
-                        .blamed = {}};
+                        .compared = store.compared_runs()};
   if (given_up == GivenUpRuns::retry) return stored;
   stored.given_up = store.given_up_runs();
-  for (const BlamedRun& blamed : store.blamed_runs()) {
-    stored.blamed.push_back(
-        {.run = blamed.run, .num_crashes = blamed.num_crashes, .attempt = blamed.attempt});
-  }
+  stored.blamed = store.blamed_runs();
   return stored;
 }
 
-FileFailure copy_of(const std::filesystem::path& file, const std::string& name) {
-  return {.file = file,
-          .reason = fmt::format("{}: campaign {} is in another file as well", file.string(), name),
-          .is_copy = true};
+FileLook failed_look(const std::filesystem::path& file, const std::string& failure) {
+  return {.record = {.file = file}, .failure = failure};
 }
 
-EndedCampaign ended_campaign(const std::filesystem::path& file, const CampaignPeek& peek,
-                             const std::optional<FileStamp>& stamp) {
-  return {.id = peek.id,
-          .file = file,
-          .status = {.name = peek.name,
-                     .phase = peek.phase,
-                     .priority = peek.priority,
-                     .num_runs = peek.num_runs,
-                     .num_done = peek.num_finished,
-                     .num_given_up = peek.num_given_up,
-                     .remaining_s = {},
-                     .storage_failure = {},
-                     .owner = peek.owner},
-          .created_utc = peek.created_utc,
-          .stamp = stamp};
+FileLook copy_of(const std::filesystem::path& file, const std::string& name) {
+  FileLook look = failed_look(
+      file, fmt::format("{}: campaign {} is in another file as well", file.string(), name));
+  look.is_copy = true;
+  return look;
+}
+
+FileLook ended_campaign(const std::filesystem::path& file, const CampaignPeek& peek,
+                        const std::optional<FileStamp>& stamp) {
+  return {.record = {.id = peek.id,
+                     .file = file,
+                     .status = {.name = peek.name,
+                                .phase = peek.phase,
+                                .priority = peek.priority,
+                                .num_runs = peek.num_runs,
+                                .num_done = peek.num_finished,
+                                .num_given_up = peek.num_given_up,
+                                .owner = peek.owner},
+                     .is_closed = true,
+                     .stamp = stamp},
+          .created_utc = peek.created_utc};
 }
 
 /// How many of the files that are looked at hold a campaign, by its name.
@@ -163,9 +159,9 @@ void require_shown(const std::filesystem::path& file, std::string_view name, std
       file.string()));
 }
 
-FileOutcome opened(const CampaignDirectory& directory, const std::filesystem::path& file,
-                   const KnownCampaigns& known, const NumFiles& num_files,
-                   const CoordinatorStart& start) {
+FileLook opened(const CampaignDirectory& directory, const std::filesystem::path& file,
+                const KnownCampaigns& known, const NumFiles& num_files,
+                const CoordinatorStart& start) {
   const std::optional<FileStamp> stamp = stamp_of(file);  // Before anything is read.
   if (const std::optional<CampaignPeek> peek = peek_without_log(file)) {
     require_shown(file, peek->name, peek->owner, peek->priority);
@@ -182,15 +178,6 @@ FileOutcome opened(const CampaignDirectory& directory, const std::filesystem::pa
     return copy_of(file, campaign.definition->name);
   }
   return prepare(std::move(campaign), GivenUpRuns::keep, start);
-}
-
-/// When the campaign of a file was made; empty if the file cannot be opened.
-std::string created_utc(const FileOutcome& outcome) {
-  if (const auto* const prepared = std::get_if<PreparedCampaign>(&outcome)) {
-    return prepared->created_utc;
-  }
-  const auto* const ended = std::get_if<EndedCampaign>(&outcome);
-  return ended == nullptr ? "" : ended->created_utc;
 }
 
 wire::Epoch random_epoch() {
@@ -212,22 +199,16 @@ CoordinatorStart coordinator_start(wire::Epoch epoch, const std::string& version
 
 }  // namespace
 
-void KnownCampaigns::add(const FileOutcome& outcome) {
-  if (const auto* const prepared = std::get_if<PreparedCampaign>(&outcome)) {
-    files.insert(prepared->campaign.file);
-    ids.insert(prepared->campaign.store.id());
-    names.insert(prepared->campaign.definition->name);
-  } else if (const auto* const ended = std::get_if<EndedCampaign>(&outcome)) {
-    files.insert(ended->file);
-    ids.insert(ended->id);
-    names.insert(ended->status.name);
-  }
+void KnownCampaigns::add(const CampaignRecord& campaign) {
+  files.insert(campaign.file);
+  ids.insert(campaign.id);
+  names.insert(campaign.status.name);
 }
 
-void KnownCampaigns::remove(const EndedFile& ended) {
-  files.erase(ended.file);
-  ids.erase(ended.id);
-  names.erase(ended.name);
+void KnownCampaigns::remove(const CampaignRecord& campaign) {
+  files.erase(campaign.file);
+  ids.erase(campaign.id);
+  names.erase(campaign.status.name);
 }
 
 std::optional<FileStamp> stamp_of(const std::filesystem::path& file) {
@@ -239,46 +220,41 @@ std::optional<FileStamp> stamp_of(const std::filesystem::path& file) {
                    .written_ns = status.st_mtim.tv_sec * ns_per_s + status.st_mtim.tv_nsec};
 }
 
-PreparedCampaign prepare(ServedCampaign campaign, GivenUpRuns given_up,
-                         const CoordinatorStart& start) {
+FileLook prepare(ServedCampaign campaign, GivenUpRuns given_up, const CoordinatorStart& start) {
   wire::kill_point(wire::KillPoint::after_open);
   Store& store = campaign.store;
-  StoredCampaign stored = stored_campaign_of(campaign, given_up);
-  const CampaignControl control = store.control();
-  require_shown(campaign.file, campaign.definition->name, store.owner(), control.priority);
-  const StopPlan plan = store.stop_plan();
-  const std::uint64_t num_failures = store.num_without_estimate();
-  std::vector<SessionId> sessions = store.attached_sessions();
-  std::string owner = store.owner();
-  std::string created_utc = store.created_utc();
+  FileLook look{.record = {.id = store.id(),
+                           .file = campaign.file,
+                           .status = {.name = campaign.definition->name, .owner = store.owner()}},
+                .created_utc = store.created_utc(),
+                .stored = stored_campaign_of(campaign, given_up),
+                .plan = store.stop_plan(),
+                .num_failures = store.num_without_estimate(),
+                .sessions = store.attached_sessions()};
+  require_shown(campaign.file, look.record.status.name, look.record.status.owner,
+                look.stored.control.priority);
   store.begin_coordinator(start);
-  return {.campaign = std::move(campaign),
-          .stored = std::move(stored),
-          .control = control,
-          .plan = plan,
-          .created_utc = std::move(created_utc),
-          .owner = std::move(owner),
-          .num_failures = num_failures,
-          .sessions = std::move(sessions)};
+  look.store = std::move(store);
+  return look;
 }
 
-std::vector<FileOutcome> look_at_all(const CampaignDirectory& directory, KnownCampaigns& known,
-                                     const CoordinatorStart& start) {
+std::vector<FileLook> look_at_all(const CampaignDirectory& directory, KnownCampaigns& known,
+                                  const CoordinatorStart& start) {
   std::vector<std::filesystem::path> files = directory.list();
   std::erase_if(files, [&](const auto& file) { return known.files.contains(file); });
   const NumFiles num_files = order_files(files, known);
-  std::vector<FileOutcome> outcomes;
+  std::vector<FileLook> looks;
   for (const std::filesystem::path& file : files) {
     try {
-      outcomes.push_back(opened(directory, file, known, num_files, start));
+      looks.push_back(opened(directory, file, known, num_files, start));
     } catch (const std::exception& error) {
-      outcomes.emplace_back(FileFailure{.file = file, .reason = error.what()});
+      looks.push_back(failed_look(file, error.what()));
     }
-    known.add(outcomes.back());
+    if (looks.back().failure.empty()) known.add(looks.back().record);
   }
   // The order of submission, which `status` shows and in which campaigns of one priority are lent.
-  std::ranges::stable_sort(outcomes, {}, created_utc);
-  return outcomes;
+  std::ranges::stable_sort(looks, {}, &FileLook::created_utc);
+  return looks;
 }
 
 Beginning beginning_of(std::vector<ServedCampaign> campaigns, GivenUpRuns given_up,
@@ -287,18 +263,15 @@ Beginning beginning_of(std::vector<ServedCampaign> campaigns, GivenUpRuns given_
       .start = coordinator_start(random_epoch(), version), .campaigns = {}, .attached = {}};
   KnownCampaigns known;
   for (ServedCampaign& campaign : campaigns) {
-    beginning.campaigns.emplace_back(prepare(std::move(campaign), given_up, beginning.start));
-    known.add(beginning.campaigns.back());
+    beginning.campaigns.push_back(prepare(std::move(campaign), given_up, beginning.start));
+    known.add(beginning.campaigns.back().record);
   }
   if (directory != nullptr) {
-    for (FileOutcome& outcome : look_at_all(*directory, known, beginning.start)) {
-      beginning.campaigns.push_back(std::move(outcome));
-    }
+    std::ranges::move(look_at_all(*directory, known, beginning.start),
+                      std::back_inserter(beginning.campaigns));
   }
-  for (const FileOutcome& outcome : beginning.campaigns) {
-    const auto* const prepared = std::get_if<PreparedCampaign>(&outcome);
-    if (prepared == nullptr) continue;
-    beginning.attached.insert(prepared->sessions.begin(), prepared->sessions.end());
+  for (const FileLook& look : beginning.campaigns) {
+    beginning.attached.insert(look.sessions.begin(), look.sessions.end());
   }
   return beginning;
 }
