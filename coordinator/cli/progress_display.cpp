@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/report/status_notes.hpp"
 #include "proto/command_line/standard_error.hpp"
 #include "proto/text/visible_text.hpp"

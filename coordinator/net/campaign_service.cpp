@@ -129,9 +129,10 @@ void CampaignService::resume(CampaignId id) {
   on_resume(state_, id, context_.now(), outbox_);
 }
 
-wire::ClientReply CampaignService::control(CampaignId id, const wire::ControlRequest& request) {
+proto::ReplyEnvelope CampaignService::control(CampaignId id, wire::ControlAction action,
+                                              int priority) {
   const CampaignState& campaign = state_.campaigns.at(id);
-  switch (request.action) {
+  switch (action) {
     case wire::ControlAction::pause:
       on_pause(state_, id, outbox_);
       break;
@@ -142,7 +143,7 @@ wire::ClientReply CampaignService::control(CampaignId id, const wire::ControlReq
       on_cancel(state_, id, outbox_);
       break;
     case wire::ControlAction::set_priority:
-      on_control(state_, id, request.priority, campaign.audit_fraction);
+      on_control(state_, id, priority, campaign.audit_fraction);
       break;
     case wire::ControlAction::archive:
       PROOFMASS_EXPECT(false);  // See archive().
@@ -348,10 +349,10 @@ bool CampaignService::is_all_told() const {
   });
 }
 
-wire::DoneReply CampaignService::done_reply(CampaignId id) const {
+proto::ReplyEnvelope CampaignService::done_reply(CampaignId id) const {
   const wire::CampaignStatus status = record_of(id).status;
-  return {.text = fmt::format("campaign {}: {}, {} runs, {} of them done", status.name,
-                              wire::phase_name(status), status.num_runs, status.num_done)};
+  return wire::done_reply(fmt::format("campaign {}: {}, {} runs, {} of them done", status.name,
+                                      wire::phase_name(status), status.num_runs, status.num_done));
 }
 
 }  // namespace proofmass::coordinator

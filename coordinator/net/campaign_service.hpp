@@ -15,6 +15,7 @@
 #include "coordinator/dispatch/state.hpp"
 #include "coordinator/net/campaign_files.hpp"
 #include "coordinator/net/directory_look.hpp"
+#include "coordinator/net/outcome.hpp"
 #include "coordinator/net/service_context.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/net/timing.hpp"
@@ -93,15 +94,17 @@ class CampaignService {
   }
 
   /// Carries out an action on a campaign that is served.
-  [[nodiscard]] wire::ClientReply control(CampaignId id, const wire::ControlRequest& request);
-  [[nodiscard]] wire::DoneReply done_reply(CampaignId id) const;
+  /// @param priority  For set_priority.
+  [[nodiscard]] proto::ReplyEnvelope control(CampaignId id, wire::ControlAction action,
+                                             int priority);
+  [[nodiscard]] proto::ReplyEnvelope done_reply(CampaignId id) const;
 
   /// Takes a campaign that is finished or cancelled from the list and moves its file to where it is
   /// not served.
   /// @param respond  Called when that is done, or with the reason why it is not.
   /// @throws Error if results are still to be stored, statistics to be computed, or another request
   ///         is changing it.
-  void archive(CampaignId id, const std::function<void(wire::ClientReply)>& respond);
+  void archive(CampaignId id, const Respond& respond);
 
   /// Follows what the dispatch did: measures rates, stores phases, brings the statistics of
   /// finished campaigns up to date. To be called several times a second.
@@ -202,7 +205,7 @@ class CampaignService {
   /// Closes the file if it is still settled when its log is folded in, and nobody reads it.
   /// @param then  Called with true when the closing is under way, with false if it is not.
   void begin_closing(CampaignId id, std::function<void(bool is_closing)> then);
-  void move_to_archive(CampaignId id, const std::function<void(wire::ClientReply)>& respond);
+  void move_to_archive(CampaignId id, const Respond& respond);
   void close_ended(CampaignId id);
   void say_not_closed(std::string_view reason);
 

@@ -282,8 +282,7 @@ void CampaignService::close_ended(CampaignId id) {
   });
 }
 
-void CampaignService::archive(CampaignId id,
-                              const std::function<void(wire::ClientReply)>& respond) {
+void CampaignService::archive(CampaignId id, const Respond& respond) {
   if (context_.config.directory == nullptr) {
     throw Error(
         "this coordinator has no directory, which archived campaigns need; start it with "
@@ -297,13 +296,12 @@ void CampaignService::archive(CampaignId id,
   }
   begin_closing(id, [this, id, respond, name = found->second.record.status.name](bool is_closing) {
     if (is_closing) return move_to_archive(id, respond);
-    respond(wire::ErrorReply{not_at_rest(name)});
+    respond(wire::error_reply(not_at_rest(name)));
   });
 }
 
 // What closes the file was posted before.
-void CampaignService::move_to_archive(CampaignId id,
-                                      const std::function<void(wire::ClientReply)>& respond) {
+void CampaignService::move_to_archive(CampaignId id, const Respond& respond) {
   const CampaignRecord& campaign = closed_.at(id);
   context_.background.post_next([this, id, respond, file = campaign.file,
                                  name = campaign.status.name]() -> Background::Finish {
@@ -314,13 +312,13 @@ void CampaignService::move_to_archive(CampaignId id,
       place = context_.config.directory->archive(file);
     });
     return [this, id, respond, place, failure, name] {
-      if (!failure.empty()) return respond(wire::ErrorReply{failure});
+      if (!failure.empty()) return respond(wire::error_reply(failure));
       // Looking at the directory may have found out before that the file is gone.
       if (closed_.contains(id)) unlist(id);
       outbox_.log(
           {.kind = "campaign_archived", .fields = {{"campaign", name}, {"file", place.string()}}});
-      respond(wire::DoneReply{
-          fmt::format("campaign {}: its database is {} now", name, place.string())});
+      respond(wire::done_reply(
+          fmt::format("campaign {}: its database is {} now", name, place.string())));
     };
   });
 }

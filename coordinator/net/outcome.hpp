@@ -4,19 +4,22 @@
 #include <functional>
 #include <string>
 
-#include "proto/wire/client_messages.hpp"
+#include "proto/wire/client_codec.hpp"
 
 namespace proofmass::coordinator {
+
+/// Answers a request, now or later; called once, in the service's thread.
+using Respond = std::function<void(proto::ReplyEnvelope)>;
 
 /// The reply of an action, or the reason why it throws. What is done for a request in its
 /// background part goes through here, because a client waits for as long as its request is not
 /// answered.
-[[nodiscard]] inline wire::ClientReply outcome_of(
-    const std::function<wire::ClientReply()>& action) {
+[[nodiscard]] inline proto::ReplyEnvelope outcome_of(
+    const std::function<proto::ReplyEnvelope()>& action) {
   try {
     return action();
   } catch (const std::exception& error) {
-    return wire::ErrorReply{error.what()};
+    return wire::error_reply(error.what());
   }
 }
 

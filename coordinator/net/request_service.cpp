@@ -10,10 +10,8 @@
 #include <set>
 #include <string_view>
 #include <utility>
-#include <variant>
 
 #include "coordinator/dispatch/workers.hpp"
-#include "coordinator/net/outcome.hpp"
 #include "coordinator/net/service_snapshot.hpp"
 #include "coordinator/store/campaign_peek.hpp"
 #include "coordinator/store/store_error.hpp"
@@ -49,9 +47,10 @@ void require_possible(const wire::CampaignStatus& campaign, wire::ControlAction 
   if (is_retry && campaign.num_given_up == 0) refuse("has no run that was given up");
 }
 
-StopPlan plan_of(const Submission& request) {
-  StopPlan plan{
-      .stop_rule = request.stop_rule, .num_runs_max = {}, .failures_max = request.failures_max};
+StopPlan plan_of(const Request& request) {
+  const proto::SubmitRequest& sent = request.message.submit();
+  StopPlan plan{.stop_rule = sent.stop_rule(), .num_runs_max = {}, .failures_max = {}};
+  if (sent.has_failures_max()) plan.failures_max = sent.failures_max();
   if (!plan.stop_rule.empty()) plan.num_runs_max = request.campaign->num_runs;
   return plan;
 }
@@ -85,7 +84,11 @@ void require_own_file(const CampaignRecord& campaign) {
 }  // namespace
 
 RequestService::RequestService(const ServiceContext& context, CampaignService& campaigns)
-    : context_(context), campaigns_(campaigns), began_at_(context.now()), answers_(context) {}
+    : context_(context),
+      campaigns_(campaigns),
+      began_at_(context.now()),
+      paths_(context.config.answer_directory.parent_path()),
+      answers_(context) {}
 
 wire::StatusReply RequestService::service_status() const {
   const State& state = context_.state;
@@ -109,108 +112,110 @@ wire::StatusReply RequestService::service_status() const {
   return reply;
 }
 
-template <>
-void RequestService::take(Submission&& submission, const Asker& asker, const Respond& respond) {
-  submit(std::make_shared<const Submission>(std::move(submission)), asker, respond);
-}
-
-template <>
-void RequestService::take(wire::ControlRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  const auto campaign = campaigns_.find(request.campaign);
+void RequestService::control(const proto::ControlRequest& request, const Asker& asker,
+                             const Respond& respond) {
+  const std::string& name = request.campaign();
+  const auto action = static_cast<wire::ControlAction>(request.action());
+  const auto campaign = campaigns_.find(name);
   if (!campaign) {
     require_right(asker, Right::submit);
-    throw Error(fmt::format("campaign = {} (is not served)", request.campaign));
+    throw Error(fmt::format("campaign = {} (is not served)", name));
   }
-  require_control(asker, request.campaign, campaign->status.owner);
-  require_possible(campaign->status, request.action);
-  if (request.action == wire::ControlAction::archive) {
-    if (under_way_.contains(request.campaign)) refuse_as_under_way(request.campaign);
+  require_control(asker, name, campaign->status.owner);
+  require_possible(campaign->status, action);
+  if (action == wire::ControlAction::archive) {
+    if (under_way_.contains(name)) refuse_as_under_way(name);
     return campaigns_.archive(campaign->id, respond);
   }
-  if (campaign->is_closed) return control_ended(*campaign, request.action, respond);
-  check_limits(request.campaign, *campaign, request.action);
-  respond(campaigns_.control(campaign->id, request));
-}
-
-void RequestService::control_ended(const CampaignRecord& campaign, wire::ControlAction action,
-                                   const Respond& respond) {
-  if (action == wire::ControlAction::resume || action == wire::ControlAction::retry) {
-    return reopen(campaign, action, respond);
+  if (campaign->is_closed) {
+    const bool begins =
+        action == wire::ControlAction::resume || action == wire::ControlAction::retry;
+    return begins ? reopen(*campaign, action, respond)
+                  : respond(campaigns_.done_reply(campaign->id));
   }
-  respond(campaigns_.done_reply(campaign.id));
+  check_limits(name, *campaign, action);
+  respond(campaigns_.control(campaign->id, action, request.priority()));
 }
 
-template <>
-void RequestService::take(wire::StatusRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::observe);
-  wire::StatusReply reply = service_status();
+proto::ReplyEnvelope RequestService::status(const proto::StatusRequest& request) const {
+  wire::StatusReply status = service_status();
   for (CampaignRecord& campaign :
-       campaigns_.records(request.first_campaign, wire::campaigns_per_reply_max)) {
-    reply.campaigns.push_back(std::move(campaign.status));
+       campaigns_.records(request.first_campaign(), wire::campaigns_per_reply_max)) {
+    status.campaigns.push_back(std::move(campaign.status));
   }
-  respond(std::move(reply));
+  paths_.hide_in(status);
+  proto::ReplyEnvelope reply;
+  wire::write(status, *reply.mutable_status());
+  return reply;
 }
 
-template <>
-void RequestService::take(wire::WorkersRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::observe);
+proto::ReplyEnvelope RequestService::workers(const proto::WorkersRequest& request) const {
   const State& state = context_.state;
   const TimePoint now = context_.now();
-  wire::WorkersReply reply{.workers = {}, .num_workers = state.workers.size()};
-  for (auto item = state.workers.upper_bound(WorkerId{request.after_worker_id});
-       item != state.workers.end() && reply.workers.size() < wire::workers_per_reply_max; ++item) {
+  wire::WorkersReply workers{.workers = {}, .num_workers = state.workers.size()};
+  for (auto item = state.workers.upper_bound(WorkerId{request.after_worker_id()});
+       item != state.workers.end() && workers.workers.size() < wire::workers_per_reply_max;
+       ++item) {
     const auto& [id, worker] = *item;
-    reply.workers.push_back(record_of(state, id, worker, now).status);
+    workers.workers.push_back(record_of(state, id, worker, now).status);
   }
-  respond(std::move(reply));
+  proto::ReplyEnvelope reply;
+  wire::write(workers, *reply.mutable_workers());
+  return reply;
 }
 
-template <>
-void RequestService::take(wire::ReleaseHostRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::control);
-  if (!on_release_host(context_.state, request.host, context_.now(), context_.outbox)) {
-    throw Error(fmt::format("host = {} (is not in quarantine)", request.host));
+proto::ReplyEnvelope RequestService::release_host(const std::string& host) {
+  if (!on_release_host(context_.state, host, context_.now(), context_.outbox)) {
+    throw Error(fmt::format("host = {} (is not in quarantine)", host));
   }
-  respond(
-      wire::DoneReply{fmt::format("host {}: runs are lent to its workers again", request.host)});
+  return wire::done_reply(fmt::format("host {}: runs are lent to its workers again", host));
 }
 
-template <>
-void RequestService::take(wire::AnswerRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::observe);
-  const auto campaign = campaigns_.find(request.campaign);
-  if (!campaign) throw Error(fmt::format("campaign = {} (is not served)", request.campaign));
+void RequestService::ask(const proto::AnswerRequest& request, const Asker& asker,
+                         const Respond& respond) {
+  const auto campaign = campaigns_.find(request.campaign());
+  if (!campaign) throw Error(fmt::format("campaign = {} (is not served)", request.campaign()));
   require_own_file(*campaign);
   answers_.ask(request, campaign->file, asker, respond);
 }
 
-template <>
-void RequestService::take(wire::AnswerPartRequest&& request, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::observe);
-  respond(answers_.part(request, asker));
-}
-
-template <>
-void RequestService::take(wire::FactoryReport&& report, const Asker& asker,
-                          const Respond& respond) {
-  require_right(asker, Right::observe);
+proto::ReplyEnvelope RequestService::take(const wire::FactoryReport& report, const Asker& asker) {
   factories_.take(report, asker.name, context_.now());
-  respond(wire::DoneReply{fmt::format("factory {}: noted", report.name)});
-}
-
-template <>
-void RequestService::take(wire::RequestPart&&, const Asker&, const Respond&) {
-  throw Error("request = a part (must be a request when its parts are together)");
+  return wire::done_reply(fmt::format("factory {}: noted", report.name));
 }
 
 void RequestService::carry_out(Request request, const Asker& asker, Respond respond) {
-  std::visit([&](auto& content) { take(std::move(content), asker, respond); }, request);
+  const proto::RequestEnvelope& message = request.message;
+  const auto may_observe = [&] { require_right(asker, Right::observe); };
+  switch (message.request_case()) {
+    case proto::RequestEnvelope::kSubmit:
+      return submit(std::make_shared<const Request>(std::move(request)), asker, respond);
+    case proto::RequestEnvelope::kStatus:
+      may_observe();
+      return respond(status(message.status()));
+    case proto::RequestEnvelope::kWorkers:
+      may_observe();
+      return respond(workers(message.workers()));
+    case proto::RequestEnvelope::kControl:
+      return control(message.control(), asker, respond);
+    case proto::RequestEnvelope::kPart:
+      throw Error("request = a part (must be a request when its parts are together)");
+    case proto::RequestEnvelope::kReleaseHost:
+      require_right(asker, Right::control);
+      return respond(release_host(message.release_host().host()));
+    case proto::RequestEnvelope::kAnswer:
+      may_observe();
+      return ask(message.answer(), asker, respond);
+    case proto::RequestEnvelope::kAnswerPart:
+      may_observe();
+      return respond(answers_.part(message.answer_part(), asker));
+    case proto::RequestEnvelope::kFactoryReport:
+      may_observe();
+      return respond(take(wire::read(message.factory_report()), asker));
+    case proto::RequestEnvelope::REQUEST_NOT_SET:
+      break;
+  }
+  PROOFMASS_EXPECT(false);
 }
 
 // Submissions.
@@ -257,7 +262,7 @@ void RequestService::review() {
     try {
       submit(waiting.request, waiting.asker, waiting.respond);
     } catch (const std::exception& error) {
-      waiting.respond(wire::ErrorReply{error.what()});
+      waiting.respond(wire::error_reply(error.what()));
     }
   }
 }
@@ -265,7 +270,7 @@ void RequestService::review() {
 // More runs of an unfinished campaign may make its tables larger. One that has ended begins again
 // if it was cancelled, gets more runs, or has a stop rule that was not checked yet.
 RequestService::Holdings RequestService::added_by(
-    const Submission& request, const std::optional<CampaignRecord>& entry) const {
+    const Request& request, const std::optional<CampaignRecord>& entry) const {
   const Holdings wanted{.num_campaigns = 1, .size = definition_size(*request.campaign)};
   if (!entry || entry->is_closed) return wanted;
   const CampaignId id = entry->id;
@@ -328,11 +333,12 @@ void RequestService::open_file(const Submitted& request, const Asker& asker,
                       : files.open(*request->campaign, plan, asker);
       },
       [request](Store& store) {
-        const CampaignControl control = store.control();
-        write(store, CampaignControl{.phase = Phase::active,
-                                     .priority = request->priority.value_or(control.priority),
-                                     .audit_fraction =
-                                         request->audit_fraction.value_or(control.audit_fraction)});
+        const proto::SubmitRequest& sent = request->message.submit();
+        CampaignControl control = store.control();
+        control.phase = Phase::active;
+        if (sent.has_priority()) control.priority = sent.priority();
+        if (sent.has_audit_fraction()) control.audit_fraction = sent.audit_fraction();
+        write(store, control);
       },
       std::move(respond));
 }
@@ -354,11 +360,11 @@ void RequestService::reopen(const CampaignRecord& campaign, wire::ControlAction 
         failure_of([&] { size = definition_size(*directory.load(campaign.file).definition); });
     return [this, name, campaign, action, size, failure, respond] {
       under_way_.erase(name);
-      if (!failure.empty()) return respond(wire::ErrorReply{failure});
+      if (!failure.empty()) return respond(wire::error_reply(failure));
       try {
         reopen_measured(name, campaign, action, size, respond);
       } catch (const std::exception& error) {
-        respond(wire::ErrorReply{error.what()});
+        respond(wire::error_reply(error.what()));
       }
     };
   };
@@ -402,8 +408,8 @@ void RequestService::serve_opened(const std::string& name, UnderWay under_way,
     if (!failure.empty() && !made.empty()) remove_made(made);
     return [this, name, look, made, failure, respond] {
       under_way_.erase(name);
-      respond(outcome_of([&]() -> wire::ClientReply {
-        if (!failure.empty()) return wire::ErrorReply{failure};
+      respond(outcome_of([&] {
+        if (!failure.empty()) return wire::error_reply(failure);
         return serve(std::move(*look), made);
       }));
     };
@@ -413,7 +419,7 @@ void RequestService::serve_opened(const std::string& name, UnderWay under_way,
 }
 
 // A campaign of that name may have come into the directory while the file was made.
-wire::DoneReply RequestService::serve(FileLook look, const std::filesystem::path& made) {
+proto::ReplyEnvelope RequestService::serve(FileLook look, const std::filesystem::path& made) {
   const CampaignId id = look.record.id;
   try {
     campaigns_.add(std::move(look));
@@ -434,10 +440,10 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Unde
   campaigns_.take_hold(id);
   const auto work = [this, id, request, plan, num_runs, has_new_plan, respond,
                      file = campaigns_.record_of(id).file]() -> Background::Finish {
-    CampaignService::Change change{.definition = nullptr,
-                                   .plan = plan,
-                                   .priority = request->priority,
-                                   .audit_fraction = request->audit_fraction};
+    const proto::SubmitRequest& sent = request->message.submit();
+    CampaignService::Change change{.definition = nullptr, .plan = plan};
+    if (sent.has_priority()) change.priority = sent.priority();
+    if (sent.has_audit_fraction()) change.audit_fraction = sent.audit_fraction();
     const std::string failure = failure_of([&] {
       const std::unique_ptr<Campaign> wanted = request->campaign->clone();
       wanted->num_runs = num_runs;
@@ -451,7 +457,7 @@ void RequestService::change_served(CampaignId id, const Submitted& request, Unde
       under_way_.erase(name);
       if (!failure.empty()) {
         campaigns_.let_go(id);
-        return respond(wire::ErrorReply{failure});
+        return respond(wire::error_reply(failure));
       }
       respond(outcome_of([&] {
         campaigns_.change(id, change);

@@ -15,8 +15,8 @@
 #include "coordinator/net/client_gateway.hpp"
 #include "coordinator/net/directory_look.hpp"
 #include "coordinator/net/factory_reports.hpp"
+#include "coordinator/net/server_paths.hpp"
 #include "coordinator/net/service_context.hpp"
-#include "proto/wire/client_messages.hpp"
 
 namespace proofmass::coordinator {
 
@@ -41,7 +41,7 @@ class RequestService {
   void review();
 
  private:
-  using Submitted = std::shared_ptr<const Submission>;
+  using Submitted = std::shared_ptr<const Request>;
 
   using Holdings = CampaignService::Holdings;
 
@@ -58,17 +58,18 @@ class RequestService {
     Respond respond;
   };
 
-  /// Has a specialisation for each kind of Request.
-  template <typename Content>
-  void take(Content&& request, const Asker& asker, const Respond& respond) = delete;
-  void control_ended(const CampaignRecord& campaign, wire::ControlAction action,
-                     const Respond& respond);
+  void control(const proto::ControlRequest& request, const Asker& asker, const Respond& respond);
+  [[nodiscard]] proto::ReplyEnvelope status(const proto::StatusRequest& request) const;
+  [[nodiscard]] proto::ReplyEnvelope workers(const proto::WorkersRequest& request) const;
+  [[nodiscard]] proto::ReplyEnvelope release_host(const std::string& host);
+  void ask(const proto::AnswerRequest& request, const Asker& asker, const Respond& respond);
+  [[nodiscard]] proto::ReplyEnvelope take(const wire::FactoryReport& report, const Asker& asker);
 
   void submit(const Submitted& request, const Asker& asker, Respond respond);
   [[nodiscard]] bool is_busy(const std::string& name) const;
   /// What a submission adds to the unfinished campaigns of an owner.
   /// @param entry  The campaign, if it is known.
-  [[nodiscard]] Holdings added_by(const Submission& request,
+  [[nodiscard]] Holdings added_by(const Request& request,
                                   const std::optional<CampaignRecord>& entry) const;
   /// To be asked wherever a request makes a campaign active or larger.
   /// @throws Error if its owner would have more than SubmissionLimits allow.
@@ -93,12 +94,13 @@ class RequestService {
                     std::function<ServedCampaign()> open, std::function<void(Store&)> activate,
                     Respond respond);
   /// @param made  The file if it was made for this campaign; else empty.
-  [[nodiscard]] wire::DoneReply serve(FileLook look, const std::filesystem::path& made);
+  [[nodiscard]] proto::ReplyEnvelope serve(FileLook look, const std::filesystem::path& made);
 
   const ServiceContext& context_;
   CampaignService& campaigns_;
   FactoryReports factories_;
   TimePoint began_at_;
+  ServerPaths paths_;
   std::map<std::string, UnderWay> under_way_;  ///< By the campaign's name.
   std::vector<Deferred> deferred_;
   Answers answers_;

@@ -166,33 +166,49 @@ class World final : public coordinator::Outbox {
     PROOFMASS_EXPECT(wire::encode(std::get<wire::Packet>(wire::decode(once))) == once);
   }
 
+  /// What is read of a reply and written is read and written again: to the same bytes.
+  template <typename Rewrite>
+  static void check_kept(const proto::ReplyEnvelope& reply, const Rewrite& rewrite) {
+    proto::ReplyEnvelope once;
+    rewrite(reply, once);
+    proto::ReplyEnvelope twice;
+    rewrite(once, twice);
+    PROOFMASS_EXPECT(wire::encode(std::move(twice)) == wire::encode(std::move(once)));
+  }
+
   void check_reply(std::string_view bytes) {
     const auto decoded = wire::decode_reply(bytes);
-    const auto* const packet = std::get_if<wire::ReplyPacket>(&decoded);
-    if (packet == nullptr) return;
+    const auto* const reply = std::get_if<proto::ReplyEnvelope>(&decoded);
+    if (reply == nullptr) return;
     ++summary_.num_replies;
-    const std::string once = wire::encode(*packet);
-    PROOFMASS_EXPECT(wire::encode(std::get<wire::ReplyPacket>(wire::decode_reply(once))) == once);
+    const std::string once = wire::encode(*reply);
+    PROOFMASS_EXPECT(wire::encode(std::get<proto::ReplyEnvelope>(wire::decode_reply(once))) ==
+                     once);
+    if (reply->has_status())
+      check_kept(*reply, [](const auto& from, auto& to) {
+        wire::write(wire::read(from.status()), *to.mutable_status());
+      });
+    if (reply->has_workers())
+      check_kept(*reply, [](const auto& from, auto& to) {
+        wire::write(wire::read(from.workers()), *to.mutable_workers());
+      });
   }
 
   void carry_out_request(std::string_view bytes) {
     const auto decoded = wire::decode_request(bytes);
-    const auto* const packet = std::get_if<wire::RequestPacket>(&decoded);
-    if (packet == nullptr) return;
+    const auto* const request = std::get_if<proto::RequestEnvelope>(&decoded);
+    if (request == nullptr) return;
     ++summary_.num_requests;
-    const std::string once = wire::encode(*packet);
-    PROOFMASS_EXPECT(wire::encode(std::get<wire::RequestPacket>(wire::decode_request(once))) ==
-                     once);
-    if (const auto* const submit = std::get_if<wire::SubmitRequest>(&packet->request)) {
-      return read_definition(submit->definition);
+    const std::string once = wire::encode(*request);
+    auto again = std::get<proto::RequestEnvelope>(wire::decode_request(once));
+    PROOFMASS_EXPECT(wire::encode(again) == once);
+    if (request->has_submit()) {
+      return read_definition(wire::take_definition(*again.mutable_submit()));
     }
-    if (const auto* const report = std::get_if<wire::FactoryReport>(&packet->request)) {
-      return take_report(*report);
-    }
-    const auto* const control = std::get_if<wire::ControlRequest>(&packet->request);
-    if (control == nullptr) return;
-    control_campaign(control->campaign == "table" ? fuzz_table_campaign : fuzz_campaign,
-                     control->action);
+    if (request->has_factory_report()) return take_report(wire::read(request->factory_report()));
+    if (!request->has_control()) return;
+    control_campaign(request->control().campaign() == "table" ? fuzz_table_campaign : fuzz_campaign,
+                     static_cast<wire::ControlAction>(request->control().action()));
   }
 
   /// As the service does it.
@@ -213,8 +229,10 @@ class World final : public coordinator::Outbox {
                                    .model_version = "m",
                                    .campaigns = {},
                                    .factories = factories_.current(now_)};
-    const std::string sent = wire::encode(wire::ReplyPacket{.id = 1, .reply = status});
-    PROOFMASS_EXPECT(std::holds_alternative<wire::ReplyPacket>(wire::decode_reply(sent)));
+    proto::ReplyEnvelope reply;
+    wire::write(status, *reply.mutable_status());
+    PROOFMASS_EXPECT(std::holds_alternative<proto::ReplyEnvelope>(
+        wire::decode_reply(wire::encode(std::move(reply)))));
   }
 
   void control_campaign(CampaignId id, wire::ControlAction action) {

@@ -11,6 +11,7 @@
 #include "proto/wire/client_codec.hpp"
 #include "proto/wire/codec.hpp"
 #include "tests/fuzz/fuzz_input.hpp"
+#include "tests/proto/wire/requests.hpp"
 #include "tests/support/drawn_result.hpp"
 
 namespace proofmass::test {
@@ -103,22 +104,22 @@ Step elapsed(std::uint16_t seconds) {
   return happening(StepKind::elapse, 0, static_cast<std::uint16_t>(seconds * per_second));
 }
 
-Step from_client(wire::ClientRequest request) {
+Step from_client(proto::RequestEnvelope request) {
   return {.kind = StepKind::client_request,
           .number = 0,
           .value = 0,
-          .content = wire::encode(wire::RequestPacket{.id = 1, .request = std::move(request)})};
+          .content = wire::encode(numbered(1, std::move(request)))};
 }
 
-Step to_client(wire::ClientReply reply) {
+Step to_client(proto::ReplyEnvelope reply) {
   return {.kind = StepKind::client_reply,
           .number = 0,
           .value = 0,
-          .content = wire::encode(wire::ReplyPacket{.id = 1, .reply = std::move(reply)})};
+          .content = wire::encode(numbered(1, std::move(reply)))};
 }
 
-Step control(wire::ControlAction action, const std::string& campaign) {
-  return from_client(wire::ControlRequest{.action = action, .campaign = campaign});
+Step from_client(wire::ControlAction action, const std::string& campaign) {
+  return from_client(control(action, campaign));
 }
 
 std::string worker_that_delivers() {
@@ -163,7 +164,7 @@ std::string workers_that_are_lost() {
 /// another.
 std::string run_that_crashes_workers() {
   std::vector<Step> steps;
-  steps.push_back(control(wire::ControlAction::cancel, "table"));
+  steps.push_back(from_client(wire::ControlAction::cancel, "table"));
   Speaker first(steps, 0, 11);
   first.say_hello("h");
   first.deliver(fuzz_campaign, 1, fuzz_num_runs - 1);
@@ -183,7 +184,7 @@ std::string campaign_that_is_audited() {
   std::vector<Step> steps;
   Speaker first(steps, 0, 11);
   Speaker second(steps, 1, 12);
-  steps.push_back(control(wire::ControlAction::cancel, "hardy2013"));
+  steps.push_back(from_client(wire::ControlAction::cancel, "hardy2013"));
   first.say_hello("h");
   second.say_hello("g");
   for (std::uint64_t run = 0; run < fuzz_num_runs; run += 4) {
@@ -203,14 +204,14 @@ std::string campaign_that_is_controlled() {
   Speaker worker(steps, 0, 11);
   worker.say_hello("h");
   worker.beat(fuzz_campaign, 0, 0);
-  steps.push_back(control(wire::ControlAction::pause, "hardy2013"));
+  steps.push_back(from_client(wire::ControlAction::pause, "hardy2013"));
   worker.beat(fuzz_campaign, 0, 8);
-  steps.push_back(control(wire::ControlAction::resume, "hardy2013"));
+  steps.push_back(from_client(wire::ControlAction::resume, "hardy2013"));
   steps.push_back(happening(StepKind::store_failure, 0));
   worker.deliver(fuzz_campaign, 0, 2);
   steps.push_back(happening(StepKind::store_failure, 1));
-  steps.push_back(control(wire::ControlAction::cancel, "table"));
-  steps.push_back(control(wire::ControlAction::resume, "table"));
+  steps.push_back(from_client(wire::ControlAction::cancel, "table"));
+  steps.push_back(from_client(wire::ControlAction::resume, "table"));
   return to_bytes(steps);
 }
 
@@ -310,17 +311,20 @@ std::string client_messages() {
   wire::WorkerStatus worker;
   worker.id = {1};
   worker.name = worker.host = "w";
-  return to_bytes({from_client(wire::StatusRequest{}), from_client(wire::WorkersRequest{}),
-                   from_client(report), to_client(status),
-                   to_client(wire::WorkersReply{.workers = {worker}}),
-                   to_client(wire::DoneReply{"done"}), to_client(wire::ErrorReply{"a = b (c)"})});
+  proto::RequestEnvelope status_request;
+  status_request.mutable_status();
+  proto::RequestEnvelope workers_request;
+  workers_request.mutable_workers();
+  return to_bytes({from_client(status_request), from_client(workers_request),
+                   from_client(request_of(report)), to_client(reply_with(status)),
+                   to_client(reply_with(wire::WorkersReply{.workers = {worker}})),
+                   to_client(wire::done_reply("done")), to_client(wire::error_reply("a = b (c)"))});
 }
 
 std::string submission() {
+  const Definition definition = definition_of(campaign_with_table());
   return to_bytes(
-      {from_client(wire::SubmitRequest{.definition = definition_of(campaign_with_table()),
-                                       .priority = -5,
-                                       .audit_fraction = 0.25})});
+      {from_client(test::submission(definition, {.priority = -5, .audit_fraction = 0.25}))});
 }
 
 std::string coordinator_messages() {

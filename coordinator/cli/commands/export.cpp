@@ -6,7 +6,7 @@
 #include <string>
 
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output_file.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/store/store.hpp"
 #include "proto/command_line/option_checks.hpp"

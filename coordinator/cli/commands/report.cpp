@@ -14,11 +14,10 @@
 #include "coordinator/archive/replayed_spectra.hpp"
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/campaign_file/requirements_file.hpp"
+#include "coordinator/cli/client.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/output_file.hpp"
-#include "coordinator/cli/override_options.hpp"
-#include "coordinator/cli/remote_answer.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
+#include "coordinator/cli/shared_options.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "coordinator/report/report_json.hpp"
 #include "coordinator/report/requirements.hpp"
@@ -79,12 +78,11 @@ int print_remote_report(const ReportOptions& options) {
                      " (must not be given with --html, --markdown and --requirements; fetch the "
                      "database first)");
   }
-  wire::AnswerRequest question{.campaign = checked_campaign_name(options.database),
-                               .question = wire::Question::report};
+  proto::RequestEnvelope question = question_about(options.database, proto::QUESTION_REPORT);
   for (const std::string& requirement : options.requirements) {
-    question.options.push_back("--requirement=" + requirement);
+    question.mutable_answer()->add_options("--requirement=" + requirement);
   }
-  if (options.format == OutputFormat::json) question.options.emplace_back("--json");
+  if (options.format == OutputFormat::json) question.mutable_answer()->add_options("--json");
   return print_answer(options.connection, question, AnswerText::lines);
 }
 

@@ -7,8 +7,7 @@
 
 #include "coordinator/archive/verification.hpp"
 #include "coordinator/cli/commands/commands.hpp"
-#include "coordinator/cli/json_output.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"

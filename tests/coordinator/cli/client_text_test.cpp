@@ -418,9 +418,12 @@ TEST(WorkersJson, HoldsEverythingUnderStableKeys) {
   EXPECT_TRUE(Json::parse(workers_json({}))["workers"].is_array());
 }
 
-TEST(DoneJson, SaysWhatWasDoneToWhat) {
-  EXPECT_EQ(Json::parse(done_json("pause", "a", {"campaign a: paused"})),
+TEST(DoneText, SaysWhatWasDoneToWhat) {
+  const proto::DoneReply done = wire::done_reply("campaign a: paused").done();
+  const ActionTaken action{.name = "pause", .kind = "campaign", .target = "a"};
+  EXPECT_EQ(Json::parse(done_text(done, action, OutputFormat::json)),
             Json({{"action", "pause"}, {"campaign", "a"}, {"text", "campaign a: paused"}}));
+  EXPECT_EQ(done_text(done, action, OutputFormat::text), "campaign a: paused\n");
 }
 
 }  // namespace

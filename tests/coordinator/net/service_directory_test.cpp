@@ -179,11 +179,10 @@ TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
   }
   EXPECT_EQ(client->status().campaigns.at(0).phase, wire::CampaignPhase::finished);
   EXPECT_EQ(client->status().campaigns.at(0).num_done, 1U);
-  EXPECT_EQ(client->error(wire::ControlRequest{wire::ControlAction::pause, "a"}),
+  EXPECT_EQ(client->error(test::control(wire::ControlAction::pause, "a")),
             "campaign = a (is finished)");
-  EXPECT_EQ(
-      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))}),
-      "campaign a: active, 3 runs, 1 of them done");
+  EXPECT_EQ(client->done(test::submission(definition_of(test::campaign_of("a", 3)))),
+            "campaign a: active, 3 runs, 1 of them done");
   PlayingWorker worker(endpoint.address(), 1002);
   EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{1});
   EXPECT_THAT(served(), ElementsAre("a"));
@@ -194,9 +193,8 @@ TEST_F(ServiceWithADirectory, ExtendsAClosedCampaignInItsFileWhateverThatIsCalle
   make_finished_file("a");
   fs::rename(directory / "a.db", directory / "small.db");
   start_service();
-  EXPECT_EQ(
-      client->done(wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))}),
-      "campaign a: active, 3 runs, 0 of them done");
+  EXPECT_EQ(client->done(test::submission(definition_of(test::campaign_of("a", 3)))),
+            "campaign a: active, 3 runs, 0 of them done");
   EXPECT_THAT(served(), ElementsAre("a"));
   EXPECT_FALSE(fs::exists(directory / "a.db"));
   end(StopRequest::now);
@@ -218,14 +216,13 @@ TEST_F(ServiceWithADirectory, RemovesAFileThatItMadeForASubmissionInVain) {
     released.get_future().get();
   });
   begun.get_future().get();
-  client->send(100, wire::SubmitRequest{.definition = definition_of(test::campaign_of("a", 3))});
+  client->send(100, test::submission(definition_of(test::campaign_of("a", 3))));
   EXPECT_THAT(served(), IsEmpty());  // An answer after the submission was begun.
   released.set_value();
-  const wire::ReplyPacket packet = client->receive_final();
-  EXPECT_EQ(packet.id, 100U);
-  EXPECT_EQ(std::get<wire::ErrorReply>(packet.reply).text,
-            "campaign = a in " + (directory / "a.db").string() +
-                " (is served already, from another file)");
+  const proto::ReplyEnvelope reply = client->receive_final();
+  EXPECT_EQ(reply.request_id(), 100U);
+  EXPECT_EQ(reply.error().text(), "campaign = a in " + (directory / "a.db").string() +
+                                      " (is served already, from another file)");
   EXPECT_FALSE(fs::exists(directory / "a.db"));
   EXPECT_TRUE(fs::exists(directory / "small.db"));
   EXPECT_THAT(served(), ElementsAre("a"));
@@ -310,9 +307,9 @@ TEST_F(ServiceWithADirectory, GoesOnWithACancelledCampaignThatItDidNotOpen) {
   }
   start_service();
   EXPECT_EQ(folder.num_loads(), 0);
-  EXPECT_EQ(client->done(wire::ControlRequest{wire::ControlAction::cancel, "a"}),
+  EXPECT_EQ(client->done(test::control(wire::ControlAction::cancel, "a")),
             "campaign a: cancelled, 2 runs, 0 of them done");
-  EXPECT_EQ(client->done(wire::ControlRequest{wire::ControlAction::resume, "a"}),
+  EXPECT_EQ(client->done(test::control(wire::ControlAction::resume, "a")),
             "campaign a: active, 2 runs, 0 of them done");
   EXPECT_EQ(client->status().campaigns.at(0).priority, 4);
   PlayingWorker worker(endpoint.address());
@@ -329,7 +326,7 @@ TEST_F(ServiceWithADirectory, RetriesRunsOfACampaignThatItDidNotOpen) {
   }
   start_service();
   EXPECT_EQ(folder.num_loads(), 0);
-  EXPECT_EQ(client->done(wire::ControlRequest{wire::ControlAction::retry, "a"}),
+  EXPECT_EQ(client->done(test::control(wire::ControlAction::retry, "a")),
             "campaign a: active, 1 runs, 0 of them done");
   PlayingWorker worker(endpoint.address());
   EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{0});
@@ -349,7 +346,7 @@ TEST_F(ServiceWithADirectory, ArchivesNoFileThatSomebodyReads) {
   ASSERT_EQ(sqlite3_open_v2(file.c_str(), &reader, SQLITE_OPEN_READONLY, nullptr), SQLITE_OK);
   const char* const read = "BEGIN; SELECT * FROM campaign";
   ASSERT_EQ(sqlite3_exec(reader, read, nullptr, nullptr, nullptr), SQLITE_OK);
-  const wire::ControlRequest archive{wire::ControlAction::archive, "a"};
+  const proto::RequestEnvelope archive = test::control(wire::ControlAction::archive, "a");
   EXPECT_EQ(client->error(archive),
             "campaign = a (its database is being read or changed; try again)");
   EXPECT_TRUE(fs::exists(file));

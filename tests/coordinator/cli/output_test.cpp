@@ -1,4 +1,4 @@
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/cli/output.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,16 +1,72 @@
-#include "coordinator/cli/output_file.hpp"
+#include "coordinator/cli/output.hpp"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <string>
 #include <system_error>
 
 #include "coordinator/archive/stored_campaign.hpp"
 #include "coordinator/cli/program.hpp"
-#include "coordinator/cli/standard_output.hpp"
+#include "coordinator/report/status_json.hpp"
 #include "core/error.hpp"
 #include "proto/link/whole_file.hpp"
+#include "proto/text/visible_text.hpp"
 
 namespace proofmass::coordinator {
+namespace {
+
+[[noreturn]] void fail_to_write() {
+  throw Error(fmt::format("standard output: {}", std::strerror(errno)));
+}
+
+std::string_view value_of_variable(const char* name) {
+  const char* const value = std::getenv(name);
+  return value == nullptr ? std::string_view() : value;
+}
+
+}  // namespace
+
+ScreenSize screen_size_of(std::FILE* stream) {
+  winsize size{};
+  const bool is_known = ioctl(fileno(stream), TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  if (!is_known) return {};
+  return {.columns = size.ws_col, .rows = size.ws_row};
+}
+
+bool takes_escapes(std::FILE* stream) {
+  const std::string_view terminal = value_of_variable("TERM");
+  return isatty(fileno(stream)) != 0 && !terminal.empty() && terminal != "dumb";
+}
+
+TerminalStyle style_of(std::FILE* stream) {
+  TerminalStyle style;
+  if (isatty(fileno(stream)) != 0) style.line_width_max = screen_size_of(stream).columns - 1;
+  const bool is_painted = takes_escapes(stream) && value_of_variable("NO_COLOR").empty();
+  style.paint = is_painted ? Paint::yes : Paint::no;
+  return style;
+}
+
+void print_lines(std::string_view text) { write_standard_output(wire::visible_lines(text)); }
+
+void print_json(const nlohmann::ordered_json& json) {
+  print_lines(dumped(json, JsonLayout::indented));
+}
+
+void write_standard_output(std::string_view text) {
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) fail_to_write();
+}
+
+void flush_standard_output() {
+  if (std::fflush(stdout) != 0) fail_to_write();
+}
+
+// Files.
 
 void refuse_output(const std::filesystem::path& output, std::string_view why) {
   throw UsageError(fmt::format("output = {} ({})", output.string(), why));
@@ -34,11 +90,6 @@ void check_output_file(const std::filesystem::path& output, wire::IfThere if_the
   }
 }
 
-void write_output_file(const std::filesystem::path& output, wire::IfThere if_there,
-                       std::string_view text) {
-  wire::write_whole_file("output", output, text, wire::public_mode, if_there);
-}
-
 void check_document(const std::filesystem::path& file, wire::IfThere if_there) {
   if (file.empty() || file == "-") return;
   check_output_file(file, if_there, "- writes to standard output");
@@ -47,7 +98,7 @@ void check_document(const std::filesystem::path& file, wire::IfThere if_there) {
 void write_document(const std::filesystem::path& file, wire::IfThere if_there,
                     std::string_view text) {
   if (file == "-") return write_standard_output(text);
-  write_output_file(file, if_there, text);
+  wire::write_whole_file("output", file, text, wire::public_mode, if_there);
 }
 
 void check_new_file(std::string_view argument, const std::filesystem::path& file) {
