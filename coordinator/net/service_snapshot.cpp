@@ -3,17 +3,9 @@
 namespace proofmass::coordinator {
 
 std::string_view name_of(WorkerActivity activity) {
-  switch (activity) {
-    case WorkerActivity::computing:
-      return "computing";
-    case WorkerActivity::idle:
-      return "idle";
-    case WorkerActivity::silent:
-      return "silent";
-    case WorkerActivity::quarantined:
-      return "quarantined";
-  }
-  return "idle";
+  constexpr std::array<std::string_view, worker_activities.size()> names{"computing", "idle",
+                                                                         "silent", "quarantined"};
+  return names.at(static_cast<std::size_t>(activity));
 }
 
 namespace {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <tuple>
 
 #include "coordinator/report/status_notes.hpp"
@@ -81,18 +82,10 @@ std::vector<Remark> overview_notes(const ServiceSnapshot& service, const PageOfL
 
 // Workers.
 
+/// In the order of worker_activities: those that need a look come first.
 int place_of(WorkerActivity activity) {
-  switch (activity) {
-    case WorkerActivity::quarantined:
-      return 0;
-    case WorkerActivity::silent:
-      return 1;
-    case WorkerActivity::computing:
-      return 2;
-    case WorkerActivity::idle:
-      return 3;
-  }
-  return 3;
+  constexpr std::array places{2, 3, 1, 0};
+  return places.at(static_cast<std::size_t>(activity));
 }
 
 bool comes_before(const RegisteredWorker& a, const RegisteredWorker& b, WorkerOrder order) {
@@ -166,15 +159,8 @@ std::string filter_form(const WorkerChoice& choice) {
 }  // namespace
 
 std::string_view name_of(WorkerOrder order) {
-  switch (order) {
-    case WorkerOrder::name:
-      return "name";
-    case WorkerOrder::state:
-      return "state";
-    case WorkerOrder::throughput:
-      return "throughput";
-  }
-  return "name";
+  constexpr std::array<std::string_view, 3> names{"name", "state", "throughput"};
+  return names.at(static_cast<std::size_t>(order));
 }
 
 WorkerChoice worker_choice(const PageRequest& request) {

@@ -143,14 +143,6 @@ TEST(StatusTable, SaysThatThereIsNoCampaign) {
             "12 workers with 48 slots, 0 runs lent\n\nno campaigns\n");
 }
 
-TEST(StatusTable, SaysWhyNothingCanBeStored) {
-  wire::CampaignStatus status = campaign("a", 0);
-  status.storage_failure = "a.db: disk full";
-  EXPECT_NE(status_text(status_with({status}), {.line_width_max = 79})
-                .find("\na: nothing can be stored: a.db: disk full\n"),
-            std::string::npos);
-}
-
 TEST(StatusTable, ShowsNoTimeLeftOfACampaignThatIsOver) {
   wire::CampaignStatus status = campaign("a", 100);
   status.phase = wire::CampaignPhase::finished;
