@@ -91,19 +91,18 @@ class LateResult : public DispatchFixture,
     return lease && state.leases.at(*lease).worker == second;
   }
 
-  std::vector<wire::HeldRuns> held_by_second() {
-    std::vector<wire::HeldRuns> all;
+  std::vector<proto::HeldRuns> held_by_second() {
+    std::vector<proto::HeldRuns> all;
     for (const LeaseId id : state.workers.at(second).leases) {
       const auto& lease = state.leases.at(id);
-      all.push_back({one, lease.attempt, lease.remaining.ranges()});
+      all.push_back(make_held(one, lease.attempt, lease.remaining.ranges()));
     }
     return all;
   }
 
-  void heartbeat(WorkerId id, std::vector<wire::HeldRuns> all) { heartbeat_of(id, std::move(all)); }
-  void heartbeat_of(WorkerId id, std::vector<wire::HeldRuns> all) {
-    on_heartbeat(state, id, {.num_runs_max = 4096, .held = std::move(all), .computing = {}},
-                 ++sequence, now, outbox);
+  void heartbeat(WorkerId id, const std::vector<proto::HeldRuns>& all) { heartbeat_of(id, all); }
+  void heartbeat_of(WorkerId id, const std::vector<proto::HeldRuns>& all) {
+    on_heartbeat(state, id, make_heartbeat(4096, all), ++sequence, now, outbox);
   }
 
   Runs waiting;  ///< On their way to the store.
@@ -167,8 +166,7 @@ class TrickIssue : public DispatchFixture {
     heartbeat(id);
   }
   void heartbeat(WorkerId id) {
-    on_heartbeat(state, id, {.num_runs_max = 4096, .held = {}, .computing = {}}, ++sequence, now,
-                 outbox);
+    on_heartbeat(state, id, make_heartbeat(4096), ++sequence, now, outbox);
   }
 };
 
@@ -179,7 +177,7 @@ TEST_F(TrickIssue, Number569AResultAfterItsTimeOutIsTaken) {
   outbox.forget();
 
   deliver(first, one, {0});
-  EXPECT_EQ(outbox.take_sent<wire::Reject>(first).reason, wire::RejectReason::not_registered);
+  EXPECT_EQ(outbox.take_sent<proto::Reject>(first).reason(), proto::REJECT_REASON_NOT_REGISTERED);
   outbox.expect_nothing_more();
   come_back(first);
   outbox.forget();
@@ -199,15 +197,16 @@ TEST_F(TrickIssue, Number1192OfTwoResultsOneIsStoredAndOneCompared) {
 
   deliver(first, one, {0});
   EXPECT_EQ(outbox.take_stored(), Runs{{0}});
-  EXPECT_EQ(outbox.take_sent<wire::Retract>(second).ranges, (std::vector<RunRange>{{{0}, 1}}));
+  EXPECT_EQ(wire::ranges_of(outbox.take_sent<proto::Retract>(second).ranges()),
+            (std::vector<RunRange>{{{0}, 1}}));
   deliver(second, one, {0}, 2);
   EXPECT_EQ(outbox.take_compared(), Runs{{0}});
   EXPECT_EQ(campaign(one).num_duplicates, 1U);
   outbox.expect_nothing_more();
 
   on_committed(state, one, Runs{{0}}, now, outbox);
-  EXPECT_EQ(outbox.take_sent<wire::ResultAck>(first).runs, Runs{{0}});
-  EXPECT_EQ(outbox.take_sent<wire::ResultAck>(second).runs, Runs{{0}});
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::ResultAck>(first)), Runs{{0}});
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::ResultAck>(second)), Runs{{0}});
   on_compared(state, one, {0}, second, true, now, outbox);
   EXPECT_TRUE(is_finished(campaign(one)));
   outbox.forget();
