@@ -272,9 +272,12 @@ TEST(MalformedRequest, HasANumber) {
 }
 
 TEST(MalformedRequest, OfAWorkerIsRefused) {
-  const std::string bye =
-      encode(Packet{.header = {.session = {1}, .epoch = {}, .sequence = 1}, .message = Bye{}});
-  EXPECT_NE(refusal_of_request(bye).text, "accepted");
+  proto::Envelope worker;
+  worker.set_protocol_version(protocol_version);
+  worker.set_session(1);
+  worker.set_sequence(1);
+  worker.mutable_bye()->set_reason(proto::LOSS_REASON_DRAINED);
+  EXPECT_NE(refusal_of_request(worker.SerializeAsString()).text, "accepted");
 }
 
 TEST(MalformedReply, OfTooManyBytesIsRefusedUnread) {
