@@ -188,7 +188,7 @@ void on_removed(State& state, CampaignId id, Outbox& outbox) {
     worker.run_time_s.erase(id);
     worker.unleased.erase(id);
     std::erase_if(worker.computing,
-                  [&](const Progress& progress) { return progress.batch.campaign == id; });
+                  [&](const Progress& progress) { return progress.campaign == id; });
   }
   send_to_all(state, id, outbox);
 }

@@ -9,6 +9,7 @@
 
 #include "coordinator/dispatch/blame.hpp"
 #include "core/error.hpp"
+#include "proto/wire/conversions.hpp"
 #include "proto/wire/names.hpp"
 
 namespace proofmass::coordinator::detail {
@@ -289,10 +290,11 @@ void send_retract(WorkerId worker, CampaignId campaign, const RunSet& runs, Outb
   const std::vector<RunRange> ranges = runs.ranges();
   for (std::size_t first = 0; first < ranges.size(); first += wire::ranges_per_message_max) {
     const std::size_t count = std::min(wire::ranges_per_message_max, ranges.size() - first);
-    const auto begin = ranges.begin() + static_cast<std::ptrdiff_t>(first);
-    outbox.send(worker,
-                wire::Retract{.campaign = campaign,
-                              .ranges = {begin, begin + static_cast<std::ptrdiff_t>(count)}});
+    proto::Envelope envelope;
+    envelope.mutable_retract()->set_campaign(campaign.value);
+    wire::add_ranges(std::span(ranges).subspan(first, count),
+                     *envelope.mutable_retract()->mutable_ranges());
+    outbox.send(worker, std::move(envelope));
   }
 }
 

@@ -10,6 +10,10 @@
 #include "proto/text/event.hpp"
 #include "proto/wire/messages.hpp"
 
+namespace proofmass::proto {
+class Envelope;
+}  // namespace proofmass::proto
+
 namespace proofmass::coordinator {
 
 using wire::Event;
@@ -23,10 +27,13 @@ class Outbox {
   virtual ~Outbox() = default;
 
   /// The message may be lost: the dispatch is made for that.
-  virtual void send(wire::WorkerId worker, wire::Message message) = 0;
+  /// @param message  Without version, session, epoch and sequence.
+  virtual void send(wire::WorkerId worker, proto::Envelope message) = 0;
   /// Sends the part of the campaign's definition that the worker asked for. It may be lost as well.
+  /// @param offset      Of the first byte of that part.
   /// @param definition  Shared with the dispatch, because it may have millions of numbers.
-  virtual void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+  virtual void send_definition(wire::WorkerId worker, wire::CampaignId campaign,
+                               std::uint64_t offset,
                                const std::shared_ptr<const Campaign>& definition) = 0;
   /// Must lead to on_committed() with this run once the result is durable, or to the end of the
   /// service. Called at most once for a run.

@@ -96,7 +96,9 @@ struct DispatchConfig {
 
 /// A batch that a worker computes, and since when it has come no further.
 struct Progress {
-  wire::ComputedBatch batch;
+  CampaignId campaign;
+  RunSet runs;
+  std::uint32_t num_steps_done = 0;
   TimePoint advanced_at;
 };
 

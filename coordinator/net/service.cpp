@@ -105,16 +105,15 @@ class Service::Impl final : public Outbox {
 
   // Outbox.
 
-  void send(WorkerId worker, wire::Message message) override {
-    if (std::holds_alternative<wire::Welcome>(message)) history_.note_registered(worker);
-    const auto* lease = std::get_if<wire::RunLease>(&message);
-    if (lease != nullptr) history_.note_lent(lease->campaign, worker);
+  void send(WorkerId worker, proto::Envelope message) override {
+    if (message.has_welcome()) history_.note_registered(worker);
+    if (message.has_run_lease()) history_.note_lent({message.run_lease().campaign()}, worker);
     worker_gateway_.send(worker, std::move(message));
   }
 
-  void send_definition(WorkerId worker, const wire::CampaignRequest& request,
+  void send_definition(WorkerId worker, CampaignId campaign, std::uint64_t offset,
                        const std::shared_ptr<const Campaign>& definition) override {
-    worker_gateway_.send_definition(worker, request, definition);
+    worker_gateway_.send_definition(worker, campaign, offset, definition);
   }
 
   void store(WorkerId worker, wire::LeasedResult result) override {

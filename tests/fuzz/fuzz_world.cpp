@@ -73,12 +73,12 @@ class World final : public coordinator::Outbox {
   [[nodiscard]] const FuzzSummary& summary() const { return summary_; }
 
   // Outbox.
-  void send(wire::WorkerId worker, wire::Message message) override {
+  void send(wire::WorkerId worker, proto::Envelope message) override {
     gateway_.send(worker, std::move(message));
   }
-  void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+  void send_definition(wire::WorkerId worker, CampaignId campaign, std::uint64_t offset,
                        const std::shared_ptr<const Campaign>& definition) override {
-    gateway_.send_definition(worker, request, definition);
+    gateway_.send_definition(worker, campaign, offset, definition);
   }
   void store(wire::WorkerId, wire::LeasedResult result) override {
     const auto& run = result.computed.result.run;
@@ -115,10 +115,10 @@ class World final : public coordinator::Outbox {
 
   void note_sent(std::string_view bytes) {
     const auto decoded = wire::decode(bytes);
-    const auto* const packet = std::get_if<wire::Packet>(&decoded);
-    PROOFMASS_EXPECT(packet != nullptr);
-    summary_.num_leases += std::holds_alternative<wire::RunLease>(packet->message) ? 1U : 0U;
-    summary_.num_rejections += std::holds_alternative<wire::Reject>(packet->message) ? 1U : 0U;
+    const auto* const message = std::get_if<proto::Envelope>(&decoded);
+    PROOFMASS_EXPECT(message != nullptr);
+    summary_.num_leases += message->has_run_lease() ? 1U : 0U;
+    summary_.num_rejections += message->has_reject() ? 1U : 0U;
   }
 
   static std::string routing_id(const Step& step) {
@@ -159,11 +159,11 @@ class World final : public coordinator::Outbox {
   /// What has been decoded is encoded and decoded again: to the same bytes.
   void check_message(std::string_view bytes) {
     const auto decoded = wire::decode(bytes);
-    const auto* const packet = std::get_if<wire::Packet>(&decoded);
-    if (packet == nullptr) return;
+    const auto* const message = std::get_if<proto::Envelope>(&decoded);
+    if (message == nullptr) return;
     ++summary_.num_orders;
-    const std::string once = wire::encode(*packet);
-    PROOFMASS_EXPECT(wire::encode(std::get<wire::Packet>(wire::decode(once))) == once);
+    const std::string once = wire::encode(*message);
+    PROOFMASS_EXPECT(wire::encode(std::get<proto::Envelope>(wire::decode(once))) == once);
   }
 
   /// What is read of a reply and written is read and written again: to the same bytes.

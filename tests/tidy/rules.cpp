@@ -105,8 +105,10 @@ std::string broken_layer(const SourceFile& file, const std::string& include) {
     return "what Protobuf itself offers stays in proto/wire/*.cpp";
   }
   if (matches(include, "\\.pb\\.h$|^proto/wire/client_codec\\.hpp$") &&
-      !matches(file.path, "^(proto/wire|coordinator/(net|cli)|tests)/")) {
-    return "messages stay in proto/wire, coordinator/net and coordinator/cli";
+      !matches(file.path, "^(proto/wire|coordinator/(cli|net)|worker|tests)/") &&
+      !(file.is_in("coordinator/dispatch") && is_source)) {
+    return "messages stay in proto/wire, coordinator/cli, coordinator/dispatch/*.cpp, "
+           "coordinator/net and worker";
   }
   if (matches(include, "^toml") &&
       !matches(file.path,

@@ -46,14 +46,14 @@ TEST_F(AuditTest, GoesToAnotherWorker) {
   outbox.forget();
   deliver(first, one, {0});
   commit(one);
-  (void)outbox.take_sent<wire::ResultAck>(first);
-  const auto lease = outbox.take_sent<wire::RunLease>(second);
-  EXPECT_EQ(lease.runs, (RunRange{{0}, 1}));
-  EXPECT_EQ(lease.attempt, Attempt{2});
+  (void)outbox.take_sent<proto::ResultAck>(first);
+  const auto lease = outbox.take_sent<proto::RunLease>(second);
+  EXPECT_EQ(wire::runs_of(lease), (RunRange{{0}, 1}));
+  EXPECT_EQ(lease.attempt(), 2U);
   EXPECT_FALSE(is_finished(campaign(one)));
 
   deliver(second, one, {0}, 2);
-  EXPECT_EQ(outbox.take_sent<wire::ResultAck>(second).runs, Runs{{0}});
+  EXPECT_EQ(wire::runs_of(outbox.take_sent<proto::ResultAck>(second)), Runs{{0}});
   EXPECT_EQ(outbox.take_compared(), Runs{{0}});
   EXPECT_TRUE(state.leases.empty());
   EXPECT_FALSE(is_finished(campaign(one)));
@@ -96,23 +96,23 @@ TEST_F(AuditTest, WaitsForAnotherWorkerThatIsBusy) {
   outbox.forget();
   deliver(first, one, {0});
   commit(one);
-  (void)outbox.take_sent<wire::ResultAck>(first);
+  (void)outbox.take_sent<proto::ResultAck>(first);
   outbox.expect_nothing_more();
   heartbeat(second);
-  (void)outbox.take_sent<wire::RunLease>(second);
+  (void)outbox.take_sent<proto::RunLease>(second);
 }
 
 TEST_F(AuditTest, GoesToTheSameWorkerIfThereIsNoOther) {
   deliver(first, one, {0});
   commit(one);
-  (void)outbox.take_sent<wire::ResultAck>(first);
-  EXPECT_EQ(outbox.take_sent<wire::RunLease>(first).attempt, Attempt{2});
+  (void)outbox.take_sent<proto::ResultAck>(first);
+  EXPECT_EQ(outbox.take_sent<proto::RunLease>(first).attempt(), 2U);
 }
 
 TEST_F(AuditTest, ThatIsLostIsLentAgain) {
   add_worker(second);
   complete(first, one, {0});
-  on_bye(state, second, {}, now, outbox);
+  on_bye(state, second, LossReason::preempted, now, outbox);
   outbox.forget();
   add_worker(third);
   EXPECT_EQ(state.workers.at(third).num_lent + state.workers.at(first).num_lent, 1U);

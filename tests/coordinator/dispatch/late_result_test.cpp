@@ -90,18 +90,17 @@ class LateResult : public DispatchFixture,
     return lease && state.leases.at(*lease).worker == second;
   }
 
-  std::vector<wire::HeldRuns> held_by_second() {
-    std::vector<wire::HeldRuns> all;
+  std::vector<proto::HeldRuns> held_by_second() {
+    std::vector<proto::HeldRuns> all;
     for (const LeaseId id : state.workers.at(second).leases) {
       const auto& lease = state.leases.at(id);
-      all.push_back({one, lease.attempt, lease.remaining.ranges()});
+      all.push_back(make_held(one, lease.attempt, lease.remaining.ranges()));
     }
     return all;
   }
 
-  void heartbeat_of(WorkerId id, std::vector<wire::HeldRuns> all) {
-    on_heartbeat(state, id, {.num_runs_max = 4096, .held = std::move(all), .computing = {}},
-                 ++sequence, now, outbox);
+  void heartbeat_of(WorkerId id, const std::vector<proto::HeldRuns>& all) {
+    on_heartbeat(state, id, make_heartbeat(4096, all), ++sequence, now, outbox);
   }
 
   Runs waiting;  ///< On their way to the store.

@@ -8,11 +8,11 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "coordinator/dispatch/outbox.hpp"
 #include "coordinator/dispatch/state.hpp"
+#include "tests/support/messages.hpp"
 
 namespace proofmass::test {
 
@@ -31,12 +31,12 @@ struct RecordedLoss : coordinator::ReturnedRuns {
 /// expected is found by expect_nothing_more().
 class RecordingOutbox final : public coordinator::Outbox {
  public:
-  void send(wire::WorkerId worker, wire::Message message) override {
+  void send(wire::WorkerId worker, proto::Envelope message) override {
     sent_.emplace_back(worker, std::move(message));
   }
-  void send_definition(wire::WorkerId worker, const wire::CampaignRequest& request,
+  void send_definition(wire::WorkerId worker, wire::CampaignId campaign, std::uint64_t offset,
                        const std::shared_ptr<const Campaign>& definition) override {
-    definitions_.push_back({worker, request, definition});
+    definitions_.push_back({worker, campaign, offset, definition});
   }
   void store(wire::WorkerId worker, wire::LeasedResult result) override {
     stored_.push_back({std::move(result), worker});
@@ -60,13 +60,14 @@ class RecordingOutbox final : public coordinator::Outbox {
     const auto [to, message] = sent_.front();
     sent_.erase(sent_.begin());
     EXPECT_EQ(to, worker);
-    return std::get<Content>(message);
+    return content_of<Content>(message);
   }
 
   /// A part of a definition that was to be sent.
   struct SentDefinition {
     wire::WorkerId worker;
-    wire::CampaignRequest request;
+    wire::CampaignId campaign;
+    std::uint64_t offset;
     std::shared_ptr<const Campaign> definition;
   };
   SentDefinition take_definition() {
@@ -80,7 +81,7 @@ class RecordingOutbox final : public coordinator::Outbox {
   template <typename Content>
   void drop_sent(wire::WorkerId worker) {
     const auto found = std::find_if(sent_.begin(), sent_.end(), [&](const auto& item) {
-      return item.first == worker && std::holds_alternative<Content>(item.second);
+      return item.first == worker && holds<Content>(item.second);
     });
     if (found == sent_.end()) throw std::logic_error("no such message was sent");
     sent_.erase(found);
@@ -110,7 +111,7 @@ class RecordingOutbox final : public coordinator::Outbox {
 
   void expect_nothing_more() {
     for (const auto& [to, message] : sent_) {
-      ADD_FAILURE() << "message of kind " << message.index() << " to worker " << to.value;
+      ADD_FAILURE() << message.ShortDebugString() << " to worker " << to.value;
     }
     EXPECT_EQ(definitions_.size(), 0U);
     EXPECT_EQ(take_stored().size(), 0U);
@@ -129,7 +130,7 @@ class RecordingOutbox final : public coordinator::Outbox {
     return runs;
   }
 
-  std::vector<std::pair<wire::WorkerId, wire::Message>> sent_;
+  std::vector<std::pair<wire::WorkerId, proto::Envelope>> sent_;
   std::vector<SentDefinition> definitions_;
   std::vector<RecordedResult> stored_;
   std::vector<RecordedResult> compared_;

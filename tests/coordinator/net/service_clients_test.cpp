@@ -52,15 +52,15 @@ TEST_F(ServiceClients, SubmitACampaignThatIsThenComputed) {
   EXPECT_EQ(status.campaigns[0].num_runs, 5U);
 
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow();
+  const proto::RunLease lease = worker.borrow();
   const wire::CampaignStatus lent = client->status().campaigns[0];
-  EXPECT_EQ(lent.num_lent, lease.runs.count);
+  EXPECT_EQ(lent.num_lent, lease.num_runs());
   worker.deliver(lease);
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   const wire::CampaignStatus after = client->status().campaigns[0];
-  EXPECT_EQ(after.num_done, lease.runs.count);
+  EXPECT_EQ(after.num_done, lease.num_runs());
   end(StopRequest::now);
-  EXPECT_EQ(num_stored("new"), lease.runs.count);
+  EXPECT_EQ(num_stored("new"), lease.num_runs());
   EXPECT_EQ(Store::open_read_only(directory / "new.db").control().audit_fraction, 0.5);
 }
 
@@ -68,11 +68,11 @@ TEST_F(ServiceClients, ExtendACampaignThatIsServed) {
   start_with({test::campaign_of("a", 1)});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::finished);
   EXPECT_EQ(submit("a", 3), "campaign a: active, 3 runs, 1 of them done");
   worker.want(1);
-  EXPECT_EQ(worker.receive<wire::RunLease>().runs.first, RunIndex{1});
+  EXPECT_EQ(worker.receive<proto::RunLease>().first_run(), 1U);
 }
 
 TEST_F(ServiceClients, GiveACampaignThatIsServedAnotherPriorityAndPlan) {
@@ -110,10 +110,10 @@ TEST_F(ServiceClients, SetThePriorityOfACampaign) {
   EXPECT_EQ(control(ControlAction::set_priority, "b", 1),
             "campaign b: active, 3 runs, 0 of them done");
   EXPECT_EQ(client->status().campaigns[1].priority, 1);
-  const wire::RunLease lease = PlayingWorker(endpoint.address()).borrow();
+  const proto::RunLease lease = PlayingWorker(endpoint.address()).borrow();
   end(StopRequest::now);
   const Store served = Store::open_read_only(directory / "b.db");
-  EXPECT_EQ(lease.campaign, served.id());
+  EXPECT_EQ(wire::CampaignId{lease.campaign()}, served.id());
   EXPECT_EQ(served.control().priority, 1);
 }
 
@@ -167,7 +167,7 @@ TEST_F(ServiceClients, PauseAndResumeACampaign) {
   EXPECT_TRUE(worker.is_lent_nothing());
   EXPECT_EQ(control(ControlAction::resume), "campaign a: active, 3 runs, 0 of them done");
   worker.want(1);
-  EXPECT_EQ(worker.receive<wire::RunLease>().runs.first, RunIndex{0});
+  EXPECT_EQ(worker.receive<proto::RunLease>().first_run(), 0U);
 }
 
 TEST_F(ServiceClients, SeeThatACampaignWithAStopRuleIsPaused) {
@@ -181,7 +181,7 @@ TEST_F(ServiceClients, LearnThatAPausedCampaignFailsTooOften) {
   plan = {.stop_rule = "", .num_runs_max = {}, .failures_max = 0};
   start_with({test::campaign_of("a", 3)});
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow(1);
+  const proto::RunLease lease = worker.borrow(1);
   (void)control(ControlAction::pause);
   worker.deliver(lease, RunStatus::no_draw);
   EXPECT_EQ(wait_for_event("too_many_failures"),
@@ -225,9 +225,9 @@ TEST_F(ServiceClients, FindACampaignPausedAfterARestart) {
 TEST_F(ServiceClients, CancelACampaignWhichWorkersThenForget) {
   start_with({test::campaign_of("a", 3)});
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow();
+  const proto::RunLease lease = worker.borrow();
   EXPECT_EQ(control(ControlAction::cancel), "campaign a: cancelled, 3 runs, 0 of them done");
-  EXPECT_EQ(worker.receive<wire::Forget>().campaign, lease.campaign);
+  EXPECT_EQ(worker.receive<proto::Forget>().campaign(), lease.campaign());
   EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::cancelled);
 }
 
@@ -237,14 +237,14 @@ TEST_F(ServiceClients, AreToldWhatCannotBeControlled) {
             "campaign = b (is not served)");
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   EXPECT_EQ(client->error(test::control(ControlAction::pause, "a")), "campaign = a (is finished)");
 }
 
 TEST_F(ServiceClients, SeeTheWorkers) {
   start_with({test::campaign_of("a", 30)});
   PlayingWorker worker(endpoint.address());
-  const wire::RunLease lease = worker.borrow();
+  const proto::RunLease lease = worker.borrow();
   proto::RequestEnvelope request;
   request.mutable_workers();
   const wire::WorkersReply reply = wire::read(client->ask(request).workers());
@@ -253,7 +253,7 @@ TEST_F(ServiceClients, SeeTheWorkers) {
   EXPECT_EQ(reply.workers[0].host, "here");
   EXPECT_EQ(reply.workers[0].process_id, 1001U);
   EXPECT_EQ(reply.workers[0].num_slots, 1U);
-  EXPECT_EQ(reply.workers[0].num_lent, lease.runs.count);
+  EXPECT_EQ(reply.workers[0].num_lent, lease.num_runs());
   EXPECT_FALSE(reply.workers[0].is_quarantined);
 }
 
@@ -370,7 +370,7 @@ TEST_F(ServiceClients, AreToldWhatFailsWhenTheirChangeTakesEffect) {
   start_with({test::campaign_of("a", 3)});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow(1), RunStatus::no_draw);
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   EXPECT_EQ(client->error(
                 test::submission(definition_of(test::campaign_of("a", 3)), {.failures_max = 0})),
             "notice = a (must be heard)");
@@ -427,7 +427,7 @@ TEST_F(ServiceClients, HaveStatisticsMadeForNewResultsOnly) {
   start_with({test::campaign_of("a", 1)});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   (void)wait_for_event("campaign_summarised");
   (void)submit("a", 1, {.priority = 5});
   end(StopRequest::now);
@@ -441,7 +441,7 @@ TEST_F(ServiceClients, AreToldTheEndByAServiceThatEndsWhenAllIsDone) {
   EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::active);
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   (void)wait_for_event("campaign_summarised");
   EXPECT_EQ(client->status().campaigns[0].phase, wire::CampaignPhase::finished);
   wait_for_end();

@@ -101,7 +101,7 @@ TEST_F(ServiceWithADirectory, ServesAFileOnceItCanBeOpened) {
   EXPECT_EQ(num_events("campaign_not_served"), 1);
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
 }
 
 // A coordinator that is killed while it folds the log in, on a full disk perhaps, leaves a file
@@ -148,7 +148,7 @@ TEST_F(ServiceWithADirectory, DoesNotOpenWhatHasEnded) {
   EXPECT_THAT(served(), testing::UnorderedElementsAre("a", "b"));
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   EXPECT_EQ(folder.num_loads(), 1);
   for (const wire::CampaignStatus& campaign : client->status().campaigns) {
     if (campaign.name != "a") continue;
@@ -172,9 +172,9 @@ TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
   {
     PlayingWorker worker(endpoint.address());
     worker.deliver(worker.borrow());
-    (void)worker.receive<wire::ResultAck>();
+    (void)worker.receive<proto::ResultAck>();
     wait_for_event("campaign_closed campaign=a");
-    worker.send(wire::Bye{});
+    worker.send(test::make_bye());
     wait_for_event("worker_left");
   }
   EXPECT_EQ(client->status().campaigns.at(0).phase, wire::CampaignPhase::finished);
@@ -184,7 +184,7 @@ TEST_F(ServiceWithADirectory, ClosesWhatFinishesAndOpensItAgain) {
   EXPECT_EQ(client->done(test::submission(definition_of(test::campaign_of("a", 3)))),
             "campaign a: active, 3 runs, 1 of them done");
   PlayingWorker worker(endpoint.address(), 1002);
-  EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{1});
+  EXPECT_EQ(worker.borrow(1).first_run(), 1U);
   EXPECT_THAT(served(), ElementsAre("a"));
 }
 
@@ -238,7 +238,7 @@ TEST_F(ServiceWithADirectory, KeepsTheFilesOpenThatFinishedLast) {
   (void)worker.register_here();
   for (int i = 0; i < 3; ++i) {
     worker.want(1);
-    worker.deliver(worker.receive<wire::RunLease>());
+    worker.deliver(worker.receive<proto::RunLease>());
   }
   while (num_events("campaign_summarised") < 3 || num_events("campaign_closed") < 2) {
     std::this_thread::yield();
@@ -261,11 +261,11 @@ TEST_F(ServiceWithADirectory, ServesAnOlderCopyInPlaceOfAFileThatWasClosed) {
   start_service();
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   wait_for_event("campaign_closed campaign=a");
   fs::rename(directory / "older", directory / "a.db");
   while (folder.num_loads() < 2) std::this_thread::yield();
-  EXPECT_EQ(worker.receive<wire::RunLease>().runs.first, RunIndex{0});
+  EXPECT_EQ(worker.receive<proto::RunLease>().first_run(), 0U);
   EXPECT_THAT(served(), ElementsAre("a"));
 }
 
@@ -290,7 +290,7 @@ TEST_F(ServiceWithADirectory, ComputesStatisticsAgainThatADiskPrevented) {
   start_service();
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   wait_for_event("campaign_closed campaign=a");
   EXPECT_EQ(num_failures, 4);
   EXPECT_EQ(num_events("statistics_failed"), 1);
@@ -313,7 +313,7 @@ TEST_F(ServiceWithADirectory, GoesOnWithACancelledCampaignThatItDidNotOpen) {
             "campaign a: active, 2 runs, 0 of them done");
   EXPECT_EQ(client->status().campaigns.at(0).priority, 4);
   PlayingWorker worker(endpoint.address());
-  EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{0});
+  EXPECT_EQ(worker.borrow(1).first_run(), 0U);
 }
 
 TEST_F(ServiceWithADirectory, RetriesRunsOfACampaignThatItDidNotOpen) {
@@ -329,7 +329,7 @@ TEST_F(ServiceWithADirectory, RetriesRunsOfACampaignThatItDidNotOpen) {
   EXPECT_EQ(client->done(test::control(wire::ControlAction::retry, "a")),
             "campaign a: active, 1 runs, 0 of them done");
   PlayingWorker worker(endpoint.address());
-  EXPECT_EQ(worker.borrow(1).runs.first, RunIndex{0});
+  EXPECT_EQ(worker.borrow(1).first_run(), 0U);
 }
 
 // Who reads the newest state is in nobody's way until the end of the service is written down.
@@ -338,7 +338,7 @@ TEST_F(ServiceWithADirectory, ArchivesNoFileThatSomebodyReads) {
   start_service();
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   wait_for_event("campaign_summarised");
   const fs::path file = directory / "a.db";
   while (has_journal(file)) std::this_thread::yield();
@@ -407,7 +407,7 @@ TEST_F(ServiceWithADirectory, IsNotDoneWhileAFileWaits) {
   folder.set_before_load([](const fs::path&) {});
   PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow());
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   wait_for_end();
 }
 

@@ -127,7 +127,7 @@ TEST_F(ServiceStop, CancelsACampaignWithMoreFailuresThanItMayHave) {
   test::PlayingWorker one(endpoint.address(), 1001);
   test::PlayingWorker two(endpoint.address(), 1002);
   one.deliver(one.borrow(1), RunStatus::no_draw);
-  (void)one.receive<wire::ResultAck>();
+  (void)one.receive<proto::ResultAck>();
   EXPECT_EQ(file_of_a().control().phase, CampaignPhase::active);
   two.deliver(two.borrow(1), RunStatus::not_finite);
   EXPECT_EQ(wait_for_event("too_many_failures"),
@@ -172,7 +172,7 @@ TEST_F(ServiceStop, CountsTheFailuresOfItsPredecessor) {
   start({test::campaign_of("a", 5)});
   test::PlayingWorker worker(endpoint.address());
   worker.deliver(worker.borrow(1), RunStatus::no_draw);
-  (void)worker.receive<wire::ResultAck>();
+  (void)worker.receive<proto::ResultAck>();
   end(StopRequest::now);
   start({test::campaign_of("a", 5)});
   test::PlayingWorker another(endpoint.address(), 1002);
