@@ -27,6 +27,7 @@
 #include "core/microscope/simulation/run.hpp"
 #include "proto/wire/codec.hpp"
 #include "tests/proto/link/raw_peer.hpp"
+#include "tests/support/messages.hpp"
 #include "tests/system/fault_fixture.hpp"
 
 namespace proofmass::test {

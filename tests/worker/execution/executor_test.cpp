@@ -29,11 +29,9 @@ proto::RunLease lease(std::uint64_t first, std::uint64_t count,
   return test::make_lease(campaign, {{first}, count}, {3});
 }
 
-/// All runs of the lease.
 void submit(Executor& executor, const proto::RunLease& lease) {
   executor.submit(lease, std::array{wire::runs_of(lease)});
 }
-
 /// Runs that yield their index as number of draws, the size of their batch as number of rounds and
 /// their first table value as truth.
 std::vector<RunResult> results_of(std::span<const RunRequest> requests) {

@@ -124,7 +124,7 @@ class ServeTest : public testing::Test {
 TEST_F(ServeTest, ComputesForACoordinatorUntilItIsDrained) {
   Coordinator coordinator(config.endpoint);
   std::future<Ending> ending = start_worker();
-  EXPECT_EQ(coordinator.have_two_runs_computed().results.size(), 2U);
+  EXPECT_EQ(coordinator.have_two_runs_computed().results_size(), 2);
   coordinator.send(test::make_ack(campaign, {{0}, {1}}));
   coordinator.send(proto::Drain());
   EXPECT_EQ(coordinator.receive<proto::Bye>().reason(), proto::LOSS_REASON_DRAINED);
