@@ -211,6 +211,13 @@ Statement select_results_in_range(const Database& database) {
   return database.prepare(select_sql("WHERE run_index >= ? AND run_index < ? ORDER BY run_index"));
 }
 
+Statement select_errors(const Database& database, std::size_t quantity) {
+  return database.prepare(fmt::format(
+      "SELECT error_{} FROM run_result WHERE run_index < ? AND status = {} ORDER BY run_index",
+      model().results().quantities[quantity].column(),
+      static_cast<std::int64_t>(RunStatus::completed)));
+}
+
 RunResult read_result(const Statement& row) {
   RunResult result{.run = RunIndex{row.count(0)},
                    .status = read_status(row),

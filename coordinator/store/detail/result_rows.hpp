@@ -33,6 +33,9 @@ class ResultRows {
 [[nodiscard]] Statement select_results(const Database& database);
 [[nodiscard]] Statement select_results_in_range(const Database& database);
 
+/// estimate − truth of a quantity in the completed runs below ?1, in run order.
+[[nodiscard]] Statement select_errors(const Database& database, std::size_t quantity);
+
 /// @throws StoreError if a number has another type than the schema gives it, or is out of the range
 /// of its field: the file is damaged.
 [[nodiscard]] RunResult read_result(const Statement& row);
