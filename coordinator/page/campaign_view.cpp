@@ -5,8 +5,8 @@
 #include "coordinator/page/attempts_chart.hpp"
 #include "coordinator/page/page_views.hpp"
 #include "coordinator/report/status_notes.hpp"
+#include "coordinator/table/document_table.hpp"
 #include "coordinator/table/figures.hpp"
-#include "coordinator/table/html_table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 

@@ -7,8 +7,8 @@
 #include <tuple>
 
 #include "coordinator/report/status_notes.hpp"
+#include "coordinator/table/document_table.hpp"
 #include "coordinator/table/figures.hpp"
-#include "coordinator/table/html_table.hpp"
 #include "proto/text/visible_text.hpp"
 #include "proto/wire/names.hpp"
 

@@ -11,7 +11,6 @@
 #include "coordinator/report/requirements.hpp"
 #include "core/model.hpp"
 #include "core/model_rules.hpp"
-#include "core/statistics/value_passes.hpp"
 
 namespace proofmass::coordinator {
 namespace {
@@ -29,13 +28,9 @@ StopCheck check_exceedances(const StopRule& rule, const Store& store,
 StopCheck check_with(const StopRule& rule, const Store& store, std::span<const double> objectives,
                      std::uint64_t num_runs) {
   if (is_about_exceedances(rule)) return check_exceedances(rule, store, objectives, num_runs);
-  ValuePasses errors(wanted_by(rule));
-  do {
-    ResultReader reader = store.results({RunIndex{0}, num_runs});
-    while (const std::optional<RunResult> result = reader.next()) {
-      if (result->is_completed()) errors.add(std::abs(result->error(rule.parameter)));
-    }
-  } while (errors.end_pass());
+  std::vector<double> errors;
+  store.for_each_error(rule.parameter, num_runs,
+                       [&](double error) { errors.push_back(std::abs(error)); });
   return check_stop_rule(rule, errors);
 }
 
@@ -166,10 +161,10 @@ void check_stop_checks(const Store& store, std::span<const double> objectives) {
 
 namespace {
 
-Verdict verdict_of(const StopRule& rule, const StopCheck& check) {
-  if (!check.is_reached) return Verdict::undecided;
+RequirementVerdict verdict_of(const StopRule& rule, const StopCheck& check) {
+  if (!check.is_reached) return RequirementVerdict::undecided;
   const double allowed_rate = 1.0 - rule.requirement.tolerance.coverage;
-  return check.estimate < allowed_rate ? Verdict::met : Verdict::not_met;
+  return check.estimate < allowed_rate ? RequirementVerdict::met : RequirementVerdict::not_met;
 }
 
 std::string verdict_text(const StopRule& rule, const StopCheckRow& row) {
@@ -177,7 +172,7 @@ std::string verdict_text(const StopRule& rule, const StopCheckRow& row) {
   const Tolerance& tolerance = rule.requirement.tolerance;
   Interval bounds = check.interval.value_or(Interval{.lower = 0.0, .upper = 1.0});
   bounds.confidence = tolerance.confidence;  // Stored with the rule and not with the bounds.
-  const Verdict verdict = verdict_of(rule, check);
+  const RequirementVerdict verdict = verdict_of(rule, check);
   // As report --requirement has it: runs in which all objectives hold, or those beyond the limit.
   const bool is_joint = rule.requirement.subject == Requirement::Subject::all_objectives;
   const double fraction = is_joint ? 1.0 - check.estimate : check.estimate;
@@ -220,7 +215,7 @@ bool is_rule_missed(const Store& store) {
   if (!check) return false;
   const StopRule rule = parse_stop_rule(plan.stop_rule);
   if (rule.statistic != StopRule::Statistic::verdict) return !check->check.is_reached;
-  return verdict_of(rule, check->check) != Verdict::met;
+  return verdict_of(rule, check->check) != RequirementVerdict::met;
 }
 
 std::string stop_text(const Store& store) {

@@ -218,6 +218,13 @@ void Store::for_each_result(const std::function<void(const RunResult&)>& visit) 
   while (const std::optional<RunResult> result = reader.next()) visit(*result);
 }
 
+void Store::for_each_error(std::size_t quantity, std::uint64_t num_runs,
+                           const std::function<void(double)>& visit) const {
+  detail::Statement row = detail::select_errors(impl_->database, quantity);
+  row.bind_all(num_runs);
+  while (row.step()) visit(row.real(0));
+}
+
 ResultReader Store::results() const { return ResultReader(impl_->database); }
 
 ResultReader Store::results(RunRange runs) const { return ResultReader(impl_->database, runs); }

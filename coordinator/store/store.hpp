@@ -206,6 +206,11 @@ class Store {
   /// Calls visit(result) for each finished run, in strictly ascending order. Zeros have no sign.
   /// @throws StoreError as ResultReader::next() does.
   void for_each_result(const std::function<void(const RunResult&)>& visit) const;
+  /// Calls visit(estimate − truth) of a quantity for each completed run below `num_runs`, in run
+  /// order: some five times as fast as reading whole results.
+  /// @pre All results were read in the same state of the file, and are in range.
+  void for_each_error(std::size_t quantity, std::uint64_t num_runs,
+                      const std::function<void(double)>& visit) const;
   /// Reads the finished runs one by one.
   [[nodiscard]] ResultReader results() const;
   [[nodiscard]] ResultReader results(RunRange runs) const;  ///< Of some of the runs.

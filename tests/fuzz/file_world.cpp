@@ -18,9 +18,9 @@
 #include "coordinator/net/service.hpp"
 #include "coordinator/query/query.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/requirements.hpp"
 #include "coordinator/report/sensitivity.hpp"
 #include "coordinator/report/summarise.hpp"
+#include "coordinator/report/verification_matrix.hpp"
 #include "coordinator/store/store.hpp"
 #include "core/error.hpp"
 #include "core/microscope/definition/campaign_definition.hpp"
@@ -228,8 +228,8 @@ void act(FileUse use, const fs::path& file, const fs::path& pristine) {
       const std::vector<double> objectives = MicroscopeCampaign{}.objectives();
       const std::array<std::string, 2> texts{"a_c12 < 9e-4 for 90% with 90%",
                                              "all objectives for 90% with 90%"};
-      for (const auto& answer :
-           check_requirements(Store::open_read_only(file), objectives, texts)) {
+      for (const auto& answer : check_requirements(Store::open_read_only(file), objectives,
+                                                   numbered_requirements(texts))) {
         (void)requirement_text(answer);
       }
       return;

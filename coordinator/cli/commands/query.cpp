@@ -1,3 +1,5 @@
+#include "coordinator/query/query.hpp"
+
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -24,7 +26,6 @@
 #include "coordinator/cli/commands/commands.hpp"
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/stop_signals.hpp"
-#include "coordinator/query/bounded_query.hpp"
 #include "coordinator/query/row_writer.hpp"
 #include "proto/command_line/option_checks.hpp"
 #include "proto/command_line/standard_error.hpp"

@@ -19,11 +19,10 @@
 #include "coordinator/cli/output.hpp"
 #include "coordinator/cli/shared_options.hpp"
 #include "coordinator/cli/stop_signals.hpp"
-#include "coordinator/report/report_json.hpp"
 #include "coordinator/report/requirements.hpp"
-#include "coordinator/report/review_html.hpp"
-#include "coordinator/report/review_markdown.hpp"
+#include "coordinator/report/review_documents.hpp"
 #include "coordinator/store/store.hpp"
+#include "core/campaign/campaign.hpp"
 #include "core/campaign/independence.hpp"
 #include "proto/command_line/option_checks.hpp"
 
@@ -54,11 +53,11 @@ std::vector<StatedRequirement> stated_in(const ReportOptions& options) {
 
 std::vector<RequirementAnswer> answers_of(const Store& store, const Campaign& campaign,
                                           const std::vector<StatedRequirement>& stated) {
-  std::vector<std::string> texts;
-  for (const StatedRequirement& each : stated) texts.push_back(each.requirement);
   try {
-    if (!texts.empty()) require_independent(campaign, "requirement", texts.front());
-    return check_requirements(store, campaign.objectives(), texts, campaign.error_budget());
+    if (!stated.empty()) {
+      require_independent(campaign, "requirement", stated.front().requirement);
+    }
+    return check_requirements(store, campaign.objectives(), stated, campaign.error_budget());
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }
@@ -118,10 +117,10 @@ int write_documents(const ReportOptions& options, const Store& store, const Camp
     if (!options.markdown.empty()) {
       write_document(options.markdown, options.if_there, review_markdown(*review));
     }
-    const std::span<const MatrixRow> rows(review->matrix);
-    return exit_code_of(std::ranges::all_of(rows.first(stated.size()), [](const MatrixRow& row) {
-      return row.answer.check.verdict == Verdict::met;
-    }));
+    const std::span<const RequirementAnswer> rows(review->matrix);
+    return exit_code_of(std::ranges::all_of(
+        rows.first(stated.size()),
+        [](const RequirementAnswer& row) { return row.check.verdict == RequirementVerdict::met; }));
   };
   if (options.html.empty()) return write();
   return run_until_stopped([&](const IsStopped& is_stopped) {
@@ -153,7 +152,7 @@ int print_report(const ReportOptions& options) {
                                           : answers_text(answers, paint));
   }
   return exit_code_of(std::ranges::all_of(answers, [](const RequirementAnswer& answer) {
-    return answer.check.verdict == Verdict::met;
+    return answer.check.verdict == RequirementVerdict::met;
   }));
 }
 

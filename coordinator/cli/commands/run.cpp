@@ -29,7 +29,6 @@
 #include "coordinator/net/service.hpp"
 #include "coordinator/page/page.hpp"
 #include "coordinator/report/report.hpp"
-#include "coordinator/report/report_json.hpp"
 #include "coordinator/report/summarise.hpp"
 #include "coordinator/store/store_error.hpp"
 #include "core/model.hpp"

@@ -173,6 +173,13 @@ RunResult read_result(const Statement& row) {
 
 }  // namespace
 
+Statement select_errors(const Database& database, std::size_t quantity) {
+  return database.prepare(fmt::format(
+      "SELECT error_{} FROM run_result WHERE run_index < ? AND status = {} ORDER BY run_index",
+      model().results().quantities[quantity].column(),
+      static_cast<std::int64_t>(RunStatus::completed)));
+}
+
 ResultRows::ResultRows(const Database& database)
     : database_(database),
       insert_(database.prepare(insert_sql())),

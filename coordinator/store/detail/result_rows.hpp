@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "coordinator/store/detail/database.hpp"
@@ -24,6 +25,9 @@ class ResultRows {
   Statement insert_;
   Statement select_;
 };
+
+/// estimate − truth of a quantity in the completed runs below ?1, in run order.
+[[nodiscard]] Statement select_errors(const Database& database, std::size_t quantity);
 
 /// Whether two results of one run agree in everything that means something.
 [[nodiscard]] bool are_equal(const RunResult& left, const RunResult& right);

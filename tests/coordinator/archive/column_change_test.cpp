@@ -109,7 +109,7 @@ class ColumnChange : public test::VerificationTest {
     for (const RunResult& result : results_) {
       errors.push_back(std::abs(result.error(index(Parameter::k2c))));
     }
-    return test::check_of(parse_stop_rule("mean(k2c) within 90%"), errors);
+    return check_stop_rule(parse_stop_rule("mean(k2c) within 90%"), errors);
   }
 
   /// Other values of a column of this type, as SQL.

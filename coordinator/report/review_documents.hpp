@@ -15,4 +15,8 @@ namespace proofmass::coordinator {
 /// Colours are custom properties, for light and dark.
 [[nodiscard]] std::string review_style();
 
+/// The matrix and the tables of a review report in Markdown (CommonMark with tables), without
+/// charts.
+[[nodiscard]] std::string review_markdown(const Review& review);
+
 }  // namespace proofmass::coordinator
