@@ -73,7 +73,7 @@ class Bench:
         self.faulty_calls = options.faulty_calls
         self.programs = folder / "bin"
         self.programs.mkdir()
-        for name in ("proofmass", "proofmass-coordinator"):
+        for name in ("proofmass", SERVED, f"{SERVED}-with-faults"):
             shutil.copy(options.programs / name, self.programs)
         # `proofmass run` starts the worker that lies beside it.
         shutil.copy(options.programs / "proofmass-null-worker", self.programs / "proofmass-worker")
