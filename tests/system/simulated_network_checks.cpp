@@ -69,9 +69,9 @@ void PlayedCoordinator::check_lease(const proto::RunLease& lease) const {
   EXPECT_GE(lease.attempt(), 1U);
   EXPECT_LE(runs.end(), file.num_runs());
   for (RunIndex run = runs.first; run.value < runs.end(); ++run.value) {
-    EXPECT_TRUE(
-        !file.num_commits.contains(run) ||
-        coordinator::is_audited(file.stored.definition->seed, run, file.stored.audit_fraction))
+    EXPECT_TRUE(!file.num_commits.contains(run) ||
+                coordinator::is_audited(file.stored.definition->seed, run,
+                                        file.stored.control.audit_fraction))
         << "what was finished is computed again";
   }
 }
